@@ -1,0 +1,1 @@
+"""Design motion profiles that leave no sway, and prove it."""

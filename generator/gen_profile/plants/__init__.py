@@ -1,0 +1,1 @@
+"""Machines with fewer motors than coordinates, one file each."""

@@ -1,0 +1,124 @@
+"""What a machine is to the rest of the project: parameters, equations and outputs.
+
+The coordinates are split as in the paper's section 3: `q_a` have motors, `q_u` have none. The motors'
+accelerations are the input, so neither motor forces nor friction on the driven side are needed:
+
+    M_uu(q) q̈_u = K_u(q) + G_u(q, q̇) − M_au(q)ᵀ q̈_a          (eq. 2–3)
+
+Equations are written with NumPy functions on scalars. The same text then takes floats, and the symbols of a
+computer algebra system that implements NumPy's protocols.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import attrs
+
+# A float, or a symbol that NumPy functions accept.
+Scalar = Any
+
+
+@attrs.frozen(kw_only=True)
+class Parameter:
+    """A physical constant of a machine.
+
+    Attributes
+    ----------
+    name, unit, description : str
+        `unit` is an SI unit.
+    nominal : float
+        Used where a spec says nothing.
+    lower, upper : float
+        Allowed values, both ends included.
+    """
+
+    name: str
+    unit: str
+    description: str
+    nominal: float
+    lower: float
+    upper: float
+
+
+@attrs.frozen(kw_only=True)
+class Coordinate:
+    """A generalised coordinate; `unit` is ``"m"`` or ``"rad"``."""
+
+    name: str
+    unit: str
+
+
+@attrs.frozen(kw_only=True)
+class Equations:
+    """The terms of eq. (2) for the unactuated coordinates, as nested sequences of scalars.
+
+    Attributes
+    ----------
+    M_uu : n_u × n_u
+    M_au : m × n_u
+    K_u, G_u : n_u
+        Rows may be scaled by any positive factor, M_uu need not be symmetric.
+    """
+
+    M_uu: Sequence[Sequence[Scalar]]
+    M_au: Sequence[Sequence[Scalar]]
+    K_u: Sequence[Scalar]
+    G_u: Sequence[Scalar]
+
+
+@attrs.frozen(kw_only=True)
+class Outputs:
+    """What is seen of the loads, one entry per load.
+
+    Attributes
+    ----------
+    sway : m
+        Horizontal distance from the load's place at rest; positive when the load trails a machine that
+        accelerates in the positive direction.
+    height : m
+        Above the suspension point, so negative for a hanging load.
+    angle : rad
+        Of the rope that carries the load, from the vertical.
+    """
+
+    sway: Sequence[Scalar]
+    height: Sequence[Scalar]
+    angle: Sequence[Scalar]
+
+
+@attrs.frozen(kw_only=True)
+class Plant:
+    """A machine: names, parameters, equations of motion and outputs. Nothing else.
+
+    Attributes
+    ----------
+    type : str
+        What a spec calls it, such as ``"double-pendulum-crane"``.
+    summary : str
+        One line for lists.
+    parameters : tuple of Parameter
+    actuated, unactuated : tuple of Coordinate
+    loads : tuple of str
+        Names of the loads, the end load last. The hook of a double pendulum is a load, too.
+    equations : (q_u, dq_u, q_a, dq_a, p) → Equations
+        Sequences of scalars, and the parameters as attributes of `p`.
+    outputs : (q_u, q_a, p) → Outputs
+    """
+
+    type: str
+    summary: str
+    parameters: tuple[Parameter, ...]
+    actuated: tuple[Coordinate, ...]
+    unactuated: tuple[Coordinate, ...]
+    loads: tuple[str, ...]
+    equations: Callable[
+        [Sequence[Scalar], Sequence[Scalar], Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Equations
+    ]
+    outputs: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Outputs]
+
+    def nominal(self) -> dict[str, float]:
+        """Nominal value of every parameter, by name."""
+        return {parameter.name: parameter.nominal for parameter in self.parameters}

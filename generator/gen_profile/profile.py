@@ -1,0 +1,227 @@
+"""Motion of the actuated axes, continuous (`Profile`) and on a controller's cycle grid (`SampledProfile`)."""
+
+from __future__ import annotations
+
+import hashlib
+from decimal import ROUND_CEILING, Decimal
+
+import attrs
+import numpy as np
+from numpy.polynomial import polynomial
+from numpy.typing import NDArray
+
+from gen_profile.errors import GenProfileError
+
+Array = NDArray[np.float64]
+
+
+def read_only(values: object) -> Array:
+    """Copy to a read-only array of doubles."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def _finite(_: object, attribute: attrs.Attribute[Array], value: Array) -> None:
+    if not np.isfinite(value).all():
+        raise GenProfileError(f"{attribute.name} of a motion must be finite numbers, found NaN or infinity.")
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Motion:
+    """Position and its derivatives at given times.
+
+    Attributes
+    ----------
+    position, velocity, acceleration, jerk : (samples, axes) array
+        m, m/s, m/s², m/s³ (or rad …).
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Profile:
+    """Piecewise polynomial motion of every actuated axis, from rest at time 0.
+
+    Segment k covers ``knots[k] <= t < knots[k + 1]``; its polynomial counts time from ``knots[k]``. Before the
+    first knot the motion stands at its start, from the last knot on it holds `target`.
+
+    Attributes
+    ----------
+    knots : (segments + 1,) array
+        Times in s, rising, the first one 0.
+    coefficients : (segments, order, axes) array
+        Position coefficients, lowest power first, in m s⁻ᵏ (or rad s⁻ᵏ).
+    target : (axes,) array
+        Position held after the end.
+    method : str
+        What designed it, such as ``"optimal"`` or ``"zvd"``.
+    """
+
+    knots: Array = attrs.field(converter=read_only, validator=_finite)
+    coefficients: Array = attrs.field(converter=read_only, validator=_finite)
+    target: Array = attrs.field(converter=read_only, validator=_finite)
+    method: str
+
+    def __attrs_post_init__(self) -> None:
+        segments, _, axes = self.coefficients.shape
+        if self.knots.shape != (segments + 1,) or self.target.shape != (axes,):
+            raise GenProfileError("A profile's knots, coefficients and target do not fit together.")
+        if self.knots[0] != 0.0 or not (np.diff(self.knots) > 0.0).all():
+            raise GenProfileError("A profile's knots must rise from 0.")
+
+    @property
+    def duration(self) -> float:
+        """Time of the last knot, in s."""
+        return float(self.knots[-1])
+
+    @property
+    def axes(self) -> int:
+        """Number of actuated axes."""
+        return self.coefficients.shape[2]
+
+    @property
+    def start(self) -> Array:
+        """Position at time 0, shape (axes,)."""
+        return self.coefficients[0, 0]
+
+    def derivative(self, times: Array, order: int) -> Array:
+        """Evaluate the derivative of the given order (0 = position); right-continuous, shape (times, axes)."""
+        times = np.asarray(times, dtype=np.float64)
+        segment = np.clip(np.searchsorted(self.knots, times, side="right") - 1, 0, len(self.knots) - 2)
+        coefficients = polynomial.polyder(np.moveaxis(self.coefficients, 1, 0), order)
+        local = times - self.knots[segment]
+        values = np.asarray(polynomial.polyval(local[:, None], coefficients[:, segment], tensor=False))
+        held = self.target if order == 0 else np.zeros(self.axes)
+        rest = self.start if order == 0 else np.zeros(self.axes)
+        values = np.where((times >= self.duration)[:, None], held, values)
+        return np.where((times < 0.0)[:, None], rest, values)
+
+    def __call__(self, times: Array) -> Motion:
+        """Evaluate position, velocity, acceleration and jerk at times in s."""
+        position, velocity, acceleration, jerk = (self.derivative(times, order) for order in range(4))
+        return Motion(position=position, velocity=velocity, acceleration=acceleration, jerk=jerk)
+
+    def within_segments(self, points: int, order: int) -> tuple[Array, Array]:
+        """Evaluate on `points` evenly spaced times per segment, both ends included, so that jumps show.
+
+        Returns
+        -------
+        times : (segments * points,) array
+        values : (segments * points, axes) array
+        """
+        length = np.diff(self.knots)[:, None]
+        local = length * np.linspace(0.0, 1.0, points)
+        coefficients = polynomial.polyder(np.moveaxis(self.coefficients, 1, 0), order)[:, :, None, :]
+        values = np.asarray(polynomial.polyval(local[:, :, None], coefficients, tensor=False))
+        return (self.knots[:-1, None] + local).ravel(), values.reshape(-1, self.axes)
+
+    def payload_hash(self) -> str:
+        """SHA-256 of the numbers, in hexadecimal: the identity of the motion, whatever format carries it."""
+        return _sha256(self.knots, self.coefficients, self.target)
+
+
+def grid_length(duration: float, cycle_time: float) -> int:
+    """Number of cycles that cover a duration, counted in decimal arithmetic.
+
+    ``0.3 / 0.1`` is a little less than 3 in floats; the decimal texts of the two numbers divide exactly.
+    """
+    quotient = Decimal(repr(float(duration))) / Decimal(repr(float(cycle_time)))
+    return int(quotient.to_integral_value(rounding=ROUND_CEILING))
+
+
+def grid_times(cycles: int, cycle_time: float) -> Array:
+    """Times ``k * cycle_time`` for k = 0 … cycles, each the double nearest to the decimal product.
+
+    Integers divided by a power of ten are correctly rounded, products with a rounded cycle are not.
+    """
+    sign, digits, exponent = Decimal(repr(float(cycle_time))).as_tuple()
+    del sign
+    unit = int("".join(map(str, digits)))
+    shift = -int(exponent)
+    counts = np.arange(cycles + 1, dtype=np.float64) * unit
+    return np.asarray(counts / 10.0**shift if shift >= 0 else counts * 10.0**-shift)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class SampledProfile:
+    """What a controller issues each cycle: one setpoint per cycle and axis, the first at time 0.
+
+    Attributes
+    ----------
+    cycle_time : float
+        s.
+    position : (samples, axes) array
+        m (or rad); the last sample is held for ever.
+    velocity, acceleration, jerk : (samples, axes) array or None
+        What the artefact carries beside positions.
+    resolution : (axes,) array
+        Spacing of the values that the artefact can represent; 0 where it carries doubles.
+    """
+
+    cycle_time: float
+    position: Array = attrs.field(converter=read_only, validator=_finite)
+    velocity: Array | None = attrs.field(
+        default=None,
+        converter=attrs.converters.optional(read_only),
+        validator=attrs.validators.optional(_finite),
+    )
+    acceleration: Array | None = attrs.field(
+        default=None,
+        converter=attrs.converters.optional(read_only),
+        validator=attrs.validators.optional(_finite),
+    )
+    jerk: Array | None = attrs.field(
+        default=None,
+        converter=attrs.converters.optional(read_only),
+        validator=attrs.validators.optional(_finite),
+    )
+    resolution: Array = attrs.field(converter=read_only, validator=_finite)
+
+    @resolution.default
+    def _exact(self) -> Array:
+        return np.zeros(self.position.shape[1])
+
+    def __attrs_post_init__(self) -> None:
+        if self.position.ndim != 2 or len(self.position) < 2:
+            raise GenProfileError("A sampled profile needs at least two samples of at least one axis.")
+        for values in (self.velocity, self.acceleration, self.jerk):
+            if values is not None and values.shape != self.position.shape:
+                raise GenProfileError("A sampled profile's columns differ in length.")
+        if not (np.isfinite(self.cycle_time) and self.cycle_time > 0.0):
+            raise GenProfileError("A sampled profile's cycle time must be positive.")
+
+    @property
+    def times(self) -> Array:
+        """Times of the samples in s, shape (samples,)."""
+        return grid_times(len(self.position) - 1, self.cycle_time)
+
+    def payload_hash(self) -> str:
+        """SHA-256 of the position setpoints and the cycle time, in hexadecimal."""
+        return _sha256(np.float64(self.cycle_time), self.position)
+
+
+def sample(profile: Profile, cycle_time: float) -> SampledProfile:
+    """Sample a profile on the cycle grid; the last sample is the first one at or after its end."""
+    times = grid_times(grid_length(profile.duration, cycle_time), cycle_time)
+    motion = profile(times)
+    return SampledProfile(
+        cycle_time=cycle_time,
+        position=motion.position,
+        velocity=motion.velocity,
+        acceleration=motion.acceleration,
+        jerk=motion.jerk,
+    )
+
+
+def _sha256(*arrays: object) -> str:
+    digest = hashlib.sha256()
+    for array in arrays:
+        contiguous = np.ascontiguousarray(array, dtype="<f8")
+        digest.update(repr(contiguous.shape).encode("ascii"))
+        digest.update(contiguous.tobytes())
+    return digest.hexdigest()

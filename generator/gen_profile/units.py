@@ -1,0 +1,45 @@
+"""The only place where units are converted: SI inside, an axis's own unit and sign at the edges."""
+
+from __future__ import annotations
+
+import math
+
+import attrs
+
+# unit → (SI unit, how many of it make one SI unit)
+UNITS: dict[str, tuple[str, float]] = {
+    "m": ("m", 1.0),
+    "mm": ("m", 1e3),
+    "um": ("m", 1e6),
+    "rad": ("rad", 1.0),
+    "deg": ("rad", 180.0 / math.pi),
+}
+COUNTS = "counts"
+AXIS_UNITS = (*UNITS, COUNTS)
+
+
+@attrs.frozen(kw_only=True)
+class AxisScale:
+    """How a controller counts one axis.
+
+    Attributes
+    ----------
+    name : str
+        Of the axis, as the plant calls it.
+    unit : str
+        One of `AXIS_UNITS`.
+    factor : float
+        Axis units per SI unit; negative where the axis counts the other way.
+    counts_per_si : float
+        Drive counts per SI unit, negative likewise.
+    """
+
+    name: str
+    unit: str
+    factor: float
+    counts_per_si: float
+
+
+def axis_factor(unit: str, counts_per_si: float) -> float:
+    """Axis units per SI unit."""
+    return counts_per_si if unit == COUNTS else UNITS[unit][1]
