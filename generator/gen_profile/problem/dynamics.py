@@ -1,0 +1,79 @@
+"""A plant's equations solved for the unactuated accelerations, eq. (3), as symbols."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import attrs
+import numpy as np
+
+from gen_profile.plants.plant import Plant
+from gen_profile.problem import symbolic as sym
+from gen_profile.problem.symbolic import Array, Symbol
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Dynamics:
+    """Symbols of a plant and its motion: q̈_u = free + driven · q̈_a.
+
+    Attributes
+    ----------
+    q_u, dq_u : (n_u,) columns
+        Unactuated coordinates and rates.
+    q_a, dq_a, ddq_a : (m,) columns
+        Actuated coordinates, rates and accelerations (the input).
+    p : (parameters,) column
+        In the order of `Plant.parameters`.
+    free : (n_u,) column
+        M_uu⁻¹ (K_u + G_u).
+    driven : (n_u, m) matrix
+        −M_uu⁻¹ M_auᵀ; also the jump of q̇_u per unit step of axis velocity.
+    ddq_u : (n_u,) column
+    sway, height, angle : (loads,) columns
+    """
+
+    q_u: Symbol
+    dq_u: Symbol
+    q_a: Symbol
+    dq_a: Symbol
+    ddq_a: Symbol
+    p: Symbol
+    free: Symbol
+    driven: Symbol
+    ddq_u: Symbol
+    sway: Symbol
+    height: Symbol
+    angle: Symbol
+
+
+def dynamics(plant: Plant) -> Dynamics:
+    """Write a plant's equations in symbols."""
+    n_u, m = len(plant.unactuated), len(plant.actuated)
+    q_u, dq_u = sym.symbols("q_u", n_u), sym.symbols("dq_u", n_u)
+    q_a, dq_a, ddq_a = sym.symbols("q_a", m), sym.symbols("dq_a", m), sym.symbols("ddq_a", m)
+    p = sym.symbols("p", len(plant.parameters))
+    named = SimpleNamespace(**dict(zip((q.name for q in plant.parameters), sym.split(p), strict=True)))
+    terms = plant.equations(sym.split(q_u), sym.split(dq_u), sym.split(q_a), sym.split(dq_a), named)
+    outputs = plant.outputs(sym.split(q_u), sym.split(q_a), named)
+    mass = sym.matrix(terms.M_uu)
+    free = sym.solve(mass, sym.column(terms.K_u) + sym.column(terms.G_u))
+    driven = -sym.solve(mass, sym.matrix(terms.M_au).T)
+    return Dynamics(
+        q_u=q_u,
+        dq_u=dq_u,
+        q_a=q_a,
+        dq_a=dq_a,
+        ddq_a=ddq_a,
+        p=p,
+        free=free,
+        driven=driven,
+        ddq_u=free + driven @ ddq_a,
+        sway=sym.column(outputs.sway),
+        height=sym.column(outputs.height),
+        angle=sym.column(outputs.angle),
+    )
+
+
+def parameter_column(plant: Plant, values: dict[str, float]) -> Array:
+    """Order parameter values as `Dynamics.p` does, as one point (1, parameters)."""
+    return np.array([[values[parameter.name] for parameter in plant.parameters]])

@@ -1,0 +1,155 @@
+"""The one module that loads CasADi: a thin typed layer over what the project uses of it.
+
+Typing stops at `Symbol`; everything that comes out is a NumPy array or C text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Symbol = Any  # casadi.SX
+
+if hasattr(casadi.GlobalOptions, "setNumpyMode"):
+    # plants call NumPy functions on symbols; -1 keeps the result symbolic, without a warning
+    casadi.GlobalOptions.setNumpyMode(-1)
+
+
+def symbols(name: str, count: int) -> Symbol:
+    """Make a column of symbols."""
+    return casadi.SX.sym(name, count)
+
+
+def split(column: Symbol) -> list[Symbol]:
+    """Entries of a column."""
+    return list(casadi.vertsplit(column)) if column.shape[0] else []
+
+
+def column(entries: Sequence[Any]) -> Symbol:
+    """Stack scalars and columns."""
+    return casadi.vertcat(*entries) if len(entries) else casadi.SX(0, 1)
+
+
+def matrix(rows: Sequence[Sequence[Any]]) -> Symbol:
+    """Make a matrix from nested rows of scalars."""
+    return casadi.vertcat(*(casadi.horzcat(*row) for row in rows))
+
+
+def solve(a: Symbol, b: Symbol) -> Symbol:
+    """Solve ``a x = b`` symbolically."""
+    return casadi.solve(a, b)
+
+
+def jacobian(expression: Symbol, variables: Symbol) -> Symbol:
+    """∂expression/∂variables."""
+    return casadi.jacobian(expression, variables)
+
+
+def gradient(expression: Symbol, variables: Symbol) -> Symbol:
+    """Gradient of a scalar, as a column."""
+    return casadi.gradient(expression, variables)
+
+
+def directional(expression: Symbol, variables: Symbol, direction: Symbol) -> Symbol:
+    """∂expression/∂variables · direction."""
+    return casadi.jtimes(expression, variables, direction)
+
+
+def substitute(expression: Symbol, variables: Symbol, values: Symbol) -> Symbol:
+    """Replace variables in an expression."""
+    return casadi.substitute(expression, variables, values)
+
+
+def exp(expression: Symbol) -> Symbol:
+    """e to the expression."""
+    return casadi.exp(expression)
+
+
+def dot(a: Symbol, b: Symbol) -> Symbol:
+    """Inner product of two columns."""
+    return casadi.dot(a, b)
+
+
+def depends_on(expression: Symbol, variables: Symbol) -> bool:
+    """Whether a variable appears in the expression at all."""
+    return bool(casadi.depends_on(expression, variables))
+
+
+def is_structurally_zero(expression: Symbol) -> bool:
+    """Whether an entry is zero by its form, whatever the values."""
+    return bool(casadi.simplify(expression).is_zero())
+
+
+class Function:
+    """A compiled expression, evaluated at many points in one call.
+
+    Parameters
+    ----------
+    name : str
+    inputs : mapping of str to Symbol
+        Columns; an evaluation takes each as an array (rows, points).
+    output : Symbol
+        Matrix of any shape; made dense.
+    """
+
+    def __init__(self, name: str, inputs: Mapping[str, Symbol], output: Symbol) -> None:
+        self._function = casadi.Function(
+            name, list(inputs.values()), [casadi.densify(output)], list(inputs), ["output"], {"cse": True}
+        )
+        self._shape: tuple[int, int] = output.shape
+        self._evaluators: dict[int, Callable[[Sequence[Array]], Array]] = {}
+
+    def __call__(self, *arguments: Array) -> Array:
+        """Evaluate.
+
+        Parameters
+        ----------
+        *arguments : (points, rows) arrays, C-contiguous
+            One per input; an input with one point is used for all.
+
+        Returns
+        -------
+        (points, output rows, output columns) array
+            In Fortran order within a point, so that a one-column output is contiguous.
+        """
+        points = max(len(argument) for argument in arguments)
+        spread = [
+            np.ascontiguousarray(np.broadcast_to(argument, (points, argument.shape[1])), dtype=np.float64)
+            for argument in arguments
+        ]
+        if points not in self._evaluators:
+            self._evaluators[points] = self._evaluator(points)
+        return self._evaluators[points](spread)
+
+    def _evaluator(self, points: int) -> Callable[[Sequence[Array]], Array]:
+        """Bind a mapped function to fixed buffers: CasADi's own conversions cost more than its evaluation."""
+        mapped = self._function.map(points) if points > 1 else self._function
+        buffer, trigger = mapped.buffer()
+        rows, columns = self._shape
+        inputs = [np.zeros((points, mapped.size1_in(i))) for i in range(mapped.n_in())]
+        result = np.zeros((points, columns, rows))
+        for i, array in enumerate(inputs):
+            buffer.set_arg(i, memoryview(array))
+        buffer.set_res(0, memoryview(result))
+
+        def evaluate(arguments: Sequence[Array], keep: object = (mapped, buffer)) -> Array:
+            del keep  # the trigger holds raw pointers into both
+            for fixed, argument in zip(inputs, arguments, strict=True):
+                fixed[...] = argument
+            trigger()
+            return result.transpose(0, 2, 1).copy()
+
+        return evaluate
+
+    @cached_property
+    def c_source(self) -> str:
+        """C99 text of the function for one point, with CasADi's calling convention."""
+        generator = casadi.CodeGenerator(self._function.name(), {"with_header": False, "verbose": False})
+        generator.add(self._function)
+        return str(generator.dump())
