@@ -1,0 +1,116 @@
+"""A plant's small oscillations about rest: q̈_u = −stiffness q_u − damping q̇_u + input q̈_a."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import InfeasibleProblem
+from gen_profile.plants.plant import Plant
+from gen_profile.problem import symbolic as sym
+from gen_profile.problem.dynamics import dynamics, parameter_column
+from gen_profile.problem.symbolic import Array, Function
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Linearization:
+    """The linear model at rest, in coordinates and in modes.
+
+    Mode k is q_u = modes[:, k] z_k(t). Its equation is ``z̈ + 2 ζ ω ż + ω² z = (modes⁻¹ input q̈_a)_k``, and it
+    shows in the sway of load l as ``(sway_gain modes)[l, k] z_k``.
+
+    Attributes
+    ----------
+    stiffness, damping : (n_u, n_u) array
+        Per unit of generalised mass, in 1/s² and 1/s; not symmetric in general.
+    input : (n_u, m) array
+        Unactuated acceleration per axis acceleration.
+    sway_gain : (loads, n_u) array
+        ∂sway/∂q_u.
+    frequencies : (n_u,) array
+        Undamped natural frequencies ω in rad/s, rising.
+    damping_ratios : (n_u,) array
+        ζ, from the diagonal of the damping matrix in modal coordinates: exact where damping does not couple
+        the modes, and off by the square of the ratios otherwise.
+    modes : (n_u, n_u) array
+        One column per frequency, of unit length, its largest entry positive.
+    """
+
+    stiffness: Array
+    damping: Array
+    input: Array
+    sway_gain: Array
+    frequencies: Array
+    damping_ratios: Array
+    modes: Array
+
+
+def linearize(
+    plant: Plant, parameters: Mapping[str, float], q_a: Sequence[float] | None = None
+) -> Linearization:
+    """Linearise a plant at rest, where q_u = 0.
+
+    Parameters
+    ----------
+    plant : Plant
+    parameters : mapping of str to float
+        Value of every parameter.
+    q_a : (m,) sequence of float, optional
+        Where the axes stand; 0 by default.
+
+    Raises
+    ------
+    InfeasibleProblem
+        A mode has no restoring force, so the machine has no natural frequency to speak of.
+    """
+    n_u, m = len(plant.unactuated), len(plant.actuated)
+    axes = np.zeros((1, m)) if q_a is None else np.array([q_a], dtype=np.float64)
+    motion_terms, sway_terms = _terms(plant)
+    values = parameter_column(plant, dict(parameters))
+    free_q, free_dq, driven = np.split(motion_terms(axes, values)[0], [n_u, 2 * n_u], axis=1)
+    frequencies, modes = _modes(plant, -free_q)
+    modal_damping = np.linalg.solve(modes, -free_dq @ modes)
+    return Linearization(
+        stiffness=-free_q,
+        damping=-free_dq,
+        input=driven,
+        sway_gain=sway_terms(axes, values)[0],
+        frequencies=frequencies,
+        damping_ratios=np.diag(modal_damping) / (2.0 * frequencies),
+        modes=modes,
+    )
+
+
+@cache
+def _terms(plant: Plant) -> tuple[Function, Function]:
+    """Functions of (q_a, p) at rest: [∂free/∂q_u, ∂free/∂q̇_u, driven] and ∂sway/∂q_u."""
+    d = dynamics(plant)
+    state = sym.column([d.q_u, d.dq_u, d.dq_a])
+    motion = sym.matrix([[sym.jacobian(d.free, d.q_u), sym.jacobian(d.free, d.dq_u), d.driven]])
+    inputs = {"q_a": d.q_a, "p": d.p}
+
+    def at_rest(expression: sym.Symbol) -> sym.Symbol:
+        return sym.substitute(expression, state, np.zeros(state.shape))
+
+    return (
+        Function("motion_terms", inputs, at_rest(motion)),
+        Function("sway_terms", inputs, at_rest(sym.jacobian(d.sway, d.q_u))),
+    )
+
+
+def _modes(plant: Plant, stiffness: Array) -> tuple[Array, Array]:
+    """Solve stiffness · mode = ω² · mode."""
+    squares, vectors = np.linalg.eig(stiffness)
+    # M⁻¹K of a conservative machine has real eigenvalues; a nearly double one may round to a complex pair
+    order = np.argsort(squares.real)
+    squares, vectors = squares.real[order], vectors.real[:, order]
+    if not (squares > 0.0).all():
+        raise InfeasibleProblem(
+            f"The machine {plant.type!r} does not return to rest with these parameters, "
+            "so it has no natural frequencies; check the signs of its parameters."
+        )
+    largest = vectors[np.abs(vectors).argmax(axis=0), range(len(squares))]
+    return np.sqrt(squares), vectors * np.sign(largest) / np.linalg.norm(vectors, axis=0)
