@@ -67,17 +67,18 @@ def linearize(
         A mode has no restoring force, so the machine has no natural frequency to speak of.
     """
     n_u, m = len(plant.unactuated), len(plant.actuated)
-    axes = np.zeros((1, m)) if q_a is None else np.array([q_a], dtype=np.float64)
+    still_u, still_a = np.zeros((1, n_u)), np.zeros((1, m))
+    axes = still_a if q_a is None else np.array([q_a], dtype=np.float64)
+    rest = (still_u, still_u, axes, still_a, parameter_column(plant, dict(parameters)))
     motion_terms, sway_terms = _terms(plant)
-    values = parameter_column(plant, dict(parameters))
-    free_q, free_dq, driven = np.split(motion_terms(axes, values)[0], [n_u, 2 * n_u], axis=1)
+    free_q, free_dq, driven = np.split(motion_terms(*rest)[0], [n_u, 2 * n_u], axis=1)
     frequencies, modes = _modes(plant, -free_q)
     modal_damping = np.linalg.solve(modes, -free_dq @ modes)
     return Linearization(
         stiffness=-free_q,
         damping=-free_dq,
         input=driven,
-        sway_gain=sway_terms(axes, values)[0],
+        sway_gain=sway_terms(*rest)[0],
         frequencies=frequencies,
         damping_ratios=np.diag(modal_damping) / (2.0 * frequencies),
         modes=modes,
@@ -86,19 +87,12 @@ def linearize(
 
 @cache
 def _terms(plant: Plant) -> tuple[Function, Function]:
-    """Functions of (q_a, p) at rest: [∂free/∂q_u, ∂free/∂q̇_u, driven] and ∂sway/∂q_u."""
+    """[∂free/∂q_u, ∂free/∂q̇_u, driven] and ∂sway/∂q_u as functions of state and parameters."""
     d = dynamics(plant)
-    state = sym.column([d.q_u, d.dq_u, d.dq_a])
+    inputs = {"q_u": d.q_u, "dq_u": d.dq_u, "q_a": d.q_a, "dq_a": d.dq_a, "p": d.p}
     motion = sym.matrix([[sym.jacobian(d.free, d.q_u), sym.jacobian(d.free, d.dq_u), d.driven]])
-    inputs = {"q_a": d.q_a, "p": d.p}
-
-    def at_rest(expression: sym.Symbol) -> sym.Symbol:
-        return sym.substitute(expression, state, np.zeros(state.shape))
-
-    return (
-        Function("motion_terms", inputs, at_rest(motion)),
-        Function("sway_terms", inputs, at_rest(sym.jacobian(d.sway, d.q_u))),
-    )
+    sway = sym.jacobian(d.sway, d.q_u)
+    return Function("motion_terms", inputs, motion), Function("sway_terms", inputs, sway)
 
 
 def _modes(plant: Plant, stiffness: Array) -> tuple[Array, Array]:

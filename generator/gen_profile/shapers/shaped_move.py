@@ -48,8 +48,9 @@ def shaped_profile(
     base_duration = duration - shaper.delay
     if base_duration < duration * SHORTEST_BASE:
         raise InfeasibleProblem(
-            f"move.duration: the {name} shaper's delay is {shaper.delay:.4g} s for this machine, so {duration:g} s "
-            f"leaves no time to move; state more than {shaper.delay:.4g} s, or choose another method."
+            f"move.duration: the {name} shaper's delay is {shaper.delay:.4g} s for this machine, so "
+            f"{duration:g} s leaves no time to move; state more than {shaper.delay:.4g} s, "
+            "or choose another method."
         )
     knots = _knots(shaper, base_duration, duration)
     first, last = np.asarray(start, dtype=np.float64), np.asarray(target, dtype=np.float64)
