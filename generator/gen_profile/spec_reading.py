@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -19,6 +18,7 @@ from gen_profile import spec as s
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant, plant_types
+from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
 
 Table = dict[str, Any]
@@ -98,13 +98,6 @@ def spec_from_dict(document: Mapping[str, Any]) -> s.Spec:
     if spec is None or faults:
         raise SpecError(*sorted(set(faults), key=faults.index))
     return spec
-
-
-def suggestion(word: str, known: Iterable[str]) -> str:
-    """``; did you mean 'x'?`` where something similar is known, else the list of what is."""
-    known = list(known)
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"; did you mean {near[0]!r}?" if near else f" (known: {', '.join(known)})"
 
 
 # ── from what a person writes to the tables that mirror the classes ──────────────────────────────────────────

@@ -1,0 +1,70 @@
+"""What an exporter is: a profile to files, and files back to what the controller will issue."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import attrs
+
+from gen_profile.profile import Profile, SampledProfile
+from gen_profile.spec import CanSpec, Spec
+from gen_profile.units import AxisScale
+
+
+@attrs.frozen(kw_only=True)
+class Target:
+    """The controller that an artefact is for.
+
+    Attributes
+    ----------
+    name : str
+        Of the motion; files and program blocks are named after it.
+    axes : tuple of AxisScale
+        How each axis is counted, in the profile's order.
+    cycle_time : float
+        Of the controller's task, in s.
+    can : CanSpec
+        The bus and the drives on it.
+    """
+
+    name: str
+    axes: tuple[AxisScale, ...]
+    cycle_time: float
+    can: CanSpec
+
+
+@attrs.frozen(kw_only=True)
+class File:
+    """A file to be written: its name, without folder, and its bytes."""
+
+    filename: str
+    content: bytes
+
+
+class Exporter(Protocol):
+    """One format: a module, or any object, with these two functions. Both are pure."""
+
+    def encode(self, profile: Profile, target: Target) -> tuple[File, ...]:
+        """Write the motion; the first file is the one that `replay` takes.
+
+        Raises
+        ------
+        ExportError
+            The format or the target cannot take the motion.
+        """
+        ...
+
+    def replay(self, content: bytes, target: Target) -> SampledProfile:
+        """Read what the controller will issue each cycle.
+
+        Raises
+        ------
+        ExportError
+            The content is not what `encode` writes: truncated, damaged or meant for another target.
+        """
+        ...
+
+
+def target_of(spec: Spec) -> Target:
+    """Pick from a spec what exporters need."""
+    return Target(name=spec.name, axes=spec.axis_scales(), cycle_time=spec.export.cycle_time, can=spec.can)

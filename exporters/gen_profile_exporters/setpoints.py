@@ -1,0 +1,147 @@
+"""Between a motion in SI units and the numbers that a controller's axes count in."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile.errors import ExportError
+from gen_profile.profile import Array, Profile, SampledProfile, grid_length, sample
+from gen_profile.spec import Bounds, CycleTime
+from gen_profile.units import COUNTS, AxisScale
+from gen_profile_exporters.exporter import Target
+
+INT32 = np.iinfo(np.int32)
+CYCLE_TIME: Bounds = get_args(CycleTime)[1]
+MAX_SAMPLES = 1_000_001
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class AxisTable:
+    """Setpoints in axis units, as they stand in an artefact.
+
+    Attributes
+    ----------
+    cycle_time : float
+        s.
+    position, velocity, acceleration : (samples, axes) array
+        In axis units per s⁰, s, s²; positions of axes that count in ``counts`` are whole numbers.
+    jerk : (samples, axes) array or None
+        In axis units per s³, where the format carries it.
+    """
+
+    cycle_time: float
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array | None
+
+
+def sampled(
+    profile: Profile, target: Target, cycle_time: float, place: str, most: int = MAX_SAMPLES
+) -> SampledProfile:
+    """Sample a profile for a target; `place` is the cycle time's spec path, `most` what a file holds."""
+    if profile.axes != len(target.axes):
+        raise ExportError(
+            f"The motion has {profile.axes} axes, the target {len(target.axes)}; design it again."
+        )
+    samples = grid_length(profile.duration, cycle_time) + 1
+    if samples > most:
+        raise ExportError(
+            f"{place}: {samples} samples of {cycle_time:g} s are more than the format holds ({most}); "
+            f"set it to {profile.duration / (most - 1):.2g} s or more."
+        )
+    return sample(profile, cycle_time)
+
+
+def axis_table(motion: SampledProfile, axes: tuple[AxisScale, ...]) -> AxisTable:
+    """Convert a sampled motion, with all its derivatives, to axis units."""
+    factor = np.array([axis.factor for axis in axes])
+    position, velocity, acceleration, jerk = (
+        _times(values, factor)
+        for values in (motion.position, motion.velocity, motion.acceleration, motion.jerk)
+        if values is not None
+    )
+    for column, axis in enumerate(axes):
+        if axis.unit == COUNTS:
+            position[:, column] = counts(motion.position[:, column], axis, motion.cycle_time)
+    return AxisTable(
+        cycle_time=motion.cycle_time,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        jerk=jerk,
+    )
+
+
+def motion_of(table: AxisTable, axes: tuple[AxisScale, ...]) -> SampledProfile:
+    """Convert a table back to SI units: what the controller will issue."""
+    factor = np.array([axis.factor for axis in axes])
+    return SampledProfile(
+        cycle_time=table.cycle_time,
+        position=_by(table.position, factor),
+        velocity=_by(table.velocity, factor),
+        acceleration=_by(table.acceleration, factor),
+        jerk=None if table.jerk is None else _by(table.jerk, factor),
+        resolution=np.array([1.0 / abs(axis.factor) if axis.unit == COUNTS else 0.0 for axis in axes]),
+    )
+
+
+def counts(position: Array, axis: AxisScale, cycle_time: float) -> NDArray[np.int32]:
+    """Round one axis's positions, shape (samples,), to drive counts, half to even.
+
+    Each count comes from the absolute position, so no error accumulates: it stays within half a count.
+
+    Raises
+    ------
+    ExportError
+        A count does not fit 32 bits, which is what drives take (CiA 402, object 607Ah).
+    """
+    rounded = np.rint(_times(position, np.array(axis.counts_per_si)))
+    outside = np.flatnonzero((rounded < INT32.min) | (rounded > INT32.max))
+    if outside.size:
+        first = int(outside[0])
+        raise ExportError(
+            f"axis {axis.name}: {rounded[first]:.15g} counts at {first * cycle_time:g} s lie outside 32 bits "
+            f"({INT32.min} to {INT32.max}); lower axis.counts_per_metre or put the origin nearer."
+        )
+    return rounded.astype(np.int32)
+
+
+def is_count(values: Array) -> NDArray[np.bool_]:
+    """Whether numbers are whole and fit 32 bits."""
+    return np.asarray((values == np.floor(values)) & (values >= INT32.min) & (values <= INT32.max))
+
+
+def plausible_cycle_time(cycle_time: float, line: int) -> float:
+    """Pass on a cycle time read from a file, if a spec could have asked for it."""
+    if not CYCLE_TIME.least <= cycle_time <= CYCLE_TIME.most:
+        raise ExportError(
+            f"line {line}: a cycle time of {cycle_time:g} s lies outside {CYCLE_TIME.least:g} to "
+            f"{CYCLE_TIME.most:g} s; export the motion again."
+        )
+    return cycle_time
+
+
+# Adding 0.0 turns a negative zero into a plain one: equal motions get equal texts and hashes.
+
+
+def _times(values: Array, factor: Array) -> Array:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _finite(np.asarray(values * factor + 0.0))
+
+
+def _by(values: Array, factor: Array) -> Array:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _finite(np.asarray(values / factor + 0.0))
+
+
+def _finite(values: Array) -> Array:
+    if not np.isfinite(values).all():
+        raise ExportError(
+            "A setpoint is too large to convert between SI and axis units; check the axis's scale."
+        )
+    return values

@@ -1,0 +1,31 @@
+"""Motions and targets to export, built without any solver."""
+
+import numpy as np
+
+from gen_profile.profile import Profile
+from gen_profile.spec import CanSpec
+from gen_profile.units import AxisScale, axis_factor
+from gen_profile_exporters.exporter import Target
+
+
+def quintic(*moves, duration=1.0):
+    """Rest-to-rest quintic from and to the given pairs of positions, one pair per axis."""
+    start, end = np.array(moves, dtype=float).T
+    distance = end - start
+    zero = np.zeros_like(start)
+    rising = [factor * distance / duration**power for power, factor in ((3, 10), (4, -15), (5, 6))]
+    coefficients = [start, zero, zero, *rising]
+    return Profile(knots=[0.0, duration], coefficients=[coefficients], target=end, method="quintic")
+
+
+def target(*names, unit="m", sign=1, counts_per_si=1e6, cycle_time=0.01, name="bay-3", **can):
+    scales = tuple(
+        AxisScale(
+            name=axis,
+            unit=unit,
+            factor=sign * axis_factor(unit, counts_per_si),
+            counts_per_si=sign * counts_per_si,
+        )
+        for axis in names or ("cart",)
+    )
+    return Target(name=name, axes=scales, cycle_time=cycle_time, can=CanSpec(**can))
