@@ -1,0 +1,26 @@
+# What CI runs, and what a change must pass.
+check: lint coverage
+
+# Format, lint, types and import layers.
+lint:
+    ruff format --check
+    ruff check
+    mypy
+    lint-imports
+
+# The whole suite with branch coverage; pyproject.toml holds the least share.
+coverage:
+    pytest -n 2 --cov --cov-report=term
+
+# Some tests: just test tests/generator -k shaper
+test *arguments:
+    pytest {{ arguments }}
+
+# Format and mend what ruff can mend.
+fix:
+    ruff check --fix
+    ruff format
+
+# Timings, printed and not judged.
+bench:
+    pytest -s tests/benchmarks
