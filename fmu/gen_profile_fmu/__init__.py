@@ -1,0 +1,1 @@
+"""FMUs of plants, and their co-simulation."""

@@ -1,0 +1,96 @@
+"""A per-user cache of built files: entries by content hash, verified when read, written atomically.
+
+Builds are reproducible, so two processes that write the same entry at once write the same bytes, and each
+file takes its place by a rename: whoever reads sees whole files only. The list of checksums comes last.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import stat
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import platformdirs
+
+ENVIRONMENT_VARIABLE = "GEN_PROFILE_CACHE"
+_CHECKSUMS = "checksums.json"
+_logger = logging.getLogger(__name__)
+
+
+def cache_folders() -> Iterator[Path]:
+    """Folders to look in and to write to, the preferred one first.
+
+    The folder that the environment variable `GEN_PROFILE_CACHE` names, else the user's cache folder; then, for
+    users without a home folder or with one that cannot be written, a private one among temporary files.
+    """
+    named = os.environ.get(ENVIRONMENT_VARIABLE, "").strip()
+    preferred = Path(named) if named else platformdirs.user_cache_path("gen-profile", appauthor=False)
+    if preferred.is_absolute() or named:
+        yield preferred.absolute()
+    private = _private_temporary_folder()
+    if private is not None:
+        yield private
+
+
+def _private_temporary_folder() -> Path | None:
+    """Make a folder that only this user can write; None when somebody else has taken its name."""
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    folder = Path(tempfile.gettempdir()) / f"gen-profile-{user}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        status = folder.lstat()
+    except OSError as error:
+        _logger.debug("No cache in %s: %s", folder, error)
+        return None
+    if not stat.S_ISDIR(status.st_mode):
+        return None
+    if hasattr(os, "getuid") and (status.st_uid != os.getuid() or stat.S_IMODE(status.st_mode) & 0o077):
+        _logger.warning("The folder %s is not this user's alone; it is not used as a cache.", folder)
+        return None
+    return folder
+
+
+def is_intact(entry: Path) -> bool:
+    """Whether an entry is complete and every file as it was written."""
+    try:
+        checksums = json.loads((entry / _CHECKSUMS).read_text(encoding="utf-8"))
+        return bool(checksums) and all(
+            _sha256((entry / name).read_bytes()) == checksum for name, checksum in checksums.items()
+        )
+    except (OSError, ValueError, AttributeError, TypeError):
+        return False
+
+
+def write_entry(entry: Path, files: Mapping[str, bytes]) -> None:
+    """Write the files of an entry, by name relative to it.
+
+    Raises
+    ------
+    OSError
+        When the folder cannot be written.
+    """
+    checksums = {name: _sha256(content) for name, content in sorted(files.items())}
+    listing = (json.dumps(checksums, indent=1) + "\n").encode("utf-8")
+    for name, content in (*sorted(files.items()), (_CHECKSUMS, listing)):
+        _write_atomically(entry / name, content)
+
+
+def _write_atomically(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".new-")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,256 @@
+"""Co-simulation of a plant FMU that is fed with a controller's setpoints, by FMPy."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from ctypes import byref, c_double, c_uint, sizeof
+from types import TracebackType
+from typing import Any, Self
+
+import attrs
+import numpy as np
+from fmpy import calloc, free
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2OK,
+    fmi2True,
+)
+
+from gen_profile.errors import CosimulationError
+from gen_profile.plants.plant import Plant
+from gen_profile.profile import Array, SampledProfile, grid_length, grid_times
+from gen_profile.response import Response
+from gen_profile_fmu.cache import ENVIRONMENT_VARIABLE
+from gen_profile_fmu.plant_fmu import PlantFmu, plant_fmu
+from gen_profile_fmu.variables import MAX_STEP, TAU
+
+_logger = logging.getLogger(__name__)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Steps:
+    """Communication steps of one run.
+
+    Step k begins at ``times[k]``, lasts ``sizes[k]`` and leads to ``setpoints[k]`` at ``times[k + 1]``.
+    """
+
+    times: Array
+    sizes: Array
+    setpoints: Array
+
+
+class PlantCosimulation:
+    """A plant FMU in memory, to be run as often as wanted; a context manager.
+
+    Parameters
+    ----------
+    plant : Plant
+    on_build : callable, optional
+        Called before the FMU is compiled, when it is not in the cache.
+
+    Raises
+    ------
+    CosimulationError
+        When the FMU cannot be built or loaded.
+    """
+
+    def __init__(self, plant: Plant, on_build: Callable[[], None] | None = None) -> None:
+        self._plant = plant
+        self._fmu = plant_fmu(plant, on_build)
+        self._messages: list[str] = []
+        self._callbacks = _callbacks(self._messages)
+        self._slave = _load(self._fmu, self._callbacks, self._messages)
+        variables = self._fmu.variables
+        self._setpoints = _references(variables.references("SETPOINT"))
+        observed = ("Q_A", "DQ_A", "SWAY", "ANGLE")
+        self._outputs = _references(
+            [reference for block in observed for reference in variables.references(block)]
+        )
+        self._output_blocks = np.cumsum([len(variables.blocks[block]) for block in observed])[:-1]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the instance; it cannot be run again."""
+        if self._slave is not None:
+            self._slave.freeInstance()
+            self._slave = None
+
+    def run(
+        self,
+        setpoints: SampledProfile,
+        parameters: Mapping[str, float],
+        *,
+        tau: float = 0.0,
+        max_step: float,
+        settle: float,
+        output_step: float | None = None,
+    ) -> Response:
+        """Let drives follow the setpoints, then hold the last one.
+
+        Parameters
+        ----------
+        setpoints : SampledProfile
+            Of which only the positions are used: the drives interpolate them linearly (CiA 402, 60C2h).
+        parameters : mapping of str to float
+            Value of every parameter of the plant.
+        tau : float
+            Lag of the drives in s; 0 for ideal ones.
+        max_step : float
+            Longest integration step in s.
+        settle : float
+            How long the last setpoint is held, in s.
+        output_step : float, optional
+            Spacing of samples while it is held, in s; the cycle time if it is longer or not given.
+
+        Returns
+        -------
+        Response
+            At time 0, after every cycle, and every `output_step` while the last setpoint is held.
+
+        Raises
+        ------
+        CosimulationError
+            When a parameter is missing, unknown or out of range, or the FMU refuses a step.
+        """
+        if self._slave is None:
+            raise CosimulationError("This co-simulation has been closed; make a new one.")
+        values = {
+            **self._plant_values(parameters),
+            **self._start_values(setpoints),
+            TAU: tau,
+            MAX_STEP: max_step,
+        }
+        steps = _steps(setpoints, settle, output_step)
+        self._messages.clear()
+        try:
+            self._initialise(values)
+            samples = self._march(steps)
+        except FMICallException as error:
+            reason = " ".join(self._messages) or f"{error.function} returned status {error.status}."
+            raise CosimulationError(
+                f"The FMU of plant {self._plant.type} could not go on: {reason}"
+            ) from error
+        position, velocity, sway, angle = np.split(samples, self._output_blocks, axis=1)
+        return Response(times=steps.times, position=position, velocity=velocity, sway=sway, angle=angle)
+
+    def _plant_values(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        known = {parameter.name for parameter in self._plant.parameters}
+        unknown, missing = sorted(parameters.keys() - known), sorted(known - parameters.keys())
+        if unknown or missing:
+            faults = [f"no parameter {name}" for name in unknown] + [
+                f"no value of {name}" for name in missing
+            ]
+            raise CosimulationError(
+                f"The co-simulation of plant {self._plant.type} needs the values of exactly its parameters "
+                f"{', '.join(sorted(known))}: found {', '.join(faults)}."
+            )
+        return {name: float(value) for name, value in parameters.items()}
+
+    def _start_values(self, setpoints: SampledProfile) -> dict[str, float]:
+        axes, columns = self._plant.actuated, setpoints.position.shape[1]
+        if columns != len(axes):
+            raise CosimulationError(
+                f"The setpoints are for {columns} axes, but plant {self._plant.type} has {len(axes)}."
+            )
+        return {
+            f"{axis.name}.{suffix}": float(position)
+            for axis, position in zip(axes, setpoints.position[0], strict=True)
+            for suffix in ("start", "setpoint")
+        }
+
+    def _initialise(self, values: Mapping[str, float]) -> None:
+        table = {variable.name: reference for reference, variable in enumerate(self._fmu.variables.variables)}
+        self._slave.reset()
+        self._slave.setupExperiment(startTime=0.0)
+        self._slave.setReal([table[name] for name in values], list(values.values()))
+        self._slave.enterInitializationMode()
+        self._slave.exitInitializationMode()
+
+    def _march(self, steps: _Steps) -> Array:
+        """Take all steps, reading setpoints and writing samples in place; a step costs a few microseconds."""
+        slave, component = self._slave, self._slave.component
+        set_real, do_step, get_real = slave.fmi2SetReal, slave.fmi2DoStep, slave.fmi2GetReal
+        inputs, outputs = self._setpoints, self._outputs
+        n_inputs, n_outputs = len(inputs), len(outputs)
+        samples = np.empty((len(steps.times), n_outputs))
+        given = np.array(steps.setpoints)
+        first_setpoint, first_sample = c_double.from_buffer(given.data), c_double.from_buffer(samples.data)
+        input_row, output_row = n_inputs * sizeof(c_double), n_outputs * sizeof(c_double)
+
+        get_real(component, outputs, n_outputs, byref(first_sample))
+        for k, (time, size) in enumerate(zip(steps.times.tolist(), steps.sizes.tolist(), strict=False)):
+            set_real(component, inputs, n_inputs, byref(first_setpoint, k * input_row))
+            do_step(component, time, size, fmi2True)
+            get_real(component, outputs, n_outputs, byref(first_sample, (k + 1) * output_row))
+        return samples
+
+
+def _steps(setpoints: SampledProfile, settle: float, output_step: float | None) -> _Steps:
+    cycle = setpoints.cycle_time
+    hold = cycle if output_step is None else min(output_step, cycle)
+    if not (np.isfinite(hold) and hold > 0.0 and np.isfinite(settle) and settle >= 0.0):
+        raise CosimulationError(
+            "The time to settle must not be negative, and the output step must be positive."
+        )
+    moving = setpoints.times
+    held = grid_times(grid_length(settle, hold), hold)[1:]
+    last = np.repeat(setpoints.position[-1:], len(held), axis=0)
+    return _Steps(
+        times=np.concatenate((moving, moving[-1] + held)),
+        sizes=np.concatenate((np.full(len(moving) - 1, cycle), np.full(len(held), hold))),
+        setpoints=np.concatenate((setpoints.position[1:], last)),
+    )
+
+
+def _references(references: Any) -> Any:
+    return (c_uint * len(references))(*references)
+
+
+def _callbacks(messages: list[str]) -> Any:
+    """Make FMI callbacks that log the FMU's messages and keep those of failures."""
+
+    def log(environment: object, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+        del environment, instance
+        text = message.decode("utf-8", errors="replace")
+        if status == fmi2OK:
+            _logger.debug("%s: %s", category.decode("utf-8"), text)
+        else:
+            _logger.warning("%s: %s", category.decode("utf-8"), text)
+            messages.append(text)
+
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(log)
+    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+    return callbacks
+
+
+def _load(fmu: PlantFmu, callbacks: Any, messages: list[str]) -> Any:
+    try:
+        slave = FMU2Slave(
+            guid=fmu.guid,
+            modelIdentifier=fmu.model_identifier,
+            unzipDirectory=str(fmu.folder),
+            instanceName=fmu.model_identifier,
+        )
+        slave.instantiate(callbacks=callbacks)
+    except Exception as error:  # FMPy raises nothing more special
+        reason = " ".join(messages) or str(error)
+        raise CosimulationError(
+            f"The plant's FMU in {fmu.folder} cannot be loaded: {reason} "
+            f"If programs must not be loaded from there, name another folder in {ENVIRONMENT_VARIABLE}."
+        ) from error
+    return slave
