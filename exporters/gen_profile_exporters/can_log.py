@@ -141,7 +141,7 @@ def _period(target: Target) -> int:
 
 
 def _check_load(target: Target) -> None:
-    """Refuse what overloads the bus with SYNC, and per axis a setpoint and an answer, all at their longest."""
+    """Refuse what overloads the bus with SYNC and, per axis, a setpoint and an answer at their longest."""
     axes, can = len(target.axes), target.can
     if can.node + axes - 1 > LAST_NODE:
         raise ExportError(
@@ -223,7 +223,7 @@ def _cycle_time(syncs: Sequence[_Frame]) -> float:
     for before, sync in pairwise(syncs):
         if sync.stamp - before.stamp != period:
             raise ExportError(
-                f"line {sync.line}: SYNC {sync.stamp - before.stamp} µs after the one before, but the first two "
-                f"are {period} µs apart; export the log again."
+                f"line {sync.line}: SYNC {sync.stamp - before.stamp} µs after the one before, where "
+                f"{period} µs lie between the first two; export the log again."
             )
     return plausible_cycle_time(float(Decimal(period) / MICROSECONDS), syncs[1].line)

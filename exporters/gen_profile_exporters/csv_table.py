@@ -214,7 +214,7 @@ def _check_counts(position: Array, axes: Sequence[AxisScale], lines: Sequence[in
     for column, axis in enumerate(axes):
         values = position[:, column]
         wrong = np.flatnonzero(~is_count(values)) if axis.unit == COUNTS else ()
-        for row in wrong:
+        for row in map(int, wrong):
             raise ExportError(
                 f"line {lines[row]}: axis {axis.name}: {values[row]:.15g} is no whole 32-bit count; "
                 "export the table again."
