@@ -23,7 +23,7 @@ from typing import ClassVar
 
 
 class GenProfileError(Exception):
-    """Root of the tree; never raised itself."""
+    """Root of the tree; raised itself only for a broken invariant, which is a bug."""
 
     exit_code: ClassVar[int] = 1
 

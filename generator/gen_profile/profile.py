@@ -47,8 +47,8 @@ class Motion:
 class Profile:
     """Piecewise polynomial motion of every actuated axis, from rest at time 0.
 
-    Segment k covers ``knots[k] <= t < knots[k + 1]``; its polynomial counts time from ``knots[k]``. Before the
-    first knot the motion stands at its start, from the last knot on it holds `target`.
+    Segment k covers ``knots[k] <= t < knots[k + 1]``; its polynomial counts time from ``knots[k]``. Before
+    the first knot the motion stands at its start, from the last knot on it holds `target`.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Profile:
         return self.coefficients[0, 0]
 
     def derivative(self, times: Array, order: int) -> Array:
-        """Evaluate the derivative of the given order (0 = position); right-continuous, shape (times, axes)."""
+        """Evaluate a derivative by its order (0 = position), right-continuous, shape (times, axes)."""
         times = np.asarray(times, dtype=np.float64)
         segment = np.clip(np.searchsorted(self.knots, times, side="right") - 1, 0, len(self.knots) - 2)
         coefficients = polynomial.polyder(np.moveaxis(self.coefficients, 1, 0), order)
@@ -126,7 +126,7 @@ class Profile:
 
 
 def grid_length(duration: float, cycle_time: float) -> int:
-    """Number of cycles that cover a duration, counted in decimal arithmetic.
+    """Count the cycles that cover a duration, in decimal arithmetic.
 
     ``0.3 / 0.1`` is a little less than 3 in floats; the decimal texts of the two numbers divide exactly.
     """
@@ -135,7 +135,7 @@ def grid_length(duration: float, cycle_time: float) -> int:
 
 
 def grid_times(cycles: int, cycle_time: float) -> Array:
-    """Times ``k * cycle_time`` for k = 0 … cycles, each the double nearest to the decimal product.
+    """List the times ``k * cycle_time`` for k = 0 … cycles, each the double nearest to the decimal product.
 
     Integers divided by a power of ten are correctly rounded, products with a rounded cycle are not.
     """

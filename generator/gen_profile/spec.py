@@ -1,7 +1,7 @@
 """A motion task as frozen values: machine, move, robustness, cost, limits, check and target.
 
-Every number is in SI units. What a TOML file may say is exactly the attributes here; `gen_profile.spec_reading`
-turns text into them and gathers a text's faults.
+Every number is in SI units. What a TOML file may say is exactly the attributes here;
+`gen_profile.spec_reading` turns text into them and gathers its faults.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 import attrs
 
@@ -144,7 +144,7 @@ class ExportSpec:
 
 @attrs.frozen(kw_only=True)
 class CanSpec:
-    """The drive on the CAN bus; several axes take node, node + 1, …"""
+    """The drive on the CAN bus; the second axis takes the next node, and so on."""
 
     node: Annotated[int, Bounds(least=1, most=127)] = 1
     bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
@@ -197,11 +197,6 @@ class Spec:
         """Hash of the whole spec, defaults included, in hexadecimal."""
         text = json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=True)
         return hashlib.sha256(text.encode("ascii")).hexdigest()
-
-
-def choices(annotation: object) -> tuple[object, ...]:
-    """Values that a ``Literal`` allows."""
-    return get_args(annotation)
 
 
 def _plain(value: Any) -> Any:

@@ -43,7 +43,8 @@ def equations(
         M_au=[[-mass * np.cos(theta1), -np.cos(theta1 + theta2)]],
         K_u=[-p.g * mass * np.sin(theta1), -p.g * np.sin(theta1 + theta2)],
         G_u=[
-            p.m2 * p.L2 * (dtheta1 + dtheta2) ** 2 * np.sin(theta2) - (p.c1 * dtheta1 - p.c2 * dtheta2) / p.L1,
+            p.m2 * p.L2 * (dtheta1 + dtheta2) ** 2 * np.sin(theta2)
+            - (p.c1 * dtheta1 - p.c2 * dtheta2) / p.L1,
             -p.L1 * dtheta1**2 * np.sin(theta2) - p.c2 * dtheta2 / (p.m2 * p.L2),
         ],
     )
@@ -68,11 +69,24 @@ PLANT = Plant(
     parameters=(
         Parameter(name="m1", unit="kg", description="hook mass", nominal=0.192, lower=1e-4, upper=1e6),
         Parameter(name="m2", unit="kg", description="payload mass", nominal=0.203, lower=1e-4, upper=1e6),
-        Parameter(name="L1", unit="m", description="rope from cart to hook", nominal=0.470, lower=1e-2, upper=200.0),
-        Parameter(name="L2", unit="m", description="rope from hook to payload", nominal=0.391, lower=1e-2, upper=200.0),
+        Parameter(
+            name="L1", unit="m", description="rope from cart to hook", nominal=0.470, lower=1e-2, upper=200.0
+        ),
+        Parameter(
+            name="L2",
+            unit="m",
+            description="rope from hook to payload",
+            nominal=0.391,
+            lower=1e-2,
+            upper=200.0,
+        ),
         Parameter(name="g", unit="m/s^2", description="gravity", nominal=9.81, lower=0.1, upper=30.0),
-        Parameter(name="c1", unit="N m s/rad", description="damping at the cart", nominal=0.0, lower=0.0, upper=1e6),
-        Parameter(name="c2", unit="N m s/rad", description="damping at the hook", nominal=0.0, lower=0.0, upper=1e6),
+        Parameter(
+            name="c1", unit="N m s/rad", description="damping at the cart", nominal=0.0, lower=0.0, upper=1e6
+        ),
+        Parameter(
+            name="c2", unit="N m s/rad", description="damping at the hook", nominal=0.0, lower=0.0, upper=1e6
+        ),
     ),
     actuated=(Coordinate(name="cart", unit="m"),),
     unactuated=(Coordinate(name="theta1", unit="rad"), Coordinate(name="theta2", unit="rad")),

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 if TYPE_CHECKING:
     from gen_profile.plants.plant import Plant
 
 # type → (module that holds PLANT, summary); modules load only when their machine is asked for
 BUILT_IN: dict[str, tuple[str, str]] = {
-    "double-pendulum-crane": ("gen_profile.plants.double_pendulum_crane", "cart, hook and payload on two ropes"),
+    "double-pendulum-crane": (
+        "gen_profile.plants.double_pendulum_crane",
+        "cart, hook and payload on two ropes",
+    ),
 }
 GROUP = "gen_profile.plants"
 
@@ -32,9 +35,7 @@ def find_plant(type_: str) -> Plant:
         When no machine has that name.
     """
     if type_ in BUILT_IN:
-        plant: Plant = import_module(BUILT_IN[type_][0]).PLANT
-        return plant
+        return cast("Plant", import_module(BUILT_IN[type_][0]).PLANT)
     for entry in entry_points(group=GROUP, name=type_):
-        plant = entry.load()
-        return plant
+        return cast("Plant", entry.load())
     raise KeyError(type_)

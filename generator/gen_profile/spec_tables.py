@@ -1,0 +1,210 @@
+"""From what a person writes to tables nested as the classes of `gen_profile.spec` are.
+
+Here stands whatever needs to know the machine (its parameters, axes and loads), or several keys at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+
+from gen_profile.plants.plant import Plant
+from gen_profile.plants.registry import find_plant, plant_types
+from gen_profile.spec import RESIDUAL_SHARE, Spec
+from gen_profile.spec_structure import Faults, Table, finite, found, place
+from gen_profile.suggestion import suggestion
+from gen_profile.units import UNITS
+
+TABLES = tuple(field.name for field in attrs.fields(Spec) if field.name != "name")
+REQUIRED = ("plant", "move")
+DEFAULT_NAME = "profile"
+
+
+def complete(document: Mapping[str, Any], faults: Faults) -> Table:
+    """Fill in what depends on the machine; where something is wrong, note it and put a harmless value.
+
+    Without a known machine, names of parameters, axes and loads cannot be judged; everything else is.
+    """
+    for key in REQUIRED:
+        if key not in document:
+            faults.add(key, f"the spec must state [{key}]; a real machine has no default here")
+    tables = {"name": DEFAULT_NAME, **document, **{key: _table(document, key, faults) for key in TABLES}}
+    tables["actuator"] = _actuator(tables["actuator"], faults)
+    tables["cost"] = _cost(tables["cost"], tables["actuator"], faults)
+    plant = _machine(tables["plant"], faults)
+    tables["plant"] = _plant(tables["plant"], plant, faults)
+    tables["move"] = _move(tables["move"], plant, faults)
+    tables["robustness"] = _robustness(tables["robustness"], tables["plant"].get("parameters"), faults)
+    tables["check"] = _check(tables["check"], tables["move"], plant, faults)
+    tables["axis"] = _axis(tables["axis"], plant, faults)
+    return tables
+
+
+def _table(document: Mapping[str, Any], key: str, faults: Faults) -> Table:
+    value = document.get(key, {})
+    if isinstance(value, Mapping):
+        return dict(value)
+    faults.add(key, f"must be a table, found {found(value)}")
+    return {}
+
+
+def _machine(table: Table, faults: Faults) -> Plant | None:
+    type_ = table.get("type")
+    known = plant_types()
+    if not isinstance(type_, str):
+        faults.add("plant.type", f"must name a machine, found {found(type_)}{suggestion('', known)}")
+    elif type_ not in known:
+        faults.add("plant.type", f"unknown machine {type_[:60]!r}{suggestion(type_, known)}")
+    else:
+        return find_plant(type_)
+    return None
+
+
+def _plant(table: Table, plant: Plant | None, faults: Faults) -> Table:
+    """Complete the parameters with the type's nominal values and hold them to its bounds."""
+    if plant is None:
+        return {"type": ""}
+    nominal = plant.nominal()
+    given = {key: value for key, value in table.items() if key != "type"}
+    for key in given:
+        if key not in nominal:
+            faults.add(place("plant", key), f"unknown key{suggestion(key, ['type', *nominal])}")
+    values: dict[str, float] = {}
+    for parameter in plant.parameters:
+        value = given.get(parameter.name, parameter.nominal)
+        number = finite(value)
+        if number is None or not parameter.lower <= number <= parameter.upper:
+            faults.add(
+                f"plant.{parameter.name}",
+                f"must be a number from {parameter.lower:g} to {parameter.upper:g} {parameter.unit}, "
+                f"found {found(value)}",
+            )
+        values[parameter.name] = parameter.nominal if number is None else number
+    return {
+        "type": plant.type,
+        "parameters": values,
+        "defaults": [name for name in nominal if name not in given],
+    }
+
+
+def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
+    """Turn ``distance`` into start and target."""
+    axes = len(plant.actuated) if plant else None
+    start, target = table.pop("start", None), table.pop("target", None)
+    if "distance" in table:
+        if start is not None or target is not None:
+            faults.add("move.distance", "state either distance, or start and target, not both")
+        start, target = None, _per_axis(table.pop("distance"), axes, "move.distance", faults)
+    elif target is not None:
+        target = _per_axis(target, axes, "move.target", faults)
+    else:
+        faults.add("move.distance", "required, but missing; state distance, or start and target")
+        target = [1.0] * (axes or 1)
+    start = _per_axis(0.0 if start is None else start, len(target), "move.start", faults)
+    if start == target:
+        faults.add("move.distance", "must not be zero on every axis")
+    if table.get("duration") == "minimum":
+        faults.add("move.duration", '"minimum" is not supported yet; state the duration in s')
+    return {**table, "start": start, "target": target}
+
+
+def _per_axis(value: Any, axes: int | None, where: str, faults: Faults) -> list[float]:
+    """One finite number per axis; a single one holds for all."""
+    values = value if isinstance(value, list) else [value] * (axes or 1)
+    if axes is not None and len(values) != axes:
+        faults.add(where, f"must hold one number per axis ({axes}), found {len(values)}")
+        return [1.0] * axes
+    numbers = [finite(item) for item in values]
+    for item, number in zip(values, numbers, strict=True):
+        if number is None:
+            faults.add(where, f"must be a finite number, found {found(item)}")
+    return [1.0 if number is None else number for number in numbers]
+
+
+def _actuator(table: Table, faults: Faults) -> Table:
+    lag = table.get("type") == "first-order"
+    if lag and "tau" not in table:
+        faults.add("actuator.tau", 'required with type = "first-order" (time constant in s)')
+    if not lag and "tau" in table:
+        faults.add("actuator.tau", 'only with type = "first-order"; remove it or set the type')
+    return table
+
+
+def _cost(table: Table, actuator: Table, faults: Faults) -> Table:
+    if table.get("effort") == "reference" and actuator.get("type") != "first-order":
+        faults.add(
+            "cost.effort",
+            '"reference" weighs the reference of a lagging drive (eq. 6); '
+            'set actuator.type = "first-order" with tau, or choose "jerk" or "snap"',
+        )
+    return {key: value for key, value in table.items() if (key, value) != ("sway_scale", "auto")}
+
+
+def _robustness(table: Table, parameters: Mapping[str, float] | None, faults: Faults) -> Table:
+    """Put the uncertain parameters into the machine's order, so that the spec's order changes nothing."""
+    where = "robustness.uncertain"
+    uncertain = table.pop("uncertain", {})
+    if not isinstance(uncertain, Mapping):
+        faults.add(where, f"must be a table such as {{ L1 = 0.2 }}, found {found(uncertain)}")
+        uncertain = {}
+    if parameters is None:
+        parameters = dict.fromkeys(uncertain, 1.0)
+    for key in uncertain:
+        if key not in parameters:
+            faults.add(place(where, key), f"unknown parameter{suggestion(key, parameters)}")
+        elif parameters[key] == 0.0:
+            faults.add(place(where, key), "its value is 0, so a relative range is empty")
+    if table.get("method") == "sensitivity" and not uncertain:
+        faults.add(where, 'required with method = "sensitivity", such as { L1 = 0.2 }')
+    ordered = {name: uncertain[name] for name in parameters if name in uncertain}
+    return {"method": "sensitivity" if uncertain else "none", **table, "uncertain": ordered}
+
+
+def _check(table: Table, move: Table, plant: Plant | None, faults: Faults) -> Table:
+    """Give every load its limit: one number is for all; in a table, the end load's is the others' default."""
+    for key in table:
+        if key != "residual_sway":
+            faults.add(place("check", key), f"unknown key{suggestion(key, ['residual_sway'])}")
+    where = "check.residual_sway"
+    given = table.get("residual_sway")
+    longest = max((abs(b - a) for a, b in zip(move["start"], move["target"], strict=True)), default=0.0)
+    usual = RESIDUAL_SHARE * (longest or 1.0)
+    stated = given if isinstance(given, Mapping) else {} if given is None else {"": given}
+    for load, limit in stated.items():
+        at = place(where, load) if load else where
+        if load and plant and load not in plant.loads:
+            faults.add(at, f"unknown load{suggestion(load, plant.loads)}")
+        elif (number := finite(limit)) is None or number <= 0.0:
+            faults.add(at, f"must be a finite number greater than 0, found {found(limit)}")
+    if plant is None:
+        return {"residual_sway": {}}
+    rest = stated.get("", stated.get(plant.loads[-1], usual))
+    limits = {load: stated.get(load, rest) for load in plant.loads}
+    return {"residual_sway": limits, "default": given is None}
+
+
+def _axis(table: Table, plant: Plant | None, faults: Faults) -> Table:
+    """Give every axis its table; a machine with one axis may leave its name out."""
+    if plant is None:
+        return {}
+    names = [axis.name for axis in plant.actuated]
+    if len(names) == 1 and not any(isinstance(value, Mapping) for value in table.values()):
+        table = {names[0]: table}
+    for key in table:
+        if key not in names:
+            faults.add(place("axis", key), f"unknown axis{suggestion(key, names)}")
+    complete: Table = {}
+    for axis in plant.actuated:
+        given = table.get(axis.name, {})
+        if not isinstance(given, Mapping):
+            faults.add(f"axis.{axis.name}", f"must be a table, found {found(given)}")
+            given = {}
+        unit = given.get("unit")
+        if isinstance(unit, str) and unit in UNITS and UNITS[unit][0] != axis.unit:
+            faults.add(
+                f"axis.{axis.name}.unit", f"{unit!r} does not measure an axis that moves in {axis.unit}"
+            )
+        complete[axis.name] = {"unit": axis.unit, **given}
+    return complete
