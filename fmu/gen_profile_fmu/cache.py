@@ -25,8 +25,8 @@ _logger = logging.getLogger(__name__)
 def cache_folders() -> Iterator[Path]:
     """Folders to look in and to write to, the preferred one first.
 
-    The folder that the environment variable `GEN_PROFILE_CACHE` names, else the user's cache folder; then, for
-    users without a home folder or with one that cannot be written, a private one among temporary files.
+    That is what the environment variable `GEN_PROFILE_CACHE` names, else the cache folder of the user; then,
+    for users without a home or with one that cannot be written, a private folder among the temporary files.
     """
     named = os.environ.get(ENVIRONMENT_VARIABLE, "").strip()
     preferred = Path(named) if named else platformdirs.user_cache_path("gen-profile", appauthor=False)

@@ -60,7 +60,7 @@ def find_compiler() -> Compiler:
 def _named_compiler(text: str) -> Compiler:
     command = (*shlex.split(text), *FLAGS)
     reported = _run((command[0], "--version"), folder=None, environment=None)
-    return Compiler(command=command, identity="\n".join((text, *FLAGS, reported)))
+    return Compiler(command=command, identity="\n".join((text, *FLAGS, sys.platform, machine(), reported)))
 
 
 def _zig_compiler() -> Compiler:

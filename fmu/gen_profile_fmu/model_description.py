@@ -33,7 +33,7 @@ LOG_CATEGORIES = {
     "logStatusWarning": "warnings",
     "logStatusError": "errors and discarded steps",
 }
-_STRUCTURED = re.compile(r"\w+(\.\w+)*", re.ASCII)
+_STRUCTURED = re.compile(r"\w+(\.\w+)*|der\(\w+\)", re.ASCII)
 
 
 def model_identifier(plant: Plant) -> str:

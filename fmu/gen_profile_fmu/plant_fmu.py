@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import io
 import tempfile
 import uuid
@@ -12,6 +11,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import attrs
+import fmpy
 
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Plant
@@ -75,15 +75,11 @@ def plant_fmu(plant: Plant, on_build: Callable[[], None] | None = None) -> Plant
     sources = _sources(plant)
     compiler = find_compiler()
     name = f"{sources.model_identifier}-{_key(sources, compiler)[:32]}"
-    for cache in cache_folders():
-        if is_intact(cache / name):
-            return _plant_fmu(sources, cache / name)
-    if on_build is not None:
-        on_build()
     refusals = []
     for cache in cache_folders():
         try:
-            write_entry(cache / name, _build(sources, compiler, cache))
+            if not is_intact(cache / name):
+                write_entry(cache / name, _build(sources, compiler, cache, on_build))
         except OSError as error:
             refusals.append(f"{cache}: {error.strerror or error}")
         else:
@@ -110,18 +106,20 @@ def _sources(plant: Plant) -> _Sources:
 
 
 def _fmi_headers() -> dict[str, str]:
-    """FMI's own headers, which FMPy brings along; found without importing it."""
-    spec = importlib.util.find_spec("fmpy")
-    assert spec is not None and spec.submodule_search_locations
-    folder = Path(spec.submodule_search_locations[0]) / "c-code"
+    """Read FMI's own headers, which FMPy brings along."""
+    folder = Path(fmpy.__file__).parent / "c-code"
     return {name: (folder / name).read_text(encoding="utf-8") for name in _FMI_HEADERS}
 
 
-def _build(sources: _Sources, compiler: Compiler, cache: Path) -> dict[str, bytes]:
+def _build(
+    sources: _Sources, compiler: Compiler, cache: Path, on_build: Callable[[], None] | None
+) -> dict[str, bytes]:
     """Compile and pack, in a folder that is gone afterwards."""
     cache.mkdir(parents=True, exist_ok=True, mode=0o700)
-    library = _library_name(sources.model_identifier)
+    library = Path("binaries", fmpy.platform, sources.model_identifier + fmpy.sharedLibraryExtension)
     with tempfile.TemporaryDirectory(dir=cache, prefix="build-") as folder:
+        if on_build is not None:
+            on_build()
         for name, text in sources.code.items():
             Path(folder, name).write_text(text, encoding="utf-8", newline="\n")
         compile_library(compiler, Path(folder), library.name, zig_cache=cache / "zig")
@@ -130,12 +128,6 @@ def _build(sources: _Sources, compiler: Compiler, cache: Path) -> dict[str, byte
             library.as_posix(): Path(folder, library.name).read_bytes(),
         }
     return {**files, f"{sources.model_identifier}.fmu": _archive(files)}
-
-
-def _library_name(identifier: str) -> Path:
-    from fmpy import platform, sharedLibraryExtension  # noqa: PLC0415  costs 90 ms, and is not needed to find an entry
-
-    return Path("binaries", platform, identifier + sharedLibraryExtension)
 
 
 def _archive(files: Mapping[str, bytes]) -> bytes:

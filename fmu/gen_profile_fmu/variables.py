@@ -176,7 +176,7 @@ def _axis_variables(
 def _unactuated(plant: Plant, *, rate: bool) -> tuple[Variable, ...]:
     return tuple(
         Variable(
-            name=f"{coordinate.name}.rate" if rate else coordinate.name,
+            name=f"der({coordinate.name})" if rate else coordinate.name,
             description="rate of an unactuated coordinate" if rate else "unactuated coordinate",
             unit=f"{coordinate.unit}/s" if rate else coordinate.unit,
             kind=Kind.OUTPUT,

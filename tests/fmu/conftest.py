@@ -1,0 +1,51 @@
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gen_profile.plants.plant import Plant
+from gen_profile.plants.registry import find_plant
+from gen_profile.profile import Profile
+from gen_profile_fmu.cosimulation import PlantCosimulation
+from gen_profile_fmu.plant_fmu import PlantFmu, plant_fmu
+
+
+@pytest.fixture(scope="session")
+def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One cache for the tests of a process, so that each FMU is compiled once."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(autouse=True)
+def cache(shared_cache: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Keep the tests out of the user's cache."""
+    monkeypatch.setenv("GEN_PROFILE_CACHE", str(shared_cache))
+    monkeypatch.delenv("GEN_PROFILE_CC", raising=False)
+    return shared_cache
+
+
+@pytest.fixture(scope="session")
+def crane() -> Plant:
+    return find_plant("double-pendulum-crane")
+
+
+@pytest.fixture
+def fmu(crane: Plant) -> PlantFmu:
+    return plant_fmu(crane)
+
+
+@pytest.fixture
+def cosimulation(crane: Plant) -> Iterator[PlantCosimulation]:
+    with PlantCosimulation(crane) as open_cosimulation:
+        yield open_cosimulation
+
+
+@pytest.fixture(scope="session")
+def quintic() -> Profile:
+    """0.3 m in 3 s, at rest at both ends."""
+    distance, duration = 0.3, 3.0
+    shape = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0]) * distance / duration ** np.arange(6)
+    return Profile(
+        knots=[0.0, duration], coefficients=shape.reshape(1, 6, 1), target=[distance], method="quintic"
+    )
