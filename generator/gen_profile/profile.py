@@ -82,12 +82,13 @@ class Profile:
     @property
     def axes(self) -> int:
         """Number of actuated axes."""
-        return self.coefficients.shape[2]
+        return int(self.coefficients.shape[2])
 
     @property
     def start(self) -> Array:
         """Position at time 0, shape (axes,)."""
-        return self.coefficients[0, 0]
+        start: Array = self.coefficients[0, 0]
+        return start
 
     def derivative(self, times: Array, order: int) -> Array:
         """Evaluate a derivative by its order (0 = position), right-continuous, shape (times, axes)."""
@@ -117,8 +118,9 @@ class Profile:
         length = np.diff(self.knots)[:, None]
         local = length * np.linspace(0.0, 1.0, points)
         coefficients = polynomial.polyder(np.moveaxis(self.coefficients, 1, 0), order)[:, :, None, :]
-        values = np.asarray(polynomial.polyval(local[:, :, None], coefficients, tensor=False))
-        return (self.knots[:-1, None] + local).ravel(), values.reshape(-1, self.axes)
+        values: Array = np.asarray(polynomial.polyval(local[:, :, None], coefficients, tensor=False))
+        times: Array = self.knots[:-1, None] + local
+        return times.ravel(), values.reshape(-1, self.axes)
 
     def payload_hash(self) -> str:
         """SHA-256 of the numbers, in hexadecimal: the identity of the motion, whatever format carries it."""
@@ -137,14 +139,10 @@ def grid_length(duration: float, cycle_time: float) -> int:
 def grid_times(cycles: int, cycle_time: float) -> Array:
     """List the times ``k * cycle_time`` for k = 0 … cycles, each the double nearest to the decimal product.
 
-    Integers divided by a power of ten are correctly rounded, products with a rounded cycle are not.
+    Python's division of two integers is correctly rounded, whatever their size.
     """
-    sign, digits, exponent = Decimal(repr(float(cycle_time))).as_tuple()
-    del sign
-    unit = int("".join(map(str, digits)))
-    shift = -int(exponent)
-    counts = np.arange(cycles + 1, dtype=np.float64) * unit
-    return np.asarray(counts / 10.0**shift if shift >= 0 else counts * 10.0**-shift)
+    numerator, denominator = Decimal(repr(float(cycle_time))).as_integer_ratio()
+    return np.array([k * numerator / denominator for k in range(cycles + 1)])
 
 
 @attrs.frozen(kw_only=True, eq=False)
