@@ -35,6 +35,7 @@ START_TOLERANCE = 1e-3  # m (or rad), the default
 VALUES_PER_LINE = 4
 QUANTITIES = ("position", "velocity", "acceleration")
 
+_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _NUMBER = re.compile(r"\s*[-+]?\d+(\.\d+)?([eE][-+]?\d+)?\s*", re.ASCII)
 
 
@@ -66,6 +67,10 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     """
     suffixes = _suffixes(target.axes)
     values = playback_block.match(content.decode("latin-1"), suffixes)
+    if not _NAME.fullmatch(values["block"].text):
+        raise ExportError(
+            f"line {values['block'].line}: {values['block'].text!r} stands where a name is due."
+        )
     columns = {
         quantity: np.column_stack([_array(values[quantity + suffix], values) for suffix in suffixes])
         for quantity in QUANTITIES

@@ -1,0 +1,150 @@
+"""What every format owes: replaying what it wrote gives the sampled motion back."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from motions import quintic, target
+
+from gen_profile.errors import ExportError
+from gen_profile.profile import SampledProfile, sample
+from gen_profile_exporters.registry import BUILT_IN, find_exporter
+
+AXES = {1: ("cart",), 2: ("bridge", "trolley")}
+MOVES = {1: quintic((0.1, 0.4)), 2: quintic((0.1, 0.4), (1.2, -0.7))}
+UNITS = ["m", "mm", "um", "deg", "counts"]
+
+bounded = settings(max_examples=60, deadline=None, derandomize=True)
+
+
+class Contract(NamedTuple):
+    """The units in which positions come back bit for bit, and whether the format counts in any unit."""
+
+    format: str
+    exact_units: tuple[str, ...]
+    counts: bool
+
+    def cycle_time(self, goal):
+        return goal.can.sync_period if self.format == "can" else goal.cycle_time
+
+    def half_count(self, unit):
+        return 0.5e-6 if self.counts or unit == "counts" else 0.0
+
+
+CONTRACTS = {
+    "csv": Contract("csv", exact_units=("m",), counts=False),
+    "plc": Contract("plc", exact_units=("m",), counts=False),
+    "can": Contract("can", exact_units=(), counts=True),
+}
+pytestmark = pytest.mark.parametrize("contract", [CONTRACTS[name] for name in BUILT_IN], ids=list(BUILT_IN))
+
+
+def round_trip(contract, profile, goal):
+    exporter = find_exporter(contract.format)
+    return exporter.replay(exporter.encode(profile, goal)[0].content, goal)
+
+
+def mutated(content, draw):
+    """Delete, double, alter or insert: bytes, or whole lines."""
+    kind = draw(
+        st.sampled_from(["cut", "delete", "double", "alter", "digit", "insert", "drop line", "double line"])
+    )
+    at = draw(st.integers(0, len(content)))
+    if kind == "cut":
+        return content[:at]
+    if kind == "delete":
+        return content[:at] + content[at + draw(st.integers(1, 20)) :]
+    if kind == "double":
+        end = at + draw(st.integers(1, 20))
+        return content[:end] + content[at:]
+    if kind == "alter":
+        return content[:at] + draw(st.binary(min_size=1, max_size=1)) + content[at + 1 :]
+    if kind == "digit":
+        return (
+            content[:at]
+            + draw(st.sampled_from([b"0", b"9", b".", b"-", b"E", b"e99", b",", b"n"]))
+            + content[at + 1 :]
+        )
+    if kind == "insert":
+        return content[:at] + draw(st.binary(min_size=1, max_size=4)) + content[at:]
+    lines = content.splitlines(keepends=True)
+    row = draw(st.integers(0, max(0, len(lines) - 1)))
+    return b"".join(
+        lines[:row] + (2 * lines[row : row + 1] if kind == "double line" else []) + lines[row + 1 :]
+    )
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("axes", [1, 2])
+def test_positions_come_back(contract, axes, unit, sign):
+    goal = target(*AXES[axes], unit=unit, sign=sign)
+    found = round_trip(contract, MOVES[axes], goal)
+    expected = sample(MOVES[axes], contract.cycle_time(goal))
+    assert found.cycle_time == contract.cycle_time(goal)
+    assert found.position.shape == expected.position.shape
+    if unit in contract.exact_units:
+        np.testing.assert_array_equal(found.position, expected.position)
+        assert found.payload_hash() == expected.payload_hash()
+    else:
+        error = np.abs(found.position - expected.position).max()
+        assert error <= contract.half_count(unit) + 1e-15
+    np.testing.assert_array_equal(found.resolution, 2 * contract.half_count(unit) * np.ones(axes))
+
+
+def test_derivatives_come_back_where_carried(contract):
+    goal = target(unit="um", sign=-1)
+    found = round_trip(contract, MOVES[1], goal)
+    expected = sample(MOVES[1], contract.cycle_time(goal))
+    for quantity in ("velocity", "acceleration", "jerk"):
+        values = getattr(found, quantity)
+        if values is not None:
+            np.testing.assert_allclose(values, getattr(expected, quantity), rtol=1e-14, atol=1e-15)
+
+
+def test_bytes_are_the_same_every_time(contract):
+    exporter = find_exporter(contract.format)
+    assert exporter.encode(MOVES[2], target(*AXES[2])) == exporter.encode(MOVES[2], target(*AXES[2]))
+
+
+def test_file_name_has_the_formats_suffix(contract):
+    (file,) = find_exporter(contract.format).encode(MOVES[1], target(name="bay 3.b"))
+    assert file.filename == f"bay 3.b{BUILT_IN[contract.format].suffix}"
+
+
+@bounded
+@given(
+    start=st.floats(-100, 100),
+    end=st.floats(-100, 100),
+    duration=st.floats(0.02, 2.0),
+    cycle=st.sampled_from(["0.001", "0.002", "0.004", "0.0125", "0.1"]),
+    sign=st.sampled_from([1, -1]),
+)
+def test_any_move_comes_back(contract, start, end, duration, cycle, sign):
+    goal = target(sign=sign, cycle_time=float(cycle), sync_period=float(cycle))
+    profile = quintic((start, end), duration=duration)
+    found = round_trip(contract, profile, goal)
+    expected = sample(profile, float(cycle))
+    assert found.cycle_time == float(cycle)
+    assert np.abs(found.position - expected.position).max() <= contract.half_count("m") * (1 + 1e-6)
+    np.testing.assert_array_equal(found.times, expected.times)
+
+
+@bounded
+@given(data=st.data())
+def test_a_mutated_file_is_refused_or_read_never_a_crash(contract, data):
+    exporter = find_exporter(contract.format)
+    goal = target(*AXES[2], cycle_time=0.05, sync_period=0.05)
+    content = exporter.encode(MOVES[2], goal)[0].content
+    for _ in range(data.draw(st.integers(1, 3))):
+        content = mutated(content, data.draw)
+    try:
+        found = exporter.replay(content, goal)
+    except ExportError as error:
+        assert str(error).endswith(".")
+        assert "\n" not in str(error)
+    else:
+        assert isinstance(found, SampledProfile)
+        assert np.isfinite(found.position).all()
