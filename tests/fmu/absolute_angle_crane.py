@@ -4,10 +4,13 @@ Both angles are counted from the vertical. Lagrange's equations of the two masse
 
     x1 = y − L1 sin φ1,   z1 = −L1 cos φ1,   x2 = x1 − L2 sin φ2,   z2 = z1 − L2 cos φ2
 
-with Rayleigh's dissipation ½ c1 φ̇1² + ½ c2 (φ̇2 − φ̇1)² are, in symmetric form,
+with Rayleigh's dissipation ½ c1 φ̇1² + ½ c2 (φ̇2 − φ̇1)² are, in symmetric form M φ̈ = f,
 
-    [ (m1+m2) L1²           m2 L1 L2 cos(φ1−φ2) ] [φ̈1]   [ (m1+m2) L1 (ÿ cos φ1 − g sin φ1) − m2 L1 L2 φ̇2² sin(φ1−φ2) − c1 φ̇1 + c2 (φ̇2−φ̇1) ]
-    [ m2 L1 L2 cos(φ1−φ2)   m2 L2²              ] [φ̈2] = [ m2 L2 (ÿ cos φ2 − g sin φ2) + m2 L1 L2 φ̇1² sin(φ1−φ2) − c2 (φ̇2−φ̇1)                ]
+    M = [ (m1+m2) L1²           m2 L1 L2 cos(φ1−φ2) ]
+        [ m2 L1 L2 cos(φ1−φ2)   m2 L2²              ]
+
+    f = [ (m1+m2) L1 (ÿ cos φ1 − g sin φ1) − m2 L1 L2 φ̇2² sin(φ1−φ2) − c1 φ̇1 + c2 (φ̇2−φ̇1) ]
+        [ m2 L2 (ÿ cos φ2 − g sin φ2) + m2 L1 L2 φ̇1² sin(φ1−φ2) − c2 (φ̇2−φ̇1)               ]
 
 A step of the cart's velocity is an infinitely short push: only the terms in ÿ count, M Δφ̇ = (…) Δv.
 """

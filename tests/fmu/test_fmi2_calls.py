@@ -1,0 +1,289 @@
+"""The binary at the level of FMI 2.0: call order, values, steps and what it exports."""
+
+import sys
+from ctypes import byref, c_char_p, c_double, c_int, c_uint
+
+import numpy as np
+import pytest
+from elftools.elf.elffile import ELFFile
+from fmpy import fmi2, read_model_description
+from fmu.slave import open_slave, status_of
+
+# what the axis does in most tests
+MOVE = [0.001 * k**2 for k in range(1, 30)]
+
+# the modes, in the order of the fixture `modes`, in which the standard (2.0.4, section 4.2.4) and this FMU allow a call
+ALLOWED = {
+    "fmi2SetupExperiment": "100000",
+    "fmi2EnterInitializationMode": "100000",
+    "fmi2ExitInitializationMode": "010000",
+    "fmi2DoStep": "001000",
+    "fmi2Terminate": "001100",
+    "fmi2SetReal": "111000",
+    "fmi2GetReal": "011111",
+    "fmi2GetRealStatus": "001110",
+    "fmi2GetBooleanStatus": "001110",
+    "fmi2Reset": "111111",
+    "fmi2CancelStep": "000000",
+}
+
+
+@pytest.fixture
+def slave(fmu):
+    with open_slave(fmu) as started:
+        yield started
+
+
+def last_message(slave):
+    return slave.messages[-1][2]
+
+
+class TestCallOrder:
+    @pytest.fixture
+    def modes(self, fmu, slave):
+        """How to bring a fresh instance into every mode of the standard's state machine."""
+
+        def instantiated():
+            slave.reset()
+
+        def initialization():
+            slave.reset()
+            slave.enterInitializationMode()
+
+        def step_complete():
+            slave.reset()
+            slave.initialise()
+
+        def step_failed():
+            step_complete()
+            slave.write(cart__setpoint=1e200)
+            assert status_of(slave.doStep, 0.0, 1e-3) == fmi2.fmi2Discard
+
+        def terminated():
+            step_complete()
+            slave.terminate()
+
+        def erroneous():
+            step_complete()
+            assert status_of(slave.doStep, 0.0, -1.0) == fmi2.fmi2Error
+
+        return [instantiated, initialization, step_complete, step_failed, terminated, erroneous]
+
+    @pytest.mark.parametrize("function", ALLOWED)
+    def test_is_enforced(self, slave, modes, function):
+        real, boolean = c_double(), c_int()
+        arguments = {
+            "fmi2SetupExperiment": (0, 0.0, 0.0, 0, 0.0),
+            "fmi2DoStep": (0.0, 1e-3, 1),
+            "fmi2SetReal": ((c_uint * 1)(0), 1, (c_double * 1)(0.5)),
+            "fmi2GetReal": ((c_uint * 1)(0), 1, (c_double * 1)()),
+            "fmi2GetRealStatus": (fmi2.fmi2LastSuccessfulTime, byref(real)),
+            "fmi2GetBooleanStatus": (fmi2.fmi2Terminated, byref(boolean)),
+        }.get(function, ())
+        found = ""
+        for enter in modes:
+            enter()
+            status = status_of(getattr(slave, function), slave.component, *arguments)
+            found += "1" if status == fmi2.fmi2OK else "0"
+            if status != fmi2.fmi2OK:
+                assert f"{function} must not be called in" in last_message(slave)
+        assert found == self.ALLOWED[function]
+
+    def test_after_an_error_nothing_goes_on_but_a_reset_helps(self, slave):
+        assert status_of(slave.doStep, 0.0, 0.0) == fmi2.fmi2Error
+        assert status_of(slave.doStep, 0.0, 1e-3) == fmi2.fmi2Error
+        slave.reset()
+        slave.initialise()
+        slave.doStep(0.0, 1e-3)
+
+    def test_no_instance_is_an_error(self, slave):
+        assert status_of(slave.fmi2DoStep, None, 0.0, 1e-3, 1) == fmi2.fmi2Error
+        slave.fmi2FreeInstance(None)
+
+
+class TestValues:
+    def test_start_values_are_those_of_the_model_description(self, fmu, slave):
+        slave.reset()
+        slave.enterInitializationMode()
+        found = dict(zip(slave.references, slave.read(), strict=True))
+        described = read_model_description(str(fmu.archive), validate=True).modelVariables
+        assert [variable.valueReference for variable in described] == list(slave.references.values())
+        for variable in described:
+            assert (variable.start is None) == (variable.causality == "output")
+            if variable.start is not None:
+                assert found[variable.name] == float(variable.start), variable.name
+
+    @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+    def test_must_be_finite(self, slave, value):
+        before = slave.read("cart.setpoint")
+        assert status_of(lambda: slave.write(cart__setpoint=value)) == fmi2.fmi2Error
+        assert last_message(slave).startswith("cart.setpoint must be finite")
+        assert slave.read("cart.setpoint") == before
+
+    @pytest.mark.parametrize(
+        ("name", "value"), [("m1", -1.0), ("L1", 201.0), ("tau", -1e-9), ("max_step", 0.0)]
+    )
+    def test_must_keep_their_bounds(self, slave, name, value):
+        slave.reset()
+        assert status_of(lambda: slave.write(**{name: value})) == fmi2.fmi2Error
+        assert last_message(slave).startswith(f"{name} must lie between")
+
+    def test_bounds_themselves_are_allowed(self, slave):
+        slave.write(L1=200.0, m1=1e-4)
+        assert slave.read("L1", "m1") == [200.0, 1e-4]
+
+    @pytest.mark.parametrize("name", ["theta1", "sway.payload", "cart.position"])
+    def test_outputs_cannot_be_set(self, slave, name):
+        assert status_of(slave.setReal, [slave.references[name]], [0.0]) == fmi2.fmi2Error
+        assert last_message(slave) == f"{name} is an output, it cannot be set."
+
+    @pytest.mark.parametrize("name", ["tau", "cart.start"])
+    def test_fixed_parameters_are_set_before_the_first_step_only(self, slave, name):
+        assert status_of(slave.setReal, [slave.references[name]], [0.0]) == fmi2.fmi2Error
+        slave.reset()
+        slave.enterInitializationMode()
+        slave.setReal([slave.references[name]], [0.5])
+        slave.exitInitializationMode()
+        assert slave.read(name) == [0.5]
+
+    def test_parameters_are_tunable_between_steps(self, slave):
+        slave.follow(MOVE, 0.0, 0.01)
+        (theta,) = slave.read("theta1")
+        slave.write(L1=0.8)
+        sway, height = slave.read("sway.hook", "height.hook")
+        np.testing.assert_allclose([sway, height], [0.8 * np.sin(theta), -0.8 * np.cos(theta)])
+
+    def test_the_start_position_shows_in_initialization_mode(self, slave):
+        slave.reset()
+        slave.enterInitializationMode()
+        slave.write(cart__start=0.25)
+        assert slave.read("cart.position") == [0.25]
+
+    @pytest.mark.parametrize("access", ["getReal", "setReal"])
+    def test_unknown_references_are_refused(self, slave, access):
+        arguments = ([999],) if access == "getReal" else ([999], [0.0])
+        assert status_of(getattr(slave, access), *arguments) == fmi2.fmi2Error
+        assert last_message(slave) == "There is no variable of reference 999."
+
+    @pytest.mark.parametrize("kind", ["Integer", "Boolean", "String"])
+    def test_there_are_no_variables_of_other_types(self, slave, kind):
+        value = c_char_p if kind == "String" else c_int
+        for function in (getattr(slave, f"fmi2Get{kind}"), getattr(slave, f"fmi2Set{kind}")):
+            slave.reset()
+            assert status_of(function, slave.component, (c_uint * 1)(0), 0, (value * 1)()) == fmi2.fmi2OK
+            assert status_of(function, slave.component, (c_uint * 1)(0), 1, (value * 1)()) == fmi2.fmi2Error
+            assert "every variable is a real" in last_message(slave)
+
+    @pytest.mark.parametrize("access", ["fmi2GetReal", "fmi2SetReal"])
+    def test_null_pointers_are_refused(self, slave, access):
+        for arguments in [(None, 1, (c_double * 1)()), ((c_uint * 1)(0), 1, None)]:
+            slave.reset()
+            slave.initialise()
+            assert status_of(getattr(slave, access), slave.component, *arguments) == fmi2.fmi2Error
+            assert last_message(slave) == f"{access} was given a null pointer."
+
+
+class TestSteps:
+    @pytest.mark.parametrize("step", [0.0, -1e-3, float("nan"), float("inf")])
+    def test_must_be_positive(self, slave, step):
+        assert status_of(slave.doStep, 0.0, step) == fmi2.fmi2Error
+        assert last_message(slave).startswith("The step size must be positive")
+
+    @pytest.mark.parametrize("time", [0.5, -1e-6, float("nan")])
+    def test_must_begin_where_the_last_one_ended(self, slave, time):
+        assert status_of(slave.doStep, time, 1e-3) == fmi2.fmi2Error
+        assert last_message(slave).startswith("The step begins at")
+
+    def test_may_be_added_up_in_floats(self, slave):
+        time = 0.0
+        for _ in range(3000):
+            slave.doStep(time, 0.01)
+            time += 0.01
+
+    def test_must_not_lead_beyond_the_stop_time(self, slave):
+        slave.reset()
+        slave.setupExperiment(startTime=1.0, stopTime=1.3)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        for k in range(3):
+            slave.doStep(1.0 + k * 0.1, 0.1)
+        assert status_of(slave.doStep, 1.3, 0.1) == fmi2.fmi2Error
+        assert "beyond the stop time" in last_message(slave)
+
+    @pytest.mark.parametrize("times", [(float("nan"), None), (0.0, float("inf")), (1.0, 0.5)])
+    def test_need_a_sensible_experiment(self, slave, times):
+        slave.reset()
+        start, stop = times
+        assert status_of(lambda: slave.setupExperiment(startTime=start, stopTime=stop)) == fmi2.fmi2Error
+
+    def test_may_vary_in_length(self, slave, fmu):
+        slave.write(max_step=1e-3)
+        rows = slave.follow(MOVE, 0.0, 0.01)
+        slave.reset()
+        slave.initialise()
+        time, position = 0.0, 0.0
+        for setpoint in MOVE:  # each step in two of 4 and 6 ms, through the same straight line
+            slave.follow([position + 0.4 * (setpoint - position)], time, 0.004)
+            row = slave.follow([setpoint], time + 0.004, 0.006)[-1]
+            time, position = time + 0.01, setpoint
+        free = slice(slave.references["theta1"], None)
+        np.testing.assert_allclose(row[free], rows[-1][free], rtol=1e-11, atol=1e-13)
+
+    def test_that_end_in_infinity_are_discarded_and_undone(self, slave):
+        before = slave.follow(MOVE, 0.0, 0.01)[-1]
+        time = len(MOVE) * 0.01
+        slave.write(cart__setpoint=1e200)
+        assert status_of(slave.doStep, time, 0.01) == fmi2.fmi2Discard
+        assert "no longer finite" in last_message(slave)
+        assert slave.getRealStatus(fmi2.fmi2LastSuccessfulTime) == pytest.approx(time)
+        changed = slave.references["cart.setpoint"]
+        after = slave.read()
+        assert after[changed] == 1e200
+        assert after[:changed] + after[changed + 1 :] == before[:changed] + before[changed + 1 :]
+
+    def test_too_fine_an_integration_is_refused(self, slave):
+        slave.reset()
+        slave.initialise(tau=1e-12)
+        assert status_of(slave.doStep, 0.0, 0.01) == fmi2.fmi2Error
+        assert "raise max_step or tau" in last_message(slave)
+
+    def test_status_of_steps_in_the_background_is_not_known(self, slave):
+        for call in (slave.fmi2GetStatus, slave.fmi2GetIntegerStatus, slave.fmi2GetStringStatus):
+            value = c_char_p() if call == slave.fmi2GetStringStatus else c_int()
+            assert status_of(call, slave.component, fmi2.fmi2PendingStatus, byref(value)) == fmi2.fmi2Discard
+        assert slave.getBooleanStatus(fmi2.fmi2Terminated) is False
+        assert status_of(slave.getRealStatus, fmi2.fmi2Terminated) == fmi2.fmi2Discard
+        assert status_of(slave.getBooleanStatus, fmi2.fmi2LastSuccessfulTime) == fmi2.fmi2Discard
+
+    def test_there_are_no_derivatives(self, slave):
+        one, real = (c_uint * 1)(0), (c_double * 1)()
+        order = (c_int * 1)(1)
+        for name, arguments in {
+            "fmi2SetRealInputDerivatives": (one, 1, order, real),
+            "fmi2GetRealOutputDerivatives": (one, 1, order, real),
+            "fmi2GetDirectionalDerivative": (one, 1, one, 1, real, real),
+        }.items():
+            assert status_of(getattr(slave, name), slave.component, *arguments) == fmi2.fmi2Error
+            assert "derivatives" in last_message(slave)
+
+
+def test_version_and_platform(slave):
+    assert slave.getVersion() == "2.0"
+    assert slave.getTypesPlatform() == "default"
+
+
+def test_only_fmi_functions_are_exported(fmu):
+    assert sys.platform == "linux", "This test reads ELF files."
+    (library,) = (fmu.folder / "binaries").glob("*/*.so")
+    with library.open("rb") as file:
+        elf = ELFFile(file)
+        symbols = list(elf.get_section_by_name(".dynsym").iter_symbols())
+        needed = {tag.needed for tag in elf.get_section_by_name(".dynamic").iter_tags("DT_NEEDED")}
+    defined = {
+        symbol.name
+        for symbol in symbols
+        if symbol["st_shndx"] != "SHN_UNDEF" and symbol["st_info"]["bind"] != "STB_LOCAL"
+    }
+    common_and_cosimulation = {name for name in dir(fmi2.FMU2Slave) if name.startswith("fmi2")}
+    assert defined == common_and_cosimulation
+    assert needed <= {"libc.so.6", "libm.so.6", "ld-linux-x86-64.so.2"}
