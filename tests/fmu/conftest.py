@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmu.slave import FMU2LoggedSlave, open_slave
 
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
@@ -33,6 +34,12 @@ def crane() -> Plant:
 @pytest.fixture
 def fmu(crane: Plant) -> PlantFmu:
     return plant_fmu(crane)
+
+
+@pytest.fixture
+def slave(fmu: PlantFmu) -> Iterator[FMU2LoggedSlave]:
+    with open_slave(fmu) as started:
+        yield started
 
 
 @pytest.fixture

@@ -11,6 +11,9 @@ from fmpy.fmi1 import FMICallException
 
 from gen_profile_fmu.plant_fmu import PlantFmu
 
+# setpoints that most tests follow
+MOVE = [0.001 * k**2 for k in range(1, 30)]
+
 
 class FMU2LoggedSlave(fmi2.FMU2Slave):
     """FMPy's slave, by variable names, with messages as (status, category, text).
@@ -49,6 +52,10 @@ class FMU2LoggedSlave(fmi2.FMU2Slave):
     def _free(self, address):
         self.allocated.remove(address)
         fmpy.free(address)
+
+    @property
+    def last_message(self) -> str:
+        return self.messages[-1][2]
 
     def start(self, **values: float) -> FMU2LoggedSlave:
         """Instantiate and initialise."""

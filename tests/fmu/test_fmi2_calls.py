@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 from elftools.elf.elffile import ELFFile
 from fmpy import fmi2, read_model_description
-from fmu.slave import open_slave, status_of
+from fmu.slave import MOVE, status_of
 
-# what the axis does in most tests
-MOVE = [0.001 * k**2 for k in range(1, 30)]
-
-# the modes, in the order of the fixture `modes`, in which the standard (2.0.4, section 4.2.4) and this FMU allow a call
+# in which of the fixture `modes` the standard (2.0.4, section 4.2.4) allows a call
 ALLOWED = {
     "fmi2SetupExperiment": "100000",
     "fmi2EnterInitializationMode": "100000",
@@ -26,16 +23,6 @@ ALLOWED = {
     "fmi2Reset": "111111",
     "fmi2CancelStep": "000000",
 }
-
-
-@pytest.fixture
-def slave(fmu):
-    with open_slave(fmu) as started:
-        yield started
-
-
-def last_message(slave):
-    return slave.messages[-1][2]
 
 
 class TestCallOrder:
@@ -86,8 +73,8 @@ class TestCallOrder:
             status = status_of(getattr(slave, function), slave.component, *arguments)
             found += "1" if status == fmi2.fmi2OK else "0"
             if status != fmi2.fmi2OK:
-                assert f"{function} must not be called in" in last_message(slave)
-        assert found == self.ALLOWED[function]
+                assert f"{function} must not be called in" in slave.last_message
+        assert found == ALLOWED[function]
 
     def test_after_an_error_nothing_goes_on_but_a_reset_helps(self, slave):
         assert status_of(slave.doStep, 0.0, 0.0) == fmi2.fmi2Error
@@ -117,7 +104,7 @@ class TestValues:
     def test_must_be_finite(self, slave, value):
         before = slave.read("cart.setpoint")
         assert status_of(lambda: slave.write(cart__setpoint=value)) == fmi2.fmi2Error
-        assert last_message(slave).startswith("cart.setpoint must be finite")
+        assert slave.last_message.startswith("cart.setpoint must be finite")
         assert slave.read("cart.setpoint") == before
 
     @pytest.mark.parametrize(
@@ -126,7 +113,7 @@ class TestValues:
     def test_must_keep_their_bounds(self, slave, name, value):
         slave.reset()
         assert status_of(lambda: slave.write(**{name: value})) == fmi2.fmi2Error
-        assert last_message(slave).startswith(f"{name} must lie between")
+        assert slave.last_message.startswith(f"{name} must lie between")
 
     def test_bounds_themselves_are_allowed(self, slave):
         slave.write(L1=200.0, m1=1e-4)
@@ -135,7 +122,7 @@ class TestValues:
     @pytest.mark.parametrize("name", ["theta1", "sway.payload", "cart.position"])
     def test_outputs_cannot_be_set(self, slave, name):
         assert status_of(slave.setReal, [slave.references[name]], [0.0]) == fmi2.fmi2Error
-        assert last_message(slave) == f"{name} is an output, it cannot be set."
+        assert slave.last_message == f"{name} is an output, it cannot be set."
 
     @pytest.mark.parametrize("name", ["tau", "cart.start"])
     def test_fixed_parameters_are_set_before_the_first_step_only(self, slave, name):
@@ -163,7 +150,7 @@ class TestValues:
     def test_unknown_references_are_refused(self, slave, access):
         arguments = ([999],) if access == "getReal" else ([999], [0.0])
         assert status_of(getattr(slave, access), *arguments) == fmi2.fmi2Error
-        assert last_message(slave) == "There is no variable of reference 999."
+        assert slave.last_message == "There is no variable of reference 999."
 
     @pytest.mark.parametrize("kind", ["Integer", "Boolean", "String"])
     def test_there_are_no_variables_of_other_types(self, slave, kind):
@@ -172,7 +159,7 @@ class TestValues:
             slave.reset()
             assert status_of(function, slave.component, (c_uint * 1)(0), 0, (value * 1)()) == fmi2.fmi2OK
             assert status_of(function, slave.component, (c_uint * 1)(0), 1, (value * 1)()) == fmi2.fmi2Error
-            assert "every variable is a real" in last_message(slave)
+            assert "every variable is a real" in slave.last_message
 
     @pytest.mark.parametrize("access", ["fmi2GetReal", "fmi2SetReal"])
     def test_null_pointers_are_refused(self, slave, access):
@@ -180,19 +167,19 @@ class TestValues:
             slave.reset()
             slave.initialise()
             assert status_of(getattr(slave, access), slave.component, *arguments) == fmi2.fmi2Error
-            assert last_message(slave) == f"{access} was given a null pointer."
+            assert slave.last_message == f"{access} was given a null pointer."
 
 
 class TestSteps:
     @pytest.mark.parametrize("step", [0.0, -1e-3, float("nan"), float("inf")])
     def test_must_be_positive(self, slave, step):
         assert status_of(slave.doStep, 0.0, step) == fmi2.fmi2Error
-        assert last_message(slave).startswith("The step size must be positive")
+        assert slave.last_message.startswith("The step size must be positive")
 
     @pytest.mark.parametrize("time", [0.5, -1e-6, float("nan")])
     def test_must_begin_where_the_last_one_ended(self, slave, time):
         assert status_of(slave.doStep, time, 1e-3) == fmi2.fmi2Error
-        assert last_message(slave).startswith("The step begins at")
+        assert slave.last_message.startswith("The step begins at")
 
     def test_may_be_added_up_in_floats(self, slave):
         time = 0.0
@@ -208,7 +195,7 @@ class TestSteps:
         for k in range(3):
             slave.doStep(1.0 + k * 0.1, 0.1)
         assert status_of(slave.doStep, 1.3, 0.1) == fmi2.fmi2Error
-        assert "beyond the stop time" in last_message(slave)
+        assert "beyond the stop time" in slave.last_message
 
     @pytest.mark.parametrize("times", [(float("nan"), None), (0.0, float("inf")), (1.0, 0.5)])
     def test_need_a_sensible_experiment(self, slave, times):
@@ -234,7 +221,7 @@ class TestSteps:
         time = len(MOVE) * 0.01
         slave.write(cart__setpoint=1e200)
         assert status_of(slave.doStep, time, 0.01) == fmi2.fmi2Discard
-        assert "no longer finite" in last_message(slave)
+        assert "no longer finite" in slave.last_message
         assert slave.getRealStatus(fmi2.fmi2LastSuccessfulTime) == pytest.approx(time)
         changed = slave.references["cart.setpoint"]
         after = slave.read()
@@ -245,7 +232,7 @@ class TestSteps:
         slave.reset()
         slave.initialise(tau=1e-12)
         assert status_of(slave.doStep, 0.0, 0.01) == fmi2.fmi2Error
-        assert "raise max_step or tau" in last_message(slave)
+        assert "raise max_step or tau" in slave.last_message
 
     def test_status_of_steps_in_the_background_is_not_known(self, slave):
         for call in (slave.fmi2GetStatus, slave.fmi2GetIntegerStatus, slave.fmi2GetStringStatus):
@@ -264,7 +251,7 @@ class TestSteps:
             "fmi2GetDirectionalDerivative": (one, 1, one, 1, real, real),
         }.items():
             assert status_of(getattr(slave, name), slave.component, *arguments) == fmi2.fmi2Error
-            assert "derivatives" in last_message(slave)
+            assert "derivatives" in slave.last_message
 
 
 def test_version_and_platform(slave):

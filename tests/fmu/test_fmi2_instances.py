@@ -4,20 +4,7 @@ from ctypes import byref, c_char, c_size_t, c_void_p
 
 import pytest
 from fmpy import fmi2, read_model_description
-from fmu.slave import FMU2LoggedSlave, open_slave, status_of
-
-# what the axis does in most tests
-MOVE = [0.001 * k**2 for k in range(1, 30)]
-
-
-@pytest.fixture
-def slave(fmu):
-    with open_slave(fmu) as started:
-        yield started
-
-
-def last_message(slave):
-    return slave.messages[-1][2]
+from fmu.slave import MOVE, FMU2LoggedSlave, open_slave, status_of
 
 
 class TestStates:
@@ -78,7 +65,7 @@ class TestStates:
         for bytes_, length in [(text, size.value - 1), (foreign, size.value)]:
             arguments = (slave.component, bytes_, length, byref(copy))
             assert status_of(slave.fmi2DeSerializeFMUstate, *arguments) == fmi2.fmi2Error
-            assert last_message(slave) == "The bytes are not a state of this FMU."
+            assert slave.last_message == "The bytes are not a state of this FMU."
         arguments = (slave.component, state, text, size.value - 1)
         assert status_of(slave.fmi2SerializeFMUstate, *arguments) == fmi2.fmi2Error
         slave.freeFMUState(state)
@@ -91,7 +78,7 @@ class TestStates:
     def test_missing_memory_is_an_error(self, slave):
         slave.allocations_left = 0
         assert status_of(slave.getFMUState) == fmi2.fmi2Error
-        assert last_message(slave) == "There is no memory for an FMU state."
+        assert slave.last_message == "There is no memory for an FMU state."
 
 
 class TestInstances:
@@ -146,7 +133,7 @@ class TestInstances:
         with pytest.raises(Exception, match="Failed to instantiate"):
             slave.instantiate(callbacks=slave.own_callbacks)
         assert not slave.allocated
-        assert last_message(slave) == "There is no memory for an instance."
+        assert slave.last_message == "There is no memory for an instance."
         slave.freeLibrary()
 
     @pytest.mark.parametrize("missing", ["allocateMemory", "freeMemory"])
@@ -203,7 +190,7 @@ class TestLog:
     def test_unknown_categories_are_refused(self, slave):
         with pytest.raises(Exception, match="fmi2SetDebugLogging"):
             slave.setDebugLogging(True, ["logWeather"])
-        assert last_message(slave) == "fmi2SetDebugLogging was given an unknown log category."
+        assert slave.last_message == "fmi2SetDebugLogging was given an unknown log category."
 
     def test_categories_are_those_of_the_model_description(self, fmu, slave):
         described = read_model_description(str(fmu.archive)).logCategories
