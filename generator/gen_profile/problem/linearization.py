@@ -19,8 +19,8 @@ from gen_profile.problem.symbolic import Array, Function
 class Linearization:
     """The linear model at rest, in coordinates and in modes.
 
-    Mode k is q_u = modes[:, k] z_k(t). Its equation is ``z̈ + 2 ζ ω ż + ω² z = (modes⁻¹ input q̈_a)_k``, and it
-    shows in the sway of load l as ``(sway_gain modes)[l, k] z_k``.
+    Mode k is q_u = modes[:, k] z_k(t). Its equation is ``z̈ + 2 ζ ω ż + ω² z = (modes⁻¹ input q̈_a)_k``, and
+    it shows in the sway of load l as ``(sway_gain modes)[l, k] z_k``.
 
     Attributes
     ----------

@@ -56,18 +56,13 @@ def gradient(expression: Symbol, variables: Symbol) -> Symbol:
     return casadi.gradient(expression, variables)
 
 
-def directional(expression: Symbol, variables: Symbol, direction: Symbol) -> Symbol:
-    """∂expression/∂variables · direction."""
-    return casadi.jtimes(expression, variables, direction)
-
-
 def substitute(expression: Symbol, variables: Symbol, values: Symbol) -> Symbol:
     """Replace variables in an expression."""
     return casadi.substitute(expression, variables, values)
 
 
 def exp(expression: Symbol) -> Symbol:
-    """e to the expression."""
+    """Raise e to the expression."""
     return casadi.exp(expression)
 
 
@@ -76,14 +71,15 @@ def dot(a: Symbol, b: Symbol) -> Symbol:
     return casadi.dot(a, b)
 
 
-def depends_on(expression: Symbol, variables: Symbol) -> bool:
-    """Whether a variable appears in the expression at all."""
-    return bool(casadi.depends_on(expression, variables))
+def beside(left: Symbol, right: Symbol) -> Symbol:
+    """Join two matrices side by side."""
+    return casadi.horzcat(left, right)
 
 
-def is_structurally_zero(expression: Symbol) -> bool:
-    """Whether an entry is zero by its form, whatever the values."""
-    return bool(casadi.simplify(expression).is_zero())
+def entries(expression: Symbol) -> set[tuple[int, int]]:
+    """Row and column of every entry of a matrix that is not zero by its form."""
+    rows, columns = casadi.sparsify(casadi.simplify(expression)).sparsity().get_triplet()
+    return set(zip(rows, columns, strict=True))
 
 
 class Function:
@@ -135,8 +131,8 @@ class Function:
         inputs = [np.zeros((points, mapped.size1_in(i))) for i in range(mapped.n_in())]
         result = np.zeros((points, columns, rows))
         for i, array in enumerate(inputs):
-            buffer.set_arg(i, memoryview(array))
-        buffer.set_res(0, memoryview(result))
+            buffer.set_arg(i, memoryview(array))  # type: ignore[arg-type, call-arg]
+        buffer.set_res(0, memoryview(result))  # type: ignore[arg-type, call-arg]
 
         def evaluate(arguments: Sequence[Array], keep: object = (mapped, buffer)) -> Array:
             del keep  # the trigger holds raw pointers into both

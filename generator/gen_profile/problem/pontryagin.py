@@ -1,0 +1,198 @@
+"""Pontryagin's conditions of a problem: state and costate equations, ready for a boundary value solver.
+
+Names and the paper's symbols:
+
+===================  =========================================================================
+``x``                x: q_u, q̇_u, then y, ẏ, ÿ (and y⃛ for snap) of every axis, then S
+``u``                u: y⃛ (jerk), its derivative (snap), or ÿ_ref (reference, eq. 6)
+``costate``          λ
+``hamiltonian``      H = g + λᵀ f
+``running_cost``     g, eq. (26): effort + β (exp((γ d)²) − 1), d the end load's sway
+===================  =========================================================================
+
+The constant −β T leaves the optimum where it is, and keeps H from drowning in it.
+
+Everything is dimensionless: ``x = offset + scale ∘ x̂``, ``t = T s``, ``g = cost_scale ĝ``. The scales, the
+plant's parameters and the weights are run-time data, so one derivation serves every move of a plant.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import attrs
+import numpy as np
+
+from gen_profile.plants.plant import Plant
+from gen_profile.problem import symbolic as sym
+from gen_profile.problem.dynamics import Dynamics, dynamics
+from gen_profile.problem.problem import Effort
+from gen_profile.problem.sensitivities import sensitivities
+from gen_profile.problem.symbolic import Array, Function, Symbol
+
+SNAP_TIME = 0.02  # s; weighs snap against jerk: ½ (j² + (0.02 s · snap)²)
+
+
+@attrs.frozen(kw_only=True)
+class StateLayout:
+    """Where things stand in the state.
+
+    Attributes
+    ----------
+    n_u, m : int
+        Unactuated and actuated coordinates.
+    orders : int
+        States per axis: position, velocity, acceleration, and for snap the jerk.
+    sensitivity_rows : tuple of (parameter, plant row)
+        One entry per sensitivity state; rows count q_u, then q̇_u.
+    """
+
+    n_u: int
+    m: int
+    orders: int
+    sensitivity_rows: tuple[tuple[str, int], ...]
+
+    @property
+    def size(self) -> int:
+        """Number of states."""
+        return 2 * self.n_u + self.orders * self.m + len(self.sensitivity_rows)
+
+    def axis(self, order: int) -> slice:
+        """States that hold the given derivative of the axes' positions."""
+        first = 2 * self.n_u + order * self.m
+        return slice(first, first + self.m)
+
+    @property
+    def sensitivities(self) -> slice:
+        """States that hold sensitivities."""
+        return slice(2 * self.n_u + self.orders * self.m, self.size)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class OptimalitySystem:
+    """The dimensionless canonical equations ``ẑ' = F(ẑ)``, z = (x, λ), the control eliminated by ∂H/∂u = 0.
+
+    Attributes
+    ----------
+    plant : Plant
+    layout : StateLayout
+    flow : Function
+        Points ẑ (points, 2 n) and data (1, …) → (points, 2 n, 1 + 2 n): F, and beside it ∂F/∂ẑ.
+    quantities : Function
+        The same → (points, 2 + m + 2 loads, 1) in SI units: H, g, the highest derivative of every axis that
+        the state's chain of integrators ends in (jerk, or snap), sway and angle of every load.
+    """
+
+    plant: Plant
+    layout: StateLayout
+    flow: Function
+    quantities: Function
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Data:
+    """Run-time data of an `OptimalitySystem`; see the module docstring for the scales.
+
+    Attributes
+    ----------
+    parameters : (parameters,) array
+    beta, gamma : float
+    tau : float
+        Any positive number where the drive is ideal.
+    duration, cost_scale : float
+    offset, scale : (n,) arrays
+    """
+
+    parameters: Array
+    beta: float
+    gamma: float
+    tau: float
+    duration: float
+    cost_scale: float
+    offset: Array
+    scale: Array
+
+    def row(self) -> Array:
+        """Order the data as the functions take them, shape (1, …)."""
+        weights = [self.beta, self.gamma, self.tau, self.duration, self.cost_scale]
+        return np.concatenate([self.parameters, weights, self.offset, self.scale])[None]
+
+
+@lru_cache(maxsize=8)
+def optimality_system(plant: Plant, desensitized: tuple[str, ...], effort: Effort) -> OptimalitySystem:
+    """Derive the canonical equations by CasADi's differentiation.
+
+    Parameters
+    ----------
+    plant : Plant
+    desensitized : tuple of str
+        Parameters whose sensitivities become states.
+    effort : str
+        ``"reference"`` brings the actuator's lag, eq. (6), into the state equations.
+    """
+    d = dynamics(plant)
+    weights = sym.symbols("weights", 5)
+    beta, gamma, tau, duration, cost_scale = sym.split(weights)
+    pendulum, pendulum_rate = sym.column([d.q_u, d.dq_u]), sym.column([d.dq_u, d.ddq_u])
+    by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
+    reached = [sensitivities(name, pendulum_rate, pendulum, by_name[name]) for name in desensitized]
+
+    axes = _axis_chain(d, effort, tau)
+    x = sym.column([pendulum, *axes.chain, *(s.states for s in reached)])
+    f = sym.column([pendulum_rate, *axes.chain[1:], axes.top, *(s.rates for s in reached)])
+    end_sway = sym.split(d.sway)[-1]
+    g = axes.effort + beta * (sym.exp((gamma * end_sway) ** 2) - 1)
+
+    n = x.shape[0]
+    x_hat, costate = sym.symbols("x_hat", n), sym.symbols("costate", n)
+    offset, scale = sym.symbols("offset", n), sym.symbols("scale", n)
+    # f is affine and g quadratic in u: ∂H/∂u = 0 is a linear equation, and its solution the minimum
+    u_star = -cost_scale / axes.weight * sym.gradient(sym.dot(costate, duration * f / scale), axes.u)
+
+    def optimal(expression: Symbol) -> Symbol:
+        return sym.substitute(sym.substitute(expression, axes.u, u_star), x, offset + scale * x_hat)
+
+    hamiltonian = optimal(g / cost_scale + sym.dot(costate, duration * f / scale))
+    z = sym.column([x_hat, costate])
+    flow = sym.column([sym.gradient(hamiltonian, costate), -sym.gradient(hamiltonian, x_hat)])
+    quantities = [hamiltonian * cost_scale, optimal(sym.column([g, axes.top, d.sway, d.angle]))]
+    inputs = {"z": z, "data": sym.column([d.p, weights, offset, scale])}
+    layout = StateLayout(
+        n_u=len(plant.unactuated),
+        m=len(plant.actuated),
+        orders=len(axes.chain),
+        sensitivity_rows=tuple(
+            (name, row) for name, s in zip(desensitized, reached, strict=True) for row in s.rows
+        ),
+    )
+    return OptimalitySystem(
+        plant=plant,
+        layout=layout,
+        flow=Function("flow", inputs, sym.beside(flow, sym.jacobian(flow, z))),
+        quantities=Function("quantities", inputs, sym.column(quantities)),
+    )
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _AxisChain:
+    """The driven axes' integrators: position upward in `chain`, then `top`, which the control moves."""
+
+    u: Symbol
+    chain: list[Symbol]
+    top: Symbol
+    effort: Symbol
+    weight: float  # ∂² effort / ∂u²
+
+
+def _axis_chain(d: Dynamics, effort: Effort, tau: Symbol) -> _AxisChain:
+    u = sym.symbols("u", d.q_a.shape[0])
+    chain, half_square = [d.q_a, d.dq_a, d.ddq_a], sym.dot(u, u) / 2
+    if effort == "jerk":
+        return _AxisChain(u=u, chain=chain, top=u, effort=half_square, weight=1.0)
+    if effort == "reference":
+        return _AxisChain(u=u, chain=chain, top=(u - d.ddq_a) / tau, effort=half_square, weight=1.0)
+    jerk = sym.symbols("dddq_a", d.q_a.shape[0])
+    weight = SNAP_TIME**2
+    return _AxisChain(
+        u=u, chain=[*chain, jerk], top=u, effort=sym.dot(jerk, jerk) / 2 + weight * half_square, weight=weight
+    )

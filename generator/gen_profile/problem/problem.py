@@ -1,0 +1,77 @@
+"""The optimal control problem of one motion task; knows no algorithm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import attrs
+
+from gen_profile.plants.plant import Plant
+from gen_profile.spec import Spec
+
+Effort = Literal["jerk", "snap", "reference"]
+
+
+@attrs.frozen(kw_only=True)
+class Problem:
+    """Plant, move, actuator, robustness and cost of eq. (26), in SI units.
+
+    Attributes
+    ----------
+    plant : Plant
+    parameters : mapping of str to float
+        Value of every plant parameter.
+    start, target : tuple of float
+        Rest positions of every axis in m (or rad).
+    duration : float
+        s.
+    tau : float or None
+        Time constant in s of a first-order actuator (eq. 6); None for an ideal one.
+    desensitized : tuple of str
+        Parameters whose sensitivities shall vanish at both ends.
+    effort : str
+        What the cost's quadratic term weighs.
+    sway_weight : float
+        β.
+    sway_scale : float or None
+        γ in 1/m; None lets the solver take `AUTO_SWAY` over the peak sway of the same move with β = 0.
+    """
+
+    plant: Plant
+    parameters: Mapping[str, float]
+    start: tuple[float, ...]
+    target: tuple[float, ...]
+    duration: float
+    tau: float | None
+    desensitized: tuple[str, ...]
+    effort: Effort
+    sway_weight: float
+    sway_scale: float | None
+
+    @property
+    def distance(self) -> tuple[float, ...]:
+        """Signed distance of every axis."""
+        return tuple(b - a for a, b in zip(self.start, self.target, strict=True))
+
+
+# With sway_scale = "auto" β and γ mean for every move what they mean for the paper's: the sway counts in
+# units of its peak, and the effort in units of its root mean square, of the same move with β = 0.
+AUTO_SWAY = 1.45  # γ · peak sway: the paper's 50/m · 29.4 mm, rounded
+AUTO_EFFORT = 1.0655  # m/s³, root mean square jerk of the paper's move with β = 0
+
+
+def problem_of(spec: Spec) -> Problem:
+    """State the problem that a spec asks to solve."""
+    return Problem(
+        plant=spec.machine(),
+        parameters=spec.plant.parameters,
+        start=spec.move.start,
+        target=spec.move.target,
+        duration=spec.move.duration,
+        tau=spec.actuator.tau,
+        desensitized=tuple(spec.robustness.uncertain) if spec.robustness.method == "sensitivity" else (),
+        effort=spec.cost.effort,
+        sway_weight=spec.cost.sway_weight,
+        sway_scale=spec.cost.sway_scale,
+    )

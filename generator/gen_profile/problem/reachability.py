@@ -1,0 +1,50 @@
+"""Which end conditions of a linear system are independent of one another.
+
+State i at time 1 of ``x' = A x + B u`` from rest is ∫ rᵢ(1 − s) u(s) ds with rᵢ(t) = (e^{At} B)ᵢ. A
+condition whose rᵢ is a combination of other conditions' holds by itself once those hold; asking for it again
+would make the boundary value problem singular. So do first-order sensitivities: zero sensitivity of two
+undamped modes to one rope length already is zero sensitivity to the other. Modes much faster than the move
+behave alike: they follow statically.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm
+
+from gen_profile.profile import Array
+
+SAMPLES = 256
+DEPENDENT = 1e-8  # share of rᵢ outside the span of the others below which its condition is implied
+
+
+def independent_states(A: Array, B: Array) -> Array:
+    """Choose, in the order of the rows, states that inputs can bring to given values independently.
+
+    Parameters
+    ----------
+    A : (n, n) array
+        In units in which the horizon is 1.
+    B : (n, m) array
+
+    Returns
+    -------
+    (n,) array of bool
+    """
+    step = expm(A / SAMPLES)
+    responses = np.empty((SAMPLES + 1, *B.shape))
+    responses[0] = B
+    for k in range(SAMPLES):
+        responses[k + 1] = step @ responses[k]
+    rows = responses.transpose(1, 0, 2).reshape(len(A), -1)
+    basis = np.empty((0, rows.shape[1]))
+    chosen = np.zeros(len(A), dtype=bool)
+    for i, row in enumerate(rows):
+        size = np.linalg.norm(row)
+        outside = row
+        for _ in range(2):  # once more, against cancellation
+            outside = outside - (basis @ outside) @ basis
+        chosen[i] = size > 0.0 and np.linalg.norm(outside) > DEPENDENT * size
+        if chosen[i]:
+            basis = np.vstack([basis, outside / np.linalg.norm(outside)])
+    return chosen

@@ -1,0 +1,195 @@
+"""Indirect method: Pontryagin's conditions solved as a two-point boundary value problem.
+
+1. With β = 0 the problem is nearly linear, and Newton's method converges from a quintic move; where angles
+are
+   large it is led there through shorter moves.
+2. From there to the β asked for, at once where that converges, else through smaller ones.
+3. Mesh intervals on which the Hamiltonian drifts or the canonical equations are missed are split.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import attrs
+import numpy as np
+from numpy.polynomial import polynomial
+
+from gen_profile.problem.pontryagin import optimality_system
+from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
+from gen_profile.profile import Array
+from gen_profile.solvers.canonical import Canonical, canonical_problem, independence
+from gen_profile.solvers.collocation import GAUSS, INTERPOLATION, STAGES, Trajectory, stage_times
+from gen_profile.solvers.newton import solve_newton
+from gen_profile.solvers.refinement import defect, refine
+from gen_profile.solvers.solution import Optimum, Solution, Status
+
+METHOD = "indirect"
+INTERVALS = 30
+SMALLEST_ADVANCE = 1.0 / 64.0  # of a continuation's share, which runs from 0 to 1
+BETA_DECADES = 8.0  # from share 0 to 1
+HORIZONTAL = np.pi / 2.0
+SMALL_ANGLE = np.pi / 3.0  # what a rope angle may reach in the linear model before nonlinearity is blamed
+
+
+def solve(problem: Problem) -> Solution:
+    """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
+
+    Returns
+    -------
+    Solution
+        Never raises for a problem that has none: the status says why.
+    """
+    system = optimality_system(problem.plant, problem.desensitized, problem.effort)
+    quiet = canonical_problem(problem, system)
+    independent, redundant = independence(quiet)
+    if redundant:
+        kept = tuple(name for name in problem.desensitized if name not in redundant)
+        solution = solve(attrs.evolve(problem, desensitized=kept))
+        return attrs.evolve(solution, problem=problem, redundant=redundant)
+    quiet = attrs.evolve(quiet, final=np.where(independent, quiet.final, np.nan))
+    try:
+        quiet, guess = quiet.rescaled(quiet.iterate(_guess(quiet)))
+    except np.linalg.LinAlgError:
+        return _failure(
+            problem, Status.DIVERGED, 1, "The end conditions contradict one another; allow more time."
+        )
+
+    linear_angle = quiet.greatest_angle(guess)
+    approach = _advance(lambda share: attrs.evolve(quiet, final=share * quiet.final), guess)
+    if approach.reached < 1.0 or quiet.greatest_angle(approach.solution) > HORIZONTAL:
+        return _too_hard(problem, approach.iterations, linear_angle)
+    quiet, guess = quiet.rescaled(approach.solution)
+    weighted = _with_sway_cost(problem, quiet, guess)
+    climb = _advance(lambda share: _lighter(weighted, share), guess)
+    iterations = approach.iterations + climb.iterations
+    if climb.reached < 1.0:
+        share = 10.0 ** (BETA_DECADES * (climb.reached - 1.0))
+        cure = f"Lower cost.sway_weight (about {problem.sway_weight * share:.2g} works)"
+        cure += "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
+        return _failure(problem, Status.DIVERGED, iterations, cure)
+    refined = refine(weighted, climb.solution)
+    best = refined.solution or climb.solution
+    if weighted.greatest_angle(best) > HORIZONTAL:
+        return _too_hard(problem, iterations, linear_angle)
+    return Solution(
+        status=Status.CONVERGED,
+        method=METHOD,
+        problem=problem,
+        optimum=_optimum(weighted, best),
+        iterations=iterations + refined.iterations,
+        residual=refined.residual or climb.residual,
+    )
+
+
+def _guess(canonical: Canonical) -> Trajectory:
+    """Move by a quintic, everything else at rest."""
+    layout = canonical.system.layout
+    quintic = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+
+    def states(times: Array) -> Array:
+        z = np.zeros((len(times), 2 * layout.size))
+        for order in range(layout.orders):
+            values = polynomial.polyval(times, polynomial.polyder(quintic, order))
+            z[:, layout.axis(order)] = values[:, None] * canonical.final[layout.axis(0)]
+        return z
+
+    mesh = np.linspace(0.0, 1.0, INTERVALS + 1)
+    stages = states(stage_times(mesh)).reshape(INTERVALS, STAGES, -1)
+    return Trajectory(mesh=mesh, nodes=states(mesh), stages=stages)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Advance:
+    """How far a continuation came, and its solution there."""
+
+    solution: Trajectory
+    reached: float
+    iterations: int
+    residual: float
+
+
+def _advance(problem_at: Callable[[float], Canonical], guess: Trajectory) -> _Advance:
+    """Solve the problem at share 1, through problems nearer to 0 where Newton needs them."""
+    reached, advance, iterations, residual = 0.0, 1.0, 0, float("inf")
+    while reached < 1.0 and advance >= SMALLEST_ADVANCE:
+        target = min(1.0, reached + advance)
+        outcome = solve_newton(problem_at(target).iterate, guess)
+        iterations += outcome.iterations
+        if outcome.solution is None:
+            advance /= 2.0
+        else:
+            reached, guess, residual, advance = target, outcome.solution, outcome.residual, 2.0 * advance
+    return _Advance(solution=guess, reached=reached, iterations=iterations, residual=residual)
+
+
+def _with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) -> Canonical:
+    values = quiet.quantities(solution.points)
+    m, loads = quiet.system.layout.m, len(problem.plant.loads)
+    beta, gamma = problem.sway_weight, problem.sway_scale
+    if gamma is None:
+        gamma = AUTO_SWAY / float(np.abs(values[:, 2 + m + loads - 1]).max())
+        beta *= 2.0 * _integral(solution, values[:, 1]) / AUTO_EFFORT**2
+    return attrs.evolve(quiet, data=attrs.evolve(quiet.data, beta=beta, gamma=gamma))
+
+
+def _lighter(weighted: Canonical, share: float) -> Canonical:
+    """Pose the same problem with a β that is smaller by decades."""
+    beta = weighted.data.beta * 10.0 ** (BETA_DECADES * (share - 1.0))
+    return attrs.evolve(weighted, data=attrs.evolve(weighted.data, beta=beta))
+
+
+def _integral(solution: Trajectory, values: Array) -> float:
+    """∫ over dimensionless time of values at the collocation points, shape (points,)."""
+    weights = np.diff(solution.mesh)[:, None] * GAUSS.b
+    return float(weights.ravel() @ values)
+
+
+def _optimum(canonical: Canonical, solution: Trajectory) -> Optimum:
+    """Return to SI units."""
+    system, data = canonical.system, canonical.data
+    layout, n, m = system.layout, system.layout.size, system.layout.m
+    loads = len(system.plant.loads)
+    at_nodes, at_points = canonical.quantities(solution.nodes), canonical.quantities(solution.points)
+    knots = data.duration * solution.mesh
+    top = np.concatenate(
+        [at_nodes[:-1, None, 2 : 2 + m], at_points[:, 2 : 2 + m].reshape(-1, STAGES, m)], axis=1
+    )
+    unit_time = np.einsum("pv,kva->kpa", INTERPOLATION, top)
+    hamiltonian = at_nodes[:, 0]
+    return Optimum(
+        knots=knots,
+        states=data.offset + data.scale * solution.nodes[:, :n],
+        costates=data.cost_scale * data.duration / data.scale * solution.nodes[:, n:],
+        hamiltonian=hamiltonian,
+        top_derivative=unit_time / np.diff(knots)[:, None, None] ** np.arange(STAGES + 1)[:, None],
+        top_order=layout.orders,
+        sway=at_points[:, 2 + m : 2 + m + loads],
+        angle=canonical.greatest_angle(solution),
+        cost=data.duration * (_integral(solution, at_points[:, 1]) + data.beta),
+        sway_weight=data.beta,
+        sway_scale=data.gamma,
+        defect=float(defect(canonical, solution).max()),
+        hamiltonian_variation=float(np.ptp(hamiltonian) / np.abs(hamiltonian).max()),
+    )
+
+
+def _too_hard(problem: Problem, iterations: int, linear_angle: float) -> Solution:
+    """Blame the swing where the linear model leaves the small angles, else the solver."""
+    if linear_angle < SMALL_ANGLE:
+        return _failure(problem, Status.DIVERGED, iterations, "Allow more time: raise move.duration.")
+    enough = problem.duration * np.sqrt(linear_angle / SMALL_ANGLE)
+    cure = f"Allow about {enough:.2g} s (move.duration), or shorten the move."
+    return _failure(problem, Status.SWINGS_TOO_FAR, iterations, cure)
+
+
+def _failure(problem: Problem, status: Status, iterations: int, cure: str) -> Solution:
+    return Solution(
+        status=status,
+        method=METHOD,
+        problem=problem,
+        optimum=None,
+        iterations=iterations,
+        residual=float("inf"),
+        cure=cure,
+    )

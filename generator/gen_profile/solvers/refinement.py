@@ -1,0 +1,66 @@
+"""Mesh refinement: split the intervals on which a collocated solution is not accurate enough."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile.profile import Array
+from gen_profile.solvers.canonical import Canonical
+from gen_profile.solvers.collocation import GAUSS, STAGES, Trajectory
+from gen_profile.solvers.newton import NewtonOutcome, solve_newton
+
+MAX_INTERVALS = 480
+DRIFT_TOLERANCE = 1e-7  # of the Hamiltonian over an interval, relative to its size
+DEFECT_TOLERANCE = 1e-2  # see `defect`; what it costs in sway is of its square
+
+
+def refine(canonical: Canonical, solution: Trajectory) -> NewtonOutcome:
+    """Split intervals until the Hamiltonian is constant and the equations are met.
+
+    Stops where the mesh would grow beyond `MAX_INTERVALS`.
+    """
+    iterations, residual = 0, 0.0
+    while True:
+        drift, missed = _drift(canonical, solution), defect(canonical, solution)
+        parts = np.maximum(
+            (drift / DRIFT_TOLERANCE) ** (1.0 / (2 * STAGES)), (missed / DEFECT_TOLERANCE) ** (1.0 / STAGES)
+        )
+        parts = np.clip(np.ceil(parts), 1, 4).astype(int)
+        if parts.max() == 1 or parts.sum() > MAX_INTERVALS:
+            break
+        outcome = solve_newton(canonical.iterate, solution.on(_split(solution.mesh, parts)))
+        iterations += outcome.iterations
+        if outcome.solution is None:
+            break
+        solution, residual = outcome.solution, outcome.residual
+    return NewtonOutcome(solution=solution, iterations=iterations, residual=residual)
+
+
+def _drift(canonical: Canonical, solution: Trajectory) -> Array:
+    """Change of H over each interval, relative to its size; none for the exact solution."""
+    hamiltonian = canonical.quantities(solution.nodes)[:, 0]
+    return np.asarray(np.abs(np.diff(hamiltonian)) / np.abs(hamiltonian).max())
+
+
+def _split(mesh: Array, parts: NDArray[np.intp]) -> Array:
+    """Divide every interval into equal parts."""
+    pieces = [
+        np.linspace(a, b, n, endpoint=False) for a, b, n in zip(mesh[:-1], mesh[1:], parts, strict=True)
+    ]
+    return np.concatenate([*pieces, mesh[-1:]])
+
+
+def defect(canonical: Canonical, solution: Trajectory) -> Array:
+    """Greatest miss of the canonical equations between collocation points, on each interval.
+
+    Per interval, as a share of each unknown's greatest value.
+    """
+    local = np.convolve(np.concatenate([[0.0], GAUSS.c, [1.0]]), [0.5, 0.5], "valid")[:, None]
+    powers, coefficients = np.arange(STAGES + 1), solution.coefficients()
+    values = np.einsum("tp,kps->kts", local**powers, coefficients)
+    slopes = np.einsum("tp,kps->kts", powers[1:] * local ** powers[:-1], coefficients[:, 1:])
+    flow = canonical.system.flow(values.reshape(-1, solution.size), canonical.data.row())[:, :, 0]
+    miss = np.abs(slopes - np.diff(solution.mesh)[:, None, None] * flow.reshape(values.shape))
+    largest = np.abs(solution.nodes).max(axis=0)
+    return np.asarray((miss / np.where(largest > 0.0, largest, 1.0)).max(axis=(1, 2)))

@@ -1,0 +1,116 @@
+"""What every solver returns: the optimal motion, or the reason why there is none."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import attrs
+
+from gen_profile.errors import GenProfileError, InfeasibleProblem, SolverDiverged
+from gen_profile.problem.problem import Problem
+from gen_profile.profile import Array
+
+
+class Status(Enum):
+    """How a solve ended, each with its sentence."""
+
+    CONVERGED = "The optimality conditions are met."
+    SWINGS_TOO_FAR = "The load would have to swing beyond the horizontal."
+    DIVERGED = "Newton's method found no motion that meets the optimality conditions."
+
+
+ERRORS: dict[Status, type[GenProfileError]] = {
+    Status.SWINGS_TOO_FAR: InfeasibleProblem,
+    Status.DIVERGED: SolverDiverged,
+}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Optimum:
+    """States, costates and what follows from them, in SI units on a mesh.
+
+    Attributes
+    ----------
+    knots : (intervals + 1,) array
+        Times of the mesh's nodes in s.
+    states, costates : (intervals + 1, n) arrays
+        In the order of `gen_profile.problem.pontryagin.StateLayout`, at the nodes.
+    hamiltonian : (intervals + 1,) array
+        H at the nodes, without the constant β of the running cost.
+    top_derivative : (intervals, points, m) array
+        The highest derivative of every axis' position that is a polynomial of degree points − 1 on each
+        interval, as coefficients in the interval's own time in s, lowest power first: the jerk, or the snap.
+    top_order : int
+        Which derivative that is: 3 or 4.
+    sway : (points, loads) array
+        Sway at the collocation points in m.
+    angle : float
+        Greatest rope angle at the collocation points in rad.
+    cost : float
+        Eq. (26), in the units of the effort squared times s.
+    sway_weight, sway_scale : float
+        β and γ as they entered the cost, automatic ones resolved.
+    defect : float
+        Greatest relative amount by which the solution misses the canonical equations between collocation
+        points.
+    hamiltonian_variation : float
+        Greatest relative change of H along the nodes; zero for the exact solution.
+    """
+
+    knots: Array
+    states: Array
+    costates: Array
+    hamiltonian: Array
+    top_derivative: Array
+    top_order: int
+    sway: Array
+    angle: float
+    cost: float
+    sway_weight: float
+    sway_scale: float
+    defect: float
+    hamiltonian_variation: float
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Solution:
+    """Outcome of a solve.
+
+    Attributes
+    ----------
+    status : Status
+    method : str
+        Name of the solver.
+    problem : Problem
+    optimum : Optimum or None
+        None exactly when the status is no success.
+    iterations : int
+        Newton iterations, all stages together.
+    residual : float
+        Relative size of the last Newton step.
+    redundant : tuple of str
+        Uncertain parameters whose sensitivities vanish with those of the others, so that they were left out.
+    cure : str
+        What to change, a sentence; empty on success.
+    """
+
+    status: Status
+    method: str
+    problem: Problem
+    optimum: Optimum | None
+    iterations: int
+    residual: float
+    redundant: tuple[str, ...] = ()
+    cure: str = ""
+
+    def raise_for_status(self) -> Optimum:
+        """Return the optimum.
+
+        Raises
+        ------
+        InfeasibleProblem, SolverDiverged
+            With the status's sentence and what to change.
+        """
+        if self.optimum is None:
+            raise ERRORS[self.status](f"{self.status.value} {self.cure}".strip())
+        return self.optimum
