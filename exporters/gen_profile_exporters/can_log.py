@@ -28,7 +28,7 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.profile import Profile, SampledProfile
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.setpoints import counts, plausible_cycle_time, sampled
+from gen_profile_exporters.setpoints import counts, in_si, plausible_cycle_time, sampled
 
 CHANNEL = "can0"
 SYNC = 0x080
@@ -110,8 +110,8 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
     return SampledProfile(
         cycle_time=_cycle_time(syncs),
-        position=np.array(setpoints) / counts_per_si + 0.0,
-        resolution=1.0 / np.abs(counts_per_si),
+        position=in_si(np.array(setpoints, dtype=np.float64), counts_per_si),
+        resolution=in_si(np.ones(len(target.axes)), np.abs(counts_per_si)),
     )
 
 
@@ -150,7 +150,7 @@ def _check_load(target: Target) -> None:
     bits = frame_bits(0) + axes * (frame_bits(POSITION_BYTES) + frame_bits(FEEDBACK_BYTES))
     shortest = bits / (MOST_LOAD * can.bitrate)
     if Decimal(repr(can.sync_period)) < shortest:
-        fitting = shortest.quantize(Decimal(1).scaleb(shortest.adjusted() - 1), ROUND_CEILING)
+        fitting = shortest.quantize(Decimal(1).scaleb(shortest.adjusted() - 1), ROUND_CEILING).normalize()
         raise ExportError(
             f"can.sync_period: {axes} axes every {can.sync_period:g} s load a bus of {can.bitrate} bit/s by "
             f"{bits / can.sync_period / can.bitrate:.0%} (limit {MOST_LOAD:.0%}); set {fitting:f} s or more, "

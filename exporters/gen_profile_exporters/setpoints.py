@@ -61,7 +61,7 @@ def axis_table(motion: SampledProfile, axes: tuple[AxisScale, ...]) -> AxisTable
     """Convert a sampled motion, with all its derivatives, to axis units."""
     factor = np.array([axis.factor for axis in axes])
     position, velocity, acceleration, jerk = (
-        _times(values, factor)
+        in_axis_units(values, factor)
         for values in (motion.position, motion.velocity, motion.acceleration, motion.jerk)
         if values is not None
     )
@@ -82,11 +82,11 @@ def motion_of(table: AxisTable, axes: tuple[AxisScale, ...]) -> SampledProfile:
     factor = np.array([axis.factor for axis in axes])
     return SampledProfile(
         cycle_time=table.cycle_time,
-        position=_by(table.position, factor),
-        velocity=_by(table.velocity, factor),
-        acceleration=_by(table.acceleration, factor),
-        jerk=None if table.jerk is None else _by(table.jerk, factor),
-        resolution=np.array([1.0 / abs(axis.factor) if axis.unit == COUNTS else 0.0 for axis in axes]),
+        position=in_si(table.position, factor),
+        velocity=in_si(table.velocity, factor),
+        acceleration=in_si(table.acceleration, factor),
+        jerk=None if table.jerk is None else in_si(table.jerk, factor),
+        resolution=in_si(np.array([float(axis.unit == COUNTS) for axis in axes]), np.abs(factor)),
     )
 
 
@@ -100,7 +100,7 @@ def counts(position: Array, axis: AxisScale, cycle_time: float) -> NDArray[np.in
     ExportError
         A count does not fit 32 bits, which is what drives take (CiA 402, object 607Ah).
     """
-    rounded = np.rint(_times(position, np.array(axis.counts_per_si)))
+    rounded = np.rint(in_axis_units(position, np.array(axis.counts_per_si)))
     outside = np.flatnonzero((rounded < INT32.min) | (rounded > INT32.max))
     if outside.size:
         first = int(outside[0])
@@ -129,12 +129,14 @@ def plausible_cycle_time(cycle_time: float, line: int) -> float:
 # Adding 0.0 turns a negative zero into a plain one: equal motions get equal texts and hashes.
 
 
-def _times(values: Array, factor: Array) -> Array:
+def in_axis_units(values: Array, factor: Array) -> Array:
+    """Multiply by axis units per SI unit, broadcast."""
     with np.errstate(over="ignore", invalid="ignore"):
         return _finite(np.asarray(values * factor + 0.0))
 
 
-def _by(values: Array, factor: Array) -> Array:
+def in_si(values: Array, factor: Array) -> Array:
+    """Divide by axis units per SI unit, broadcast."""
     with np.errstate(over="ignore", invalid="ignore"):
         return _finite(np.asarray(values / factor + 0.0))
 
