@@ -68,7 +68,7 @@ class PlantCosimulation:
         self._slave = _load(self._fmu, self._callbacks, self._messages)
         variables = self._fmu.variables
         self._setpoints = _references(variables.references("SETPOINT"))
-        observed = ("Q_A", "DQ_A", "SWAY", "ANGLE")
+        observed = ("Q_A", "DQ_A", "Q_U", "DQ_U", "SWAY", "ANGLE")
         self._outputs = _references(
             [reference for block in observed for reference in variables.references(block)]
         )
@@ -143,8 +143,16 @@ class PlantCosimulation:
             raise CosimulationError(
                 f"The FMU of plant {self._plant.type} could not go on: {reason}"
             ) from error
-        position, velocity, sway, angle = np.split(samples, self._output_blocks, axis=1)
-        return Response(times=steps.times, position=position, velocity=velocity, sway=sway, angle=angle)
+        position, velocity, q_u, dq_u, sway, angle = np.split(samples, self._output_blocks, axis=1)
+        return Response(
+            times=steps.times,
+            position=position,
+            velocity=velocity,
+            q_u=q_u,
+            dq_u=dq_u,
+            sway=sway,
+            angle=angle,
+        )
 
     def _plant_values(self, parameters: Mapping[str, float]) -> dict[str, float]:
         known = {parameter.name for parameter in self._plant.parameters}
