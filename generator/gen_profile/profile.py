@@ -130,7 +130,7 @@ class Profile:
 def grid_length(duration: float, cycle_time: float) -> int:
     """Count the cycles that cover a duration, in decimal arithmetic.
 
-    ``0.3 / 0.1`` is a little less than 3 in floats; the decimal texts of the two numbers divide exactly.
+    ``0.07 / 0.005`` is a little more than 14 in floats; the decimal texts of the two numbers divide exactly.
     """
     quotient = Decimal(repr(float(duration))) / Decimal(repr(float(cycle_time)))
     return int(quotient.to_integral_value(rounding=ROUND_CEILING))
