@@ -1,0 +1,214 @@
+"""Where FMUs are kept, and that whatever happens to the cache, a good FMU comes out."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import attrs
+import pytest
+
+from gen_profile.errors import CosimulationError
+from gen_profile_fmu import cache as cache_module
+from gen_profile_fmu.cache import cache_folders, is_intact, write_entry
+from gen_profile_fmu.cosimulation import PlantCosimulation
+from gen_profile_fmu.plant_fmu import plant_fmu
+
+BUILD = """
+from gen_profile.plants.registry import find_plant
+from gen_profile_fmu.plant_fmu import plant_fmu
+print(plant_fmu(find_plant("double-pendulum-crane")).archive)
+"""
+
+
+@pytest.fixture
+def builds(crane):
+    """Get the crane's FMU and count the compilations."""
+
+    class Builds:
+        count = 0
+
+        def get(self):
+            def on_build():
+                self.count += 1
+
+            return plant_fmu(crane, on_build)
+
+    return Builds()
+
+
+@pytest.fixture
+def new_cache(tmp_path, cache, monkeypatch):
+    """An empty cache, but for what Zig has built of the C library."""
+    folder = tmp_path / "new"
+    folder.mkdir()
+    (cache / "zig").mkdir(exist_ok=True)
+    (folder / "zig").symlink_to(cache / "zig")
+    monkeypatch.setenv("GEN_PROFILE_CACHE", str(folder))
+    return folder
+
+
+@pytest.fixture
+def temporary_folder(tmp_path, monkeypatch):
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    return folder
+
+
+def works(crane):
+    with PlantCosimulation(crane):
+        return True
+
+
+class TestPlantFmu:
+    def test_is_compiled_once(self, new_cache, builds):
+        first = builds.get()
+        assert (builds.count, builds.get(), builds.count) == (1, first, 1)
+        assert first.archive.is_relative_to(new_cache)
+        assert first.archive.is_file()
+
+    def test_is_compiled_again_for_other_equations(self, new_cache, builds, crane):
+        first = builds.get()
+        other = attrs.evolve(
+            crane, parameters=(attrs.evolve(crane.parameters[0], nominal=0.3), *crane.parameters[1:])
+        )
+        second = plant_fmu(other)
+        assert first.guid != second.guid
+        assert first.folder != second.folder
+
+    @pytest.mark.parametrize("kind", ["*.xml", "*.fmu", "binaries/*/*", "checksums.json"])
+    @pytest.mark.parametrize("damage", ["truncated", "missing", "altered"])
+    def test_is_mended(self, new_cache, builds, crane, kind, damage):
+        folder = builds.get().folder
+        (path,) = folder.glob(kind)
+        content = path.read_bytes()
+        if damage == "missing":
+            path.unlink()
+        else:
+            # a new file: a library that is loaded must not change under the process
+            path.unlink()
+            half = len(content) // 2
+            path.write_bytes(
+                content[:half] if damage == "truncated" else content[:half] + b"?" + content[half + 1 :]
+            )
+        builds.get()
+        assert builds.count == 2
+        assert path.read_bytes() == content
+        assert works(crane)
+
+    @pytest.mark.parametrize("listing", ["[]", "{}", '"text"', "3", '{"gone": "00"}', "\udcff"])
+    def test_is_mended_when_its_listing_is_something_else(self, new_cache, builds, listing):
+        path = builds.get().folder / "checksums.json"
+        path.write_bytes(listing.encode("utf-8", errors="surrogateescape"))
+        builds.get()
+        assert builds.count == 2
+
+    def test_is_the_same_in_every_folder(self, new_cache, cache, builds, monkeypatch):
+        archives = [builds.get().archive]
+        monkeypatch.setenv("GEN_PROFILE_CACHE", str(new_cache / "deeper" / "folder"))
+        archives.append(builds.get().archive)
+        assert builds.count == 2
+        assert archives[0] != archives[1]
+        assert archives[0].read_bytes() == archives[1].read_bytes()
+
+    def test_is_built_by_two_processes_at_once(self, new_cache):
+        commands = [[sys.executable, "-c", BUILD]] * 2
+        processes = [
+            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) for command in commands
+        ]
+        results = [process.communicate() for process in processes]
+        assert [process.returncode for process in processes] == [0, 0], results
+        paths = {Path(words.decode().strip()) for words, _ in results}
+        assert len(paths) == 1
+        assert is_intact(paths.pop().parent)
+        assert not list(new_cache.glob("build-*"))
+
+    def test_needs_no_home(self, temporary_folder, builds, crane, monkeypatch):
+        """As for a user of a container whom the list of users does not know."""
+
+        def unknown(_):
+            raise KeyError("no such user")
+
+        for variable in ("HOME", "XDG_CACHE_HOME", "GEN_PROFILE_CACHE"):
+            monkeypatch.delenv(variable, raising=False)
+        monkeypatch.setattr("pwd.getpwuid", unknown)
+        assert builds.get().folder.is_relative_to(temporary_folder)
+        assert works(crane)
+
+    @pytest.mark.parametrize("obstacle", ["a file", "a folder that does not take files"])
+    def test_falls_back_when_the_cache_cannot_be_written(
+        self, obstacle, tmp_path, temporary_folder, builds, crane, monkeypatch
+    ):
+        named = tmp_path / "file" / "cache" if obstacle == "a file" else Path("/proc/self")
+        (tmp_path / "file").write_text("in the way")
+        monkeypatch.setenv("GEN_PROFILE_CACHE", str(named))
+        assert builds.get().folder.is_relative_to(temporary_folder)
+        builds.get()
+        assert builds.count == 1
+        assert works(crane)
+
+    def test_is_read_from_a_cache_that_cannot_be_written(self, new_cache, builds, monkeypatch):
+        first = builds.get()
+
+        def refuse(*_):
+            raise PermissionError(13, "Permission denied")
+
+        monkeypatch.setattr("gen_profile_fmu.plant_fmu.write_entry", refuse)
+        assert builds.get() == first
+
+    def test_says_where_it_could_not_be_written(self, tmp_path, builds, monkeypatch):
+        in_the_way = tmp_path / "file"
+        in_the_way.write_text("in the way")
+        monkeypatch.setenv("GEN_PROFILE_CACHE", str(in_the_way))
+        monkeypatch.setattr("tempfile.tempdir", str(in_the_way))
+        with pytest.raises(CosimulationError, match=r"There is no folder .*file: .*GEN_PROFILE_CACHE"):
+            builds.get()
+        assert builds.count == 0
+
+
+class TestCacheFolders:
+    def test_begin_with_the_users(self, monkeypatch):
+        monkeypatch.delenv("GEN_PROFILE_CACHE")
+        monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
+        first, *_ = cache_folders()
+        assert first.name == "gen-profile"
+
+    def test_are_private_among_temporary_files(self, temporary_folder):
+        *_, private = cache_folders()
+        assert private.stat().st_mode & 0o777 == 0o700
+        assert list(cache_folders())[-1] == private
+
+    @pytest.mark.parametrize("trap", ["open to others", "a link", "a file", "somebody else's"])
+    def test_do_not_trust_what_others_could_have_laid(self, temporary_folder, trap, monkeypatch):
+        private = temporary_folder / f"gen-profile-{os.getuid()}"
+        if trap == "a link":
+            elsewhere = temporary_folder / "elsewhere"
+            elsewhere.mkdir(mode=0o700)
+            private.symlink_to(elsewhere)
+        elif trap == "a file":
+            private.write_text("")
+        else:
+            private.mkdir()
+            private.chmod(0o777 if trap == "open to others" else 0o700)
+        if trap == "somebody else's":
+            user = os.getuid()
+            private.rename(temporary_folder / f"gen-profile-{user + 1}")
+            monkeypatch.setattr(os, "getuid", lambda: user + 1)
+        assert private not in list(cache_folders())
+        assert len(list(cache_folders())) == 1
+
+
+def test_an_entry_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    entry = tmp_path / "entry"
+    write_entry(entry, {"folder/file": b"old"})
+    assert is_intact(entry)
+
+    def fail(*_):
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(cache_module.Path, "replace", fail)
+    with pytest.raises(OSError, match="No space"):
+        write_entry(entry, {"folder/file": b"new"})
+    assert (entry / "folder" / "file").read_bytes() == b"old"
+    assert [path.name for path in (entry / "folder").iterdir()] == ["file"]
