@@ -16,7 +16,7 @@ PACKAGES = {
 
 
 def layers():
-    """Modules that the layers name, and those among them that need not exist."""
+    """Modules that the layers name, in their order."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
         "contracts"
     ]

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from decimal import Decimal
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -68,7 +69,7 @@ def test_it_stands_at_both_ends(profile, after, before):
 def test_segments_are_seen_from_within(profile, order):
     times, values = profile.within_segments(3, order)
     assert times.shape == (3 * (len(profile.knots) - 1),)
-    for k, (a, b) in enumerate(zip(profile.knots, profile.knots[1:], strict=False)):
+    for k, (a, b) in enumerate(pairwise(profile.knots)):
         np.testing.assert_allclose(times[3 * k : 3 * k + 3], [a, (a + b) / 2.0, b], rtol=1e-15)
         alone = PPoly(profile.coefficients[k, ::-1][:, None], [0.0, b - a])
         expected = alone([0.0, (b - a) / 2.0, b - a], nu=order)

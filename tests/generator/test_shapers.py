@@ -1,4 +1,6 @@
-"""Shapers against their defining equations, the paper's table and separately integrated equations of motion."""
+"""Shapers against their defining equations, the paper's table and separately integrated motion."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -104,9 +106,8 @@ def test_a_very_stiff_mode_costs_no_time():
 
 @pytest.mark.parametrize("duration", [0.5, 2.42, 2.4229])
 def test_a_move_shorter_than_the_delay_names_the_shortest_one(duration):
-    with pytest.raises(
-        InfeasibleProblem, match=r"move\.duration: the zvd shaper's delay is 2\.423 s .* more than 2\.423 s"
-    ):
+    cure = r"move\.duration: the zvd shaper's delay is 2\.423 s .* state more than 2\.423 s"
+    with pytest.raises(InfeasibleProblem, match=cure):
         shaped_profile("zvd", start=[0.0], target=[0.3], duration=duration, frequencies=FREQUENCIES)
 
 
@@ -125,7 +126,7 @@ def test_the_papers_table(name):
 
 
 def swing(profile, parameters, times):
-    """Sway of hook and payload by absolute angles, knot by knot so that no step straddles a jump of the jerk."""
+    """Sway of hook and payload by absolute angles; knot by knot, lest a step straddle a jump of the jerk."""
 
     def rates(time, x):
         push = profile.derivative(np.array([time]), 2)[0, 0]
@@ -133,7 +134,7 @@ def swing(profile, parameters, times):
 
     x, angles = np.zeros(4), np.empty((len(times), 2))
     stops = np.append(profile.knots, times[-1])
-    for a, b in zip(stops, stops[1:], strict=False):
+    for a, b in pairwise(stops):
         inside = (times >= a) & (times <= b)
         leg = solve_ivp(rates, (a, b), x, method="DOP853", rtol=1e-9, atol=1e-12, dense_output=True)
         angles[inside], x = leg.sol(times[inside]).T[:, :2], leg.y[:, -1]
@@ -155,7 +156,7 @@ def test_the_papers_sway(name):
 
 @pytest.mark.parametrize("name", SHAPERS)
 def test_the_linear_crane_stands_still_afterwards(name):
-    """ω-weighted response ∫ ÿ exp(jωt) dt of every mode at the end, which is what swings on."""
+    """Whatever a mode keeps swinging with is ∫ ÿ exp(jωt) dt."""
     profile = papers(name)
     nodes, weights = np.polynomial.legendre.leggauss(30)
     length = np.diff(profile.knots)
