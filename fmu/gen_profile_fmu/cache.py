@@ -23,18 +23,27 @@ _logger = logging.getLogger(__name__)
 
 
 def cache_folders() -> Iterator[Path]:
-    """Folders to look in and to write to, the preferred one first.
+    """List folders to look in and to write to, the preferred one first.
 
     That is what the environment variable `GEN_PROFILE_CACHE` names, else the cache folder of the user; then,
     for users without a home or with one that cannot be written, a private folder among the temporary files.
     """
     named = os.environ.get(ENVIRONMENT_VARIABLE, "").strip()
-    preferred = Path(named) if named else platformdirs.user_cache_path("gen-profile", appauthor=False)
-    if preferred.is_absolute() or named:
-        yield preferred.absolute()
-    private = _private_temporary_folder()
+    preferred = Path(named).absolute() if named else _users_folder()
+    if preferred is not None:
+        yield preferred
+    private = _private_temporary_folder()  # made only when the first folder will not do
     if private is not None:
         yield private
+
+
+def _users_folder() -> Path | None:
+    """Find the user's cache folder; None for a user without a home."""
+    try:
+        folder = platformdirs.user_cache_path("gen-profile", appauthor=False)
+    except RuntimeError:
+        return None
+    return folder if folder.is_absolute() else None  # "~" stays where some versions find no home
 
 
 def _private_temporary_folder() -> Path | None:
