@@ -190,7 +190,8 @@ def _axis(table: Table, plant: Plant | None, faults: Faults) -> Table:
     if plant is None:
         return {}
     names = [axis.name for axis in plant.actuated]
-    if len(names) == 1 and not any(isinstance(value, Mapping) for value in table.values()):
+    nameless = not any(key in names or isinstance(value, Mapping) for key, value in table.items())
+    if len(names) == 1 and nameless:
         table = {names[0]: table}
     for key in table:
         if key not in names:

@@ -1,0 +1,256 @@
+"""Every fault of a spec: found, placed, and all of them at once."""
+
+import datetime
+import re
+from copy import deepcopy
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gen_profile.errors import SpecError
+from gen_profile.spec_reading import preset_spec, spec_from_dict
+
+PAPER = preset_spec("paper").to_dict()
+MISSING = object()
+
+
+def with_value(place, value):
+    """Copy the paper's document with one value set or removed."""
+    document = deepcopy(PAPER)
+    *outer, key = place.split(".")
+    table = document
+    for step in outer:
+        table = table[step]
+    if value is MISSING:
+        del table[key]
+    else:
+        table[key] = value
+    return document
+
+
+def faults_of(document):
+    with pytest.raises(SpecError) as caught:
+        spec_from_dict(document)
+    assert "\n".join(caught.value.faults) == str(caught.value)
+    return caught.value.faults
+
+
+FAULTS = [
+    # what is missing
+    ("plant", MISSING, r"plant: the spec must state \[plant\]; a real machine has no default here\."),
+    ("move", MISSING, r"move: the spec must state \[move\]; .*\."),
+    ("plant", {}, r"plant\.type: must name a machine, found nothing .known: double-pendulum-crane.\."),
+    (
+        "move",
+        {"duration": 3.0},
+        r"move\.distance: required, but missing; state distance, or start and target\.",
+    ),
+    ("move.duration", MISSING, r"move\.duration: required, but missing\."),
+    # unknown words
+    ("pants", {}, r"pants: unknown key; did you mean 'plant'\?"),
+    (
+        "plant.type",
+        "double-pendulum-cran",
+        r"plant\.type: unknown machine 'double-pendulum-cran'; did you mean .*\?",
+    ),
+    ("plant.type", 3, r"plant\.type: must name a machine, found 3 .*\."),
+    ("plant.m3", 1.0, r"plant\.m3: unknown key .known: type, m1, m2, L1, L2, g, c1, c2.\."),
+    ("move.durations", 1.0, r"move\.durations: unknown key; did you mean 'duration'\?"),
+    ("limits.jrek", 1.0, r"limits\.jrek: unknown key; did you mean 'jerk'\?"),
+    ("check.residual", 1.0, r"check\.residual: unknown key; did you mean 'residual_sway'\?"),
+    ("check.default", True, r"check\.default: unknown key .*\."),
+    ("check.residual_sway.hok", 1.0, r"check\.residual_sway\.hok: unknown load; did you mean 'hook'\?"),
+    ("axis.crat", {}, r"axis\.crat: unknown axis; did you mean 'cart'\?"),
+    ("axis.cart.units", "mm", r"axis\.cart\.units: unknown key; did you mean 'unit'\?"),
+    (
+        "robustness.uncertain.L3",
+        0.1,
+        r"robustness\.uncertain\.L3: unknown parameter .known: m1, m2, L1, L2, g, c1, c2.\.",
+    ),
+    ("cost.effort", "jerky", r"cost\.effort: unknown value, found text 'jerky'; did you mean 'jerk'\?"),
+    ("axis.cart.unit", "inch", r"axis\.cart\.unit: unknown value, found text 'inch' .known: m, mm, .*"),
+    ("axis.cart.sign", 0, r"axis\.cart\.sign: unknown value, found 0 .known: 1, -1.\."),
+    ("axis.cart.sign", True, r"axis\.cart\.sign: unknown value, found true .*"),
+    # numbers that are none, or too large, or too small
+    ("plant.m1", -0.2, r"plant\.m1: must be a number from 0\.0001 to 1e\+06 kg, found -0\.2\."),
+    ("plant.m1", 0, r"plant\.m1: must be a number .*, found 0\."),
+    ("plant.L1", "0.47", r"plant\.L1: must be a number .*, found text '0\.47'\."),
+    ("plant.L1", float("nan"), r"plant\.L1: must be a number .*, found nan\."),
+    ("plant.L1", float("inf"), r"plant\.L1: must be a number .*, found inf\."),
+    ("plant.L1", True, r"plant\.L1: must be a number .*, found true\."),
+    ("plant.L1", 10**400, r"plant\.L1: must be a number .*, found a whole number of more than 18 digits\."),
+    ("plant.L1", 16**9999, r"plant\.L1: must be a number .*, found a whole number of more than 18 digits\."),
+    ("plant.L1", datetime.date(2024, 1, 1), r"plant\.L1: must be a number .*, found a date or time\."),
+    ("move.target", ["far"], r"move\.target: must be a finite number, found text 'far'\."),
+    ("move.target", [float("-inf")], r"move\.target: must be a finite number, found -inf\."),
+    ("move.target", [0.1, 0.2], r"move\.target: must hold one number per axis .1., found 2\."),
+    ("move.target", [], r"move\.target: must hold one number per axis .1., found 0\."),
+    (
+        "move.target",
+        [1e6],
+        r"move\.target\.0: must be at least -100000 and at most 100000, found 1000000\.0\.",
+    ),
+    ("move.start", {}, r"move\.start: must be a finite number, found a table\."),
+    ("move.target", [0.0], r"move\.distance: must not be zero on every axis\."),
+    ("move.distance", 0.3, r"move\.distance: state either distance, or start and target, not both\."),
+    ("move.duration", 0, r"move\.duration: must be at least 0\.001 and at most 100000, found 0\.0\."),
+    ("move.duration", -3.0, r"move\.duration: must be at least .*, found -3\.0\."),
+    ("move.duration", float("nan"), r"move\.duration: must be a finite number, found nan\."),
+    ("move.duration", "3 s", r"move\.duration: must be a finite number, found text '3 s'\."),
+    ("move.duration", [3.0], r"move\.duration: must be a finite number, found an array\."),
+    (
+        "move.duration",
+        "minimum",
+        r"move\.duration: \"minimum\" is not supported yet; state the duration in s\.",
+    ),
+    ("limits.jerk", 0, r"limits\.jerk: must be greater than 0, found 0\.0\."),
+    ("cost.sway_weight", -1, r"cost\.sway_weight: must be at least 0, found -1\.0\."),
+    ("check.residual_sway", 0, r"check\.residual_sway: must be a finite number greater than 0, found 0\."),
+    ("check.residual_sway", "3 mm", r"check\.residual_sway: must be a finite number .*, found text '3 mm'\."),
+    ("check.residual_sway.hook", -1, r"check\.residual_sway\.hook: must be a finite number .*, found -1\."),
+    (
+        "robustness.uncertain.L1",
+        1.5,
+        r"robustness\.uncertain\.L1: must be greater than 0 and at most 0\.9, found 1\.5\.",
+    ),
+    (
+        "robustness.uncertain.c1",
+        0.1,
+        r"robustness\.uncertain\.c1: its value is 0, so a relative range is empty\.",
+    ),
+    ("export.cycle_time", 0, r"export\.cycle_time: must be at least 1e-05 and at most 10, found 0\.0\."),
+    ("can.node", 128, r"can\.node: must be at least 1 and at most 127, found 128\."),
+    ("can.node", 1.5, r"can\.node: must be a whole number, found 1\.5\."),
+    ("can.node", 10**400, r"can\.node: must be at least 1 .*, found a whole number of more than 18 digits\."),
+    # things of another kind
+    ("move", 3, r"move: must be a table, found 3\."),
+    ("limits", [1], r"limits: must be a table, found an array\."),
+    ("axis.cart", "mm", r"axis\.cart: must be a table, found text 'mm'\."),
+    (
+        "robustness.uncertain",
+        ["L1"],
+        r"robustness\.uncertain: must be a table such as \{ L1 = 0\.2 \}, found an array\.",
+    ),
+    ("name", 7, r"name: must be text, found 7\."),
+    # what contradicts
+    ("actuator", {"type": "first-order"}, r"actuator\.tau: required with type = \"first-order\" .*\."),
+    ("actuator.tau", 0.1, r"actuator\.tau: only with type = \"first-order\"; .*\."),
+    ("cost.effort", "reference", r"cost\.effort: \"reference\" weighs the reference of a lagging drive .*\."),
+    ("robustness.uncertain", {}, r"robustness\.uncertain: required with method = \"sensitivity\", .*\."),
+    ("axis.cart.unit", "deg", r"axis\.cart\.unit: 'deg' does not measure an axis that moves in m\."),
+]
+
+
+@pytest.mark.parametrize(("place", "value", "sentence"), FAULTS, ids=[place for place, _, _ in FAULTS])
+def test_one_fault_is_one_sentence(place, value, sentence):
+    (fault,) = faults_of(with_value(place, value))
+    assert re.fullmatch(sentence, fault)
+
+
+NAMES = [
+    "*) END_PROGRAM (*",
+    "../escape",
+    "<script>alert(1)</script>",
+    "",
+    " ",
+    ".hidden",
+    "a" * 65,
+    "ends.",
+    "ends ",
+]
+NAMES += [
+    "line\nbreak",
+    "nul\0",
+    "slash/",
+    "back\\slash",
+    "quo'te",
+    'quo"te',
+    "Brücke",
+    "\x1b[31mred",
+    "name\n",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_that_could_break_out_of_a_comment_a_path_or_a_page(name):
+    (fault,) = faults_of(with_value("name", name))
+    assert fault.startswith("name: must be 1 to 64 letters, digits, dots, underscores, hyphens and spaces")
+    assert fault.isprintable()
+
+
+@pytest.mark.parametrize("name", ["a", "bay-3", "Bay 3.1_new", "7", "a" * 64])
+def test_names_that_are_fine(name):
+    assert spec_from_dict(with_value("name", name)).name == name
+
+
+def test_all_faults_are_told_at_once():
+    document = deepcopy(PAPER)
+    document |= {"name": "../x", "extra": 1, "can": {"node": 0}}
+    document["plant"] |= {"m1": -1, "L9": 1}
+    document["move"] = {"distance": "far", "duration": 0}
+    document["limits"] = {"jerk": float("nan"), "sawy": 1}
+    document["check"] = {"residual_sway": {"hook": -1, "hok": 1}}
+    places = [fault.partition(":")[0] for fault in faults_of(document)]
+    assert set(places) == {
+        "name", "extra", "can.node", "plant.m1", "plant.L9", "move.distance", "move.duration",
+        "limits.jerk", "limits.sawy", "check.residual_sway.hook", "check.residual_sway.hok",
+    }  # fmt: skip
+    assert len(places) == len(set(places))
+
+
+def test_an_unknown_machine_does_not_hide_the_other_faults():
+    document = with_value("plant.type", "tower")
+    document["move"] = {"distance": [1.0, 2.0], "duration": -1.0}
+    document["robustness"] = {"uncertain": {"radius": 7.0}, "order": 9}
+    document["check"] = {"residual_sway": -1.0}
+    places = {fault.partition(":")[0] for fault in faults_of(document)}
+    assert places == {
+        "plant.type", "move.duration", "robustness.uncertain.radius", "robustness.order",
+        "check.residual_sway",
+    }  # fmt: skip
+
+
+def test_a_key_cannot_pose_as_another_line():
+    (fault,) = faults_of(with_value("limits", {"jerk\nname: fine": 1.0}))
+    assert fault.startswith(r"limits.'jerk\nname: fine': unknown key")
+
+
+SCALARS = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(),
+    st.dates(),
+    st.sampled_from([10**400, 1e308]),
+)
+VALUES = st.recursive(
+    SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3)
+)
+PLACES = [
+    f"{table}.{key}" for table, content in PAPER.items() if isinstance(content, dict) for key in content
+]
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from([*PAPER, *PLACES, "axis.cart.unit", "check.residual_sway.hook"]), VALUES, max_size=4
+    )
+)
+def test_whatever_stands_there_gives_a_spec_or_sentences(changes):
+    document = deepcopy(PAPER)
+    for place, value in changes.items():
+        *outer, key = place.split(".")
+        table = document
+        for step in outer:
+            table = table.get(step) if isinstance(table, dict) else None
+        if isinstance(table, dict):
+            table[key] = value
+    try:
+        spec = spec_from_dict(document)
+    except SpecError as error:
+        assert error.faults
+        assert all(re.match(r"[\w.'-]+", fault) and fault.isprintable() for fault in error.faults)
+    else:
+        assert spec_from_dict(spec.to_dict()) == spec

@@ -1,0 +1,252 @@
+"""Specs from files, presets and overrides."""
+
+import os
+import subprocess
+import sys
+
+import attrs
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gen_profile.errors import OutputError, SpecError
+from gen_profile.spec_reading import parse_spec, preset_spec, presets, read_spec, spec_from_dict
+
+LEAST = """
+[plant]
+type = "double-pendulum-crane"
+[move]
+distance = 0.3
+duration = 3.0
+"""
+
+
+def test_the_least_spec_is_filled_in(tmp_path):
+    file = tmp_path / "least.toml"
+    file.write_text(LEAST, "utf-8")
+    spec = read_spec(file)
+    assert spec.plant.parameters == spec.machine().nominal()
+    assert spec.plant.defaults == tuple(spec.machine().nominal())
+    assert (spec.move.start, spec.move.target, spec.move.distance) == ((0.0,), (0.3,), (0.3,))
+    assert spec.check.default
+    assert spec.check.residual_sway == pytest.approx({"hook": 0.003, "payload": 0.003})
+    assert (spec.robustness.method, spec.actuator.type, spec.cost.effort) == ("none", "ideal", "jerk")
+    assert spec.export.cycle_time == 0.001
+
+
+@pytest.mark.parametrize("bom", [b"", b"\xef\xbb\xbf"], ids=["plain", "byte order mark"])
+@pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
+def test_editors_of_any_kind_will_do(tmp_path, bom, newline):
+    file = tmp_path / "spec.toml"
+    file.write_bytes(bom + LEAST.encode().replace(b"\n", newline))
+    assert read_spec(file) == parse_spec(LEAST)
+
+
+def test_a_stated_parameter_is_no_default():
+    spec = parse_spec(LEAST.replace("[move]", "L1 = 0.5\n[move]"))
+    assert spec.plant.parameters["L1"] == 0.5
+    assert "L1" not in spec.plant.defaults
+
+
+# ── files ───────────────────────────────────────────────────────────────────────────────────────────────
+
+
+def test_a_missing_file(tmp_path):
+    with pytest.raises(OutputError, match=r"Cannot read the spec .*gone\.toml: No such file or directory\."):
+        read_spec(tmp_path / "gone.toml")
+
+
+def test_a_folder(tmp_path):
+    with pytest.raises(OutputError, match="Is a directory"):
+        read_spec(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["", "\n\n", "# a comment only\n"])
+def test_an_empty_file(tmp_path, text):
+    file = tmp_path / "empty.toml"
+    file.write_text(text, "utf-8")
+    with pytest.raises(
+        SpecError, match=r"empty\.toml: the spec is empty; it must state .*\[plant\].*\[move\]"
+    ):
+        read_spec(file)
+
+
+def test_another_encoding(tmp_path):
+    file = tmp_path / "latin.toml"
+    file.write_bytes('name = "Br\xfccke"'.encode("latin-1"))
+    with pytest.raises(SpecError, match=r"not UTF-8 text .byte 10.; save the spec as UTF-8"):
+        read_spec(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        ('name = "a"\n[plant\ntype = 1', "line 2, column 7"),
+        ("[move]\ndistance = 0.3 m", "line 2, column 16"),
+        ("name = 'a'\nname = 'b'", "line 2, column 11"),
+        ("\ndistance = [1.0,", "line 2, column 17"),
+        ("name =", "line 1, column 7"),
+    ],
+)
+def test_malformed_toml_is_located(text, where):
+    with pytest.raises(SpecError, match=rf"^bay\.toml: not valid TOML: .*{where}\)\.$"):
+        parse_spec(text, source="bay.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [("a = " + "9" * 5000, "thousands of digits"), ("a = " + "[" * 50000, "nested too deeply")],
+)
+def test_what_the_toml_parser_stumbles_over(text, why):
+    with pytest.raises(SpecError, match=f"not valid TOML: .*{why}"):
+        parse_spec(text)
+
+
+# ── presets ─────────────────────────────────────────────────────────────────────────────────────────────
+
+
+@pytest.mark.parametrize("name", presets())
+def test_presets_are_valid_and_carry_their_name(name):
+    spec = preset_spec(name)
+    assert spec.name == name
+    assert spec.plant.defaults == ()
+    assert presets()[name]
+
+
+def test_the_papers_presets_differ_in_beta_only():
+    base = attrs.evolve(preset_spec("paper"), name="same")
+    for beta in (0, 20, 50):
+        other = preset_spec(f"paper-beta{beta}", ["name=same", "cost.sway_weight=50"])
+        assert preset_spec(f"paper-beta{beta}").cost.sway_weight == beta
+        assert other == base
+
+
+def test_an_unknown_preset_is_met_with_a_suggestion():
+    with pytest.raises(SpecError, match=r"unknown preset 'papre'; did you mean 'paper'[?]"):
+        preset_spec("papre")
+
+
+def test_a_preset_is_no_path():
+    with pytest.raises(SpecError, match="unknown preset"):
+        preset_spec("../presets/paper")
+
+
+# ── overrides ───────────────────────────────────────────────────────────────────────────────────────────
+
+
+@pytest.mark.parametrize(
+    ("override", "found"),
+    [
+        ("plant.L1=0.5", lambda spec: spec.plant.parameters["L1"] == 0.5),
+        (" plant . L1 = 0.5 ", lambda spec: spec.plant.parameters["L1"] == 0.5),
+        ("name=bay 3", lambda spec: spec.name == "bay 3"),
+        ('name="7"', lambda spec: spec.name == "7"),
+        ("cost.effort=snap", lambda spec: spec.cost.effort == "snap"),
+        ("cost.sway_scale=auto", lambda spec: spec.cost.sway_scale is None),
+        ("robustness.uncertain={ L2 = 0.1 }", lambda spec: spec.robustness.uncertain == {"L2": 0.1}),
+        ("robustness.uncertain.L2=0.1", lambda spec: spec.robustness.uncertain == {"L1": 0.2, "L2": 0.1}),
+        ("limits.jerk=40", lambda spec: spec.limits.jerk == 40.0),
+        ("move.distance=[2.0]", lambda spec: spec.move.distance == (2.0,)),
+        ("can.node=3", lambda spec: spec.can.node == 3),
+    ],
+)
+def test_an_override_is_toml_or_else_text(override, found):
+    assert found(preset_spec("paper", [override]))
+
+
+def test_the_last_override_counts():
+    assert preset_spec("paper", ["plant.L1=0.5", "plant.L1=0.6"]).plant.parameters["L1"] == 0.6
+
+
+def test_overrides_can_make_a_whole_spec():
+    overrides = ["plant.type=double-pendulum-crane", "move.distance=0.3", "move.duration=3"]
+    assert parse_spec("", overrides) == parse_spec(LEAST)
+
+
+def test_a_move_stated_otherwise_replaces_the_files_way():
+    by_target = preset_spec("paper", ["move.target=0.8", "move.start=0.5"])
+    assert (by_target.move.start, by_target.move.target) == ((0.5,), (0.8,))
+    from_file = LEAST.replace("distance = 0.3", "start = 1.0\ntarget = 2.0")
+    assert parse_spec(from_file, ["move.distance=0.4"]).move.target == (0.4,)
+
+
+@pytest.mark.parametrize(
+    ("override", "sentence"),
+    [
+        ("plant.L1", r"--set plant\.L1: write KEY=VALUE, such as"),
+        ("=3", r"--set =3: write KEY=VALUE"),
+        ("plant..L1=3", r"--set plant\.\.L1=3: write KEY=VALUE"),
+        ("name.first=3", r"--set name\.first=3: name is a value, not a table"),
+        ("plant.L1=", r"plant\.L1: must be a number .*, found text ''"),
+        ("plant.L1=half a metre", r"plant\.L1: must be a number .*, found text 'half a metre'"),
+        ("name=bay\nfoo = 3", r"name: must be 1 to 64 letters"),
+        ("plant.l3=1", r"plant\.l3: unknown key .known: type, m1"),
+        ("L1=0.5", r"L1: unknown key"),
+    ],
+)
+def test_faulty_overrides(override, sentence):
+    with pytest.raises(SpecError, match=sentence):
+        preset_spec("paper", [override])
+
+
+# ── there and back ──────────────────────────────────────────────────────────────────────────────────────
+
+POSITIVE = st.floats(1e-3, 1e3)
+OVERRIDES = st.fixed_dictionaries(
+    {},
+    optional={
+        "name": st.from_regex(r"\A[A-Za-z][A-Za-z0-9_-]{0,20}\Z").map(lambda text: f'"{text}"'),
+        "plant.L1": st.floats(0.2, 20.0),
+        "move.distance": st.floats(-40.0, 40.0).filter(bool),
+        "move.duration": st.floats(0.1, 100.0),
+        "actuator": POSITIVE.map(lambda tau: f'{{ type = "first-order", tau = {tau!r} }}'),
+        "robustness.uncertain": st.floats(0.01, 0.9).map(lambda r: f"{{ L2 = {r!r}, m1 = {r!r} }}"),
+        "cost.sway_scale": st.one_of(st.just('"auto"'), POSITIVE),
+        "limits.velocity": POSITIVE,
+        "check.residual_sway": st.one_of(POSITIVE, POSITIVE.map(lambda limit: f"{{ hook = {limit!r} }}")),
+        "axis.unit": st.sampled_from(["mm", "um", "counts"]),
+        "export.cycle_time": st.floats(1e-4, 1.0),
+    },
+)
+
+
+@given(OVERRIDES)
+def test_a_spec_survives_being_written_down(overrides):
+    spec = preset_spec("paper", [f"{key}={value}" for key, value in overrides.items()])
+    again = spec_from_dict(spec.to_dict())
+    assert again == spec
+    assert again.sha256() == spec.sha256()
+    assert again.axis_scales() == spec.axis_scales()
+
+
+def test_a_round_trip_keeps_apart_what_differs():
+    changes = ["plant.L1=0.48", "move.distance=0.31", "limits.jerk=1", "axis.cart.sign=-1"]
+    changes += ["check.residual_sway={ hook = 0.1 }", "can.node=2"]
+    hashes = {preset_spec("paper", [change]).sha256() for change in changes} | {preset_spec("paper").sha256()}
+    assert len(hashes) == len(changes) + 1
+
+
+def test_the_order_of_keys_changes_nothing():
+    forward = preset_spec("paper", ["robustness.uncertain={ L1 = 0.2, m2 = 0.1 }"])
+    backward = preset_spec("paper", ["robustness.uncertain={ m2 = 0.1, L1 = 0.2 }"])
+    assert list(backward.robustness.uncertain) == ["m2", "L1"]  # the machine's order
+    assert forward.sha256() == backward.sha256()
+    document = forward.to_dict()
+    assert spec_from_dict(dict(reversed(document.items()))).sha256() == forward.sha256()
+
+
+def test_whole_numbers_are_the_same_numbers():
+    assert preset_spec("paper", ["move.duration=3"]).sha256() == preset_spec("paper").sha256()
+
+
+@pytest.mark.parametrize("seed", ["0", "1", "4711"])
+def test_the_hash_does_not_hang_on_pythons_hash_seed(seed):
+    script = "from gen_profile.spec_reading import preset_spec; print(preset_spec('paper').sha256())"
+    printed = subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, "PYTHONHASHSEED": seed},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert printed.stdout.strip() == preset_spec("paper").sha256()
