@@ -254,7 +254,7 @@ def _load(fmu: PlantFmu, callbacks: Any, messages: list[str]) -> Any:
             unzipDirectory=str(fmu.folder),
             instanceName=fmu.model_identifier,
         )
-        slave.instantiate(callbacks=callbacks)
+        slave.instantiate(callbacks=callbacks, loggingOn=_logger.isEnabledFor(logging.DEBUG))
     except Exception as error:  # FMPy raises nothing more special
         reason = " ".join(messages) or str(error)
         raise CosimulationError(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import attrs
 import pytest
+from fmu.caches import share_zig
 
 from gen_profile.errors import CosimulationError
 from gen_profile_fmu import cache as cache_module
@@ -41,9 +42,7 @@ def builds(crane):
 def new_cache(tmp_path, cache, monkeypatch):
     """An empty cache, but for what Zig has built of the C library."""
     folder = tmp_path / "new"
-    folder.mkdir()
-    (cache / "zig").mkdir(exist_ok=True)
-    (folder / "zig").symlink_to(cache / "zig")
+    share_zig(cache, folder)
     monkeypatch.setenv("GEN_PROFILE_CACHE", str(folder))
     return folder
 
@@ -106,7 +105,8 @@ class TestPlantFmu:
 
     def test_is_the_same_in_every_folder(self, new_cache, cache, builds, monkeypatch):
         archives = [builds.get().archive]
-        monkeypatch.setenv("GEN_PROFILE_CACHE", str(new_cache / "deeper" / "folder"))
+        share_zig(cache, new_cache / "deeper")
+        monkeypatch.setenv("GEN_PROFILE_CACHE", str(new_cache / "deeper"))
         archives.append(builds.get().archive)
         assert builds.count == 2
         assert archives[0] != archives[1]
@@ -124,12 +124,13 @@ class TestPlantFmu:
         assert is_intact(paths.pop().parent)
         assert not list(new_cache.glob("build-*"))
 
-    def test_needs_no_home(self, temporary_folder, builds, crane, monkeypatch):
+    def test_needs_no_home(self, cache, temporary_folder, builds, crane, monkeypatch):
         """As for a user of a container whom the list of users does not know."""
 
         def unknown(_):
             raise KeyError("no such user")
 
+        share_zig(cache, temporary_folder / f"gen-profile-{os.getuid()}")
         for variable in ("HOME", "XDG_CACHE_HOME", "GEN_PROFILE_CACHE"):
             monkeypatch.delenv(variable, raising=False)
         monkeypatch.setattr("pwd.getpwuid", unknown)
@@ -138,8 +139,9 @@ class TestPlantFmu:
 
     @pytest.mark.parametrize("obstacle", ["a file", "a folder that does not take files"])
     def test_falls_back_when_the_cache_cannot_be_written(
-        self, obstacle, tmp_path, temporary_folder, builds, crane, monkeypatch
+        self, obstacle, tmp_path, cache, temporary_folder, builds, crane, monkeypatch
     ):
+        share_zig(cache, temporary_folder / f"gen-profile-{os.getuid()}")
         named = tmp_path / "file" / "cache" if obstacle == "a file" else Path("/proc/self")
         (tmp_path / "file").write_text("in the way")
         monkeypatch.setenv("GEN_PROFILE_CACHE", str(named))

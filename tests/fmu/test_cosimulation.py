@@ -6,6 +6,7 @@ import attrs
 import fmpy
 import numpy as np
 import pytest
+from fmu.caches import share_zig
 from fmu.hoisting_pendulum import PLANT as WINCH
 
 from gen_profile.errors import CosimulationError
@@ -146,17 +147,27 @@ def test_closes_once_and_says_so(crane, setpoints):
         cosimulation.run(setpoints, crane.nominal(), max_step=1e-3, settle=0.0)
 
 
-def test_messages_of_the_fmu_are_logged(cosimulation, crane, setpoints, caplog):
-    with caplog.at_level(logging.DEBUG), pytest.raises(CosimulationError):
+def test_errors_of_the_fmu_are_logged(cosimulation, crane, setpoints, caplog):
+    with pytest.raises(CosimulationError):
         cosimulation.run(setpoints, {**crane.nominal(), "g": 0.0}, max_step=1e-3, settle=0.0)
     (record,) = caplog.records
-    assert record.name == "gen_profile_fmu.cosimulation"
+    assert (record.name, record.levelno) == ("gen_profile_fmu.cosimulation", logging.WARNING)
     assert record.getMessage() == "logStatusError: g must lie between 0.1 and 30, found 0."
 
 
+def test_events_of_the_fmu_are_logged_for_debugging(crane, setpoints, caplog):
+    with caplog.at_level(logging.DEBUG, "gen_profile_fmu"), PlantCosimulation(crane) as cosimulation:
+        cosimulation.run(setpoints, crane.nominal(), max_step=1e-3, settle=0.0)
+    messages = [record.getMessage() for record in caplog.records]
+    assert messages == [
+        "logEvents: Instantiated.",
+        "logEvents: Reset.",
+        "logEvents: Initialized at time 0 s.",
+    ]
+
+
 def test_tells_before_it_compiles(crane, tmp_path, cache, monkeypatch):
-    (cache / "zig").mkdir(exist_ok=True)
-    (tmp_path / "zig").symlink_to(cache / "zig")
+    share_zig(cache, tmp_path)
     monkeypatch.setenv("GEN_PROFILE_CACHE", str(tmp_path))
     builds = []
     for _ in range(2):
