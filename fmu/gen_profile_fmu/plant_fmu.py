@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import tempfile
-import uuid
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -95,7 +94,7 @@ def _sources(plant: Plant) -> _Sources:
     equations = dynamics(plant)
     code = {**c_sources(plant, equations, table), **_fmi_headers()}
     anonymous = model_description(plant, equations, table, guid="")
-    guid = str(uuid.UUID(_digest(anonymous, *_flat(code))[:32]))
+    guid = _digest(anonymous, *_flat(code))[:32]
     return _Sources(
         guid=guid,
         model_identifier=model_identifier(plant),

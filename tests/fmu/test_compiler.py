@@ -69,10 +69,10 @@ def test_a_compiler_that_is_not_there_is_named(crane, monkeypatch):
         plant_fmu(crane)
 
 
-def test_what_a_failing_compiler_says_is_passed_on(sources, tmp_path):
+def test_what_a_failing_compiler_says_is_passed_on(sources, cache):
     (sources / "driven_plant.c").write_text("int broken = ;")
     with pytest.raises(CosimulationError, match=r"exit code 1(.|\n)*broken"):
-        compile_library(find_compiler(), sources, "library.so", zig_cache=tmp_path / "zig")
+        compile_library(find_compiler(), sources, "library.so", zig_cache=cache / "zig")
 
 
 def test_other_computers_are_told_what_to_do(monkeypatch):
