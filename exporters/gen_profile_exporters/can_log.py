@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from decimal import ROUND_CEILING, Decimal
+from decimal import Decimal
 from itertools import pairwise
 
 import attrs
@@ -28,7 +28,7 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.profile import Profile, SampledProfile
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.setpoints import counts, in_si, plausible_cycle_time, sampled
+from gen_profile_exporters.setpoints import counts, in_si, plausible_cycle_time, sampled, two_digits_up
 
 CHANNEL = "can0"
 SYNC = 0x080
@@ -150,11 +150,10 @@ def _check_load(target: Target) -> None:
     bits = frame_bits(0) + axes * (frame_bits(POSITION_BYTES) + frame_bits(FEEDBACK_BYTES))
     shortest = bits / (MOST_LOAD * can.bitrate)
     if Decimal(repr(can.sync_period)) < shortest:
-        fitting = shortest.quantize(Decimal(1).scaleb(shortest.adjusted() - 1), ROUND_CEILING).normalize()
         raise ExportError(
             f"can.sync_period: {axes} axes every {can.sync_period:g} s load a bus of {can.bitrate} bit/s by "
-            f"{bits / can.sync_period / can.bitrate:.0%} (limit {MOST_LOAD:.0%}); set {fitting:f} s or more, "
-            "or raise can.bitrate."
+            f"{bits / can.sync_period / can.bitrate:.0%} (limit {MOST_LOAD:.0%}); "
+            f"set {two_digits_up(shortest)} s or more, or raise can.bitrate."
         )
 
 

@@ -83,7 +83,7 @@ def find_exporter(name: str) -> Exporter:
     SpecError
         When no format has that name.
     """
-    known = formats()
+    known = BUILT_IN if name in BUILT_IN else formats()
     if name not in known:
         raise SpecError(f"--export: unknown format {name!r}{suggestion(name, known)}.")
     return cast("Exporter", import_module(known[name].module))
@@ -98,7 +98,9 @@ def format_of(path: PurePath | str) -> str:
         When no format has that suffix.
     """
     suffix = PurePath(path).suffix.lower()
-    suffixes = {form.suffix: name for name, form in (*formats().items(), *BUILT_IN.items())}
+    suffixes = {form.suffix: name for name, form in BUILT_IN.items()}
+    if suffix not in suffixes:
+        suffixes = {form.suffix: name for name, form in formats().items()} | suffixes
     if suffix not in suffixes:
         raise SpecError(
             f"{path}: no format has the suffix {suffix!r} (known: {', '.join(sorted(suffixes))}); "

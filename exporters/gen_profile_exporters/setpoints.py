@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import ROUND_CEILING, Decimal
 from typing import get_args
 
 import attrs
@@ -52,7 +53,7 @@ def sampled(
     if samples > most:
         raise ExportError(
             f"{place}: {samples} samples of {cycle_time:g} s are more than the format holds ({most}); "
-            f"set it to {profile.duration / (most - 1):.2g} s or more."
+            f"set it to {two_digits_up(Decimal(profile.duration) / (most - 1))} s or more."
         )
     return sample(profile, cycle_time)
 
@@ -124,6 +125,12 @@ def plausible_cycle_time(cycle_time: float, line: int) -> float:
             f"{CYCLE_TIME.most:g} s; export the motion again."
         )
     return cycle_time
+
+
+def two_digits_up(value: Decimal) -> str:
+    """Round a positive number up to two digits, so that it still is enough where it is the least that is."""
+    rounded = value.quantize(Decimal(1).scaleb(value.adjusted() - 1), ROUND_CEILING)
+    return f"{rounded.normalize():f}"
 
 
 # Adding 0.0 turns a negative zero into a plain one: equal motions get equal texts and hashes.

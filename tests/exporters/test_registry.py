@@ -75,6 +75,8 @@ def test_broken_plugins_are_named(plugins, value, message):
     plugins(extra=value)
     with pytest.raises(SpecError, match=message):
         formats()
+    assert find_exporter("csv")
+    assert format_of("motion.csv") == "csv"
 
 
 def test_listing_formats_loads_nothing_heavy():

@@ -94,6 +94,12 @@ class TestText:
         ):
             encoded(quintic((0, 1), duration=100.0), cycle_time=0.0001)
 
+    def test_takes_the_cycle_time_that_its_refusal_names(self):
+        move = quintic((0, 1), duration=123.4)
+        with pytest.raises(ExportError, match=r"set it to 0\.0013 s or more"):
+            encoded(move, cycle_time=0.0001)
+        assert encoded(move, cycle_time=0.0013)
+
 
 class TestPlayback:
     """The block, executed cycle by cycle by an interpreter of the language."""
