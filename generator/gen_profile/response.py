@@ -46,72 +46,74 @@ class Response:
     angle: Array
 
 
-def respond(
-    plant: Plant, profile: Profile, machines: Sequence[Mapping[str, float]], times: Array
-) -> tuple[Response, ...]:
-    """Integrate machines whose axes follow a profile exactly, all at once, to nearly rounding accuracy.
+class Swing:
+    """Machines whose axes follow one profile exactly, integrated all at once to nearly rounding accuracy.
 
     Parameters
     ----------
     plant : Plant
     profile : Profile
     machines : sequence of mapping of str to float
-        The parameters of each machine.
-    times : (samples,) array
-        Rising from 0, where every machine hangs at rest.
-
-    Returns
-    -------
-    tuple of Response
-        One per machine.
+        The parameters of each machine. All hang at rest at time 0.
+    until : float
+        Last time that can be asked for, in s.
 
     Raises
     ------
     CosimulationError
         The integration fails, as when a load is thrown over.
     """
-    acceleration, outputs = _functions(plant)
-    p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
-    n_u, count = len(plant.unactuated), len(machines)
-    motion = _motion(profile)
 
-    def rate(t: float, state: Array) -> Array:
-        q_u, dq_u = state.reshape(2, count, n_u)
-        ddq_u = acceleration(q_u, dq_u, motion(t), p)[:, :, 0]
-        return np.concatenate([dq_u.ravel(), ddq_u.ravel()])
+    def __init__(
+        self, plant: Plant, profile: Profile, machines: Sequence[Mapping[str, float]], until: float
+    ) -> None:
+        acceleration, self._outputs = _functions(plant)
+        self._plant, self._profile = plant, profile
+        self._p = p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
+        self._shape = shape = (2, len(machines), len(plant.unactuated))
+        motion = _motion(profile)
 
-    # a move begins so gently that a step-size control left alone would leap over it
-    longest = profile.duration / 20.0
-    integral = solve_ivp(
-        rate,
-        (0.0, float(times[-1])),
-        np.zeros(2 * count * n_u),
-        method="DOP853",
-        t_eval=times,
-        rtol=RELATIVE_TOLERANCE,
-        atol=ABSOLUTE_TOLERANCE,
-        max_step=longest,
-    )
-    if not integral.success:
-        raise CosimulationError(f"The motion of the {plant.type} cannot be integrated: {integral.message}")
-    states = integral.y.reshape(2, count, n_u, len(times)).transpose(0, 1, 3, 2)
-    axes = profile(times)
-    loads = len(plant.loads)
-    responses = []
-    for q_u, dq_u, machine in zip(*np.ascontiguousarray(states), p[:, None], strict=True):
-        seen = outputs(q_u, axes.position, machine)[:, :, 0]
-        responses.append(
-            Response(
-                times=times,
-                position=axes.position,
-                velocity=axes.velocity,
-                q_u=q_u,
-                dq_u=dq_u,
-                sway=seen[:, :loads],
-                angle=seen[:, loads:],
-            )
+        def rate(t: float, state: Array) -> Array:
+            q_u, dq_u = state.reshape(shape)
+            ddq_u = acceleration(q_u, dq_u, motion(t), p)[:, :, 0]
+            return np.concatenate([dq_u.ravel(), ddq_u.ravel()])
+
+        # a move begins so gently that a step-size control left alone would leap over it
+        longest = profile.duration / 20.0
+        integral = solve_ivp(
+            rate,
+            (0.0, until),
+            np.zeros(int(np.prod(shape))),
+            method="DOP853",
+            dense_output=True,
+            rtol=RELATIVE_TOLERANCE,
+            atol=ABSOLUTE_TOLERANCE,
+            max_step=longest,
         )
-    return tuple(responses)
+        if not integral.success:
+            raise CosimulationError(f"The {plant.type}'s motion cannot be integrated: {integral.message}")
+        self._solution = integral.sol
+
+    def at(self, times: Array) -> tuple[Response, ...]:
+        """Evaluate every machine at rising times in s."""
+        states = self._solution(times).reshape(*self._shape, len(times)).transpose(0, 1, 3, 2)
+        axes = self._profile(times)
+        loads = len(self._plant.loads)
+        responses = []
+        for q_u, dq_u, machine in zip(*np.ascontiguousarray(states), self._p[:, None], strict=True):
+            seen = self._outputs(q_u, axes.position, machine)[:, :, 0]
+            responses.append(
+                Response(
+                    times=times,
+                    position=axes.position,
+                    velocity=axes.velocity,
+                    q_u=q_u,
+                    dq_u=dq_u,
+                    sway=seen[:, :loads],
+                    angle=seen[:, loads:],
+                )
+            )
+        return tuple(responses)
 
 
 @cache

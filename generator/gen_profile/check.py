@@ -1,0 +1,121 @@
+"""What a check found: values only, no work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+
+
+@attrs.frozen(kw_only=True)
+class Scenario:
+    """A machine that the check moves.
+
+    Attributes
+    ----------
+    name : str
+        Such as ``"nominal"`` or ``"L1 +20 %"``.
+    parameters : mapping of str to float
+        Value of every plant parameter.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+
+
+@attrs.frozen(kw_only=True)
+class Finding:
+    """How much one machine sways once its axes stand still.
+
+    Attributes
+    ----------
+    scenario : Scenario
+    residual : mapping of str to float
+        Greatest sway of every load in m.
+    modal : mapping of str to float
+        Sum of the modes' amplitudes at standstill in m: what the sway of every load can ever reach.
+    """
+
+    scenario: Scenario
+    residual: Mapping[str, float]
+    modal: Mapping[str, float]
+
+
+@attrs.frozen(kw_only=True)
+class Check:
+    """Verdict on one artefact.
+
+    Attributes
+    ----------
+    limit : mapping of str to float
+        Allowed residual sway of every load in m; the end load is the last one.
+    error_bound : float
+        No residual is further than this from the truth, in m.
+    arrival : float
+        When the axes stand still, in s.
+    findings : tuple of Finding
+    faults : tuple of str
+        What else is wrong with the artefact, a sentence each.
+    """
+
+    limit: Mapping[str, float]
+    error_bound: float
+    arrival: float
+    findings: tuple[Finding, ...]
+    faults: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every load keeps its limit in every scenario, the error bound included."""
+        return not self.reasons()
+
+    def keeps_limit(self, finding: Finding) -> bool:
+        """Whether every load keeps its limit in one scenario, the error bound included."""
+        return all(finding.residual[load] + self.error_bound <= limit for load, limit in self.limit.items())
+
+    @property
+    def demand(self) -> float:
+        """Share of its limit that the worst load takes up; infinite where something else is wrong."""
+        if self.faults:
+            return float("inf")
+        return max(self._excess(finding) for finding in self.findings)
+
+    def reasons(self) -> tuple[str, ...]:
+        """Say why the check failed, a sentence each; none when it passed."""
+        worst = max(self.findings, key=self._excess)
+        if self.keeps_limit(worst):
+            return self.faults
+        load = max(self.limit, key=lambda name: worst.residual[name] / self.limit[name])
+        return (
+            f"The {load} sways by {1e3 * worst.residual[load]:.3f} mm after the move "
+            f"({worst.scenario.name}), and {1e3 * self.limit[load]:.3f} mm are allowed (check.residual_sway; "
+            f"numerical error up to {1e6 * self.error_bound:.2g} µm).",
+            *self.faults,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON and the manifest."""
+        end = list(self.limit)[-1]
+        return {
+            "passed": self.passed,
+            "limit_m": self.limit[end],
+            "limits_m": dict(self.limit),
+            "error_bound_m": self.error_bound,
+            "arrival_s": self.arrival,
+            "scenarios": [
+                {
+                    "name": finding.scenario.name,
+                    "parameters": dict(finding.scenario.parameters),
+                    "residual_peak_m": finding.residual[end],
+                    "residual_peaks_m": dict(finding.residual),
+                    "residual_modal_m": dict(finding.modal),
+                    "passed": self.keeps_limit(finding),
+                }
+                for finding in self.findings
+            ],
+            "reasons": list(self.reasons()),
+        }
+
+    def _excess(self, finding: Finding) -> float:
+        return max((finding.residual[load] + self.error_bound) / limit for load, limit in self.limit.items())

@@ -1,0 +1,106 @@
+"""``manifest.json``, the record beside the artefacts: spec, versions, hashes and the check."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+
+from gen_profile.errors import OutputError
+
+FILENAME = "manifest.json"
+FORMAT = "gen-profile manifest"
+FORMAT_VERSION = 1
+UNVERIFIED = "unverified"
+
+
+@attrs.frozen(kw_only=True)
+class Artefact:
+    """One exported file.
+
+    Attributes
+    ----------
+    format : str
+    path : str
+        Relative to the manifest's folder.
+    sha256 : str
+        Of the file's bytes.
+    bytes : int
+    payload_sha256 : str
+        Of the setpoints that the file carries, whatever its form; empty for a file that carries none.
+    """
+
+    format: str
+    path: str
+    sha256: str
+    bytes: int
+    payload_sha256: str = ""
+
+
+@attrs.frozen(kw_only=True)
+class Manifest:
+    """What was designed, from what, by what, and how it was judged.
+
+    Attributes
+    ----------
+    name : str
+    spec : mapping
+        The whole spec, as `gen_profile.spec.Spec.to_dict` gives it.
+    spec_sha256 : str
+    profile_sha256 : str
+        Of the continuous profile.
+    versions : mapping of str to str
+        Of this program and the libraries that shape the numbers.
+    artefacts : tuple of Artefact
+    check : mapping or None
+        `gen_profile.check.Check.to_dict` of the artefact that came off worst; None when none was checked.
+    """
+
+    name: str
+    spec: Mapping[str, Any]
+    spec_sha256: str
+    profile_sha256: str
+    versions: Mapping[str, str]
+    artefacts: tuple[Artefact, ...]
+    check: Mapping[str, Any] | None
+
+    def to_json(self) -> bytes:
+        """Render, UTF-8."""
+        document = {"format": FORMAT, "format_version": FORMAT_VERSION, **attrs.asdict(self)}
+        document["check"] = self.check or UNVERIFIED
+        return (json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")
+
+
+def parse_manifest(content: bytes, source: str) -> Manifest:
+    """Read a manifest.
+
+    Parameters
+    ----------
+    content : bytes
+    source : str
+        Where it comes from, for the error.
+
+    Raises
+    ------
+    OutputError
+        It is none, or of another version.
+    """
+    try:
+        document = json.loads(content.decode("utf-8"))
+        if (document.pop("format"), document.pop("format_version")) != (FORMAT, FORMAT_VERSION):
+            raise ValueError("another format")
+        artefacts = tuple(Artefact(**artefact) for artefact in document.pop("artefacts"))
+        check = document.pop("check")
+        return Manifest(artefacts=artefacts, check=None if check == UNVERIFIED else check, **document)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise OutputError(
+            f"{source}: not a manifest of this version of gen-profile; export again, or give the spec."
+        ) from error
+
+
+def sha256(content: bytes) -> str:
+    """Hash bytes, in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,161 @@
+"""Judging an artefact that lies on disk, whoever wrote or altered it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.check import Check
+from gen_profile.errors import OutputError, SpecError
+from gen_profile.manifest import FILENAME, Manifest, parse_manifest, sha256
+from gen_profile.profile import SampledProfile
+from gen_profile.spec import Spec
+from gen_profile.spec_reading import spec_from_dict
+from gen_profile.workflows.scenarios import scenarios
+from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.registry import find_exporter, format_of
+
+TARGET_TOLERANCE = 1e-6  # of the longest axis move, beside the artefact's own resolution
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Judgement:
+    """A check of one file, and what its manifest says about it.
+
+    Attributes
+    ----------
+    path : Path
+    format : str
+    spec : Spec
+    check : Check
+    manifest : str
+        ``"matches"``, ``"differs"`` (the file is not the one that was exported), or ``"none"`` for this spec.
+    """
+
+    path: Path
+    format: str
+    spec: Spec
+    check: Check
+    manifest: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "artefact": {"format": self.format, "path": str(self.path), "manifest": self.manifest},
+            "check": self.check.to_dict(),
+        }
+
+
+def check_artefact(
+    path: Path, spec: Spec | None = None, on_build: Callable[[], None] | None = None
+) -> Judgement:
+    """Replay a file, co-simulate it, and compare it with its manifest.
+
+    Parameters
+    ----------
+    path : Path
+        Any artefact that the exporters write; its format is told by its suffix.
+    spec : Spec, optional
+        Taken from ``manifest.json`` beside the file when not given.
+    on_build : callable, optional
+        Called before the plant's FMU is compiled.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read, or there is no spec.
+    ExportError
+        The file is damaged.
+    CosimulationError
+    """
+    format_ = format_of(path)
+    content = _read(path)
+    manifest = _manifest_beside(path)
+    if spec is None:
+        spec = _spec_of(manifest, path)
+    setpoints = find_exporter(format_).replay(content, target_of(spec))
+    standing = _provenance(manifest, content, spec)
+    check = _verdict(spec, setpoints, on_build)
+    faults = (*_missed_ends(spec, setpoints), *check.faults)
+    if standing == "differs":
+        faults += (f"{path.name} is not the file that was exported: its hash differs from {FILENAME}.",)
+    return Judgement(
+        path=path, format=format_, spec=spec, check=attrs.evolve(check, faults=faults), manifest=standing
+    )
+
+
+def _verdict(spec: Spec, setpoints: SampledProfile, on_build: Callable[[], None] | None) -> Check:
+    """Judge setpoints by themselves.
+
+    Holding velocity over a cycle errs with the cycle's square, so setpoints of twice the cycle tell how much.
+    """
+    machines = scenarios(spec)
+    spacing = sample_spacing(spec, setpoints, machines)
+    found = cosimulate(spec, setpoints, machines, output_step=spacing, on_build=on_build)
+    expected = cosimulate(spec, _every_other(setpoints), machines, output_step=spacing)
+    check = judge(spec, setpoints, machines, found, expected)
+    return attrs.evolve(check, error_bound=check.error_bound + float(setpoints.resolution.max()))
+
+
+def _every_other(setpoints: SampledProfile) -> SampledProfile:
+    """Leave out every second setpoint, but neither the first nor the last."""
+    position = setpoints.position
+    if len(position) % 2 == 0:
+        position = np.concatenate([position[:1], position])  # stand one cycle longer before the start
+    return SampledProfile(
+        cycle_time=2.0 * setpoints.cycle_time, position=position[::2], resolution=setpoints.resolution
+    )
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise OutputError(f"Cannot read {path}: {error.strerror or error}.") from error
+
+
+def _manifest_beside(path: Path) -> Manifest | None:
+    beside = path.parent / FILENAME
+    return parse_manifest(_read(beside), str(beside)) if beside.is_file() else None
+
+
+def _spec_of(manifest: Manifest | None, path: Path) -> Spec:
+    if manifest is None:
+        raise OutputError(
+            f"There is no {FILENAME} beside {path}, so its spec is unknown; name the spec: "
+            f"gen-profile check {path} SPEC.toml"
+        )
+    try:
+        return spec_from_dict(manifest.spec)
+    except SpecError as error:
+        raise OutputError(f"The spec in {path.parent / FILENAME} is faulty: {error}") from error
+
+
+def _provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
+    if manifest is None or manifest.spec_sha256 != spec.sha256():
+        return "none"
+    if sha256(content) in {artefact.sha256 for artefact in manifest.artefacts}:
+        return "matches"
+    return "differs"
+
+
+def _missed_ends(spec: Spec, setpoints: SampledProfile) -> tuple[str, ...]:
+    """Say where the motion does not begin or end as the spec asks."""
+    longest = max(abs(distance) for distance in spec.move.distance)
+    allowed = TARGET_TOLERANCE * longest + setpoints.resolution
+    faults = []
+    for word, found, asked in (
+        ("starts", setpoints.position[0], spec.move.start),
+        ("ends", setpoints.position[-1], spec.move.target),
+    ):
+        for axis, at, due, tolerance in zip(spec.axis, found, asked, allowed, strict=True):
+            if abs(at - due) > tolerance:
+                faults.append(f"Axis {axis} {word} at {at:.9g} m, and the spec asks for {due:.9g} m.")
+    return tuple(faults)

@@ -1,0 +1,66 @@
+"""Writing a folder of artefacts so that nobody ever sees half of it."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from gen_profile.errors import OutputError
+
+
+class Staging:
+    """A hidden folder beside the files to come; made by `staged`."""
+
+    def __init__(self, folder: Path, destination: Path) -> None:
+        self._folder, self._destination = folder, destination
+        self._names: list[str] = []
+
+    def write(self, name: str, content: bytes) -> bytes:
+        """Write a file and return what the disk holds of it."""
+        path = self._folder / name
+        path.write_bytes(content)
+        self._names.append(name)
+        return path.read_bytes()
+
+    def deliver(self) -> None:
+        """Move the files to their destination, in the order in which they were written."""
+        for name in self._names:
+            (self._folder / name).replace(self._destination / name)
+
+
+@contextmanager
+def staged(destination: Path) -> Iterator[Staging]:
+    """Open a staging folder in an output folder; what is not delivered when it closes is gone.
+
+    An output folder that was made for this and holds nothing at the end is gone, too.
+
+    Raises
+    ------
+    OutputError
+        The folder or a file in it cannot be written.
+    """
+    made = [folder for folder in (destination, *destination.parents) if not folder.exists()]
+    try:
+        destination.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=".gen-profile-", dir=destination))
+        try:
+            yield Staging(folder, destination)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            _remove_empty(made)
+    except OSError as error:
+        raise OutputError(
+            f"Cannot write to the folder {destination}: {error.strerror or error}; "
+            "choose another one with --out."
+        ) from error
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in folders:
+        try:
+            folder.rmdir()
+        except OSError:  # something was delivered there
+            return

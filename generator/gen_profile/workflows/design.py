@@ -1,0 +1,185 @@
+"""The main job: from a spec to artefacts that were proved by co-simulation before anyone can take them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from gen_profile.check import Check
+from gen_profile.manifest import FILENAME, Artefact, Manifest, sha256
+from gen_profile.profile import Profile, SampledProfile
+from gen_profile.spec import Spec
+from gen_profile.workflows.delivery import Staging, staged
+from gen_profile.workflows.planning import Plan, plan
+from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
+from gen_profile_exporters.exporter import Exporter, target_of
+from gen_profile_exporters.registry import find_exporter
+
+Progress = Callable[[str], None]
+LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Design:
+    """Outcome of the main job.
+
+    Attributes
+    ----------
+    spec : Spec
+    plan : Plan
+    check : Check or None
+        Of the artefact that came off worst; None when no check was asked for.
+    artefacts : tuple of Artefact
+        What was delivered, paths relative to `folder`; empty when the check failed.
+    folder : Path
+    """
+
+    spec: Spec
+    plan: Plan
+    check: Check | None
+    artefacts: tuple[Artefact, ...]
+    folder: Path
+
+    @property
+    def passed(self) -> bool:
+        """Whether no check failed."""
+        return self.check is None or self.check.passed
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON; see the command-line contract."""
+        solution, optimum = self.plan.solution, self.plan.solution.raise_for_status()
+        return {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "solver": {
+                "status": solution.status.name.lower(),
+                "method": solution.method,
+                "iterations": solution.iterations,
+                "residual": solution.residual,
+                "time_s": self.plan.solver_time,
+                "cost": optimum.cost,
+                "sway_weight": optimum.sway_weight,
+                "sway_scale_per_m": optimum.sway_scale,
+                "intervals": len(optimum.knots) - 1,
+                "defect": optimum.defect,
+                "hamiltonian_variation": optimum.hamiltonian_variation,
+                "redundant": list(solution.redundant),
+            },
+            "figures": self.plan.figures,
+            "check": None if self.check is None else self.check.to_dict(),
+            "artefacts": [
+                {
+                    "format": artefact.format,
+                    "path": os.path.relpath(self.folder / artefact.path),
+                    "sha256": artefact.sha256,
+                    "bytes": artefact.bytes,
+                }
+                for artefact in self.artefacts
+            ],
+        }
+
+
+def design(
+    spec: Spec,
+    formats: Sequence[str],
+    folder: Path,
+    *,
+    check: bool = True,
+    keep_failed: bool = False,
+    progress: Progress = lambda _: None,
+) -> Design:
+    """Solve, export, replay what was written, co-simulate, and deliver what passes.
+
+    Parameters
+    ----------
+    spec : Spec
+    formats : sequence of str
+        Names known to the exporters' registry.
+    folder : Path
+        Made if needed; files of the same names are replaced, others left alone.
+    check : bool
+        Without it the manifest says ``"unverified"``.
+    keep_failed : bool
+        Deliver even what failed, marked so in the manifest.
+    progress : callable
+        Told what is being done.
+
+    Raises
+    ------
+    GenProfileError
+        Nothing was written.
+    """
+    exporters = {name: find_exporter(name) for name in dict.fromkeys(formats)}
+    progress("solving")
+    planned = plan(spec)
+    with staged(folder) as staging:
+        progress("exporting")
+        artefacts, replayed = _export(spec, planned.trial.command, exporters, staging)
+        worst = _check(spec, planned, replayed, progress) if check else None
+        staging.write(FILENAME, _manifest(spec, planned, artefacts, worst).to_json())
+        delivered = worst is None or worst.passed or keep_failed
+        if delivered:
+            staging.deliver()
+    return Design(
+        spec=spec, plan=planned, check=worst, artefacts=artefacts if delivered else (), folder=folder
+    )
+
+
+def _export(
+    spec: Spec, command: Profile, exporters: dict[str, Exporter], staging: Staging
+) -> tuple[tuple[Artefact, ...], list[SampledProfile]]:
+    """Write every format, and replay each one's first file as the disk holds it."""
+    target = target_of(spec)
+    artefacts, replayed = [], []
+    for name, exporter in exporters.items():
+        payload = ""
+        for index, file in enumerate(exporter.encode(command, target)):
+            written = staging.write(file.filename, file.content)
+            if index == 0:
+                replayed.append(exporter.replay(written, target))
+                payload = replayed[-1].payload_hash()
+            artefacts.append(
+                Artefact(
+                    format=name,
+                    path=file.filename,
+                    sha256=sha256(written),
+                    bytes=len(written),
+                    payload_sha256=payload,
+                )
+            )
+    return tuple(artefacts), replayed
+
+
+def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progress: Progress) -> Check:
+    """Judge all artefacts against the continuous motion, and keep the verdict on the worst."""
+    progress("checking by co-simulation")
+    machines = planned.trial.machines
+    checks = []
+    for setpoints in replayed:
+        found = cosimulate(
+            spec,
+            setpoints,
+            machines,
+            output_step=sample_spacing(spec, setpoints, machines),
+            on_build=lambda: progress("compiling the plant's FMU, once"),
+        )
+        expected = planned.trial.swing.at(found[0].times)
+        checks.append(judge(spec, setpoints, machines, found, expected))
+    return max(checks, key=lambda check: check.demand)
+
+
+def _manifest(spec: Spec, planned: Plan, artefacts: tuple[Artefact, ...], check: Check | None) -> Manifest:
+    return Manifest(
+        name=spec.name,
+        spec=spec.to_dict(),
+        spec_sha256=spec.sha256(),
+        profile_sha256=planned.trial.command.payload_hash(),
+        versions={library: version(library) for library in LIBRARIES},
+        artefacts=artefacts,
+        check=None if check is None else check.to_dict(),
+    )

@@ -1,0 +1,147 @@
+"""From a spec to a motion and its figures, before anything is written."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from gen_profile.check import Scenario
+from gen_profile.metrics import greatest, mean_square_root, peak, root_mean_square
+from gen_profile.plants.plant import Plant
+from gen_profile.problem.actuator import lag_compensated
+from gen_profile.problem.limits import require_limits
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.problem import problem_of
+from gen_profile.profile import Array, Profile
+from gen_profile.response import Swing
+from gen_profile.solvers import indirect
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.solution import Solution
+from gen_profile.spec import Spec
+from gen_profile.workflows.scenarios import scenarios
+
+SHORTEST_WATCH = 4.0  # s; a residual is watched for this long, or for two of the slowest periods
+STANDSTILL = 10.0  # time constants after which a lagging drive counts as standing: its speed is down to e⁻¹⁰
+TRANSIENT_SAMPLES = 2001
+RESIDUAL_SAMPLES = 4001
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Trial:
+    """A motion and what it does to the machines of its spec.
+
+    Attributes
+    ----------
+    motion : Profile
+        Of the axes.
+    command : Profile
+        Setpoints of the drives, which is the motion itself where they are ideal.
+    machines : tuple of Scenario
+        Nominal first.
+    swing : Swing
+        Of these machines.
+    watch : float
+        How long a residual is watched, in s.
+    """
+
+    motion: Profile
+    command: Profile
+    machines: tuple[Scenario, ...]
+    swing: Swing
+    watch: float
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Plan:
+    """A design that is not yet written: the solver's outcome, the trial of its motion, and its figures."""
+
+    solution: Solution
+    solver_time: float
+    trial: Trial
+    figures: dict[str, float]
+
+
+def plan(spec: Spec) -> Plan:
+    """Solve a spec and try the motion on all machines.
+
+    Raises
+    ------
+    InfeasibleProblem, SolverDiverged, LimitViolation
+    """
+    began = time.perf_counter()
+    solution = indirect.solve(problem_of(spec))
+    motion = optimal_profile(solution)
+    solver_time = time.perf_counter() - began
+    trial = try_motion(spec, motion)
+    found = figures(trial)
+    require_limits(spec.limits, trial.command, found["sway_transient_peak_m"])
+    return Plan(solution=solution, solver_time=solver_time, trial=trial, figures=found)
+
+
+def try_motion(spec: Spec, motion: Profile) -> Trial:
+    """Integrate every machine of a spec under a motion of its axes.
+
+    Parameters
+    ----------
+    spec : Spec
+    motion : Profile
+    """
+    plant, machines = spec.machine(), scenarios(spec)
+    tau = spec.actuator.tau
+    watch = watch_time(plant, machines)
+    settle = 2.0 * max(spec.export.cycle_time, spec.can.sync_period) + STANDSTILL * (tau or 0.0)
+    swing = Swing(plant, motion, [m.parameters for m in machines], motion.duration + settle + watch)
+    return Trial(
+        motion=motion, command=lag_compensated(motion, tau), machines=machines, swing=swing, watch=watch
+    )
+
+
+def watch_time(plant: Plant, machines: Sequence[Scenario]) -> float:
+    """Time in s in which every mode of every machine shows its greatest sway."""
+    slowest = min(linearize(plant, machine.parameters).frequencies[0] for machine in machines)
+    return max(SHORTEST_WATCH, 2.0 * 2.0 * np.pi / float(slowest))
+
+
+def figures(trial: Trial) -> dict[str, float]:
+    """Measure a trial: first axis, end load; sway during the move of the nominal machine, after it of all."""
+    motion, command, duration = trial.motion, trial.command, trial.motion.duration
+    during = trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES))[0].sway[:, -1:]
+    after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
+    residuals = [float(peak(response.sway[:, -1:])[0]) for response in after]
+    names = ("velocity", "acceleration", "jerk")
+    units = ("m_per_s", "m_per_s2", "m_per_s3")
+    table = {"duration_s": duration}
+    for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1):
+        table[f"{name}_max_{unit}"] = greatest(motion, order)
+        if order > 1:
+            table[f"{name}_rms_{unit}"] = root_mean_square(motion, order)
+    table |= {
+        "sway_transient_peak_m": float(peak(during)[0]),
+        "sway_transient_rms_m": float(mean_square_root(during)[0]),
+        "sway_residual_peak_m": residuals[0],
+        "sway_residual_peak_perturbed_m": residuals[min(1, len(residuals) - 1)],
+        "sway_residual_worst_m": max(residuals),
+    }
+    if command is not motion:
+        table |= {
+            f"command_{name}_max_{unit}": greatest(command, order)
+            for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1)
+        }
+    return table
+
+
+def modal_amplitudes(plant: Plant, machine: Scenario, q_u: Array, dq_u: Array) -> Array:
+    """Sum over the modes of what each adds to the sway of every load, in m, shape (loads,).
+
+    Parameters
+    ----------
+    q_u, dq_u : (n_u,) arrays
+        State of the free machine at any one time.
+    """
+    linear = linearize(plant, machine.parameters)
+    z, dz = np.linalg.solve(linear.modes, np.stack([q_u, dq_u], axis=1)).T
+    amplitudes = np.hypot(z, dz / linear.frequencies)
+    return np.asarray(np.abs(linear.sway_gain @ linear.modes) @ amplitudes)

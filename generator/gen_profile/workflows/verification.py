@@ -1,0 +1,167 @@
+"""Co-simulation of replayed setpoints on the plant FMU, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from gen_profile.check import Check, Finding, Scenario
+from gen_profile.metrics import peak
+from gen_profile.problem.linearization import linearize
+from gen_profile.profile import Array, SampledProfile
+from gen_profile.response import Response
+from gen_profile.spec import Spec
+from gen_profile.workflows.planning import RESIDUAL_SAMPLES, STANDSTILL, modal_amplitudes, watch_time
+from gen_profile_fmu.cosimulation import PlantCosimulation
+
+LONGEST_STEP = 1e-3  # s, of the FMU's integrator
+STEP_PHASE = 0.05  # rad of the fastest mode that one step may cover
+ERROR_FLOOR = 1e-8  # m; covers what both integrations leave
+VELOCITY_TOLERANCE = 0.01  # of the greatest velocity, between a velocity column and the positions beside it
+
+
+def cosimulate(
+    spec: Spec,
+    setpoints: SampledProfile,
+    machines: Sequence[Scenario],
+    *,
+    output_step: float,
+    on_build: Callable[[], None] | None = None,
+) -> tuple[Response, ...]:
+    """Let the plant's FMU follow setpoints, once with every machine.
+
+    Parameters
+    ----------
+    spec : Spec
+    setpoints : SampledProfile
+        Replayed from an artefact.
+    machines : sequence of Scenario
+    output_step : float
+        Spacing of samples in s, at most the cycle.
+    on_build : callable, optional
+        Called before the FMU is compiled.
+
+    Returns
+    -------
+    tuple of Response
+        One per machine, from the standstill of the axes on.
+
+    Raises
+    ------
+    CosimulationError
+        The FMU cannot be built or run.
+    """
+    plant, tau = spec.machine(), spec.actuator.tau or 0.0
+    with PlantCosimulation(plant, on_build) as fmu:
+        return tuple(
+            _from(
+                fmu.run(
+                    setpoints,
+                    machine.parameters,
+                    tau=tau,
+                    max_step=_max_step(spec, machine),
+                    settle=STANDSTILL * tau + watch_time(plant, machines),
+                    output_step=output_step,
+                ),
+                _arrival(spec, setpoints),
+            )
+            for machine in machines
+        )
+
+
+def judge(
+    spec: Spec,
+    setpoints: SampledProfile,
+    machines: Sequence[Scenario],
+    found: Sequence[Response],
+    expected: Sequence[Response],
+) -> Check:
+    """Compare what swings on with what is allowed.
+
+    Parameters
+    ----------
+    found : sequence of Response
+        Of `cosimulate`, one per machine.
+    expected : sequence of Response
+        Of another simulation at the same times, such that how far the two are apart bounds the error of
+        `found`.
+    """
+    error = max(
+        float(np.abs(one.sway - other.sway).max()) for one, other in zip(found, expected, strict=True)
+    )
+    return Check(
+        limit=dict(spec.check.residual_sway),
+        error_bound=error + ERROR_FLOOR,
+        arrival=_arrival(spec, setpoints),
+        findings=tuple(
+            _finding(spec, machine, response) for machine, response in zip(machines, found, strict=True)
+        ),
+        faults=_contradictions(setpoints),
+    )
+
+
+def sample_spacing(spec: Spec, setpoints: SampledProfile, machines: Sequence[Scenario]) -> float:
+    """Choose the spacing in s at which residuals are sampled."""
+    return min(setpoints.cycle_time, watch_time(spec.machine(), machines) / (RESIDUAL_SAMPLES - 1))
+
+
+def _arrival(spec: Spec, setpoints: SampledProfile) -> float:
+    """Time in s from which the axes stand still, the drives' lag included."""
+    return float(setpoints.times[-1]) + STANDSTILL * (spec.actuator.tau or 0.0)
+
+
+def _max_step(spec: Spec, machine: Scenario) -> float:
+    fastest = linearize(spec.machine(), machine.parameters).frequencies[-1]
+    return min(LONGEST_STEP, STEP_PHASE / float(fastest))
+
+
+def _from(response: Response, arrival: float) -> Response:
+    """Cut what comes before."""
+    kept = response.times >= arrival * (1.0 - 1e-12)
+    return Response(
+        times=response.times[kept],
+        position=response.position[kept],
+        velocity=response.velocity[kept],
+        q_u=response.q_u[kept],
+        dq_u=response.dq_u[kept],
+        sway=response.sway[kept],
+        angle=response.angle[kept],
+    )
+
+
+def _finding(spec: Spec, machine: Scenario, response: Response) -> Finding:
+    plant = spec.machine()
+    modal = modal_amplitudes(plant, machine, response.q_u[0], response.dq_u[0])
+    return Finding(
+        scenario=machine,
+        residual=dict(zip(plant.loads, map(float, peak(response.sway)), strict=True)),
+        modal=dict(zip(plant.loads, map(float, modal), strict=True)),
+    )
+
+
+def _contradictions(setpoints: SampledProfile) -> tuple[str, ...]:
+    """Say where a velocity column does not belong to the positions beside it.
+
+    A drive fed with both would follow one and not the other.
+    """
+    if setpoints.velocity is None or len(setpoints.position) < 3:
+        return ()
+    central = (setpoints.position[2:] - setpoints.position[:-2]) / (2.0 * setpoints.cycle_time)
+    size = max(float(np.abs(central).max()), float(np.abs(setpoints.velocity).max()))
+    noise = float(setpoints.resolution.max()) / setpoints.cycle_time
+    apart: Array = np.abs(setpoints.velocity[1:-1] - central).max(axis=1)
+    worst = int(apart.argmax())
+    if apart[worst] <= VELOCITY_TOLERANCE * size + noise + _curvature(setpoints):
+        return ()
+    return (
+        f"The velocity at {setpoints.times[worst + 1]:.6g} s contradicts the positions around it by "
+        f"{apart[worst]:.3g} m/s: the artefact was altered; export it again.",
+    )
+
+
+def _curvature(setpoints: SampledProfile) -> float:
+    """Bound what a central difference misses of a smooth velocity: h²/6 of the accelerations' slope."""
+    if setpoints.acceleration is None:
+        return 0.0
+    return float(np.abs(np.diff(setpoints.acceleration, axis=0)).max()) * setpoints.cycle_time / 6.0
