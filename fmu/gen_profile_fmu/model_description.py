@@ -138,9 +138,9 @@ def _start_dependencies(equations: Dynamics, table: VariableTable) -> dict[int, 
     starts, positions = table.references("START"), table.references("Q_A")
     dependencies = {position: [start] for position, start in zip(positions, starts, strict=True)}
     knowns = [*table.references("P"), *starts]
-    symbols = sym.column([equations.p, equations.q_a])
-    for block, column in (("SWAY", equations.sway), ("HEIGHT", equations.height), ("ANGLE", equations.angle)):
-        occurring = sym.entries(sym.jacobian(column, symbols))
-        for row, output in enumerate(table.references(block)):
-            dependencies[output] = [known for i, known in enumerate(knowns) if (row, i) in occurring]
+    observed = sym.column([equations.sway, equations.height, equations.angle])
+    occurring = sym.entries(sym.jacobian(observed, sym.column([equations.p, equations.q_a])))
+    outputs = [reference for block in ("SWAY", "HEIGHT", "ANGLE") for reference in table.references(block)]
+    for row, output in enumerate(outputs):
+        dependencies[output] = [known for column, known in enumerate(knowns) if (row, column) in occurring]
     return dependencies

@@ -6,6 +6,7 @@ variables lie side by side there, so that the equations can read and write them 
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from enum import Enum
@@ -129,11 +130,15 @@ def _plant_parameters(plant: Plant) -> tuple[Variable, ...]:
             unit=parameter.unit,
             kind=Kind.TUNABLE_PARAMETER,
             start=parameter.nominal,
-            lower=parameter.lower,
-            upper=parameter.upper,
+            lower=_bound(parameter.lower),
+            upper=_bound(parameter.upper),
         )
         for parameter in plant.parameters
     )
+
+
+def _bound(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _lag() -> Variable:

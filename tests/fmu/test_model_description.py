@@ -1,5 +1,6 @@
 """The model description, judged by other people's readers and against the equations."""
 
+import math
 import subprocess
 import sys
 import zipfile
@@ -140,6 +141,19 @@ def test_an_unknown_unit_stays_without_base_units(tmp_path):
     assert validate_fmu(str(archive)) == []
     units = {unit.name: unit.baseUnit for unit in read_model_description(str(archive)).unitDefinitions}
     assert units["stone"] is None
+
+
+def test_a_plant_may_have_unbounded_parameters_and_constant_outputs():
+    parameter = attrs.evolve(WINCH.parameters[0], lower=-math.inf, upper=math.inf)
+    flat = attrs.evolve(
+        WINCH,
+        parameters=(parameter, *WINCH.parameters[1:]),
+        outputs=lambda *arguments: attrs.evolve(WINCH.outputs(*arguments), height=[-1.0]),
+    )
+    archive = plant_fmu(flat).archive
+    assert validate_fmu(str(archive)) == []
+    described = read_model_description(str(archive)).modelVariables[0]
+    assert (described.name, described.min, described.max) == ("m", None, None)
 
 
 @pytest.mark.parametrize(
