@@ -104,12 +104,13 @@ def _override(document: Table, override: str) -> None:
     key, equals, text = override.partition("=")
     path = [part.strip() for part in key.split(".")]
     if not equals or not all(path):
-        raise SpecError(f"--set {override}: write KEY=VALUE, such as --set plant.L1=0.5.")
+        raise SpecError(f"--set {override!r}: write KEY=VALUE, such as --set plant.L1=0.5.")
     table = document
     for depth, part in enumerate(path[:-1]):
         inner = table.setdefault(part, {})
         if not isinstance(inner, dict):
-            raise SpecError(f"--set {override}: {'.'.join(path[: depth + 1])} is a value, not a table.")
+            taken = ".".join(path[: depth + 1])
+            raise SpecError(f"--set {override!r}: {taken!r} is a value, not a table.")
         table = inner
     # a move is stated one way: the override's way replaces the file's
     replaced = {"distance": ("start", "target"), "start": ("distance",), "target": ("distance",)}

@@ -64,5 +64,10 @@ def test_reading_a_spec_or_an_artefact_loads_nothing_heavy(heavy):
     )
 
 
+@pytest.mark.parametrize("heavy", ["casadi", "scipy"])
+def test_shapers_need_numpy_only(heavy):
+    assert heavy not in loaded_by("gen_profile.shapers.shaped_move")
+
+
 def test_that_test_would_see_casadi():
     assert "casadi" in loaded_by("gen_profile.problem.linearization")

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from gen_profile.errors import SpecError
 from gen_profile.plants import registry
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.problem.linearization import linearize
@@ -109,11 +110,20 @@ def test_the_list_tells_what_the_machines_say_of_themselves():
 def test_other_distributions_add_machines(monkeypatch):
     own = EntryPoint("winch", "fmu.hoisting_pendulum:PLANT", registry.GROUP)
 
-    def installed(**wanted):
-        return EntryPoints([own]).select(**wanted)
-
-    monkeypatch.setattr(registry, "entry_points", installed)
+    monkeypatch.setattr(registry, "entry_points", EntryPoints([own]).select)
     assert "winch" in plant_types()
     assert find_plant("winch").parameters
     with pytest.raises(KeyError):
         find_plant("crane")
+
+
+@pytest.mark.parametrize(
+    ("value", "why"),
+    [("no_such_module:PLANT", "No module named"), ("fmu.hoisting_pendulum:outputs", "is no gen_profile")],
+)
+def test_a_broken_machine_of_another_distribution(monkeypatch, value, why):
+    broken = EntryPoints([EntryPoint("winch", value, registry.GROUP)])
+    monkeypatch.setattr(registry, "entry_points", broken.select)
+    assert "winch" in plant_types()
+    with pytest.raises(SpecError, match=rf"plant\.type: 'winch'.*{why}.*update or uninstall"):
+        find_plant("winch")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, cast
+from importlib.metadata import EntryPoint, entry_points
+from typing import cast
 
-if TYPE_CHECKING:
-    from gen_profile.plants.plant import Plant
+from gen_profile.errors import SpecError
+from gen_profile.plants.plant import Plant
 
 # type → (module that holds PLANT, summary); modules load only when their machine is asked for
 BUILT_IN: dict[str, tuple[str, str]] = {
@@ -32,10 +32,27 @@ def find_plant(type_: str) -> Plant:
     Raises
     ------
     KeyError
-        When no machine has that name.
+        No machine has that name.
+    SpecError
+        Another distribution's machine cannot be loaded.
     """
     if type_ in BUILT_IN:
-        return cast("Plant", import_module(BUILT_IN[type_][0]).PLANT)
+        return cast(Plant, import_module(BUILT_IN[type_][0]).PLANT)
     for entry in entry_points(group=GROUP, name=type_):
-        return cast("Plant", entry.load())
+        return _plant_of_plugin(entry)
     raise KeyError(type_)
+
+
+def _plant_of_plugin(entry: EntryPoint) -> Plant:
+    cure = "update or uninstall the package that provides it."
+    try:
+        plant = entry.load()
+    except Exception as error:
+        raise SpecError(
+            f"plant.type: {entry.name!r} cannot be loaded from {entry.value} ({error}); {cure}"
+        ) from error
+    if not isinstance(plant, Plant):
+        raise SpecError(
+            f"plant.type: {entry.name!r}: {entry.value} is no gen_profile.plants.plant.Plant; {cure}"
+        )
+    return plant
