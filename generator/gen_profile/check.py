@@ -75,22 +75,27 @@ class Check:
         return all(finding.residual[load] + self.error_bound <= limit for load, limit in self.limit.items())
 
     @property
+    def worst(self) -> tuple[str, Finding]:
+        """The load that takes up the greatest share of its limit, and where."""
+        pairs = [(load, finding) for finding in self.findings for load in self.limit]
+        return max(pairs, key=lambda pair: pair[1].residual[pair[0]] / self.limit[pair[0]])
+
+    @property
     def demand(self) -> float:
         """Share of its limit that the worst load takes up; infinite where something else is wrong."""
-        if self.faults:
-            return float("inf")
-        return max(self._excess(finding) for finding in self.findings)
+        load, finding = self.worst
+        share = (finding.residual[load] + self.error_bound) / self.limit[load]
+        return float("inf") if self.faults else share
 
     def reasons(self) -> tuple[str, ...]:
         """Say why the check failed, a sentence each; none when it passed."""
-        worst = max(self.findings, key=self._excess)
-        if self.keeps_limit(worst):
+        if all(self.keeps_limit(finding) for finding in self.findings):
             return self.faults
-        load = max(self.limit, key=lambda name: worst.residual[name] / self.limit[name])
+        load, finding = self.worst
         return (
-            f"The {load} sways by {1e3 * worst.residual[load]:.3f} mm after the move "
-            f"({worst.scenario.name}), and {1e3 * self.limit[load]:.3f} mm are allowed (check.residual_sway; "
-            f"numerical error up to {1e6 * self.error_bound:.2g} µm).",
+            f"The {load} sways by {1e3 * finding.residual[load]:.4g} mm after the move "
+            f"({finding.scenario.name}), and {1e3 * self.limit[load]:.4g} mm are allowed "
+            f"(check.residual_sway; numerical error up to {1e6 * self.error_bound:.2g} µm).",
             *self.faults,
         )
 
@@ -116,6 +121,3 @@ class Check:
             ],
             "reasons": list(self.reasons()),
         }
-
-    def _excess(self, finding: Finding) -> float:
-        return max((finding.residual[load] + self.error_bound) / limit for load, limit in self.limit.items())

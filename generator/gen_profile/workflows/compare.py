@@ -17,7 +17,7 @@ from gen_profile.shapers.shaped_move import shaped_profile
 from gen_profile.solvers import indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.spec import Spec
-from gen_profile.workflows.planning import figures, try_motion
+from gen_profile.workflows.planning import Trial, figures, try_motion
 
 SWAY_WEIGHTS = (0.0, 20.0, 50.0)  # the paper's
 
@@ -31,8 +31,8 @@ class Row:
     Attributes
     ----------
     method : str
-    motion : Profile or None
-        None when the method has none for this move.
+    trial : Trial or None
+        None when the method has no motion for this move.
     figures : dict of str to float
         Empty without a motion.
     reason : str
@@ -40,7 +40,7 @@ class Row:
     """
 
     method: str
-    motion: Profile | None
+    trial: Trial | None
     figures: dict[str, float]
     reason: str = ""
 
@@ -68,8 +68,8 @@ class Comparison:
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
-            "rows": [{"method": row.method, "figures": row.figures} for row in self.rows if row.motion],
-            "left_out": [{"method": row.method, "reason": row.reason} for row in self.rows if not row.motion],
+            "rows": [{"method": row.method, "figures": row.figures} for row in self.rows if row.trial],
+            "left_out": [{"method": row.method, "reason": row.reason} for row in self.rows if not row.trial],
             "recommended": self.recommended,
             "reasons": self.reasons,
         }
@@ -81,11 +81,11 @@ def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
     for method, make in _methods(spec):
         progress(method)
         try:
-            motion = make()
-            rows.append(Row(method=method, motion=motion, figures=figures(try_motion(spec, motion))))
+            trial = try_motion(spec, make())
+            rows.append(Row(method=method, trial=trial, figures=figures(trial)))
         except GenProfileError as error:
-            rows.append(Row(method=method, motion=None, figures={}, reason=str(error)))
-    recommended, reasons = _recommend(spec, [row for row in rows if row.motion])
+            rows.append(Row(method=method, trial=None, figures={}, reason=str(error)))
+    recommended, reasons = _recommend(spec, [row for row in rows if row.trial])
     return Comparison(spec=spec, rows=tuple(rows), recommended=recommended, reasons=reasons)
 
 

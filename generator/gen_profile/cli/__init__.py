@@ -1,0 +1,5 @@
+"""The command line: arguments in, a workflow called, words and exit codes out."""
+
+from gen_profile.cli.commands import main
+
+__all__ = ["main"]

@@ -1,0 +1,301 @@
+"""The commands. Each imports its workflow when it runs: ``--help`` must not wait for CasADi."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+from click.shell_completion import CompletionItem
+
+from gen_profile.cli.group import DefaultGroup
+from gen_profile.errors import CheckFailed, GenProfileError, SpecError
+from gen_profile.suggestion import suggestion
+
+if TYPE_CHECKING:
+    from gen_profile.spec import Spec
+
+DEFAULT_PRESET = "paper"
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def _complete_formats(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    from gen_profile_exporters.registry import formats
+
+    return [
+        CompletionItem(name, help=known.summary)
+        for name, known in formats().items()
+        if name.startswith(incomplete)
+    ]
+
+
+def _complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    from gen_profile.spec_reading import presets
+
+    return [
+        CompletionItem(name, help=text) for name, text in presets().items() if name.startswith(incomplete)
+    ]
+
+
+def _spec_options(command: Command) -> Command:
+    """Add what every command that takes a spec takes."""
+    for decorate in (
+        click.option(
+            "--set",
+            "overrides",
+            metavar="KEY=VALUE",
+            multiple=True,
+            help="Override a key of the spec, such as plant.L1=0.5. Repeatable.",
+        ),
+        click.option(
+            "--preset",
+            metavar="NAME",
+            shell_complete=_complete_presets,
+            help="Use a built-in spec (see gen-profile presets).",
+        ),
+        click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=click.Path(path_type=Path)),
+    ):
+        command = decorate(command)
+    return command
+
+
+_json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
+_debug_option = click.option(
+    "--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."
+)
+
+
+@click.group(cls=DefaultGroup, epilog="Example: gen-profile crane.toml --export plc --out deploy")
+@click.version_option(package_name="gen-profile", message="%(version)s")
+def cli() -> None:
+    """Design motion profiles that leave no sway, prove them by co-simulation, and export them.
+
+    Without a command: design, export and verify.
+    """
+
+
+@cli.command(epilog="Example: gen-profile --preset paper --export plc --export can --out deploy")
+@_spec_options
+@click.option(
+    "--export",
+    "formats",
+    metavar="FORMAT",
+    multiple=True,
+    default=("csv",),
+    shell_complete=_complete_formats,
+    help="Format to write (see gen-profile formats). Repeatable; csv by default.",
+)
+@click.option(
+    "--out",
+    "folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    default=Path("gen-profile-out"),
+    help="Folder to write to; ./gen-profile-out by default.",
+)
+@click.option("--cycle-time", metavar="SECONDS", help="Cycle of the controller, and SYNC period of the bus.")
+@click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
+@click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
+@_json_option
+@_debug_option
+def design(
+    spec_path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    formats: tuple[str, ...],
+    folder: Path,
+    cycle_time: str | None,
+    no_check: bool,
+    keep_failed: bool,
+    as_json: bool,
+) -> None:
+    """Design, export and verify (the default)."""
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import progress
+    from gen_profile.workflows.design import design as run
+
+    if cycle_time is not None:
+        overrides += (f"export.cycle_time={cycle_time}", f"can.sync_period={cycle_time}")
+    spec = _spec(spec_path, preset, overrides)
+    with progress() as tell:
+        outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
+    _print(outcome.to_dict(), words.design(outcome), as_json)
+    if not outcome.passed and outcome.check is not None:
+        _fail(
+            outcome.check.reasons(), "The files were kept." if outcome.artefacts else "Nothing was written."
+        )
+
+
+@cli.command(epilog="Example: gen-profile compare --preset paper --plot comparison.png")
+@_spec_options
+@click.option(
+    "--plot",
+    "picture",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Draw the comparison (png, svg or pdf).",
+)
+@_json_option
+@_debug_option
+def compare(
+    spec_path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    picture: Path | None,
+    as_json: bool,
+) -> None:
+    """Compare optimal profiles with shapers."""
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import progress
+    from gen_profile.workflows.compare import compare as run
+
+    spec = _spec(spec_path, preset, overrides)
+    with progress() as tell:
+        comparison = run(spec, tell)
+        if picture is not None:
+            from gen_profile.workflows.comparison_plot import draw
+
+            tell("drawing")
+            draw(comparison, picture)
+    _print(comparison.to_dict(), words.comparison(comparison), as_json)
+
+
+@cli.command(epilog="Example: gen-profile check deploy/paper.st")
+@click.argument("artefact", type=click.Path(path_type=Path))
+@_spec_options
+@_json_option
+@_debug_option
+def check(
+    artefact: Path, spec_path: Path | None, preset: str | None, overrides: tuple[str, ...], as_json: bool
+) -> None:
+    """Replay, co-simulate and judge an artefact.
+
+    The spec comes from the manifest beside the artefact unless one is named.
+    """
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import progress
+    from gen_profile.workflows.check import check_artefact
+
+    given = spec_path is not None or preset is not None
+    if overrides and not given:
+        raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")
+    spec = _spec(spec_path, preset, overrides) if given else None
+    with progress() as tell:
+        tell("checking by co-simulation")
+        judgement = check_artefact(artefact, spec, lambda: tell("compiling the plant's FMU, once"))
+    _print(judgement.to_dict(), words.judgement(judgement), as_json)
+    if not judgement.check.passed:
+        _fail(judgement.check.reasons(), "Do not deploy it.")
+
+
+@cli.command(epilog="Example: gen-profile formats")
+@_json_option
+def formats(as_json: bool) -> None:
+    """List the export formats."""
+    from gen_profile_exporters.registry import formats as known
+
+    rows = {name: f"{form.summary} ({form.suffix}; {form.proof})" for name, form in known().items()}
+    _print({"formats": {name: form._asdict() for name, form in known().items()}}, _definitions(rows), as_json)
+
+
+@cli.command(epilog="Example: gen-profile plants")
+@_json_option
+def plants(as_json: bool) -> None:
+    """List the machines with their parameters."""
+    from gen_profile.plants.registry import find_plant, plant_types
+
+    document, blocks = {}, []
+    for type_ in plant_types():
+        plant = find_plant(type_)
+        document[type_] = {
+            "summary": plant.summary,
+            "axes": {axis.name: axis.unit for axis in plant.actuated},
+            "loads": list(plant.loads),
+            "parameters": {
+                q.name: {"unit": q.unit, "nominal": q.nominal, "lower": q.lower, "upper": q.upper}
+                for q in plant.parameters
+            },
+        }
+        values = {
+            q.name: f"{q.description}, {q.nominal:g} {q.unit} ({q.lower:g} to {q.upper:g})"
+            for q in plant.parameters
+        }
+        blocks.append(f"{type_}: {plant.summary}\n{_definitions(values)}")
+    _print({"plants": document}, "\n\n".join(blocks), as_json)
+
+
+@cli.command(epilog="Example: gen-profile presets")
+@_json_option
+def presets(as_json: bool) -> None:
+    """List the built-in specs."""
+    from gen_profile.spec_reading import presets as known
+
+    _print({"presets": known()}, _definitions(known()), as_json)
+
+
+def main() -> None:
+    """Run the command line; the entry point."""
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a terminal may lack β
+    debug, as_json = "--debug" in sys.argv, "--json" in sys.argv
+    if debug:
+        import logging
+
+        logging.basicConfig(level=logging.DEBUG, format="%(name)s: %(message)s")
+    try:
+        cli(prog_name="gen-profile")
+    except GenProfileError as error:
+        if debug:
+            raise
+        _report(error, as_json)
+        sys.exit(error.exit_code)
+    except Exception as error:
+        if debug:
+            raise
+        bug = f"gen-profile: internal error ({type(error).__name__}: {error}). Run again with --debug."
+        click.echo(bug, err=True)
+        sys.exit(1)
+
+
+def _spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
+    from gen_profile.spec_reading import preset_spec, read_spec
+
+    if path is not None and preset is not None:
+        raise SpecError("--preset: name either a spec file or a preset, not both.")
+    if path is None:
+        return preset_spec(preset or DEFAULT_PRESET, overrides)
+    if not path.exists():
+        near = suggestion(str(path), cli.commands)
+        raise SpecError(f"{path}: there is no such spec file{near if 'did you mean' in near else ''}.")
+    return read_spec(path, overrides)
+
+
+def _print(document: dict[str, Any], text: str, as_json: bool) -> None:
+    click.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else text)
+
+
+def _definitions(rows: dict[str, str]) -> str:
+    formatter = click.HelpFormatter(width=110)
+    formatter.indent()
+    formatter.write_dl(list(rows.items()))
+    return formatter.getvalue().rstrip("\n")
+
+
+def _fail(reasons: tuple[str, ...], consequence: str) -> None:
+    for sentence in reasons:
+        click.echo(f"Check failed: {sentence}", err=True)
+    click.echo(consequence, err=True)
+    sys.exit(CheckFailed.exit_code)
+
+
+def _report(error: GenProfileError, as_json: bool) -> None:
+    if as_json:
+        kind = type(error).__name__
+        document = {"error": {"type": kind, "message": str(error), "exit_code": error.exit_code}}
+        click.echo(json.dumps(document, indent=2))
+    for line in str(error).splitlines():
+        click.echo(f"Error: {line}", err=True)

@@ -1,0 +1,39 @@
+"""A command group whose first command runs when no command is named."""
+
+from __future__ import annotations
+
+import click
+from click.shell_completion import CompletionItem
+
+DEFAULT = "design"
+
+
+class DefaultGroup(click.Group):
+    """Put `DEFAULT` before arguments that begin with neither a command nor an option of the group."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments, the default command put in."""
+        own = {option for parameter in self.get_params(ctx) for option in parameter.opts}
+        completing_first_word = ctx.resilient_parsing and not args
+        if not completing_first_word and (not args or (args[0] not in self.commands and args[0] not in own)):
+            args = [DEFAULT, *args]
+        return super().parse_args(ctx, args)
+
+    def format_usage(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Show both ways of calling."""
+        formatter.write_usage(ctx.command_path, "[SPEC.toml] [OPTIONS]")
+        formatter.write_usage(ctx.command_path, "COMMAND [ARGS]...", prefix="   or: ")
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Show the default command's options with the group's own."""
+        default = self.commands[DEFAULT]
+        records = (parameter.get_help_record(ctx) for parameter in (*default.params, *self.get_params(ctx)))
+        with formatter.section("Options"):
+            formatter.write_dl([record for record in records if record is not None])
+        self.format_commands(ctx, formatter)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete commands and what the default command takes."""
+        default = self.commands[DEFAULT]
+        inner = default.make_context(DEFAULT, [], parent=ctx, resilient_parsing=True)
+        return [*super().shell_complete(ctx, incomplete), *default.shell_complete(inner, incomplete)]

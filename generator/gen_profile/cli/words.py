@@ -1,0 +1,145 @@
+"""Outcomes in words and tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import StringIO
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from gen_profile.check import Check
+from gen_profile.spec import Spec
+from gen_profile.workflows.check import Judgement
+from gen_profile.workflows.compare import Comparison
+from gen_profile.workflows.design import Design
+
+MANIFEST_WORDS = {
+    "matches": "the file is the one that was exported",
+    "differs": "the file is NOT the one that was exported",
+    "none": "no manifest of this spec beside the file",
+}
+
+# head → unit, figure, how many of the unit make one of the figure's
+COLUMNS = {
+    "a max": ("m/s²", "acceleration_max_m_per_s2", 1.0),
+    "a rms": ("m/s²", "acceleration_rms_m_per_s2", 1.0),
+    "jerk max": ("m/s³", "jerk_max_m_per_s3", 1.0),
+    "jerk rms": ("m/s³", "jerk_rms_m_per_s3", 1.0),
+    "sway max": ("mm", "sway_transient_peak_m", 1e3),
+    "sway rms": ("mm", "sway_transient_rms_m", 1e3),
+    "residual": ("mm", "sway_residual_peak_m", 1e3),
+    "perturbed": ("mm", "sway_residual_peak_perturbed_m", 1e3),
+    "worst": ("mm", "sway_residual_worst_m", 1e3),
+}
+
+
+def design(outcome: Design) -> str:
+    """Tell what was designed, how it was judged and where it lies."""
+    solution, figures = outcome.plan.solution, outcome.plan.figures
+    status, seconds = solution.status.name.lower(), outcome.plan.solver_time
+    found = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
+    residual = (
+        f"{_mm(figures['sway_residual_peak_m'])} nominal, {_mm(figures['sway_residual_worst_m'])} at worst"
+    )
+    rows = [
+        ("move", _move(outcome.spec)),
+        ("solver", found),
+        _peaks(outcome),
+        ("sway on the way", _mm(figures["sway_transient_peak_m"])),
+        ("residual sway", residual),
+        ("check", _verdict(outcome.check)),
+    ]
+    if outcome.spec.plant.defaults:
+        rows.append(("defaults used", ", ".join(f"plant.{name}" for name in outcome.spec.plant.defaults)))
+    if solution.redundant:
+        names = ", ".join(solution.redundant)
+        rows.append(("left out", f"sensitivity to {names}: zero with that to the others, to first order"))
+    rows += [("wrote", str(outcome.folder / artefact.path)) for artefact in outcome.artefacts]
+    return _block(outcome.spec.name, rows)
+
+
+def judgement(found: Judgement) -> str:
+    """Tell how an artefact was judged."""
+    findings = [
+        (finding.scenario.name, ", ".join(f"{load} {_mm(sway)}" for load, sway in finding.residual.items()))
+        for finding in found.check.findings
+    ]
+    manifest = MANIFEST_WORDS[found.manifest]
+    rows = [("move", _move(found.spec)), ("manifest", manifest), *findings, ("check", _verdict(found.check))]
+    return _block(str(found.path), rows)
+
+
+def comparison(found: Comparison) -> str:
+    """Lay the methods out side by side, with the recommendation below."""
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("method\n")
+    for head, (unit, _, _) in COLUMNS.items():
+        table.add_column(f"{head}\n{unit}", justify="right")
+    for row in found.rows:
+        if row.trial:
+            cells = (_figure(factor * row.figures[key]) for _, key, factor in COLUMNS.values())
+            table.add_row(row.method, *cells)
+    left_out = [f"{row.method}: {row.reason}" for row in found.rows if not row.trial]
+    advice = [
+        f"{kind}: {method or 'none'}. {found.reasons[kind]}" for kind, method in found.recommended.items()
+    ]
+    return "\n".join([f"{found.spec.name}: {_move(found.spec)}", _text(table), *left_out, *advice])
+
+
+def _move(spec: Spec) -> str:
+    units = [axis.unit for axis in spec.machine().actuated]
+    distances = ", ".join(
+        f"{name} {distance:g} {unit}"
+        for name, distance, unit in zip(spec.axis, spec.move.distance, units, strict=True)
+    )
+    uncertain = ", ".join(f"{name} ±{100 * share:g} %" for name, share in spec.robustness.uncertain.items())
+    return f"{spec.plant.type}, {distances} in {spec.move.duration:g} s" + (
+        f", {uncertain}" if uncertain else ""
+    )
+
+
+def _peaks(outcome: Design) -> tuple[str, str]:
+    lagging, figures = outcome.spec.actuator.tau is not None, outcome.plan.figures
+    peaks = [
+        f"{figures[('command_' if lagging else '') + key]:.4g} {unit}"
+        for key, unit in (
+            ("velocity_max_m_per_s", "m/s"),
+            ("acceleration_max_m_per_s2", "m/s²"),
+            ("jerk_max_m_per_s3", "m/s³"),
+        )
+    ]
+    return ("peak command" if lagging else "peak motion", ", ".join(peaks))
+
+
+def _verdict(check: Check | None) -> str:
+    if check is None:
+        return "not asked for: UNVERIFIED"
+    load, finding = check.worst
+    return (
+        f"{'passed' if check.passed else 'FAILED'}: {load} {_mm(finding.residual[load])} at worst "
+        f"({finding.scenario.name}), {_mm(check.limit[load])} allowed, error below {_mm(check.error_bound)}"
+    )
+
+
+def _mm(metres: float) -> str:
+    return f"{_figure(1e3 * metres)} mm"
+
+
+def _figure(value: float) -> str:
+    """Write four digits, and none below a hundred-thousandth: of a millimetre, that is numerical error."""
+    return f"{round(value, 5):.4g}"
+
+
+def _block(title: str, rows: Sequence[tuple[str, str]]) -> str:
+    table = Table.grid(padding=(0, 2))
+    for row in rows:
+        table.add_row("", *row)
+    return f"{title}\n{_text(table)}"
+
+
+def _text(table: Table) -> str:
+    buffer = StringIO()
+    Console(file=buffer, width=200).print(table, markup=False, highlight=False)
+    return "\n".join(line.rstrip() for line in buffer.getvalue().rstrip().splitlines())
