@@ -30,6 +30,15 @@ from gen_profile_fmu.cache import ENVIRONMENT_VARIABLE
 from gen_profile_fmu.plant_fmu import PlantFmu, plant_fmu
 from gen_profile_fmu.variables import MAX_STEP, TAU
 
+# blocks of variables that are read after every step, and what a Response calls them
+_OBSERVED = {
+    "Q_A": "position",
+    "DQ_A": "velocity",
+    "Q_U": "q_u",
+    "DQ_U": "dq_u",
+    "SWAY": "sway",
+    "ANGLE": "angle",
+}
 _logger = logging.getLogger(__name__)
 
 
@@ -68,11 +77,10 @@ class PlantCosimulation:
         self._slave = _load(self._fmu, self._callbacks, self._messages)
         variables = self._fmu.variables
         self._setpoints = _references(variables.references("SETPOINT"))
-        observed = ("Q_A", "DQ_A", "Q_U", "DQ_U", "SWAY", "ANGLE")
         self._outputs = _references(
-            [reference for block in observed for reference in variables.references(block)]
+            [reference for block in _OBSERVED for reference in variables.references(block)]
         )
-        self._output_blocks = np.cumsum([len(variables.blocks[block]) for block in observed])[:-1]
+        self._output_blocks = np.cumsum([len(variables.blocks[block]) for block in _OBSERVED])[:-1]
 
     def __enter__(self) -> Self:
         return self
@@ -125,8 +133,6 @@ class PlantCosimulation:
         CosimulationError
             When a parameter is missing, unknown or out of range, or the FMU refuses a step.
         """
-        if self._slave is None:
-            raise CosimulationError("This co-simulation has been closed; make a new one.")
         values = {
             **self._plant_values(parameters),
             **self._start_values(setpoints),
@@ -134,25 +140,8 @@ class PlantCosimulation:
             MAX_STEP: max_step,
         }
         steps = _steps(setpoints, settle, output_step)
-        self._messages.clear()
-        try:
-            self._initialise(values)
-            samples = self._march(steps)
-        except FMICallException as error:
-            reason = " ".join(self._messages) or f"{error.function} returned status {error.status}."
-            raise CosimulationError(
-                f"The FMU of plant {self._plant.type} could not go on: {reason}"
-            ) from error
-        position, velocity, q_u, dq_u, sway, angle = np.split(samples, self._output_blocks, axis=1)
-        return Response(
-            times=steps.times,
-            position=position,
-            velocity=velocity,
-            q_u=q_u,
-            dq_u=dq_u,
-            sway=sway,
-            angle=angle,
-        )
+        samples = np.split(self._simulate(values, steps), self._output_blocks, axis=1)
+        return Response(times=steps.times, **dict(zip(_OBSERVED.values(), samples, strict=True)))
 
     def _plant_values(self, parameters: Mapping[str, float]) -> dict[str, float]:
         known = {parameter.name for parameter in self._plant.parameters}
@@ -178,6 +167,20 @@ class PlantCosimulation:
             for axis, position in zip(axes, setpoints.position[0], strict=True)
             for suffix in ("start", "setpoint")
         }
+
+    def _simulate(self, values: Mapping[str, float], steps: _Steps) -> Array:
+        """Run from the start; the observed outputs in blocks, shape (samples, outputs)."""
+        if self._slave is None:
+            raise CosimulationError("This co-simulation has been closed; make a new one.")
+        self._messages.clear()
+        try:
+            self._initialise(values)
+            return self._march(steps)
+        except FMICallException as error:
+            reason = " ".join(self._messages) or f"{error.function} returned status {error.status}."
+            raise CosimulationError(
+                f"The FMU of plant {self._plant.type} could not go on: {reason}"
+            ) from error
 
     def _initialise(self, values: Mapping[str, float]) -> None:
         table = {variable.name: reference for reference, variable in enumerate(self._fmu.variables.variables)}

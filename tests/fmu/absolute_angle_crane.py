@@ -62,11 +62,11 @@ def swing(push: Callable[[float], float], times: Array, p: Parameters) -> Array:
 
 
 def swing_in_steps(positions: Array, cycle: float, tau: float, p: Parameters) -> tuple[Array, Array]:
-    """Angles and cart positions at the setpoints' times, for drives that interpolate linearly.
+    """Angles and their rates, and cart positions, at the times of linearly interpolated setpoints.
 
     With tau = 0 the cart takes up every new velocity by a push, else the lagging cart is integrated along.
     """
-    angles, carts = [np.zeros(2)], [positions[0]]
+    states, carts = [np.zeros(4)], [positions[0]]
     state, cart = np.zeros(4), np.array([positions[0], 0.0])
     for velocity in np.diff(positions) / cycle:
         if tau == 0.0:
@@ -77,9 +77,9 @@ def swing_in_steps(positions: Array, cycle: float, tau: float, p: Parameters) ->
             cart = np.array([cart[0] + velocity * cycle, velocity])
         else:
             state, cart = _lagging(state, cart, velocity, cycle, tau, p)
-        angles.append(state[:2])
+        states.append(state.copy())
         carts.append(cart[0])
-    return np.array(angles), np.array(carts)
+    return np.array(states), np.array(carts)
 
 
 def sway(phi: Array, p: Parameters) -> Array:
