@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -11,18 +12,14 @@ import click
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
     """Show the current step with a spinner on a terminal, and as lines elsewhere."""
-    if click.get_text_stream("stderr").isatty():
-        from rich.console import Console
+    if not sys.stderr.isatty():
+        yield _print_line
+        return
+    from rich.console import Console
 
-        with Console(stderr=True).status("starting …") as status:
+    with Console(stderr=True).status("starting …") as status:
+        yield lambda text: status.update(f"{text} …")
 
-            def show(text: str) -> None:
-                status.update(f"{text} …")
 
-            yield show
-    else:
-
-        def print_line(text: str) -> None:
-            click.echo(f"{text} …", err=True)
-
-        yield print_line
+def _print_line(text: str) -> None:
+    click.echo(f"{text} …", err=True)
