@@ -58,7 +58,7 @@ def _fill(axes: Any, comparison: Comparison) -> None:
     limit = 1e3 * list(comparison.spec.check.residual_sway.values())[-1]
     load = comparison.spec.machine().loads[-1]
     motion.set(ylabel="acceleration (m/s²)")
-    motion.legend(loc="upper right", ncols=2)
+    motion.legend(loc="upper right", fontsize="small")
     nominal.set(ylabel=f"{load} sway (mm),\nnominal machine")
     perturbed.set(ylabel=f"{load} sway (mm),\nworst machine", xlabel="time (s)")
     for axis in (motion, nominal, perturbed):
