@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 from collections.abc import Callable
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -12,13 +14,14 @@ import click
 from click.shell_completion import CompletionItem
 
 from gen_profile.cli.group import DefaultGroup
-from gen_profile.errors import CheckFailed, GenProfileError, SpecError
+from gen_profile.errors import CheckFailed, GenProfileError, OutputError, SpecError
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
     from gen_profile.spec import Spec
 
 DEFAULT_PRESET = "paper"
+INTERRUPTED = 128 + signal.SIGINT  # as shells count it
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -240,25 +243,20 @@ def presets(as_json: bool) -> None:
 def main() -> None:
     """Run the command line; the entry point."""
     for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a terminal may lack β
+        if isinstance(stream, TextIOWrapper):  # and not closed by the caller
+            stream.reconfigure(errors="replace")  # a terminal may lack β
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up then as for Ctrl-C
     debug, as_json = "--debug" in sys.argv, "--json" in sys.argv
     if debug:
         import logging
 
         logging.basicConfig(level=logging.DEBUG, format="%(name)s: %(message)s")
     try:
-        cli(prog_name="gen-profile")
-    except GenProfileError as error:
-        if debug:
-            raise
-        _report(error, as_json)
-        sys.exit(error.exit_code)
+        sys.exit(cli.main(prog_name="gen-profile", standalone_mode=False))
     except Exception as error:
         if debug:
             raise
-        bug = f"gen-profile: internal error ({type(error).__name__}: {error}). Run again with --debug."
-        click.echo(bug, err=True)
-        sys.exit(1)
+        sys.exit(_report(error, as_json))
 
 
 def _spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
@@ -268,10 +266,18 @@ def _spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> 
         raise SpecError("--preset: name either a spec file or a preset, not both.")
     if path is None:
         return preset_spec(preset or DEFAULT_PRESET, overrides)
-    if not path.exists():
-        near = suggestion(str(path), cli.commands)
-        raise SpecError(f"{path}: there is no such spec file{near if 'did you mean' in near else ''}.")
-    return read_spec(path, overrides)
+    try:
+        return read_spec(path, overrides)
+    except OutputError as error:
+        raise OutputError(f"{str(error).rstrip('.')}{_command_meant(str(path))}") from error
+
+
+def _command_meant(word: str) -> str:
+    """End the sentence on a spec that cannot be read: its name may have been meant as a command."""
+    if word in cli.commands:
+        return f"; a command comes before its options: gen-profile {word} …"
+    near = suggestion(word, cli.commands)
+    return near if "did you mean" in near else "."
 
 
 def _print(document: dict[str, Any], text: str, as_json: bool) -> None:
@@ -292,10 +298,23 @@ def _fail(reasons: tuple[str, ...], consequence: str) -> None:
     sys.exit(CheckFailed.exit_code)
 
 
-def _report(error: GenProfileError, as_json: bool) -> None:
+def _report(error: Exception, as_json: bool) -> int:
+    """Tell an error in sentences, and in JSON where that was asked for; return its exit code."""
+    match error:
+        case GenProfileError():
+            code, message = error.exit_code, str(error)
+        case click.ClickException():
+            code, message = error.exit_code, error.format_message()
+        case click.Abort():
+            code, message = INTERRUPTED, "Interrupted."
+        case _:
+            code, message = 1, f"Internal error ({type(error).__name__}: {error}). Run again with --debug."
     if as_json:
-        kind = type(error).__name__
-        document = {"error": {"type": kind, "message": str(error), "exit_code": error.exit_code}}
+        document = {"error": {"type": type(error).__name__, "message": message, "exit_code": code}}
         click.echo(json.dumps(document, indent=2))
-    for line in str(error).splitlines():
-        click.echo(f"Error: {line}", err=True)
+    if isinstance(error, click.ClickException):
+        error.show()
+    else:
+        for line in message.splitlines():
+            click.echo(f"Error: {line}", err=True)
+    return code

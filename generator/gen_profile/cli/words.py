@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from io import StringIO
+from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from gen_profile.check import Check
-from gen_profile.spec import Spec
-from gen_profile.workflows.check import Judgement
-from gen_profile.workflows.compare import Comparison
-from gen_profile.workflows.design import Design
+if TYPE_CHECKING:
+    from gen_profile.check import Check
+    from gen_profile.spec import Spec
+    from gen_profile.workflows.check import Judgement
+    from gen_profile.workflows.compare import Comparison
+    from gen_profile.workflows.design import Design
 
 MANIFEST_WORDS = {
     "matches": "the file is the one that was exported",

@@ -75,8 +75,8 @@ def check_artefact(
         The file is damaged.
     CosimulationError
     """
-    format_ = format_of(path)
     content = _read(path)
+    format_ = format_of(path)
     manifest = _manifest_beside(path)
     if spec is None:
         spec = _spec_of(manifest, path)
@@ -85,7 +85,10 @@ def check_artefact(
     check = _verdict(spec, setpoints, on_build)
     faults = (*_missed_ends(spec, setpoints), *check.faults)
     if standing == "differs":
-        faults += (f"{path.name} is not the file that was exported: its hash differs from {FILENAME}.",)
+        faults += (
+            f"{path.name} is none of the files that {FILENAME} beside it lists: it was altered after its "
+            "export, or a later export replaced the manifest; export it again.",
+        )
     return Judgement(
         path=path, format=format_, spec=spec, check=attrs.evolve(check, faults=faults), manifest=standing
     )

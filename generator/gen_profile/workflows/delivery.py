@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from gen_profile.errors import OutputError
 
@@ -42,14 +41,15 @@ def staged(destination: Path) -> Iterator[Staging]:
     OutputError
         The folder or a file in it cannot be written.
     """
-    made = [folder for folder in (destination, *destination.parents) if not folder.exists()]
     try:
-        destination.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=".gen-profile-", dir=destination))
+        made = [folder for folder in (destination, *destination.parents) if not folder.exists()]
         try:
-            yield Staging(folder, destination)
+            destination.mkdir(parents=True, exist_ok=True)
+            with TemporaryDirectory(
+                prefix=".gen-profile-", dir=destination, ignore_cleanup_errors=True
+            ) as folder:
+                yield Staging(Path(folder), destination)
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
             _remove_empty(made)
     except OSError as error:
         raise OutputError(
@@ -60,7 +60,5 @@ def staged(destination: Path) -> Iterator[Staging]:
 
 def _remove_empty(folders: list[Path]) -> None:
     for folder in folders:
-        try:
+        with suppress(OSError):  # something was delivered there, or it could not even be made
             folder.rmdir()
-        except OSError:  # something was delivered there
-            return
