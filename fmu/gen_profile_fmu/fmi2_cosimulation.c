@@ -151,11 +151,10 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         return NULL;
     }
     Instance *instance = callbacks->allocateMemory(1, sizeof *instance);
-    char *copy = callbacks->allocateMemory(strlen(name) + 1, sizeof *copy);
-    if (!instance || !copy) {
+    char *copy = instance ? callbacks->allocateMemory(strlen(name) + 1, sizeof *copy) : NULL;
+    if (!copy) {
         report(&unborn, fmi2Error, ERRORS, "There is no memory for an instance.");
         if (instance) callbacks->freeMemory(instance);
-        if (copy) callbacks->freeMemory(copy);
         return NULL;
     }
     instance->callbacks = callbacks;

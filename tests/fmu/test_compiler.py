@@ -1,5 +1,6 @@
 """The compiler that is chosen, what it says, and that the hand-written C is clean."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -33,13 +34,34 @@ def sources(crane, tmp_path):
     return tmp_path
 
 
+@pytest.fixture
+def zig_cc(sources, cache):
+    """Run Zig's C compiler on one of the sources; what it writes to its standard output."""
+
+    def run(*arguments):
+        caches = dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(cache / "zig"))
+        command = [sys.executable, "-m", "ziglang", "cc", *arguments]
+        done = subprocess.run(
+            command, cwd=sources, env=os.environ | caches, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
+
+
 @pytest.mark.parametrize(
     "name", sorted(path.name for path in Path(gen_profile_fmu.__file__).parent.glob("*.c"))
 )
-def test_hand_written_c_has_no_warning(sources, name):
-    command = [sys.executable, "-m", "ziglang", "cc", *STRICT, "-c", name, "-o", "object.o"]
-    done = subprocess.run(command, cwd=sources, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+def test_hand_written_c_has_no_warning(zig_cc, name):
+    zig_cc(*STRICT, "-c", name, "-o", "object.o")
+
+
+@pytest.mark.parametrize("name", ["plant_acceleration", "plant_jump", "plant_outputs"])
+def test_equations_are_not_exported_on_windows(zig_cc, name):
+    text = zig_cc("-target", "x86_64-windows-gnu", "-E", f"{name}.c")
+    assert f"int {name}(const double** arg" in text
+    assert "dllexport" not in text.partition("casadi")[2]
 
 
 def test_zig_is_the_default():

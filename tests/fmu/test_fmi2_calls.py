@@ -219,6 +219,14 @@ class TestSteps:
         free = slice(slave.references["theta1"], None)
         np.testing.assert_allclose(row[free], rows[-1][free], rtol=1e-11, atol=1e-13)
 
+    def test_bring_new_outputs_without_new_inputs(self, slave):
+        slave.follow(MOVE, 0.0, 0.01)
+        before = slave.read("sway.hook")
+        slave.doStep(len(MOVE) * 0.01, 0.01)
+        sway, theta = slave.read("sway.hook", "theta1")
+        assert [sway] != before
+        assert sway == pytest.approx(0.47 * np.sin(theta), rel=1e-14)
+
     def test_that_end_in_infinity_are_discarded_and_undone(self, slave):
         before = slave.follow(MOVE, 0.0, 0.01)[-1]
         time = len(MOVE) * 0.01
