@@ -1,5 +1,4 @@
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,20 +9,6 @@ from gen_profile.plants.registry import find_plant
 from gen_profile.profile import Profile
 from gen_profile_fmu.cosimulation import PlantCosimulation
 from gen_profile_fmu.plant_fmu import PlantFmu, plant_fmu
-
-
-@pytest.fixture(scope="session")
-def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One cache for the tests of a process, so that each FMU is compiled once."""
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture(autouse=True)
-def cache(shared_cache: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Keep the tests out of the user's cache."""
-    monkeypatch.setenv("GEN_PROFILE_CACHE", str(shared_cache))
-    monkeypatch.delenv("GEN_PROFILE_CC", raising=False)
-    return shared_cache
 
 
 @pytest.fixture(scope="session")

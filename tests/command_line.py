@@ -1,0 +1,75 @@
+"""Running `gen-profile`: in this process, quickly, or in one of its own, as a user does."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import sysconfig
+from contextlib import redirect_stderr, redirect_stdout
+from io import BytesIO, TextIOWrapper
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import attrs
+
+from gen_profile.cli import main
+
+PROGRAM = Path(sysconfig.get_path("scripts")) / "gen-profile"
+
+
+@attrs.frozen
+class Outcome:
+    code: int
+    out: str
+    err: str
+
+    @property
+    def document(self) -> Any:
+        """The one JSON document on stdout."""
+        return json.loads(self.out)
+
+    @property
+    def errors(self) -> list[str]:
+        """Lines on stderr that are no progress."""
+        return [line for line in self.err.splitlines() if not line.endswith(" …")]
+
+
+def run_here(*arguments: str | Path) -> Outcome:
+    """Call the entry point in this process, where coverage sees it."""
+    out, err = (TextIOWrapper(BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    terminate = signal.getsignal(signal.SIGTERM)
+    code: Any = 0
+    with (
+        patch.object(sys, "argv", ["gen-profile", *map(str, arguments)]),
+        redirect_stdout(out),
+        redirect_stderr(err),
+    ):
+        try:
+            main()
+        except SystemExit as stop:
+            code = stop.code
+        finally:
+            signal.signal(signal.SIGTERM, terminate)
+    return Outcome(code or 0, _text(out), _text(err))
+
+
+def run_process(*arguments: str | Path, cwd: Path | None = None, **environment: str) -> Outcome:
+    """Start the installed program, with some environment variables changed."""
+    done = subprocess.run(
+        [PROGRAM, *map(str, arguments)],
+        check=False,
+        cwd=cwd,
+        env={**os.environ, **environment},
+        capture_output=True,
+    )
+    return Outcome(done.returncode, done.stdout.decode("utf-8"), done.stderr.decode("utf-8"))
+
+
+def _text(stream: TextIOWrapper) -> str:
+    buffer = stream.buffer
+    assert isinstance(buffer, BytesIO)
+    return buffer.getvalue().decode("utf-8")

@@ -1,0 +1,75 @@
+"""Verdicts: which load, which machine, and the numerical error that counts against the artefact."""
+
+import pytest
+
+from gen_profile.check import Check, Finding, Scenario
+
+LIMIT = {"hook": 0.004, "payload": 0.002}
+
+
+def finding(name, hook, payload):
+    residual = {"hook": hook, "payload": payload}
+    return Finding(scenario=Scenario(name=name, parameters={"L1": 1.0}), residual=residual, modal=residual)
+
+
+def check(*findings, error_bound=0.0, faults=()):
+    return Check(limit=LIMIT, error_bound=error_bound, arrival=3.0, findings=findings, faults=faults)
+
+
+def test_passes_when_every_load_keeps_its_limit_everywhere():
+    found = check(finding("nominal", 0.0, 0.0), finding("longer", 0.004, 0.002))
+    assert found.passed
+    assert found.reasons() == ()
+    assert found.demand == 1.0
+
+
+@pytest.mark.parametrize(("hook", "payload"), [(0.0041, 0.0), (0.0, 0.0021)])
+def test_one_load_on_one_machine_fails_it(hook, payload):
+    found = check(finding("nominal", 0.0, 0.0), finding("longer", hook, payload))
+    assert not found.passed
+    assert [found.keeps_limit(each) for each in found.findings] == [True, False]
+    assert found.demand > 1.0
+
+
+def test_the_error_bound_counts_against_it():
+    assert check(finding("nominal", 0.0039, 0.0), error_bound=0.0001 - 1e-9).passed
+    assert not check(finding("nominal", 0.0039, 0.0), error_bound=0.00011).passed
+
+
+def test_the_worst_takes_up_the_greatest_share_of_its_own_limit():
+    found = check(finding("nominal", 0.003, 0.001), finding("longer", 0.001, 0.0018))
+    load, worst = found.worst
+    assert (load, worst.scenario.name) == ("payload", "longer")
+    assert found.demand == pytest.approx(0.9)
+
+
+def test_the_reason_names_load_machine_figure_limit_key_and_error():
+    found = check(finding("nominal", 0.0, 0.0), finding("L1 +20 %", 0.0, 0.00345), error_bound=2.5e-7)
+    assert found.reasons() == (
+        "The payload sways by 3.45 mm after the move (L1 +20 %), and 2 mm are allowed "
+        "(check.residual_sway; numerical error up to 0.25 µm).",
+    )
+
+
+def test_faults_fail_it_whatever_the_sway():
+    found = check(finding("nominal", 0.0, 0.0), faults=("Something is wrong.",))
+    assert not found.passed
+    assert found.reasons() == ("Something is wrong.",)
+    assert found.demand == float("inf")
+    assert len(check(finding("nominal", 1.0, 0.0), faults=("Something is wrong.",)).reasons()) == 2
+
+
+def test_the_document_holds_the_contract_s_keys():
+    found = check(finding("nominal", 0.003, 0.001), finding("longer", 0.001, 0.0025), error_bound=1e-6)
+    document = found.to_dict()
+    assert {key: document[key] for key in ("passed", "limit_m", "error_bound_m", "arrival_s")} == {
+        "passed": False,
+        "limit_m": 0.002,
+        "error_bound_m": 1e-6,
+        "arrival_s": 3.0,
+    }
+    assert [row["name"] for row in document["scenarios"]] == ["nominal", "longer"]
+    assert [row["residual_peak_m"] for row in document["scenarios"]] == [0.001, 0.0025]
+    assert [row["passed"] for row in document["scenarios"]] == [True, False]
+    assert document["scenarios"][0]["parameters"] == {"L1": 1.0}
+    assert document["reasons"] == list(found.reasons())

@@ -1,0 +1,89 @@
+"""Nobody ever sees half of an output folder."""
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from gen_profile.errors import OutputError
+from gen_profile.workflows.delivery import staged
+
+
+def tree(folder):
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+    }
+
+
+def test_nothing_is_seen_before_delivery_and_everything_after(tmp_path):
+    out = tmp_path / "a" / "b"
+    with staged(out) as staging:
+        assert staging.write("one.txt", b"1") == b"1"
+        assert not (out / "one.txt").exists()
+        staging.deliver()
+        assert (out / "one.txt").read_bytes() == b"1"
+    assert tree(tmp_path) == {"a": None, "a/b": None, "a/b/one.txt": b"1"}
+
+
+def test_what_is_not_delivered_is_gone_with_the_folders_made_for_it(tmp_path):
+    (tmp_path / "a").mkdir()
+    with staged(tmp_path / "a" / "b" / "c") as staging:
+        staging.write("one.txt", b"1")
+    assert tree(tmp_path) == {"a": None}
+
+
+def test_other_files_stay_and_those_of_the_same_name_are_replaced(tmp_path):
+    for name in ("one.txt", "two.txt"):
+        (tmp_path / name).write_bytes(b"old")
+    with staged(tmp_path) as staging:
+        staging.write("one.txt", b"new")
+        staging.deliver()
+    assert tree(tmp_path) == {"one.txt": b"new", "two.txt": b"old"}
+
+
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt, ValueError])
+def test_an_interruption_leaves_everything_as_it_was(tmp_path, interruption):
+    (tmp_path / "one.txt").write_bytes(b"old")
+    with pytest.raises(interruption), staged(tmp_path) as staging:
+        staging.write("one.txt", b"new")
+        raise interruption
+    with pytest.raises(interruption), staged(tmp_path / "new" / "folder") as staging:
+        staging.write("one.txt", b"new")
+        raise interruption
+    assert tree(tmp_path) == {"one.txt": b"old"}
+
+
+def test_a_full_disk_is_a_sentence_and_leaves_nothing(tmp_path, monkeypatch):
+    (tmp_path / "one.txt").write_bytes(b"old")
+    whole = Path.write_bytes
+
+    def write_half(path, content):
+        whole(path, content[: len(content) // 2])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", write_half)
+    for out in (tmp_path, tmp_path / "new"):
+        full = pytest.raises(OutputError, match=r"^Cannot write .*: No space left on device; .* --out\.$")
+        with full, staged(out) as staging:
+            staging.write("one.txt", b"new")
+    assert tree(tmp_path) == {"one.txt": b"old"}
+
+
+@pytest.mark.parametrize("out", ["file", "file/below", "made/" + 300 * "x", 300 * "x"])
+def test_a_folder_that_cannot_be_is_a_sentence_and_leaves_nothing(tmp_path, out):
+    (tmp_path / "file").write_bytes(b"in the way")
+    with (
+        pytest.raises(OutputError, match=r"^Cannot write to the folder .*; choose another .* with --out\.$"),
+        staged(tmp_path / out),
+    ):
+        pytest.fail("there is no such folder")
+    assert tree(tmp_path) == {"file": b"in the way"}
+
+
+def test_a_file_that_cannot_be_replaced_is_a_sentence(tmp_path):
+    (tmp_path / "one.txt").mkdir()
+    with pytest.raises(OutputError, match="Is a directory"), staged(tmp_path) as staging:
+        staging.write("one.txt", b"1")
+        staging.deliver()
+    assert tree(tmp_path) == {"one.txt": None}

@@ -1,0 +1,78 @@
+"""The record beside the artefacts."""
+
+import hashlib
+import json
+
+import attrs
+import pytest
+
+from gen_profile.errors import OutputError
+from gen_profile.manifest import Artefact, Manifest, parse_manifest, sha256
+
+ARTEFACT = Artefact(format="csv", path="brücke.csv", sha256="00", bytes=3, payload_sha256="11")
+MANIFEST = Manifest(
+    name="brücke",
+    spec={"name": "brücke", "move": {"duration": 3.0}},
+    spec_sha256="22",
+    profile_sha256="33",
+    versions={"gen-profile": "0.1.0"},
+    artefacts=(ARTEFACT,),
+    check={"passed": True},
+)
+
+
+@pytest.mark.parametrize("manifest", [MANIFEST, attrs.evolve(MANIFEST, check=None, artefacts=())])
+def test_reads_what_it_writes(manifest):
+    assert parse_manifest(manifest.to_json(), "manifest.json") == manifest
+
+
+def test_is_plain_utf_8_json_that_ends_in_a_newline():
+    content = MANIFEST.to_json()
+    assert content.endswith(b"}\n")
+    assert "brücke".encode() in content
+    document = json.loads(content)
+    assert (document["format"], document["format_version"]) == ("gen-profile manifest", 1)
+    assert document["artefacts"] == [attrs.asdict(ARTEFACT)]
+    assert document["check"] == {"passed": True}
+
+
+def test_says_unverified_without_a_check():
+    assert json.loads(attrs.evolve(MANIFEST, check=None).to_json())["check"] == "unverified"
+
+
+def change(**changes):
+    document = json.loads(MANIFEST.to_json())
+    for key, value in changes.items():
+        if value is None:
+            del document[key]
+        else:
+            document[key] = value
+    return json.dumps(document).encode()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\xff\xfe",
+        b"[]",
+        b"null",
+        b'"text"',
+        b"{}",
+        MANIFEST.to_json()[:-20],
+        change(format="something else"),
+        change(format_version=2),
+        change(artefacts=[{"format": "csv"}]),
+        change(artefacts=[1]),
+        change(artefacts=None),
+        change(spec=None),
+        change(surplus=1),
+    ],
+)
+def test_refuses_what_is_no_manifest(content):
+    with pytest.raises(OutputError, match=r"^out/manifest\.json: not a manifest of this version .*\.$"):
+        parse_manifest(content, "out/manifest.json")
+
+
+def test_hashes_as_others_do():
+    assert sha256(b"load") == hashlib.sha256(b"load").hexdigest()
