@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import attrs
+from attrs.validators import instance_of
 
 from gen_profile.errors import OutputError
 
@@ -35,7 +36,7 @@ class Artefact:
 
     format: str
     path: str
-    sha256: str
+    sha256: str = attrs.field(validator=instance_of(str))
     bytes: int
     payload_sha256: str = ""
 
@@ -60,7 +61,7 @@ class Manifest:
     """
 
     name: str
-    spec: Mapping[str, Any]
+    spec: Mapping[str, Any] = attrs.field(validator=instance_of(dict))
     spec_sha256: str
     profile_sha256: str
     versions: Mapping[str, str]
