@@ -14,6 +14,8 @@ from gen_profile_fmu.variables import Kind, VariableTable
 BASE_UNITS: dict[str, dict[str, int]] = {
     "kg": {"kg": 1},
     "kg m^2": {"kg": 1, "m": 2},
+    "kg/m^3": {"kg": 1, "m": -3},
+    "Pa s": {"kg": 1, "m": -1, "s": -1},
     "m": {"m": 1},
     "m/s": {"m": 1, "s": -1},
     "m/s^2": {"m": 1, "s": -2},

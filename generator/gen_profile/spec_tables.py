@@ -39,6 +39,7 @@ def complete(document: Mapping[str, Any], faults: Faults) -> Table:
     tables["robustness"] = _robustness(tables["robustness"], tables["plant"].get("parameters"), faults)
     tables["check"] = _check(tables["check"], tables["move"], plant, faults)
     tables["axis"] = _axis(tables["axis"], plant, faults)
+    tables["can"] = _can(tables["can"], plant, faults)
     return tables
 
 
@@ -52,14 +53,14 @@ def _table(document: Mapping[str, Any], key: str, faults: Faults) -> Table:
 
 def _machine(table: Table, faults: Faults) -> Plant | None:
     type_ = table.get("type")
-    known = plant_types()
     if not isinstance(type_, str):
-        faults.add("plant.type", f"must name a machine, found {found(type_)}{suggestion('', known)}")
-    elif type_ not in known:
-        faults.add("plant.type", f"unknown machine {type_[:60]!r}{suggestion(type_, known)}")
-    else:
+        faults.add("plant.type", f"must name a machine, found {found(type_)}{suggestion('', plant_types())}")
+        return None
+    try:
         return find_plant(type_)
-    return None
+    except KeyError:
+        faults.add("plant.type", f"unknown machine {type_[:60]!r}{suggestion(type_, plant_types())}")
+        return None
 
 
 def _plant(table: Table, plant: Plant | None, faults: Faults) -> Table:
@@ -105,6 +106,13 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
     start = _per_axis(0.0 if start is None else start, len(target), "move.start", faults)
     if start == target:
         faults.add("move.distance", "must not be zero on every axis")
+    for key, values in (("start", start), ("target", target)):
+        for axis, value in zip(plant.actuated if plant else (), values, strict=False):
+            if not axis.lower <= value <= axis.upper:
+                faults.add(
+                    f"move.{key}",
+                    f"{axis.name} must be from {axis.lower:g} to {axis.upper:g} {axis.unit}, found {value:g}",
+                )
     if table.get("duration") == "minimum":
         faults.add("move.duration", '"minimum" is not supported yet; state the duration in s')
     return {**table, "start": start, "target": target}
@@ -209,3 +217,21 @@ def _axis(table: Table, plant: Plant | None, faults: Faults) -> Table:
             )
         complete[axis.name] = {"unit": axis.unit, **given}
     return complete
+
+
+def _can(table: Table, plant: Plant | None, faults: Faults) -> Table:
+    travel = table.get("travel", {})
+    if not isinstance(travel, Mapping):
+        faults.add("can.travel", f"must be a table such as {{ cart = [0.0, 0.5] }}, found {found(travel)}")
+        return {**table, "travel": {}}
+    for key in travel:
+        if plant and key not in (names := [axis.name for axis in plant.actuated]):
+            faults.add(place("can.travel", key), f"unknown axis{suggestion(key, names)}")
+    if table.get("feed_forward") == "torque" and "torque_per_acceleration" not in table:
+        faults.add(
+            "can.torque_per_acceleration",
+            'required with feed_forward = "torque" (‰ of the rated torque per m/s²)',
+        )
+    if table.get("mode") == "ip" and table.get("feed_forward", "none") != "none":
+        faults.add("can.feed_forward", 'only with mode = "csp"; remove it or set the mode')
+    return table

@@ -11,6 +11,7 @@ computer algebra system that implements NumPy's protocols.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -45,10 +46,21 @@ class Parameter:
 
 @attrs.frozen(kw_only=True)
 class Coordinate:
-    """A generalised coordinate; `unit` is ``"m"`` or ``"rad"``."""
+    """A generalised coordinate.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+        ``"m"`` or ``"rad"``.
+    lower, upper : float
+        Of an actuated coordinate: where it may start and end, both ends included.
+    """
 
     name: str
     unit: str
+    lower: float = -math.inf
+    upper: float = math.inf
 
 
 @attrs.frozen(kw_only=True)
@@ -71,7 +83,7 @@ class Equations:
 
 @attrs.frozen(kw_only=True)
 class Outputs:
-    """What is seen of the loads, one entry per load.
+    """What is seen of the loads, one entry per load, or one per load and horizontal direction.
 
     Attributes
     ----------
@@ -81,7 +93,7 @@ class Outputs:
     height : m
         Above the suspension point, so negative for a hanging load.
     angle : rad
-        Of the rope that carries the load, from the vertical.
+        Of the rope that carries the load, from the vertical; 0 where nothing hangs.
     """
 
     sway: Sequence[Scalar]
@@ -102,7 +114,10 @@ class Plant:
     parameters : tuple of Parameter
     actuated, unactuated : tuple of Coordinate
     loads : tuple of str
-        Names of the loads, the end load last. The hook of a double pendulum is a load, too.
+        Names of the outputs: the loads, the end load last. The hook of a double pendulum is a load, too. One
+        that swings in two horizontal directions has a name for each.
+    directions : int
+        In how many directions the end load swings: as many of the last `loads` are its components.
     equations : (q_u, dq_u, q_a, dq_a, p) → Equations
         Sequences of scalars, and the parameters as attributes of `p`.
     outputs : (q_u, q_a, p) → Outputs
@@ -114,10 +129,16 @@ class Plant:
     actuated: tuple[Coordinate, ...]
     unactuated: tuple[Coordinate, ...]
     loads: tuple[str, ...]
+    directions: int = 1
     equations: Callable[
         [Sequence[Scalar], Sequence[Scalar], Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Equations
     ]
     outputs: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Outputs]
+
+    @property
+    def end_load(self) -> slice:
+        """Which of the outputs are the end load's."""
+        return slice(len(self.loads) - self.directions, len(self.loads))
 
     def nominal(self) -> dict[str, float]:
         """Nominal value of every parameter, by name."""

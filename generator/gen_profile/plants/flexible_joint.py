@@ -1,0 +1,66 @@
+"""Rotary flexible joint: a driven hub, and an arm that a torsion spring ties to it.
+
+α is how far the arm trails the hub, so the arm stands at θ − α. Euler's equation of the arm about the hub's
+axis, with a viscous moment c α̇ in the joint:
+
+    J α̈ = −k α − c α̇ + J θ̈
+
+The sway is the arc R α that the arm's tip trails by, measured along its circle. Gravity plays no part: the
+arm turns in a horizontal plane. (M. W. Spong, Modeling and control of elastic joint robots, 1987, with the
+motor's side driven.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+
+
+def equations(
+    q_u: Sequence[Scalar],
+    dq_u: Sequence[Scalar],
+    q_a: Sequence[Scalar],
+    dq_a: Sequence[Scalar],
+    p: SimpleNamespace,
+) -> Equations:
+    """Terms of the arm's equation of motion (module docstring)."""
+    del q_a, dq_a  # the arm feels the hub's acceleration only
+    (alpha,), (rate,) = q_u, dq_u
+    return Equations(M_uu=[[p.J]], M_au=[[-p.J]], K_u=[-p.k * alpha], G_u=[-p.c * rate])
+
+
+def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+    """Arc by which the arm's tip trails the hub, in m, and the joint's angle."""
+    del q_a
+    (alpha,) = q_u
+    return Outputs(sway=[p.R * alpha], height=[0.0], angle=[alpha])
+
+
+PLANT = Plant(
+    type="flexible-joint",
+    summary="arm behind a torsion spring on a driven hub",
+    parameters=(
+        Parameter(
+            name="J",
+            unit="kg m^2",
+            description="moment of inertia of the arm",
+            nominal=0.0035,
+            lower=1e-9,
+            upper=1e9,
+        ),
+        Parameter(
+            name="k", unit="N m/rad", description="joint stiffness", nominal=1.3, lower=1e-6, upper=1e12
+        ),
+        Parameter(
+            name="c", unit="N m s/rad", description="joint damping", nominal=0.004, lower=0.0, upper=1e9
+        ),
+        Parameter(name="R", unit="m", description="from hub to tip", nominal=0.3, lower=1e-3, upper=100.0),
+    ),
+    actuated=(Coordinate(name="hub", unit="rad"),),
+    unactuated=(Coordinate(name="alpha", unit="rad"),),
+    loads=("tip",),
+    equations=equations,
+    outputs=outputs,
+)

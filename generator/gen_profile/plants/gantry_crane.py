@@ -1,0 +1,80 @@
+"""Gantry crane: a bridge in x, a trolley in y, and a payload on a rope that swings in both directions.
+
+The payload hangs at (x − L sin θx cos θy, y − L sin θy, −L cos θx cos θy): the angles of a universal joint,
+which are singular only where the rope is horizontal. Both are positive when the load trails a positive
+acceleration. Lagrange's equations with a viscous moment c on the rope's angular velocity, divided by m L:
+
+    L cos²θy θ̈x = −g sin θx cos θy + 2 L sin θy cos θy θ̇x θ̇y − c cos²θy θ̇x / (m L) + ẍ cos θx cos θy
+    L θ̈y        = −g cos θx sin θy − L sin θy cos θy θ̇x² − c θ̇y / (m L) − ẍ sin θx sin θy + ÿ cos θy
+
+(H.-H. Lee, Modeling and control of a three-dimensional overhead crane, 1998, with angles that trail.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+import numpy as np
+
+from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+
+
+def equations(
+    q_u: Sequence[Scalar],
+    dq_u: Sequence[Scalar],
+    q_a: Sequence[Scalar],
+    dq_a: Sequence[Scalar],
+    p: SimpleNamespace,
+) -> Equations:
+    """Terms of the payload's equations of motion (module docstring)."""
+    del q_a, dq_a  # the rope feels the trolley's acceleration only
+    (theta_x, theta_y), (rate_x, rate_y) = q_u, dq_u
+    sx, cx, sy, cy = np.sin(theta_x), np.cos(theta_x), np.sin(theta_y), np.cos(theta_y)
+    damping = p.c / (p.m * p.L)
+    return Equations(
+        M_uu=[[p.L * cy**2, 0.0], [0.0, p.L]],
+        M_au=[[-cx * cy, sx * sy], [0.0, -cy]],
+        K_u=[-p.g * sx * cy, -p.g * cx * sy],
+        G_u=[
+            2.0 * p.L * sy * cy * rate_x * rate_y - damping * cy**2 * rate_x,
+            -p.L * sy * cy * rate_x**2 - damping * rate_y,
+        ],
+    )
+
+
+def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+    """Sway of the payload in both directions, its height below the trolley, and the rope's two angles."""
+    del q_a
+    theta_x, theta_y = q_u
+    height = -p.L * np.cos(theta_x) * np.cos(theta_y)
+    return Outputs(
+        sway=[p.L * np.sin(theta_x) * np.cos(theta_y), p.L * np.sin(theta_y)],
+        height=[height, height],
+        angle=[theta_x, theta_y],
+    )
+
+
+PLANT = Plant(
+    type="gantry-crane",
+    summary="bridge and trolley, and a payload that swings in both directions",
+    parameters=(
+        Parameter(name="m", unit="kg", description="payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
+        Parameter(name="L", unit="m", description="rope", nominal=5.0, lower=1e-2, upper=200.0),
+        Parameter(name="g", unit="m/s^2", description="gravity", nominal=9.81, lower=0.1, upper=30.0),
+        Parameter(
+            name="c",
+            unit="N m s/rad",
+            description="damping at the trolley",
+            nominal=0.0,
+            lower=0.0,
+            upper=1e9,
+        ),
+    ),
+    actuated=(Coordinate(name="x", unit="m"), Coordinate(name="y", unit="m")),
+    unactuated=(Coordinate(name="theta_x", unit="rad"), Coordinate(name="theta_y", unit="rad")),
+    loads=("payload-x", "payload-y"),
+    directions=2,
+    equations=equations,
+    outputs=outputs,
+)

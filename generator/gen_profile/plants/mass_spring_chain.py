@@ -1,0 +1,113 @@
+"""A family of machines: n masses behind a driven axis, each tied to the one before by a spring and a damper.
+
+dᵢ is how far mass i trails the axis, so it stands at y − dᵢ; with d₀ = 0 and nothing behind the last mass,
+Newton's second law reads
+
+    mᵢ d̈ᵢ = −sᵢ + sᵢ₊₁ + mᵢ ÿ,   sᵢ = kᵢ (dᵢ − dᵢ₋₁) + cᵢ (ḋᵢ − ḋᵢ₋₁)
+
+Drive belts, conveyors, long shafts and elastic structures are such chains. With equal masses and springs and
+no damping the natural frequencies are 2 √(k/m) sin((2j − 1) π / (4 n + 2)), j = 1 … n (any text on lattice
+vibrations with one end fixed and one free).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from itertools import pairwise
+from types import SimpleNamespace
+
+from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+
+LARGEST = 24
+
+
+@cache
+def member(masses: int) -> Plant:
+    """Make the chain with the given number of masses, type ``mass-spring-chain-<masses>``.
+
+    Raises
+    ------
+    KeyError
+        The family has no such member.
+    """
+    if not 1 <= masses <= LARGEST:
+        raise KeyError(masses)
+    numbers = range(1, masses + 1)
+    return Plant(
+        type=f"mass-spring-chain-{masses}",
+        summary=(
+            f"springs and masses behind a driven axis, {masses} of each (or another number: it ends the type)"
+        ),
+        parameters=tuple(parameter(number) for parameter in (_mass, _spring, _damper) for number in numbers),
+        actuated=(Coordinate(name="axis", unit="m"),),
+        unactuated=tuple(Coordinate(name=f"d{number}", unit="m") for number in numbers),
+        loads=tuple(f"mass{number}" for number in numbers),
+        equations=_equations(masses),
+        outputs=_outputs,
+    )
+
+
+def _mass(number: int) -> Parameter:
+    return Parameter(
+        name=f"m{number}", unit="kg", description=f"mass {number}", nominal=1.0, lower=1e-6, upper=1e6
+    )
+
+
+def _spring(number: int) -> Parameter:
+    return Parameter(
+        name=f"k{number}",
+        unit="N/m",
+        description=f"spring before mass {number}",
+        nominal=100.0,
+        lower=1e-6,
+        upper=1e12,
+    )
+
+
+def _damper(number: int) -> Parameter:
+    return Parameter(
+        name=f"c{number}",
+        unit="N s/m",
+        description=f"damper beside spring {number}",
+        nominal=0.0,
+        lower=0.0,
+        upper=1e9,
+    )
+
+
+def _equations(masses: int) -> Callable[..., Equations]:
+    """Terms of the masses' equations of motion (module docstring)."""
+    numbers = range(1, masses + 1)
+
+    def equations(
+        q_u: Sequence[Scalar],
+        dq_u: Sequence[Scalar],
+        q_a: Sequence[Scalar],
+        dq_a: Sequence[Scalar],
+        p: SimpleNamespace,
+    ) -> Equations:
+        del q_a, dq_a  # the chain feels the axis' acceleration only
+        mass, stiffness, damping = ([getattr(p, f"{name}{i}") for i in numbers] for name in "mkc")
+        springs, dampers = _forces(stiffness, q_u), _forces(damping, dq_u)
+        return Equations(
+            M_uu=[[m if row == column else 0.0 for column in range(masses)] for row, m in enumerate(mass)],
+            M_au=[[-m for m in mass]],
+            K_u=[behind - before for before, behind in pairwise(springs)],
+            G_u=[behind - before for before, behind in pairwise(dampers)],
+        )
+
+    return equations
+
+
+def _forces(gains: Sequence[Scalar], values: Sequence[Scalar]) -> list[Scalar]:
+    """List the forces of all links, and of the missing one behind the last mass."""
+    steps = [after - before for before, after in zip([0.0, *values[:-1]], values, strict=True)]
+    return [gain * step for gain, step in zip(gains, steps, strict=True)] + [0.0]
+
+
+def _outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+    """Distance by which every mass trails its place behind the axis."""
+    del q_a, p
+    nothing = [0.0 for _ in q_u]
+    return Outputs(sway=list(q_u), height=nothing, angle=nothing)

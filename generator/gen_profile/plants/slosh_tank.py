@@ -1,0 +1,88 @@
+"""Slosh tank: a rectangular, open tank moved along its length, the liquid as its pendulum equivalent.
+
+Of the liquid's antisymmetric modes n = 1, 2 (the symmetric ones are not excited by a horizontal motion), with
+tank length a, width b, fill height h and wave number κ = (2n − 1) π / a:
+
+    ω² = g κ tanh(κ h),   L = g / ω² = 1 / (κ tanh(κ h))
+    ζ  = √(ν / (2 ω)) [1/a + 1/b + κ (1 − 2h/a) / sinh(2 κ h)] + 2 ν κ² / ω,   ν = μ/ρ
+    L θ̈ + 2 ζ ω L θ̇ + g sin θ = ÿ cos θ
+
+ω and L are those of R. A. Ibrahim, Liquid Sloshing Dynamics, 2005, and F. T. Dodge, The New Dynamic Behavior
+of Liquids in Moving Containers, 2000, after H. N. Abramson, NASA SP-106, 1966. ζ is the boundary layers' of
+G. H. Keulegan, 1959 (Landau & Lifshitz, Fluid Mechanics, § 25), plus the bulk's. Real liquids lose more, by
+films and wetting: measure where it matters.
+
+The sway is the rise of the liquid at the trailing wall. A steady acceleration ÿ tilts the surface by ÿ/g, of
+whose Fourier series along the tank mode n holds 4 a / ((2n − 1) π)² at the wall; so mode n raises the liquid
+there by 4 a / ((2n − 1) π)² sin θ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+import numpy as np
+
+from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+
+ODD = (1, 3)  # 2n − 1 of the modes
+
+
+def equations(
+    q_u: Sequence[Scalar],
+    dq_u: Sequence[Scalar],
+    q_a: Sequence[Scalar],
+    dq_a: Sequence[Scalar],
+    p: SimpleNamespace,
+) -> Equations:
+    """Terms of the pendulums' equations of motion (module docstring)."""
+    del q_a, dq_a  # the liquid feels the tank's acceleration only
+    lengths, dampings = zip(*(_pendulum(odd, p) for odd in ODD), strict=True)
+    return Equations(
+        M_uu=[[lengths[0], 0.0], [0.0, lengths[1]]],
+        M_au=[[-np.cos(theta) for theta in q_u]],
+        K_u=[-p.g * np.sin(theta) for theta in q_u],
+        G_u=[-damping * rate for damping, rate in zip(dampings, dq_u, strict=True)],
+    )
+
+
+def _pendulum(odd: int, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
+    """Length L and damping 2 ζ ω L of a mode."""
+    wave_number = odd * np.pi / p.a
+    length = 1.0 / (wave_number * np.tanh(wave_number * p.h))
+    omega, viscosity = np.sqrt(p.g / length), p.mu / p.rho
+    at_walls = 1.0 / p.a + 1.0 / p.b
+    at_walls += wave_number * (1.0 - 2.0 * p.h / p.a) / np.sinh(2.0 * wave_number * p.h)
+    ratio = np.sqrt(viscosity / (2.0 * omega)) * at_walls + 2.0 * viscosity * wave_number**2 / omega
+    return length, 2.0 * ratio * omega * length
+
+
+def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+    """Rise of the liquid at the trailing wall, and the first mode's angle."""
+    del q_a
+    rise = sum(4.0 * p.a / (odd * np.pi) ** 2 * np.sin(theta) for odd, theta in zip(ODD, q_u, strict=True))
+    return Outputs(sway=[rise], height=[rise], angle=[q_u[0]])
+
+
+PLANT = Plant(
+    type="slosh-tank",
+    summary="liquid in a rectangular tank that is moved along its length",
+    parameters=(
+        Parameter(
+            name="a", unit="m", description="tank length along the move", nominal=0.5, lower=1e-2, upper=100.0
+        ),
+        Parameter(name="b", unit="m", description="tank width across", nominal=0.3, lower=1e-2, upper=100.0),
+        Parameter(name="h", unit="m", description="fill height", nominal=0.25, lower=1e-3, upper=100.0),
+        Parameter(name="rho", unit="kg/m^3", description="density", nominal=998.0, lower=100.0, upper=2e4),
+        Parameter(
+            name="mu", unit="Pa s", description="dynamic viscosity", nominal=1.0e-3, lower=0.0, upper=1e3
+        ),
+        Parameter(name="g", unit="m/s^2", description="gravity", nominal=9.81, lower=0.1, upper=30.0),
+    ),
+    actuated=(Coordinate(name="tank", unit="m"),),
+    unactuated=(Coordinate(name="theta1", unit="rad"), Coordinate(name="theta2", unit="rad")),
+    loads=("surface",),
+    equations=equations,
+    outputs=outputs,
+)

@@ -1,0 +1,95 @@
+"""Tower crane: a slewing jib, a trolley on it, and a payload on a rope that swings in both directions.
+
+In the frame that turns with the jib (radial, tangential, up) the payload hangs at
+
+    (x, y, z) = (r − L sin θr cos θt, −L sin θt, −L cos θr cos θt)
+
+with r the trolley's radius and α the slew angle: the angles of a universal joint, singular only where the
+rope is horizontal, positive when the load trails. Its acceleration in that frame is
+
+    (ẍ − 2 α̇ ẏ − α̈ y − α̇² x,  ÿ + 2 α̇ ẋ + α̈ x − α̇² y,  z̈)
+
+and d'Alembert's principle along e_r = ∂(x, y, z)/∂θr / L and e_t = ∂(x, y, z)/∂θt / L, with a viscous moment
+c on the rope's angular velocity relative to the jib, gives the two equations, divided by m L:
+
+    e_r = (−cos θr cos θt, 0, sin θr cos θt),   e_t = (sin θr sin θt, −cos θt, cos θr sin θt)
+    L cos²θt θ̈r = −g e_r,z + 2 L sin θt cos θt θ̇r θ̇t − c cos²θt θ̇r / (m L) − e_r · (frame + input)
+    L θ̈t        = −g e_t,z − L sin θt cos θt θ̇r² − c θ̇t / (m L) − e_t · (frame + input)
+    frame = (−2 α̇ ẏ − α̇² x,  2 α̇ ẋ − α̇² y),   input = (r̈ − α̈ y,  α̈ x)
+
+A steady slew alone pulls the load outward, α̇² x, which only the trolley can answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+import numpy as np
+
+from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+
+
+def equations(
+    q_u: Sequence[Scalar],
+    dq_u: Sequence[Scalar],
+    q_a: Sequence[Scalar],
+    dq_a: Sequence[Scalar],
+    p: SimpleNamespace,
+) -> Equations:
+    """Terms of the payload's equations of motion (module docstring)."""
+    (theta_r, theta_t), (rate_r, rate_t) = q_u, dq_u
+    (_, radius), (slew_rate, radius_rate) = q_a, dq_a
+    sr, cr, st, ct = np.sin(theta_r), np.cos(theta_r), np.sin(theta_t), np.cos(theta_t)
+    damping = p.c / (p.m * p.L)
+    x, y = radius - p.L * sr * ct, -p.L * st
+    dx = radius_rate + p.L * (sr * st * rate_t - cr * ct * rate_r)
+    dy = -p.L * ct * rate_t
+    frame_x = -2.0 * slew_rate * dy - slew_rate**2 * x
+    frame_y = 2.0 * slew_rate * dx - slew_rate**2 * y
+    return Equations(
+        M_uu=[[p.L * ct**2, 0.0], [0.0, p.L]],
+        M_au=[[cr * ct * y, -sr * st * y - ct * x], [-cr * ct, sr * st]],
+        K_u=[-p.g * sr * ct, -p.g * cr * st],
+        G_u=[
+            2.0 * p.L * st * ct * rate_r * rate_t - damping * ct**2 * rate_r + cr * ct * frame_x,
+            -p.L * st * ct * rate_r**2 - damping * rate_t - sr * st * frame_x + ct * frame_y,
+        ],
+    )
+
+
+def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+    """Sway of the payload along and across the jib, its height below it, and the rope's two angles."""
+    del q_a
+    theta_r, theta_t = q_u
+    height = -p.L * np.cos(theta_r) * np.cos(theta_t)
+    return Outputs(
+        sway=[p.L * np.sin(theta_r) * np.cos(theta_t), p.L * np.sin(theta_t)],
+        height=[height, height],
+        angle=[theta_r, theta_t],
+    )
+
+
+PLANT = Plant(
+    type="tower-crane",
+    summary="slewing jib with a trolley, and a payload that swings along and across it",
+    parameters=(
+        Parameter(name="m", unit="kg", description="payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
+        Parameter(name="L", unit="m", description="rope", nominal=10.0, lower=1e-2, upper=200.0),
+        Parameter(name="g", unit="m/s^2", description="gravity", nominal=9.81, lower=0.1, upper=30.0),
+        Parameter(
+            name="c",
+            unit="N m s/rad",
+            description="damping at the trolley",
+            nominal=0.0,
+            lower=0.0,
+            upper=1e9,
+        ),
+    ),
+    actuated=(Coordinate(name="slew", unit="rad"), Coordinate(name="trolley", unit="m", lower=0.0)),
+    unactuated=(Coordinate(name="theta_r", unit="rad"), Coordinate(name="theta_t", unit="rad")),
+    loads=("payload-radial", "payload-tangential"),
+    directions=2,
+    equations=equations,
+    outputs=outputs,
+)
