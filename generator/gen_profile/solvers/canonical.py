@@ -5,6 +5,7 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
+from gen_profile.problem.axis_reach import axis_reach, effort_weights
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.pontryagin import Data, OptimalitySystem
 from gen_profile.problem.problem import Problem
@@ -64,8 +65,8 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     Lengths are measured by the move, angles by what its mean acceleration holds statically.
     """
     layout, duration = system.layout, problem.duration
-    distance = np.array(problem.distance)
-    reach = np.where(distance != 0.0, np.abs(distance), np.abs(distance).max())
+    distance, reach = np.array(problem.distance), axis_reach(problem)
+    weights = effort_weights(reach)
     middle = tuple((np.array(problem.start) + np.array(problem.target)) / 2.0)
     linear = linearize(problem.plant, problem.parameters, middle)
     static = np.abs(np.linalg.solve(linear.stiffness, linear.input @ (reach / duration**2))).max()
@@ -84,7 +85,8 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
         gamma=1.0,
         tau=problem.tau or 1.0,
         duration=duration,
-        cost_scale=float((reach**2).sum()) / duration**6,
+        cost_scale=float(weights @ reach**2) / duration**6,
+        effort_weights=weights,
         offset=offset,
         scale=scale,
     )

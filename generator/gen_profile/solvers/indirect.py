@@ -125,10 +125,10 @@ def _advance(problem_at: Callable[[float], Canonical], guess: Trajectory) -> _Ad
 
 def _with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) -> Canonical:
     values = quiet.quantities(solution.points)
-    m, loads = quiet.system.layout.m, len(problem.plant.loads)
+    sway = values[:, 2 + quiet.system.layout.m :][:, problem.plant.end_load]
     beta, gamma = problem.sway_weight, problem.sway_scale
     if gamma is None:
-        gamma = AUTO_SWAY / float(np.abs(values[:, 2 + m + loads - 1]).max())
+        gamma = AUTO_SWAY / float(np.linalg.norm(sway, axis=1).max())
         beta *= 2.0 * _integral(solution, values[:, 1]) / AUTO_EFFORT**2
     return attrs.evolve(quiet, data=attrs.evolve(quiet.data, beta=beta, gamma=gamma))
 

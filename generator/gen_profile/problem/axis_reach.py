@@ -1,0 +1,34 @@
+"""How far each axis goes, as the unit in which its own motion is measured.
+
+Axes may move in metres and radians, or by very different distances. The cost weighs the effort of each
+relative to its own move, in units of the first axis: ``½ Σ (uᵢ · reach₁ / reachᵢ)²``. One axis alone has
+weight 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.problem import Problem
+from gen_profile.profile import Array
+
+
+def axis_reach(problem: Problem) -> Array:
+    """Measure every axis by its move, shape (m,), in m or rad.
+
+    An axis that ends where it began, but may be needed on the way, is measured by the move that would swing
+    the load as much as the others' moves do; where there is no such move, by the longest of theirs.
+    """
+    distance = np.abs(np.array(problem.distance))
+    middle = (np.array(problem.start) + np.array(problem.target)) / 2.0
+    gain = np.linalg.norm(linearize(problem.plant, problem.parameters, middle).input, axis=0)
+    swing = (gain * distance).max()
+    equivalent = np.where(gain > 0.0, swing / np.where(gain > 0.0, gain, 1.0), 0.0)
+    equivalent = np.where(equivalent > 0.0, equivalent, distance.max())
+    return np.asarray(np.where(distance > 0.0, distance, equivalent))
+
+
+def effort_weights(reach: Array) -> Array:
+    """Weigh the square of every axis' effort, shape (m,)."""
+    return np.asarray((reach[0] / reach) ** 2)
