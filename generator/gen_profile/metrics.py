@@ -10,10 +10,10 @@ from gen_profile.profile import Array, Profile
 POINTS_PER_SEGMENT = 33
 
 
-def greatest(profile: Profile, order: int) -> float:
-    """Greatest magnitude of the first axis' derivative of the given order."""
+def greatest(profile: Profile, order: int, axis: int = 0) -> float:
+    """Greatest magnitude of an axis' derivative of the given order; of the first axis by default."""
     _, values = profile.within_segments(POINTS_PER_SEGMENT, order)
-    return float(np.abs(values[:, 0]).max())
+    return float(np.abs(values[:, axis]).max())
 
 
 def root_mean_square(profile: Profile, order: int) -> float:
@@ -26,6 +26,13 @@ def root_mean_square(profile: Profile, order: int) -> float:
     values = np.asarray(polynomial.polyval(local, coefficients[:, :, None], tensor=False))
     mean = (values**2 @ weights / 2.0) @ lengths / profile.duration
     return float(np.sqrt(mean))
+
+
+def length(components: Array) -> Array:
+    """Length of the vector in each row, as one column; a single component keeps its sign."""
+    if components.shape[1] == 1:
+        return components
+    return np.asarray(np.linalg.norm(components, axis=1, keepdims=True))
 
 
 def peak(values: Array) -> Array:

@@ -68,7 +68,7 @@ class Swing:
         self, plant: Plant, profile: Profile, machines: Sequence[Mapping[str, float]], until: float
     ) -> None:
         acceleration, self._outputs = _functions(plant)
-        self._plant, self._profile = plant, profile
+        self.plant, self._profile = plant, profile
         self._p = p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
         self._shape = shape = (2, len(machines), len(plant.unactuated))
         motion = _motion(profile)
@@ -98,7 +98,7 @@ class Swing:
         """Evaluate every machine at rising times in s."""
         states = self._solution(times).reshape(*self._shape, len(times)).transpose(0, 1, 3, 2)
         axes = self._profile(times)
-        loads = len(self._plant.loads)
+        loads = len(self.plant.loads)
         responses = []
         for q_u, dq_u, machine in zip(*np.ascontiguousarray(states), self._p[:, None], strict=True):
             seen = self._outputs(q_u, axes.position, machine)[:, :, 0]

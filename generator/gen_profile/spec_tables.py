@@ -177,7 +177,11 @@ def _check(table: Table, move: Table, plant: Plant | None, faults: Faults) -> Ta
             faults.add(place("check", key), f"unknown key{suggestion(key, ['residual_sway'])}")
     where = "check.residual_sway"
     given = table.get("residual_sway")
-    longest = max((abs(b - a) for a, b in zip(move["start"], move["target"], strict=True)), default=0.0)
+    in_metres = [axis.unit == "m" for axis in plant.actuated] if plant else [True] * len(move["start"])
+    moves = zip(move["start"], move["target"], in_metres, strict=False)
+    longest = max((abs(b - a) for a, b, linear in moves if linear), default=0.0)
+    if given is None and longest == 0.0 and move["start"] != move["target"]:
+        faults.add(where, "required where no axis moves in m; state what may remain, in m")
     usual = RESIDUAL_SHARE * (longest or 1.0)
     stated = given if isinstance(given, Mapping) else {} if given is None else {"": given}
     for load, limit in stated.items():

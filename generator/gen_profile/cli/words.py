@@ -48,7 +48,7 @@ def design(outcome: Design) -> str:
     rows = [
         ("move", _move(outcome.spec)),
         ("solver", found),
-        _peaks(outcome),
+        *_peaks(outcome),
         ("sway on the way", _mm(figures["sway_transient_peak_m"])),
         ("residual sway", residual),
         ("check", _verdict(outcome.check)),
@@ -102,17 +102,17 @@ def _move(spec: Spec) -> str:
     )
 
 
-def _peaks(outcome: Design) -> tuple[str, str]:
-    lagging, figures = outcome.spec.actuator.tau is not None, outcome.plan.figures
-    peaks = [
-        f"{figures[('command_' if lagging else '') + key]:.4g} {unit}"
-        for key, unit in (
-            ("velocity_max_m_per_s", "m/s"),
-            ("acceleration_max_m_per_s2", "m/s²"),
-            ("jerk_max_m_per_s3", "m/s³"),
-        )
-    ]
-    return ("peak command" if lagging else "peak motion", ", ".join(peaks))
+def _peaks(outcome: Design) -> list[tuple[str, str]]:
+    from gen_profile.metrics import greatest
+
+    kind = "peak motion" if outcome.spec.actuator.tau is None else "peak command"
+    axes, command = outcome.spec.machine().actuated, outcome.plan.trial.command
+    rows = []
+    for index, axis in enumerate(axes):
+        powers = zip((1, 2, 3), ("s", "s²", "s³"), strict=True)
+        peaks = [f"{greatest(command, order, index):.4g} {axis.unit}/{time}" for order, time in powers]
+        rows.append((kind if len(axes) == 1 else f"{kind}, {axis.name}", ", ".join(peaks)))
+    return rows
 
 
 def _verdict(check: Check | None) -> str:

@@ -14,6 +14,8 @@ from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_column
 from gen_profile.problem.symbolic import Array, Function
 
+SAME_FREQUENCY = 1e-6  # relative difference of natural frequencies that count as one
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class Linearization:
@@ -46,6 +48,12 @@ class Linearization:
     frequencies: Array
     damping_ratios: Array
     modes: Array
+
+    @property
+    def distinct_frequencies(self) -> Array:
+        """Frequencies without repetition: a spherical pendulum has one, in two directions."""
+        apart = np.diff(self.frequencies) > SAME_FREQUENCY * self.frequencies[1:]
+        return np.asarray(self.frequencies[np.concatenate([[True], apart])])
 
 
 def linearize(

@@ -20,7 +20,7 @@ from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
-TARGET_TOLERANCE = 1e-6  # of the longest axis move, beside the artefact's own resolution
+TARGET_TOLERANCE = 1e-6  # of the axis' move, beside the artefact's own resolution
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -151,14 +151,17 @@ def _provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
 
 def _missed_ends(spec: Spec, setpoints: SampledProfile) -> tuple[str, ...]:
     """Say where the motion does not begin or end as the spec asks."""
-    longest = max(abs(distance) for distance in spec.move.distance)
-    allowed = TARGET_TOLERANCE * longest + setpoints.resolution
+    distance = np.abs(spec.move.distance)
+    allowed = TARGET_TOLERANCE * np.where(distance > 0.0, distance, distance.max()) + setpoints.resolution
+    axes = spec.machine().actuated
     faults = []
     for word, found, asked in (
         ("starts", setpoints.position[0], spec.move.start),
         ("ends", setpoints.position[-1], spec.move.target),
     ):
-        for axis, at, due, tolerance in zip(spec.axis, found, asked, allowed, strict=True):
+        for axis, at, due, tolerance in zip(axes, found, asked, allowed, strict=True):
             if abs(at - due) > tolerance:
-                faults.append(f"Axis {axis} {word} at {at:.9g} m, and the spec asks for {due:.9g} m.")
+                faults.append(
+                    f"Axis {axis.name} {word} at {at:.9g} {axis.unit}, and the spec asks for {due:.9g} {axis.unit}."
+                )
     return tuple(faults)

@@ -99,9 +99,14 @@ def _methods(spec: Spec) -> Iterator[tuple[str, Callable[[], Profile]]]:
 
 def _shaped(spec: Spec, name: str) -> Profile:
     move = spec.move
-    frequencies = linearize(spec.machine(), spec.plant.parameters).frequencies
+    # where the load would swing on; a shaper knows one frequency per mode, whatever the hoist does on the way
+    linear = linearize(spec.machine(), spec.plant.parameters, move.target)
     return shaped_profile(
-        name, start=move.start, target=move.target, duration=move.duration, frequencies=frequencies
+        name,
+        start=move.start,
+        target=move.target,
+        duration=move.duration,
+        frequencies=linear.distinct_frequencies,
     )
 
 

@@ -9,14 +9,14 @@ import attrs
 import numpy as np
 
 from gen_profile.check import Scenario
-from gen_profile.metrics import greatest, mean_square_root, peak, root_mean_square
+from gen_profile.metrics import greatest, length, mean_square_root, peak, root_mean_square
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import require_limits
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.profile import Array, Profile
-from gen_profile.response import Swing
+from gen_profile.response import Response, Swing
 from gen_profile.solvers import indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
@@ -91,7 +91,7 @@ def try_motion(spec: Spec, motion: Profile) -> Trial:
     """
     plant, machines = spec.machine(), scenarios(spec)
     tau = spec.actuator.tau
-    watch = watch_time(plant, machines)
+    watch = watch_time(spec, machines)
     settle = 2.0 * max(spec.export.cycle_time, spec.can.sync_period) + STANDSTILL * (tau or 0.0)
     swing = Swing(plant, motion, [m.parameters for m in machines], motion.duration + settle + watch)
     return Trial(
@@ -99,18 +99,20 @@ def try_motion(spec: Spec, motion: Profile) -> Trial:
     )
 
 
-def watch_time(plant: Plant, machines: Sequence[Scenario]) -> float:
-    """Time in s in which every mode of every machine shows its greatest sway."""
-    slowest = min(linearize(plant, machine.parameters).frequencies[0] for machine in machines)
+def watch_time(spec: Spec, machines: Sequence[Scenario]) -> float:
+    """Time in s in which every mode of every machine shows its greatest sway at the target."""
+    plant, target = spec.machine(), spec.move.target
+    slowest = min(linearize(plant, machine.parameters, target).frequencies[0] for machine in machines)
     return max(SHORTEST_WATCH, 2.0 * 2.0 * np.pi / float(slowest))
 
 
 def figures(trial: Trial) -> dict[str, float]:
     """Measure a trial: first axis, end load; sway during the move of the nominal machine, after it of all."""
     motion, command, duration = trial.motion, trial.command, trial.motion.duration
-    during = trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES))[0].sway[:, -1:]
+    end_load = trial.swing.plant.end_load
+    during = length(trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES))[0].sway[:, end_load])
     after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
-    residuals = [float(peak(response.sway[:, -1:])[0]) for response in after]
+    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in after]
     names = ("velocity", "acceleration", "jerk")
     units = ("m_per_s", "m_per_s2", "m_per_s3")
     table = {"duration_s": duration}
@@ -133,15 +135,18 @@ def figures(trial: Trial) -> dict[str, float]:
     return table
 
 
-def modal_amplitudes(plant: Plant, machine: Scenario, q_u: Array, dq_u: Array) -> Array:
+def modal_amplitudes(plant: Plant, machine: Scenario, standing: Response) -> Array:
     """Sum over the modes of what each adds to the sway of every load, in m, shape (loads,).
 
     Parameters
     ----------
-    q_u, dq_u : (n_u,) arrays
-        State of the free machine at any one time.
+    plant : Plant
+    machine : Scenario
+    standing : Response
+        Of the machine from the standstill of its axes on.
     """
-    linear = linearize(plant, machine.parameters)
+    linear = linearize(plant, machine.parameters, standing.position[0])
+    q_u, dq_u = standing.q_u[0], standing.dq_u[0]
     z, dz = np.linalg.solve(linear.modes, np.stack([q_u, dq_u], axis=1)).T
     amplitudes = np.hypot(z, dz / linear.frequencies)
     return np.asarray(np.abs(linear.sway_gain @ linear.modes) @ amplitudes)

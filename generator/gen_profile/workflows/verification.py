@@ -52,8 +52,8 @@ def cosimulate(
     CosimulationError
         The FMU cannot be built or run.
     """
-    plant, tau = spec.machine(), spec.actuator.tau or 0.0
-    with PlantCosimulation(plant, on_build) as fmu:
+    tau = spec.actuator.tau or 0.0
+    with PlantCosimulation(spec.machine(), on_build) as fmu:
         return tuple(
             _from(
                 fmu.run(
@@ -61,7 +61,7 @@ def cosimulate(
                     machine.parameters,
                     tau=tau,
                     max_step=_max_step(spec, machine),
-                    settle=STANDSTILL * tau + watch_time(plant, machines),
+                    settle=STANDSTILL * tau + watch_time(spec, machines),
                     output_step=output_step,
                 ),
                 _arrival(spec, setpoints),
@@ -98,13 +98,14 @@ def judge(
         findings=tuple(
             _finding(spec, machine, response) for machine, response in zip(machines, found, strict=True)
         ),
+        directions=spec.machine().directions,
         faults=_contradictions(setpoints),
     )
 
 
 def sample_spacing(spec: Spec, setpoints: SampledProfile, machines: Sequence[Scenario]) -> float:
     """Choose the spacing in s at which residuals are sampled."""
-    return min(setpoints.cycle_time, watch_time(spec.machine(), machines) / (RESIDUAL_SAMPLES - 1))
+    return min(setpoints.cycle_time, watch_time(spec, machines) / (RESIDUAL_SAMPLES - 1))
 
 
 def _above_samples(values: Array) -> float:
@@ -118,7 +119,8 @@ def _arrival(spec: Spec, setpoints: SampledProfile) -> float:
 
 
 def _max_step(spec: Spec, machine: Scenario) -> float:
-    fastest = linearize(spec.machine(), machine.parameters).frequencies[-1]
+    ends = (spec.move.start, spec.move.target)
+    fastest = max(linearize(spec.machine(), machine.parameters, q_a).frequencies[-1] for q_a in ends)
     return min(LONGEST_STEP, STEP_PHASE / float(fastest))
 
 
@@ -138,7 +140,7 @@ def _from(response: Response, arrival: float) -> Response:
 
 def _finding(spec: Spec, machine: Scenario, response: Response) -> Finding:
     plant = spec.machine()
-    modal = modal_amplitudes(plant, machine, response.q_u[0], response.dq_u[0])
+    modal = modal_amplitudes(plant, machine, response)
     return Finding(
         scenario=machine,
         residual=dict(zip(plant.loads, map(float, peak(response.sway)), strict=True)),
