@@ -15,11 +15,12 @@ from gen_profile.errors import SpecError
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
-    from gen_profile_exporters import can_log, csv_table, structured_text
+    from gen_profile_exporters import csv_table, structured_text
+    from gen_profile_exporters.can import exporter as can
     from gen_profile_exporters.exporter import Exporter
 
     # Holds the project's own formats to the protocol wherever types are checked.
-    _CONFORMING: tuple[Exporter, ...] = (csv_table, structured_text, can_log)
+    _CONFORMING: tuple[Exporter, ...] = (csv_table, structured_text, can)
 
 Proof = Literal["executed", "read back", "parsed", "untested"]
 
@@ -48,8 +49,8 @@ class Format(NamedTuple):
 
 BUILT_IN: dict[str, Format] = {
     "can": Format(
-        module="gen_profile_exporters.can_log",
-        summary="candump log of CiA 402 position setpoints and SYNCs, for canplayer and python-can",
+        module="gen_profile_exporters.can.exporter",
+        summary="CiA 402 setpoints and SYNCs as candump log, ASC and BLF, with DBC and start-up list",
         proof="read back",
         suffix=".log",
     ),

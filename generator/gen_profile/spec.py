@@ -50,6 +50,7 @@ RelativeRange = Annotated[float, Bounds(above=0.0, most=0.9)]
 CycleTime = Annotated[float, Bounds(least=1e-5, most=10.0)]
 Duration = Annotated[float, Bounds(least=1e-3, most=1e5)]
 Distance = Annotated[float, Bounds(least=-1e5, most=1e5)]
+Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]
 
 DEFAULT_COUNTS_PER_SI = 1e6
 RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longest axis move
@@ -110,12 +111,13 @@ class CostSpec:
 
 @attrs.frozen(kw_only=True)
 class LimitsSpec:
-    """Greatest magnitudes of the command in SI units, and of the end load's transient sway in m."""
+    """Greatest magnitudes of the command in SI units, its travel, and the end load's transient sway in m."""
 
     velocity: Positive | None = None
     acceleration: Positive | None = None
     jerk: Positive | None = None
     sway: Positive | None = None
+    travel: tuple[Distance, Distance] | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -144,12 +146,56 @@ class ExportSpec:
 
 @attrs.frozen(kw_only=True)
 class CanSpec:
-    """The drive on the CAN bus; the second axis takes the next node, and so on."""
+    """The drives on the CAN bus, and how they are to be fed, watched and stopped.
+
+    Attributes
+    ----------
+    node : int
+        CANopen node of the first axis; the second axis takes the next one, and so on.
+    bitrate : int
+        bit/s.
+    mode : str
+        ``"csp"`` (cyclic synchronous position, 607Ah) or ``"ip"`` (interpolated position, 60C1h).
+    sync_period : float
+        s; also the drives' interpolation period 60C2h.
+    feed_forward : str
+        What goes along with each position in csp: nothing, the velocity 60B1h, or the torque 60B2h.
+    torque_per_acceleration : float or None
+        For the torque: ‰ of the rated torque per m/s² (or rad/s²) of the axis.
+    timeout : float or None
+        How long a drive waits for the next setpoint before it stops by itself, in s; None takes 20 ms or
+        three cycles, whichever is longer.
+    start_tolerance : float
+        How far the axis may stand from the first setpoint, in m (or rad).
+    following_error : float or None
+        Window 6065h in m (or rad); None leaves the drive's own.
+    quick_stop : float or None
+        Deceleration 6085h in m/s² (or rad/s²); None takes twice the motion's greatest acceleration.
+    travel : mapping of str to (float, float)
+        Software position limits 607Dh by axis, in m (or rad).
+    encoder, gear, feed : (int, int) or None
+        Numerator and denominator of 608Fh (increments per motor revolutions), 6091h (motor per shaft
+        revolutions) and 6092h (counts per shaft revolutions), for drives that scale positions themselves.
+    vendor, product : int or None
+        Identity 1018h:01 and :02 that a drive must have.
+    """
 
     node: Annotated[int, Bounds(least=1, most=127)] = 1
     bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
-    mode: Literal["csp"] = "csp"
+    mode: Literal["csp", "ip"] = "csp"
     sync_period: CycleTime = 0.004
+    feed_forward: Literal["none", "velocity", "torque"] = "none"
+    torque_per_acceleration: Positive | None = None
+    timeout: Annotated[float, Bounds(least=0.001, most=30.0)] | None = None
+    start_tolerance: Positive = 0.001
+    following_error: Positive | None = None
+    quick_stop: Positive | None = None
+    travel: Mapping[str, tuple[Distance, Distance]] = attrs.field(factory=dict, converter=_frozen_mapping)
+    encoder: tuple[Unsigned32, Unsigned32] | None = None
+    gear: tuple[Unsigned32, Unsigned32] | None = None
+    feed: tuple[Unsigned32, Unsigned32] | None = None
+    vendor: Unsigned32 | None = None
+    product: Unsigned32 | None = None
 
 
 @attrs.frozen(kw_only=True)

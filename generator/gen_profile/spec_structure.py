@@ -183,6 +183,21 @@ def _enforce(value: Any, constraint: Bounds | Pattern) -> None:
         raise ValueError(f"must be {' and '.join(stated)}, found {found(value)}")
 
 
+def _is_fixed_tuple(annotation: Any) -> bool:
+    return get_origin(annotation) is tuple and Ellipsis not in get_args(annotation)
+
+
+def _fixed_tuple(annotation: Any) -> Callable[[Any, Any], Any]:
+    items = get_args(annotation)
+
+    def structure_items(value: Any, _: Any) -> Any:
+        if not isinstance(value, list | tuple) or len(value) != len(items):
+            raise ValueError(f"must be an array of {len(items)} numbers, found {found(value)}")
+        return tuple(_CONVERTER.structure(one, item) for one, item in zip(value, items, strict=True))
+
+    return structure_items
+
+
 def _is(form: Any) -> Callable[[Any], bool]:
     return lambda annotation: get_origin(annotation) is form
 
@@ -195,6 +210,7 @@ def _converter() -> Converter:
     converter.register_structure_hook(bool, lambda value, _: value)  # none of them is typed by a person
     converter.register_structure_hook_func(_is(Literal), _structure_choice)
     converter.register_structure_hook_factory(_is(Annotated), _constrained)
+    converter.register_structure_hook_factory(_is_fixed_tuple, _fixed_tuple)
     return converter
 
 

@@ -110,7 +110,7 @@ def test_bytes_are_the_same_every_time(contract):
 
 
 def test_file_name_has_the_formats_suffix(contract):
-    (file,) = find_exporter(contract.format).encode(MOVES[1], target(name="bay 3.b"))
+    file, *_ = find_exporter(contract.format).encode(MOVES[1], target(name="bay 3.b"))
     assert file.filename == f"bay 3.b{BUILT_IN[contract.format].suffix}"
 
 

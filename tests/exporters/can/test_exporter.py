@@ -9,14 +9,14 @@ from motions import quintic, target
 
 from gen_profile.errors import ExportError
 from gen_profile.profile import sample
-from gen_profile_exporters import can_log
+from gen_profile_exporters.can import exporter, frames
 
 MOVE = quintic((0.1, 0.4))
 TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))
 
 
 def encoded(profile=MOVE, *names, **options):
-    (file,) = can_log.encode(profile, target(*names, **options))
+    file, *_ = exporter.encode(profile, target(*names, **options))
     return file.content
 
 
@@ -25,7 +25,7 @@ def lines_of(content):
 
 
 def replayed(lines, *names, **options):
-    return can_log.replay(("\n".join(lines) + "\n").encode("ascii"), target(*names, **options))
+    return exporter.replay(("\n".join(lines) + "\n").encode("ascii"), target(*names, **options))
 
 
 class TestEncode:
@@ -52,7 +52,7 @@ class TestEncode:
     def test_sign_turns_the_counts(self):
         content = encoded(sign=-1)
         assert lines_of(content)[0].endswith("301#6079FEFF")
-        assert can_log.replay(content, target(sign=-1)).position[0, 0] == 0.1
+        assert exporter.replay(content, target(sign=-1)).position[0, 0] == 0.1
 
     def test_python_can_reads_the_same(self, tmp_path):
         path = tmp_path / "bay-3.log"
@@ -90,11 +90,11 @@ class TestEncode:
             encoded(quintic((0.0, 3000.0)), sign=-1)
 
     def test_node_ids_end(self):
-        assert can_log.encode(TWO_MOVES, target("x", "y", node=126))
+        assert exporter.encode(TWO_MOVES, target("x", "y", node=125))
         with pytest.raises(
-            ExportError, match=r"can\.node: 2 axes from node 127 on exceed the last node id 127"
+            ExportError, match=r"can\.node: 2 axes from node 126 on exceed the last node id 126"
         ):
-            encoded(TWO_MOVES, "x", "y", node=127)
+            encoded(TWO_MOVES, "x", "y", node=126)
 
     @pytest.mark.parametrize("period", [0.00333, 0.0000125, 1 / 3, 0.256])
     def test_periods_that_no_drive_can_be_set_to_are_refused(self, period):
@@ -103,7 +103,7 @@ class TestEncode:
 
     @pytest.mark.parametrize("period", [0.001, 0.0025, 0.255, 0.5, 1.0])
     def test_periods_that_drives_can_be_set_to_are_taken(self, period):
-        motion = can_log.replay(encoded(sync_period=period), target(sync_period=period))
+        motion = exporter.replay(encoded(sync_period=period), target(sync_period=period))
         assert motion.cycle_time == period
 
     def test_refuses_more_samples_than_fit(self):
@@ -115,7 +115,7 @@ class TestBusLoad:
     @pytest.mark.parametrize(("data_bytes", "bits"), [(0, 55), (1, 65), (4, 95), (6, 115), (8, 135)])
     def test_longest_frames(self, data_bytes, bits):
         # Davis et al., table of worst-case lengths: (55 + 10 n) bits for an 11-bit identifier.
-        assert can_log.frame_bits(data_bytes) == bits
+        assert frames.frame_bits(data_bytes) == bits
 
     def test_a_full_bus_is_refused_with_the_period_that_fits(self):
         # 55 + 95 + 115 bits at 500 kbit/s are 0.53 ms; 70 % of the period is 0.757 ms.
@@ -128,24 +128,24 @@ class TestBusLoad:
     def test_more_axes_load_more(self):
         axes = [f"axis{number}" for number in range(3)]
         moves = quintic(*[(0, 0.1)] * 3)
-        assert can_log.encode(moves, target(*axes, sync_period=0.001, bitrate=1_000_000))
+        assert exporter.encode(moves, target(*axes, sync_period=0.001, bitrate=1_000_000))
         with pytest.raises(ExportError, match=r"3 axes every 0\.001 s .* set 0\.002 s or more"):
             encoded(moves, *axes, sync_period=0.001, bitrate=500_000)
 
 
 class TestReplay:
     def test_resolution_is_one_count(self):
-        motion = can_log.replay(encoded(counts_per_si=-20000.0), target(counts_per_si=-20000.0))
+        motion = exporter.replay(encoded(counts_per_si=-20000.0), target(counts_per_si=-20000.0))
         np.testing.assert_array_equal(motion.resolution, [5e-5])
         assert motion.velocity is None
 
     def test_takes_carriage_returns_and_any_channel_and_start(self):
         lines = lines_of(encoded())
         moved = [line.replace("can0", "vcan7").replace("(000000000", "(173000000") for line in lines]
-        reference = can_log.replay(encoded(), target())
+        reference = exporter.replay(encoded(), target())
         assert replayed(moved).payload_hash() == reference.payload_hash()
         content = encoded().replace(b"\n", b"\r\n")
-        assert can_log.replay(content, target()).payload_hash() == reference.payload_hash()
+        assert exporter.replay(content, target()).payload_hash() == reference.payload_hash()
 
     def test_a_log_that_ends_early_plays_short(self):
         assert len(replayed(lines_of(encoded())[:20]).position) == 10
@@ -197,13 +197,13 @@ class TestReplay:
 
     def test_refuses_truncated_text(self):
         with pytest.raises(ExportError, match="line 502: the CAN log breaks off"):
-            can_log.replay(encoded()[:-1], target())
+            exporter.replay(encoded()[:-1], target())
 
     def test_refuses_too_few_syncs(self):
         with pytest.raises(ExportError, match="holds 1 SYNCs"):
             replayed(lines_of(encoded())[:2])
         with pytest.raises(ExportError, match="holds 0 SYNCs"):
-            can_log.replay(b"", target())
+            exporter.replay(b"", target())
 
     def test_refuses_syncs_without_time_between(self):
         lines = [line.replace("0.004000", "0.000000") for line in lines_of(encoded())[:4]]
@@ -212,8 +212,8 @@ class TestReplay:
 
     def test_refuses_a_log_for_other_nodes(self):
         with pytest.raises(ExportError, match="line 1: frame 301h is none of this target's"):
-            can_log.replay(encoded(), target(node=2))
+            exporter.replay(encoded(), target(node=2))
 
     def test_refuses_positions_beyond_doubles(self):
         with pytest.raises(ExportError, match="too large to convert"):
-            can_log.replay(encoded(counts_per_si=10.0), target(counts_per_si=1e-320))
+            exporter.replay(encoded(counts_per_si=10.0), target(counts_per_si=1e-320))

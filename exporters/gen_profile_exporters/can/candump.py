@@ -1,0 +1,85 @@
+"""Log of CAN frames in candump's format (``candump -L`` of can-utils): written, and read back strictly.
+
+::
+
+    (0000000000.000000) can0 301#00000000
+    (0000000000.000000) can0 080#
+    (0000000000.004000) can0 301#01000000
+    (0000000000.004000) can0 080#
+
+Frames of one cycle carry the stamp of its SYNC; they are sent in the file's order.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+
+import attrs
+
+from gen_profile.errors import ExportError
+from gen_profile_exporters.can.frames import MICROSECONDS
+
+CHANNEL = "can0"
+
+_FRAME = re.compile(r"\((\d{1,12})\.(\d{6})\) (\S+) ([0-9A-F]{3})#((?:[0-9A-F]{2}){0,8})")
+
+
+@attrs.frozen
+class Frame:
+    """A classical data frame.
+
+    Attributes
+    ----------
+    stamp : int
+        µs.
+    cob_id : int
+        11 bits.
+    data : bytes
+    line : int
+        Where it was read, from 1; 0 where it was not.
+    """
+
+    stamp: int
+    cob_id: int
+    data: bytes
+    line: int = 0
+
+
+def write(frames: Iterable[Frame]) -> bytes:
+    """Render frames, ASCII."""
+    return "".join(
+        f"({frame.stamp // MICROSECONDS:010d}.{frame.stamp % MICROSECONDS:06d}) {CHANNEL} "
+        f"{frame.cob_id:03X}#{frame.data.hex().upper()}\n"
+        for frame in frames
+    ).encode("ascii")
+
+
+def read(content: bytes) -> Iterator[Frame]:
+    """Read frames in the file's order.
+
+    Raises
+    ------
+    ExportError
+        A line is none, the text breaks off, a stamp falls, or the channel changes.
+    """
+    lines = content.decode("latin-1").split("\n")
+    if lines.pop().strip():
+        raise ExportError(
+            f"line {len(lines) + 1}: the CAN log breaks off without a line end; export it again."
+        )
+    stamp, channel = 0, None
+    for number, text in enumerate(lines, start=1):
+        match = _FRAME.fullmatch(text.rstrip("\r"))
+        if match is None:
+            raise ExportError(
+                f"line {number}: {text[:60]!r} is no frame in candump's format; export the log again."
+            )
+        seconds, microseconds, found, cob_id, data = match.groups()
+        frame = Frame(
+            int(seconds) * MICROSECONDS + int(microseconds), int(cob_id, 16), bytes.fromhex(data), number
+        )
+        if frame.stamp < stamp or found != (channel or found):
+            raise ExportError(f"line {number}: the stamp falls or the channel changes; export the log again.")
+        stamp, channel = frame.stamp, found
+        yield frame

@@ -1,0 +1,63 @@
+"""DBC of the bus: what the frames mean, for analysers and loggers."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+
+from gen_profile.units import AxisScale
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.frames import Field
+from gen_profile_exporters.can.scaling import exact
+from gen_profile_exporters.exporter import Target
+
+MASTER_NAME = "Controller"
+
+
+def dbc(target: Target) -> bytes:
+    """Render the database; positions and velocities read in the axes' SI units.
+
+    The format is that of Vector's *DBC File Format Documentation*, version 1.0.5.
+    """
+    names = [identifier(axis.name) for axis in target.axes]
+    blocks = ['VERSION ""', "NS_ :", "BS_:", f"BU_: {MASTER_NAME} {' '.join(names)}"]
+    blocks.append(f"BO_ {frames.SYNC} Sync: 0 {MASTER_NAME}")
+    for name, axis, node in zip(names, target.axes, frames.nodes(target), strict=True):
+        setpoint = frames.setpoint_fields(target.can)
+        blocks += [
+            _message(frames.RPDO1 + node, f"{name}_Command", frames.COMMAND, axis, (MASTER_NAME, name)),
+            _message(frames.RPDO2 + node, f"{name}_Setpoint", setpoint, axis, (MASTER_NAME, name)),
+            _message(frames.TPDO1 + node, f"{name}_Feedback", frames.FEEDBACK, axis, (name, MASTER_NAME)),
+        ]
+    return ("\n\n".join(blocks) + "\n").encode("ascii")
+
+
+def identifier(name: str) -> str:
+    """Turn an axis's name into a C identifier."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return plain if plain[:1].isalpha() else f"axis_{plain}"
+
+
+def _message(cob_id: int, name: str, fields: tuple[Field, ...], axis: AxisScale, way: tuple[str, str]) -> str:
+    sender, receiver = way
+    lines = [f"BO_ {cob_id} {name}: {frames.packing(fields).size} {sender}"]
+    start = 0
+    for field in fields:
+        sign = "-" if field.code.islower() else "+"
+        factor, unit = _physical(field, axis)
+        lines.append(
+            f' SG_ {field.name} : {start}|{field.bits}@1{sign} ({factor},0) [0|0] "{unit}" {receiver}'
+        )
+        start += field.bits
+    return "\n".join(lines)
+
+
+def _physical(field: Field, axis: AxisScale) -> tuple[str, str]:
+    """Factor and unit of a signal: what one count means."""
+    metre = repr(float(Fraction(1) / exact(axis.counts_per_si)))
+    length = "rad" if axis.unit in {"rad", "deg"} else "m"
+    if field in {frames.TARGET_POSITION, frames.INTERPOLATION_DATA, frames.ACTUAL_POSITION}:
+        return metre, length
+    if field == frames.VELOCITY_OFFSET:
+        return metre, f"{length}/s"
+    return ("0.1", "%") if field == frames.TORQUE_OFFSET else ("1", "")

@@ -1,0 +1,158 @@
+"""The format ``can``: setpoints for CiA 402 drives as logs, with a DBC and what the drives must be set to.
+
+Each cycle holds one RPDO2 per axis and after them one SYNC, which makes the drives take it. Between two SYNCs
+a drive interpolates over its interpolation period 60C2h, which is the SYNC period. See
+`gen_profile_exporters.can.frames` for the frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from itertools import pairwise
+
+import numpy as np
+
+from gen_profile.errors import ExportError
+from gen_profile.profile import Profile, SampledProfile
+from gen_profile_exporters.can import candump, database, frames, startup, traces
+from gen_profile_exporters.can.candump import Frame
+from gen_profile_exporters.can.frames import MICROSECONDS, SYNC
+from gen_profile_exporters.can.scaling import Setpoints, setpoints
+from gen_profile_exporters.exporter import File, Target
+from gen_profile_exporters.setpoints import in_si, plausible_cycle_time, sampled
+
+
+def encode(profile: Profile, target: Target) -> tuple[File, ...]:
+    """Write the frames of the motion, sampled at the SYNC period, and what belongs to them.
+
+    Raises
+    ------
+    ExportError
+        The bus is too slow, there are too few node ids, drives cannot be set to the period, a position does
+        not fit 32 bits or the axis's travel, or there are too many samples.
+    """
+    frames.period_digits(target.can)
+    frames.require_load(target)
+    motion = setpoints(sampled(profile, target, target.can.sync_period, "can.sync_period"), target)
+    cycles = tuple(cyclic_frames(motion, target))
+    lists = startup.startup_lists(motion, target)
+    contents = {
+        ".log": candump.write(cycles),
+        ".asc": traces.asc(cycles),
+        ".blf": traces.blf(cycles),
+        ".dbc": database.dbc(target),
+        ".startup.csv": startup.table(lists),
+        **{f".node{node}.cdcf": startup.concise_dcf(entries) for node, entries in lists.items()},
+    }
+    return tuple(
+        File(filename=f"{target.name}{suffix}", content=content) for suffix, content in contents.items()
+    )
+
+
+def replay(content: bytes, target: Target) -> SampledProfile:
+    """Read the positions that the drives take at each SYNC.
+
+    Raises
+    ------
+    ExportError
+        The text is no such log, was cut off, or is for other nodes than the target's.
+    """
+    taken, stamps = read_setpoints(content, target)
+    counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
+    velocity = None
+    if target.can.feed_forward == "velocity":
+        velocity = in_si(taken[:, :, 1].astype(np.float64), counts_per_si)
+    return SampledProfile(
+        cycle_time=_cycle_time(stamps),
+        position=in_si(taken[:, :, 0].astype(np.float64), counts_per_si),
+        velocity=velocity,
+        resolution=in_si(np.ones(len(target.axes)), np.abs(counts_per_si)),
+    )
+
+
+def cyclic_frames(motion: Setpoints, target: Target) -> Iterator[Frame]:
+    """List the frames of all cycles in the order in which they are sent."""
+    period = frames.period_microseconds(target.can)
+    pack = frames.packing(frames.setpoint_fields(target.can)).pack
+    cob_ids = setpoint_ids(target)
+    for cycle in range(len(motion.position)):
+        for column, cob_id in enumerate(cob_ids):
+            values = [int(motion.position[cycle, column])]
+            if motion.offset is not None:
+                values.append(int(motion.offset[cycle, column]))
+            yield Frame(cycle * period, cob_id, pack(*values))
+        yield Frame(cycle * period, SYNC, b"")
+
+
+def setpoint_ids(target: Target) -> tuple[int, ...]:
+    """COB-IDs of the setpoints, in the axes' order."""
+    return tuple(frames.RPDO2 + node for node in frames.nodes(target))
+
+
+def read_setpoints(content: bytes, target: Target) -> tuple[frames.Integers, list[Frame]]:
+    """Read a log: what each RPDO2 holds, shape (cycles, axes, fields), and the SYNCs."""
+    cob_ids = setpoint_ids(target)
+    unpack = frames.packing(frames.setpoint_fields(target.can))
+    taken: list[list[tuple[int, ...]]] = []
+    syncs: list[Frame] = []
+    pending: dict[int, tuple[int, ...]] = {}
+    for frame in candump.read(content):
+        if frame.cob_id == SYNC:
+            _require_complete(pending, cob_ids, frame)
+            taken.append([pending[cob_id] for cob_id in cob_ids])
+            syncs.append(frame)
+            pending = {}
+        else:
+            _require_expected(frame, pending, cob_ids, unpack.size)
+            pending[frame.cob_id] = unpack.unpack(frame.data)
+    if pending:
+        raise ExportError("The CAN log ends without a SYNC after its last setpoint; export it again.")
+    if len(syncs) < 2:
+        raise ExportError(f"The CAN log holds {len(syncs)} SYNCs, a motion needs 2 or more; export it again.")
+    return np.array(taken, dtype=np.int64), syncs
+
+
+def _require_complete(pending: dict[int, tuple[int, ...]], cob_ids: Sequence[int], sync: Frame) -> None:
+    if sync.data:
+        raise ExportError(
+            f"line {sync.line}: SYNC with data, which this format has not; export the log again."
+        )
+    missing = [cob_id for cob_id in cob_ids if cob_id not in pending]
+    if missing:
+        raise ExportError(
+            f"line {sync.line}: SYNC without a setpoint {missing[0]:03X}h before it; "
+            "export the log again, or check it with the spec that it was exported with."
+        )
+
+
+def _require_expected(
+    frame: Frame, pending: dict[int, tuple[int, ...]], cob_ids: Sequence[int], size: int
+) -> None:
+    if frame.cob_id not in cob_ids:
+        known = ", ".join(f"{cob_id:03X}h" for cob_id in (*cob_ids, SYNC))
+        raise ExportError(
+            f"line {frame.line}: frame {frame.cob_id:03X}h is none of this target's ({known}); "
+            "check the log with the spec that it was exported with, or export it again."
+        )
+    if frame.cob_id in pending:
+        raise ExportError(
+            f"line {frame.line}: second setpoint {frame.cob_id:03X}h before a SYNC; export the log again."
+        )
+    if len(frame.data) != size:
+        raise ExportError(
+            f"line {frame.line}: setpoint {frame.cob_id:03X}h with {len(frame.data)} data bytes instead of "
+            f"{size}; export the log again."
+        )
+
+
+def _cycle_time(syncs: Sequence[Frame]) -> float:
+    """Step of the SYNCs' stamps in s, which must all be equal."""
+    period = syncs[1].stamp - syncs[0].stamp
+    for before, sync in pairwise(syncs):
+        if sync.stamp - before.stamp != period:
+            raise ExportError(
+                f"line {sync.line}: SYNC {sync.stamp - before.stamp} µs after the one before, where "
+                f"{period} µs lie between the first two; export the log again."
+            )
+    return plausible_cycle_time(float(Decimal(period) / MICROSECONDS), syncs[1].line)

@@ -1,0 +1,175 @@
+"""Which frames carry what: COB-IDs, the content of each PDO, and how much of the bus they take.
+
+Per axis (node ids count up from ``can.node``), after the predefined connection set of CiA 301:
+
+========== ======================= ================================================ =========================
+COB-ID     PDO                     content                                          sent
+========== ======================= ================================================ =========================
+200h + n   RPDO1, to the drive     controlword 6040h                                when it changes
+300h + n   RPDO2, to the drive     607Ah, and 60B1h or 60B2h; or 60C1h:01           every cycle, before SYNC
+180h + n   TPDO1, from the drive   statusword 6041h, actual position 6064h          on SYNC
+========== ======================= ================================================ =========================
+
+The controlword has a PDO of its own, so that setpoints which still wait in a queue cannot undo a quick stop.
+"""
+
+from __future__ import annotations
+
+import struct
+from decimal import Decimal
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile.errors import ExportError
+from gen_profile.spec import CanSpec
+from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.setpoints import two_digits_up
+
+NMT = 0x000
+SYNC = 0x080  # and EMCY, of node n: 080h + n
+EMCY = 0x080
+TPDO1 = 0x180
+RPDO1 = 0x200
+RPDO2 = 0x300
+SDO_ANSWER = 0x580
+SDO_REQUEST = 0x600
+HEARTBEAT = 0x700
+MASTER = 127  # node id under which the streamer sends its heartbeat
+LAST_NODE = 126
+
+MOST_LOAD = Decimal("0.7")  # of the bus, at worst; the rest is for SDOs, heartbeats and repeated frames
+MICROSECONDS = 1_000_000
+
+Integers = NDArray[np.int64]
+
+
+@attrs.frozen(kw_only=True)
+class Field:
+    """One object in a PDO.
+
+    Attributes
+    ----------
+    index, sub : int
+        Of the object dictionary.
+    code : str
+        Its type, as `struct` spells it: ``"H"`` for UNSIGNED16, ``"i"`` for INTEGER32 …
+    name : str
+        As a DBC calls it.
+    """
+
+    index: int
+    sub: int
+    code: str
+    name: str
+
+    @property
+    def bits(self) -> int:
+        """Length."""
+        return 8 * struct.calcsize(self.code)
+
+    @property
+    def mapping(self) -> int:
+        """Value of a mapping entry (1600h and following): index, subindex, length in bits."""
+        return self.index << 16 | self.sub << 8 | self.bits
+
+
+CONTROLWORD = Field(index=0x6040, sub=0, code="H", name="Controlword")
+STATUSWORD = Field(index=0x6041, sub=0, code="H", name="Statusword")
+ACTUAL_POSITION = Field(index=0x6064, sub=0, code="i", name="ActualPosition")
+TARGET_POSITION = Field(index=0x607A, sub=0, code="i", name="TargetPosition")
+INTERPOLATION_DATA = Field(index=0x60C1, sub=1, code="i", name="InterpolationData")
+VELOCITY_OFFSET = Field(index=0x60B1, sub=0, code="i", name="VelocityOffset")
+TORQUE_OFFSET = Field(index=0x60B2, sub=0, code="h", name="TorqueOffset")
+
+COMMAND = (CONTROLWORD,)
+FEEDBACK = (STATUSWORD, ACTUAL_POSITION)
+_FEED_FORWARD = {"none": (), "velocity": (VELOCITY_OFFSET,), "torque": (TORQUE_OFFSET,)}
+
+
+def setpoint_fields(can: CanSpec) -> tuple[Field, ...]:
+    """List what one RPDO2 holds."""
+    if can.mode == "ip":
+        return (INTERPOLATION_DATA,)
+    return (TARGET_POSITION, *_FEED_FORWARD[can.feed_forward])
+
+
+def packing(fields: tuple[Field, ...]) -> struct.Struct:
+    """Pack the fields as a PDO does: little-endian, without gaps."""
+    return struct.Struct("<" + "".join(field.code for field in fields))
+
+
+def nodes(target: Target) -> tuple[int, ...]:
+    """List the node ids, in the axes' order.
+
+    Raises
+    ------
+    ExportError
+        There are too few.
+    """
+    first, axes = target.can.node, len(target.axes)
+    if first + axes - 1 > LAST_NODE:
+        raise ExportError(
+            f"can.node: {axes} axes from node {first} on exceed the last node id {LAST_NODE} "
+            f"({MASTER} is the master's)."
+        )
+    return tuple(range(first, first + axes))
+
+
+def period_digits(can: CanSpec) -> tuple[int, int]:
+    """SYNC period as object 60C2h tells it to a drive: 1 to 255 times a power of ten of seconds.
+
+    Raises
+    ------
+    ExportError
+        It cannot be told.
+    """
+    period = Decimal(repr(can.sync_period)).normalize()
+    _, digits, exponent = period.as_tuple()
+    value = int("".join(map(str, digits)))
+    if value > 255 or not isinstance(exponent, int) or exponent < -6:
+        raise ExportError(
+            f"can.sync_period: drives cannot be set to an interpolation period of {period:f} s (60C2h holds "
+            "1 to 255 times a power of ten, here of at least 1 µs); choose a rounder one, such as 0.004."
+        )
+    return value, exponent
+
+
+def period_microseconds(can: CanSpec) -> int:
+    """SYNC period in µs."""
+    value, exponent = period_digits(can)
+    return int(value * Decimal(10) ** exponent * MICROSECONDS)
+
+
+def frame_bits(data_bytes: int) -> int:
+    """Count the bits of the longest classical frame with an 11-bit identifier, interframe space included.
+
+    47 bits frame the data; of them 34, and all data bits, are subject to stuffing: one more bit for every
+    four after the first (ISO 11898-1; Davis et al., *Controller Area Network schedulability analysis*, 2007).
+    """
+    return 47 + 8 * data_bytes + (33 + 8 * data_bytes) // 4
+
+
+def cycle_bits(target: Target) -> int:
+    """Bits of one cycle at their most: SYNC and, per axis, a setpoint and an answer."""
+    setpoint, answer = packing(setpoint_fields(target.can)).size, packing(FEEDBACK).size
+    return frame_bits(0) + len(target.axes) * (frame_bits(setpoint) + frame_bits(answer))
+
+
+def require_load(target: Target) -> None:
+    """Refuse what overloads the bus.
+
+    Raises
+    ------
+    ExportError
+        With the shortest period that fits.
+    """
+    axes, can, bits = len(target.axes), target.can, cycle_bits(target)
+    shortest = bits / (MOST_LOAD * can.bitrate)
+    if Decimal(repr(can.sync_period)) < shortest:
+        raise ExportError(
+            f"can.sync_period: {axes} axes every {can.sync_period:g} s load a bus of {can.bitrate} bit/s by "
+            f"{bits / can.sync_period / can.bitrate:.0%} (limit {MOST_LOAD:.0%}); "
+            f"set {two_digits_up(shortest)} s or more, or raise can.bitrate."
+        )

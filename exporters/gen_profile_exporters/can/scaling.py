@@ -1,0 +1,170 @@
+"""From a motion in SI units to the whole numbers that drives take, exactly.
+
+A position is multiplied by the exact ratio that the spec's decimal number states, and rounded once, half to
+even. Nothing is added up from cycle to cycle, so nothing drifts.
+"""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from fractions import Fraction
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import ExportError
+from gen_profile.profile import Array, SampledProfile
+from gen_profile.spec import CanSpec
+from gen_profile.units import AxisScale
+from gen_profile_exporters.can.frames import Integers
+from gen_profile_exporters.exporter import Target
+
+INT32 = np.iinfo(np.int32)
+INT16 = np.iinfo(np.int16)
+NEAR_TIE = 1e-6  # of a count; doubles decide the rounding of what is further from a half
+DECELERATION_MARGIN = 2.0  # of a quick stop, over the motion's own greatest acceleration
+DIFFERENCE = 0.02  # s; velocities so far apart tell an acceleration without the noise of rounding
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Setpoints:
+    """What the drives are sent, in their own counts.
+
+    Attributes
+    ----------
+    period : float
+        s.
+    position : (samples, axes) integer array
+    offset : (samples, axes) integer array or None
+        Velocity 60B1h in counts/s, or torque 60B2h in ‰.
+    """
+
+    period: float
+    position: Integers
+    offset: Integers | None
+
+
+def exact(value: float) -> Fraction:
+    """Read a double as the shortest decimal number that means it, as a spec states it."""
+    return Fraction(Decimal(repr(float(value))))
+
+
+def exact_counts(values: Array, ratio: Fraction) -> Integers:
+    """Multiply doubles by a ratio and round to whole numbers, half to even, without any other error.
+
+    Parameters
+    ----------
+    values : array
+    ratio : Fraction
+
+    Raises
+    ------
+    ExportError
+        A product lies outside 32 bits.
+    """
+    product = np.asarray(values, dtype=np.float64) * float(ratio)
+    if not (np.abs(product) < 2.0**40).all():
+        raise ExportError("A setpoint lies far outside 32 bits; check axis.counts_per_metre.")
+    counts = np.rint(product).astype(np.int64)
+    for index in zip(*np.nonzero(np.abs(product - np.floor(product) - 0.5) < NEAR_TIE), strict=True):
+        counts[index] = round(Fraction(float(values[index])) * ratio)
+    return counts
+
+
+def setpoints(motion: SampledProfile, target: Target) -> Setpoints:
+    """Scale a motion that was sampled at the SYNC period.
+
+    Raises
+    ------
+    ExportError
+        A number leaves 32 bits (or 16, of a torque), or a position the axis's travel.
+    """
+    position = np.column_stack(
+        [
+            _positions(motion.position[:, column], axis, target.can, motion.cycle_time)
+            for column, axis in enumerate(target.axes)
+        ]
+    )
+    return Setpoints(period=motion.cycle_time, position=position, offset=_offsets(motion, target))
+
+
+def travel_counts(axis: AxisScale, can: CanSpec) -> tuple[int, int] | None:
+    """Software position limits 607Dh, lower first, or None."""
+    if axis.name not in can.travel:
+        return None
+    ends = exact_counts(np.array(can.travel[axis.name]), exact(axis.counts_per_si))
+    return int(ends.min()), int(ends.max())
+
+
+def magnitude_counts(value: float, axis: AxisScale) -> int:
+    """Scale a distance or deceleration, always positive, never to nothing."""
+    return max(1, int(exact_counts(np.array([value]), abs(exact(axis.counts_per_si)))[0]))
+
+
+def quick_stop_deceleration(position: Integers, period: float, can: CanSpec, axis: AxisScale) -> int:
+    """Deceleration 6085h in counts/s²: the spec's, else twice the motion's own greatest acceleration."""
+    if can.quick_stop is not None:
+        return magnitude_counts(can.quick_stop, axis)
+    velocity = np.diff(position) / period
+    apart = max(1, round(DIFFERENCE / period))
+    change = velocity[apart:] - velocity[:-apart] if len(velocity) > apart else velocity
+    return max(1, min(INT32.max, round(DECELERATION_MARGIN * float(np.abs(change).max()) / (apart * period))))
+
+
+def _positions(values: Array, axis: AxisScale, can: CanSpec, period: float) -> Integers:
+    counts = exact_counts(values, exact(axis.counts_per_si))
+    _require(
+        counts, INT32, f"axis {axis.name}", "lower axis.counts_per_metre or put the origin nearer", period
+    )
+    if can.encoder is not None or can.gear is not None or can.feed is not None:
+        increments = np.array([round(int(count) * position_factor(can)) for count in counts], dtype=object)
+        _require(
+            increments,
+            INT32,
+            f"axis {axis.name}, in the drive's increments",
+            "choose a coarser encoder",
+            period,
+        )
+    travel = travel_counts(axis, can)
+    if travel is not None:
+        outside = np.flatnonzero((counts < travel[0]) | (counts > travel[1]))
+        if outside.size:
+            raise ExportError(
+                f"can.travel.{axis.name}: the motion leaves the travel at {outside[0] * period:g} s "
+                f"({values[outside[0]]:.9g} m); shift the move, or widen the travel if the axis has it."
+            )
+    return counts
+
+
+def position_factor(can: CanSpec) -> Fraction:
+    """Increments per count, 6093h = 608Fh × 6091h / 6092h (CiA 402-2)."""
+    encoder, gear, feed = (Fraction(*(pair or (1, 1))) for pair in (can.encoder, can.gear, can.feed))
+    return encoder * gear / feed
+
+
+def _offsets(motion: SampledProfile, target: Target) -> Integers | None:
+    can = target.can
+    if can.feed_forward == "none" or motion.velocity is None or motion.acceleration is None:
+        return None
+    columns = []
+    for column, axis in enumerate(target.axes):
+        ratio = exact(axis.counts_per_si)
+        if can.feed_forward == "velocity":
+            values, limits, cure = motion.velocity, INT32, "lower axis.counts_per_metre"
+        else:
+            ratio = exact(can.torque_per_acceleration or 0.0) * (1 if ratio > 0 else -1)
+            values, limits, cure = motion.acceleration, INT16, "lower can.torque_per_acceleration"
+        counts = exact_counts(values[:, column], ratio)
+        _require(counts, limits, f"axis {axis.name}, {can.feed_forward}", cure, motion.cycle_time)
+        columns.append(counts)
+    return np.column_stack(columns)
+
+
+def _require(counts: Integers, limits: np.iinfo, what: str, cure: str, period: float) -> None:  # type: ignore[type-arg]
+    outside = np.flatnonzero((counts < limits.min) | (counts > limits.max))
+    if outside.size:
+        first = int(outside[0])
+        raise ExportError(
+            f"{what}: {counts[first]} counts at {first * period:g} s lie outside {limits.bits} bits "
+            f"({limits.min} to {limits.max}); {cure}."
+        )

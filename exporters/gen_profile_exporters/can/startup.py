@@ -1,0 +1,186 @@
+"""What the drives must be set to before they follow: the SDO start-up list, as a table and as concise DCF.
+
+The list makes a drive stop by itself when nobody feeds it any more: it watches the master's heartbeat (1016h)
+and the setpoints' arrival (1401h:05), and answers both with a quick stop (6007h, 605Ah, 6085h).
+
+Objects: CiA 301 (1000h to 1FFFh), CiA 402-2 (6000h and up), CiA 302-3 (concise DCF).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from math import ceil
+
+import attrs
+
+from gen_profile.errors import ExportError
+from gen_profile.spec import CanSpec
+from gen_profile.units import AxisScale
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.frames import Field
+from gen_profile_exporters.can.scaling import (
+    Setpoints,
+    magnitude_counts,
+    quick_stop_deceleration,
+    travel_counts,
+)
+from gen_profile_exporters.exporter import Target
+
+MODES = {"ip": 7, "csp": 8}  # 6060h
+QUICK_STOP_ON_LOST_CONNECTION = 3  # 6007h
+RAMP_THEN_DISABLE = 2  # 605Ah
+OFF = 1 << 31  # of a PDO's COB-ID
+NO_REMOTE_REQUEST = 1 << 30
+ON_SYNC, ON_EVENT = 1, 255  # transmission types
+SHORTEST_TIMEOUT = 0.02  # s, unless the spec asks for less
+CYCLES_PER_TIMEOUT = 3
+SLOWEST_HEARTBEAT = 100  # ms; a drive's own
+
+Lists = Mapping[int, "tuple[Entry, ...]"]
+
+
+@attrs.frozen
+class Entry:
+    """One object to be set.
+
+    Attributes
+    ----------
+    index, sub : int
+    bits : int
+        8, 16 or 32.
+    value : int
+        Negative ones in two's complement.
+    meaning : str
+    optional : bool
+        A drive without this object will do.
+    """
+
+    index: int
+    sub: int
+    bits: int
+    value: int
+    meaning: str
+    optional: bool = False
+
+    @property
+    def data(self) -> bytes:
+        """The value as SDOs carry it."""
+        return (self.value & (1 << self.bits) - 1).to_bytes(self.bits // 8, "little")
+
+
+def timeout_ms(can: CanSpec) -> int:
+    """How long a drive waits for the next setpoint, in ms.
+
+    Raises
+    ------
+    ExportError
+        It is shorter than two cycles.
+    """
+    if can.timeout is None:
+        return ceil(1e3 * max(SHORTEST_TIMEOUT, CYCLES_PER_TIMEOUT * can.sync_period))
+    if can.timeout < 2.0 * can.sync_period:
+        raise ExportError(
+            f"can.timeout: {can.timeout:g} s are less than two cycles of {can.sync_period:g} s, so that a "
+            f"drive would stop for one late frame; set {2.0 * can.sync_period:g} s or more."
+        )
+    return ceil(round(1e3 * can.timeout, 9))
+
+
+def startup_lists(motion: Setpoints, target: Target) -> dict[int, tuple[Entry, ...]]:
+    """List by node what its drive must be set to, in the order in which it must be set."""
+    return {
+        node: tuple(_entries(node, column, motion, target))
+        for column, node in enumerate(frames.nodes(target))
+    }
+
+
+def table(lists: Lists) -> bytes:
+    """Render lists as a table for people and scripts (RFC 4180)."""
+    lines = ["node,object,subindex,bits,value,meaning"]
+    for node, entries in lists.items():
+        lines += [
+            f"{node},{entry.index:04X}h,{entry.sub:02X}h,{entry.bits},{_number(entry)},{entry.meaning}"
+            for entry in entries
+        ]
+    return ("\n".join(lines) + "\n").encode("utf-8")
+
+
+def concise_dcf(entries: Sequence[Entry]) -> bytes:
+    """Render one node's list as the content of object 1F22h, for CANopen managers."""
+    parts = [struct.pack("<I", len(entries))]
+    parts += [struct.pack("<HBI", entry.index, entry.sub, len(entry.data)) + entry.data for entry in entries]
+    return b"".join(parts)
+
+
+def _number(entry: Entry) -> str:
+    large = entry.index < 0x6000 and entry.bits == 32
+    return f"0x{entry.value:08X}" if large else str(entry.value)
+
+
+def _entries(node: int, column: int, motion: Setpoints, target: Target) -> Iterator[Entry]:
+    can, axis = target.can, target.axes[column]
+    yield from _monitoring(can)
+    yield from _mapping(node, can)
+    digits, exponent = frames.period_digits(can)
+    yield Entry(0x60C2, 1, 8, digits, "interpolation period: digits")
+    yield Entry(0x60C2, 2, 8, exponent, "interpolation period: power of ten (s)")
+    yield Entry(0x6060, 0, 8, MODES[can.mode], f"mode of operation: {can.mode}")
+    yield Entry(0x6007, 0, 16, QUICK_STOP_ON_LOST_CONNECTION, "connection lost: quick stop")
+    yield Entry(0x605A, 0, 16, RAMP_THEN_DISABLE, "quick stop: brake on its ramp and disable")
+    deceleration = quick_stop_deceleration(motion.position[:, column], motion.period, can, axis)
+    yield Entry(0x6085, 0, 32, deceleration, "deceleration of a quick stop (counts/s²)")
+    yield from _limits(axis, can)
+    for index, pair, meaning in (
+        (0x608F, can.encoder, "encoder: increments per motor revolutions"),
+        (0x6091, can.gear, "gear: motor revolutions per shaft revolutions"),
+        (0x6092, can.feed, "feed: counts per shaft revolutions"),
+    ):
+        for sub, value in enumerate(pair or (), start=1):
+            yield Entry(index, sub, 32, value, meaning)
+
+
+def _monitoring(can: CanSpec) -> Iterator[Entry]:
+    waiting = timeout_ms(can)
+    yield Entry(0x1017, 0, 16, min(SLOWEST_HEARTBEAT, waiting), "heartbeat of the drive (ms)")
+    yield Entry(0x1016, 1, 32, frames.MASTER << 16 | waiting, "watch the controller's heartbeat (node, ms)")
+    microseconds = frames.period_microseconds(can)
+    yield Entry(0x1006, 0, 32, microseconds, "period of SYNC (µs)", optional=True)
+
+
+def _mapping(node: int, can: CanSpec) -> Iterator[Entry]:
+    yield from _pdo(0x1400, frames.RPDO1 + node, ON_EVENT, frames.COMMAND, "controlword")
+    yield from _pdo(0x1401, frames.RPDO2 + node, ON_SYNC, frames.setpoint_fields(can), "setpoint")
+    yield Entry(0x1401, 5, 16, timeout_ms(can), "longest wait for a setpoint (ms)", optional=True)
+    answer = NO_REMOTE_REQUEST | (frames.TPDO1 + node)
+    yield from _pdo(0x1800, answer, ON_SYNC, frames.FEEDBACK, "feedback")
+    for index, cob_id in (
+        (0x1402, 0x400),
+        (0x1403, 0x500),
+        (0x1801, 0x280),
+        (0x1802, 0x380),
+        (0x1803, 0x480),
+    ):
+        yield Entry(index, 1, 32, OFF | cob_id + node, "not used: off", optional=True)
+
+
+def _pdo(index: int, cob_id: int, kind: int, fields: Sequence[Field], name: str) -> Iterator[Entry]:
+    """Set up a PDO in the order that CiA 301 asks for: off, mapping, on."""
+    mapping = index + 0x200
+    yield Entry(index, 1, 32, OFF | cob_id, f"{name}: off while it changes")
+    yield Entry(mapping, 0, 8, 0, f"{name}: mapping cleared")
+    for number, field in enumerate(fields, start=1):
+        yield Entry(mapping, number, 32, field.mapping, f"{name}: {field.name}")
+    yield Entry(mapping, 0, 8, len(fields), f"{name}: entries")
+    yield Entry(index, 2, 8, kind, f"{name}: {'on SYNC' if kind == ON_SYNC else 'at once'}")
+    yield Entry(index, 1, 32, cob_id, f"{name}: on")
+
+
+def _limits(axis: AxisScale, can: CanSpec) -> Iterator[Entry]:
+    if can.following_error is not None:
+        window = magnitude_counts(can.following_error, axis)
+        yield Entry(0x6065, 0, 32, window, "following error window (counts)")
+    travel = travel_counts(axis, can)
+    if travel is not None:
+        yield Entry(0x607D, 1, 32, travel[0], "lower end of the travel (counts)")
+        yield Entry(0x607D, 2, 32, travel[1], "upper end of the travel (counts)")
