@@ -1,0 +1,66 @@
+"""The same spec gives the same bytes, wherever and however it is run."""
+
+import locale
+import os
+
+import pytest
+from command_line import run_process
+
+FORMATS = ("--export", "csv", "--export", "plc", "--export", "can")
+GERMAN = "de_DE.UTF-8"
+
+
+def outputs(folder, **environment):
+    folder.mkdir()
+    outcome = run_process(*FORMATS, "--json", cwd=folder, **environment)
+    assert outcome.code == 0, outcome.err
+    document = outcome.document
+    del document["solver"]["time_s"]
+    return document, {path.name: path.read_bytes() for path in sorted((folder / "gen-profile-out").iterdir())}
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("first") / "run"
+    return outputs(folder, PYTHONHASHSEED="0", LC_ALL="C.UTF-8", TZ="UTC")
+
+
+def test_a_second_run_in_another_folder_with_another_hash_seed(first, tmp_path):
+    folder = tmp_path / "anderer Ort, weit weg ‒ très loin"
+    assert outputs(folder, PYTHONHASHSEED="4242", LC_ALL="C.UTF-8", TZ="UTC") == first
+
+
+def test_another_time_zone(first, tmp_path):
+    assert outputs(tmp_path / "run", PYTHONHASHSEED="1", LC_ALL="C.UTF-8", TZ="Asia/Kathmandu") == first
+
+
+@pytest.mark.parametrize("plain", ["C", "POSIX"])
+def test_a_locale_without_letters_beyond_ascii(first, tmp_path, plain):
+    environment = {"LC_ALL": plain, "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+    assert outputs(tmp_path / "run", **environment) == first
+
+
+def test_a_german_locale_with_its_decimal_comma(first, tmp_path):
+    before = locale.setlocale(locale.LC_ALL)
+    try:
+        locale.setlocale(locale.LC_ALL, GERMAN)
+        assert locale.localeconv()["decimal_point"] == ","
+    except locale.Error:
+        missing = f"the locale {GERMAN} is not installed: localedef -i de_DE -f UTF-8 {GERMAN}"
+        if os.environ.get("CI"):
+            pytest.fail(missing)
+        pytest.skip(missing)
+    finally:
+        locale.setlocale(locale.LC_ALL, before)
+    assert outputs(tmp_path / "run", LC_ALL=GERMAN, LANG=GERMAN, LANGUAGE="de") == first
+
+
+def test_artefacts_name_neither_machine_nor_clock(first, tmp_path):
+    _, files = first
+    for content in files.values():
+        text = content.decode("utf-8")
+        assert "\r" not in text
+        assert text.endswith("\n")
+        assert not any(
+            word in text for word in ("/tmp", "/home", "/root", os.uname().nodename, "gen-profile-out")
+        )

@@ -1,0 +1,156 @@
+"""What fails leaves nothing behind, unless it was asked to stay; nor does what was interrupted."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from command_line import PROGRAM, run_here
+
+STRICT = ("--set", "check.residual_sway=0.0001")
+
+
+def tree(folder):
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+    }
+
+
+@pytest.mark.parametrize("words", [(), ("--json",)])
+def test_a_failed_check_leaves_nothing_and_says_why(tmp_path, words):
+    outcome = run_here(*STRICT, "--out", tmp_path / "new" / "deploy", *words)
+    assert outcome.code == 4
+    reason, consequence = outcome.errors
+    assert reason.startswith("Check failed: The hook sways by 2.193 mm after the move (L1 -20 %), and 0.1 mm")
+    assert consequence == "Nothing was written."
+    assert tree(tmp_path) == {}
+    if words:
+        assert outcome.document["check"]["passed"] is False
+        assert outcome.document["artefacts"] == []
+    else:
+        assert "FAILED" in outcome.out
+
+
+def test_earlier_outputs_stay_as_they_were(tmp_path):
+    assert run_here("--export", "csv", "--export", "plc", "--out", tmp_path).code == 0
+    before = tree(tmp_path)
+    assert run_here(*STRICT, "--export", "csv", "--export", "can", "--out", tmp_path).code == 4
+    assert tree(tmp_path) == before
+
+
+def test_failed_artefacts_can_be_kept_and_are_marked(tmp_path):
+    outcome = run_here(*STRICT, "--keep-failed", "--out", tmp_path, "--json")
+    assert outcome.code == 4
+    assert outcome.errors[-1] == "The files were kept."
+    assert {path.name for path in tmp_path.iterdir()} == {"paper.csv", "manifest.json"}
+    manifest = json.loads((tmp_path / "manifest.json").read_text("utf-8"))
+    assert manifest["check"]["passed"] is False
+    assert manifest["check"] == outcome.document["check"]
+    assert [row["format"] for row in outcome.document["artefacts"]] == ["csv"]
+    assert run_here("check", tmp_path / "paper.csv").code == 4
+
+
+def test_the_worst_artefact_decides(tmp_path):
+    """Counts of a centimetre swing the crane, the table in metres beside them does not."""
+    coarse = ("--set", "axis.cart.counts_per_metre=100", "--set", "check.residual_sway=0.003")
+    assert run_here(*coarse, "--export", "csv", "--out", tmp_path).code == 0
+    assert run_here(*coarse, "--export", "csv", "--export", "can", "--out", tmp_path / "new").code == 4
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("out", ["file", "file/below", "/proc/gen-profile", "/proc/self/gen-profile/deeper"])
+def test_an_unwritable_folder_is_one_sentence(tmp_path, monkeypatch, out):
+    (tmp_path / "file").write_bytes(b"in the way")
+    monkeypatch.chdir(tmp_path)
+    outcome = run_here("--out", out, "--json")
+    assert outcome.code == 2
+    (error,) = outcome.errors
+    assert error.startswith(f"Error: Cannot write to the folder {out}: ")
+    assert outcome.document["error"]["exit_code"] == 2
+    assert tree(tmp_path) == {"file": b"in the way"}
+
+
+def test_a_full_disk_is_one_sentence(tmp_path):
+    """The file system takes the name and refuses the bytes."""
+    (tmp_path / "old.txt").write_bytes(b"old")
+    full = Path.write_bytes
+
+    def refuse(path, content):
+        full(path, content[:100])
+        raise OSError(28, "No space left on device")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Path, "write_bytes", refuse)
+        outcome = run_here("--out", tmp_path)
+    assert outcome.code == 2
+    (error,) = outcome.errors
+    assert error.startswith(f"Error: Cannot write to the folder {tmp_path}: No space left on device; ")
+    assert tree(tmp_path) == {"old.txt": b"old"}
+
+
+def interrupted(folder, word, delay, number):
+    """Send a signal some time after a word of progress; return the code and stderr of what ends."""
+    with subprocess.Popen(
+        [PROGRAM, "--export", "csv", "--export", "plc", "--out", "deploy"],
+        cwd=folder,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+    ) as process:
+        seen = []
+        while not (seen and seen[-1].startswith(word)):
+            line = process.stderr.readline()
+            assert line, "".join(seen)
+            seen.append(line)
+        time.sleep(delay)
+        with contextlib.suppress(ProcessLookupError):
+            process.send_signal(number)
+        _, rest = process.communicate()
+        return process.returncode, "".join(seen) + rest
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("word", "delay"), [("solving", 0.02), ("solving", 0.15), ("exporting", 0.0), ("checking", 0.03)]
+)
+def test_an_interrupted_run_leaves_all_or_nothing(tmp_path, word, delay, number):
+    code, stderr = interrupted(tmp_path, word, delay, number)
+    assert "Traceback" not in stderr
+    if code == 0:  # too late: it was done
+        assert {path.name for path in (tmp_path / "deploy").iterdir()} == {
+            "paper.csv",
+            "paper.st",
+            "manifest.json",
+        }
+    else:
+        assert code == 130
+        assert stderr.endswith("Error: Interrupted.\n")
+        assert tree(tmp_path) == {}
+
+
+def test_an_interruption_between_two_files_leaves_the_old_manifest_to_tell(tmp_path, monkeypatch):
+    """Files are replaced one by one, each whole; the manifest comes last."""
+    assert run_here("--out", tmp_path).code == 0
+    old = (tmp_path / "manifest.json").read_bytes()
+    whole = Path.replace
+
+    def replace(path, target):
+        if target.name == "manifest.json":
+            raise KeyboardInterrupt
+        return whole(path, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    outcome = run_here("--set", "move.duration=4", "--out", tmp_path)
+    assert (outcome.code, outcome.errors[-1]) == (130, "Error: Interrupted.")
+    assert (tmp_path / "manifest.json").read_bytes() == old
+    monkeypatch.undo()
+    check = run_here("check", tmp_path / "paper.csv")
+    assert check.code == 4
+    assert any("manifest.json" in line for line in check.errors)

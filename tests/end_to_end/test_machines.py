@@ -1,0 +1,82 @@
+"""The preset of every machine, through the whole job, and against separately written machines."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from command_line import run_here
+from generator.lagrangian_machines import Lagrange
+from scipy.integrate import solve_ivp
+
+from gen_profile.metrics import peak
+from gen_profile.spec_reading import preset_spec, presets
+from gen_profile.workflows.planning import figures, plan, watch_time
+from gen_profile.workflows.scenarios import scenarios
+
+PRESETS = [name for name in presets() if not name.startswith("paper")]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_solves_and_passes_its_check(tmp_path, preset):
+    designed = run_here("--preset", preset, "--out", tmp_path, "--export", "csv", "--json")
+    assert (designed.code, designed.errors) == (0, [])
+    check = designed.document["check"]
+    assert check["passed"]
+    nominal, *others = check["scenarios"]
+    assert nominal["residual_peak_m"] < 0.01 * check["limit_m"]
+    assert len(others) == 2
+    assert all(0.0 < row["residual_peak_m"] < check["limit_m"] for row in others)
+
+    judged = run_here("check", tmp_path / f"{preset}.csv", "--json")
+    assert (judged.code, judged.errors) == (0, [])
+    again = [row["residual_peak_m"] for row in judged.document["check"]["scenarios"]]
+    np.testing.assert_allclose(
+        again, [row["residual_peak_m"] for row in check["scenarios"]], rtol=1e-4, atol=1e-7
+    )
+
+
+@pytest.mark.parametrize("preset", ["single-pendulum-crane", "gantry-crane", "tower-crane"])
+def test_machines_of_several_axes_sway_as_lagrange_says(preset):
+    spec = preset_spec(preset)
+    lagrange, plant = Lagrange(spec.plant.type), spec.machine()
+    found = plan(spec)
+    motion, machines = found.trial.motion, scenarios(spec)
+    n_u, until = len(plant.unactuated), motion.duration + watch_time(spec, machines)
+    after = np.linspace(motion.duration, until, 4001)
+    residuals = []
+    for machine in machines:
+        values = dict(machine.parameters)
+
+        def rates(t, x, values=values):
+            now = motion(np.array([t]))
+            q, dq = np.concatenate([x[:n_u], now.position[0]]), np.concatenate([x[n_u:], now.velocity[0]])
+            return np.concatenate([x[n_u:], lagrange.accelerations(q, dq, now.acceleration[0], values)])
+
+        swing = solve_ivp(
+            rates, (0.0, until), np.zeros(2 * n_u), t_eval=after, rtol=1e-8, atol=1e-11, max_step=0.5
+        )
+        sway = [
+            np.linalg.norm(plant.outputs(x[:n_u], motion.target, SimpleNamespace(**values)).sway)
+            for x in swing.y.T
+        ]
+        residuals.append(peak(np.array(sway)[:, None])[0])
+    expected = figures(found.trial)
+    assert residuals[0] < 1e-6
+    assert residuals[1] == pytest.approx(expected["sway_residual_peak_perturbed_m"], rel=1e-4)
+    assert max(residuals) == pytest.approx(expected["sway_residual_worst_m"], rel=1e-4)
+
+
+def test_shapers_of_a_spherical_pendulum_shape_its_one_frequency_once():
+    compared = run_here("compare", "--preset", "gantry-crane", "--set", "robustness.method=none", "--json")
+    rows = {row["method"]: row["figures"] for row in compared.document["rows"]}
+    period = 2.0 * np.pi * np.sqrt(5.0 / 9.81)
+    for method, delay in (("nzv", period / 3.0), ("zvd", period)):
+        base = 12.0 - delay  # the quintic's share of the time; its greatest velocity bounds the shaped one's
+        assert rows[method]["velocity_max_m_per_s"] <= 15.0 / 8.0 * 12.0 / base * (1.0 + 1e-9)
+        assert rows[method]["velocity_max_m_per_s"] > 12.0 / base
+
+
+def test_figures_of_a_turning_axis_are_in_its_own_unit(tmp_path):
+    designed = run_here("--preset", "flexible-joint", "--no-check", "--out", tmp_path)
+    assert "rad/s²" in designed.out
+    assert " m/s²" not in designed.out

@@ -1,0 +1,144 @@
+"""The command line by itself: lists, help, where the default command steps in, and its streams."""
+
+import io
+import json
+import logging
+import re
+import subprocess
+import sys
+
+import pytest
+from command_line import PROGRAM, run_here, run_process
+
+from gen_profile.cli import progress
+from gen_profile.cli.commands import cli
+
+COMMANDS = sorted(cli.commands)
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS)], ids="".join)
+def test_help_ends_with_an_example(command):
+    outcome = run_here(*command, "--help")
+    assert (outcome.code, outcome.err) == (0, "")
+    (example,) = (line.strip() for line in outcome.out.splitlines() if line.strip().startswith("Example: "))
+    assert example.startswith("Example: gen-profile")
+
+
+def test_the_root_s_help_shows_the_default_command_s_options_and_all_commands():
+    text = run_here("--help").out
+    assert "[SPEC.toml] [OPTIONS]" in text
+    assert "COMMAND [ARGS]" in text
+    for option in ("--preset", "--set", "--export", "--out", "--cycle-time", "--no-check", "--keep-failed"):
+        assert option in text
+    for option in ("--json", "--version", "--help"):
+        assert option in text
+    for command in COMMANDS:
+        assert re.search(rf"^  {command} +\S", text, re.MULTILINE)
+
+
+def test_the_version_is_that_of_the_distribution():
+    outcome = run_here("--version")
+    assert outcome.code == 0
+    assert re.fullmatch(r"\d+\.\d+\.\d+\S*\n", outcome.out)
+
+
+@pytest.mark.parametrize("command", ["formats", "plants", "presets"])
+def test_lists_say_the_same_to_people_and_programs(command):
+    document = run_here(command, "--json").document[command]
+    text = run_here(command).out
+    assert len(document) >= 1
+    for name in document:
+        assert re.search(rf"^ *{re.escape(name)}\b", text, re.MULTILINE)
+
+
+def test_formats_tell_suffix_and_proof():
+    known = run_here("formats", "--json").document["formats"]
+    assert {"csv", "plc", "can"} <= known.keys()
+    assert known["csv"]["suffix"] == ".csv"
+    assert {"summary", "proof", "suffix"} <= known["plc"].keys()
+
+
+def test_plants_tell_parameters_with_units_and_bounds():
+    crane = run_here("plants", "--json").document["plants"]["double-pendulum-crane"]
+    assert crane["loads"] == ["hook", "payload"]
+    assert crane["parameters"]["L1"]["unit"] == "m"
+    assert crane["parameters"]["L1"]["lower"] < crane["parameters"]["L1"]["nominal"]
+
+
+def test_design_can_be_named(tmp_path):
+    assert run_here("design", "--no-check", "--out", tmp_path).code == 0
+    assert run_here("--no-check", "--out", tmp_path / "again").code == 0
+    assert (tmp_path / "paper.csv").read_bytes() == (tmp_path / "again" / "paper.csv").read_bytes()
+
+
+def test_a_spec_with_the_name_of_a_command_is_given_with_a_path(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = '[plant]\ntype = "double-pendulum-crane"\n[move]\ndistance = 0.3\nduration = 3\n'
+    (tmp_path / "compare").write_text(text, "utf-8")
+    assert run_here("./compare", "--no-check", "--json").document["name"]
+
+
+def test_json_is_all_that_stdout_gets(tmp_path):
+    outcome = run_here("--out", tmp_path, "--json")
+    json.loads(outcome.out)
+    assert "solving" in outcome.err
+
+
+def test_a_bug_is_told_without_a_traceback(monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError("broken")
+
+    monkeypatch.setattr("gen_profile.workflows.design.plan", broken)
+    outcome = run_here("--json")
+    assert outcome.code == 1
+    assert outcome.errors == ["Error: Internal error (ZeroDivisionError: broken). Run again with --debug."]
+    assert outcome.document["error"]["exit_code"] == 1
+    monkeypatch.setattr(logging, "basicConfig", lambda **_: None)
+    with pytest.raises(ZeroDivisionError):
+        run_here("--debug")
+
+
+def test_an_interrupt_is_no_bug(monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gen_profile.workflows.design.plan", interrupted)
+    outcome = run_here("--json")
+    assert outcome.code == outcome.document["error"]["exit_code"] == 130
+    assert outcome.errors[-1] == "Error: Interrupted."
+
+
+def test_debugging_logs_what_libraries_tell(tmp_path):
+    outcome = run_process("--debug", "--no-check", "--out", tmp_path)
+    assert outcome.code == 0
+    assert "Traceback" not in outcome.err
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    """As in ``gen-profile plants | head -1``."""
+    with subprocess.Popen([PROGRAM, "plants"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        process.wait()
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_a_terminal_sees_a_spinner_and_nothing_stays(monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress.progress() as tell:
+        tell("solving")
+    assert "solving …" in terminal.getvalue() or terminal.getvalue() == ""
+    assert not terminal.getvalue().endswith("…\n")
+
+
+def test_a_closed_output_does_not_stop_the_work(tmp_path):
+    """As in ``gen-profile >&-``."""
+    done = subprocess.run(["sh", "-c", f'"{PROGRAM}" --no-check --out out >&-'], cwd=tmp_path, check=False)
+    assert done.returncode == 0
+    assert (tmp_path / "out" / "manifest.json").exists()
