@@ -53,7 +53,7 @@ def test_machines_of_several_axes_sway_as_lagrange_says(preset):
             return np.concatenate([x[n_u:], lagrange.accelerations(q, dq, now.acceleration[0], values)])
 
         swing = solve_ivp(
-            rates, (0.0, until), np.zeros(2 * n_u), t_eval=after, rtol=1e-8, atol=1e-11, max_step=0.5
+            rates, (0.0, until), np.zeros(2 * n_u), "DOP853", after, rtol=1e-8, atol=1e-11, max_step=0.5
         )
         sway = [
             np.linalg.norm(plant.outputs(x[:n_u], motion.target, SimpleNamespace(**values)).sway)

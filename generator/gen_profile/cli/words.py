@@ -77,8 +77,9 @@ def comparison(found: Comparison) -> str:
     """Lay the methods out side by side, with the recommendation below."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("method\n")
+    first = found.spec.machine().actuated[0].unit
     for head, (unit, _, _) in COLUMNS.items():
-        table.add_column(f"{head}\n{unit}", justify="right")
+        table.add_column(f"{head}\n{unit.replace('m/', f'{first}/')}", justify="right")
     for row in found.rows:
         if row.trial:
             cells = (_figure(factor * row.figures[key]) for _, key, factor in COLUMNS.values())
