@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 
 import attrs
 
+from gen_profile.plants.machine_file import MachineFile, plant_of_file
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
 from gen_profile.units import AxisScale, axis_factor
@@ -62,9 +63,10 @@ def _frozen_mapping(values: Mapping[str, Any]) -> Mapping[str, Any]:
 
 @attrs.frozen(kw_only=True)
 class PlantSpec:
-    """Which machine, with the value of every parameter."""
+    """Which machine, with the value of every parameter, and the file that a user wrote it in."""
 
     type: str
+    file: MachineFile | None = None
     parameters: Mapping[str, float] = attrs.field(factory=dict, converter=_frozen_mapping)
     defaults: tuple[str, ...] = attrs.field(default=(), eq=False)  # parameters the spec left to the type
 
@@ -139,9 +141,10 @@ class AxisSpec:
 
 @attrs.frozen(kw_only=True)
 class ExportSpec:
-    """The controller's cycle in s."""
+    """The controller's cycle in s, and what the formats leave to choose."""
 
     cycle_time: CycleTime = 0.001
+    plc_layout: Literal["segments", "samples", "counts"] = "segments"
 
 
 @attrs.frozen(kw_only=True)
@@ -216,7 +219,7 @@ class Spec:
 
     def machine(self) -> Plant:
         """Load the plant."""
-        return find_plant(self.plant.type)
+        return find_plant(self.plant.type) if self.plant.file is None else plant_of_file(self.plant.file)
 
     def axis_scales(self) -> tuple[AxisScale, ...]:
         """How the target counts each axis, in the plant's order."""
@@ -233,7 +236,9 @@ class Spec:
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values that `gen_profile.spec_reading.spec_from_dict` reads back to an equal spec."""
         document: dict[str, Any] = _plain(self)
-        document["plant"] = {"type": self.plant.type, **self.plant.parameters}
+        own = self.plant.file
+        written = {} if own is None else {"file": own.name, "file_sha256": own.sha256}
+        document["plant"] = {"type": self.plant.type, **written, **self.plant.parameters}
         if self.cost.sway_scale is None:
             document["cost"]["sway_scale"] = "auto"
         del document["check"]["default"]

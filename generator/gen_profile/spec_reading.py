@@ -15,6 +15,8 @@ from gen_profile.spec_structure import Faults, Table, structure
 from gen_profile.spec_tables import complete
 from gen_profile.suggestion import suggestion
 
+HERE = Path()
+
 
 def read_spec(path: Path, overrides: Sequence[str] = ()) -> Spec:
     """Read a TOML file.
@@ -32,11 +34,20 @@ def read_spec(path: Path, overrides: Sequence[str] = ()) -> Spec:
         raise OutputError(f"Cannot read the spec {path}: {error.strerror}.") from error
     except UnicodeDecodeError as error:
         raise SpecError(f"{path}: not UTF-8 text (byte {error.start}); save the spec as UTF-8.") from error
-    return parse_spec(text, overrides, str(path))
+    return parse_spec(text, overrides, str(path), path.parent)
 
 
-def parse_spec(text: str, overrides: Sequence[str] = (), source: str = "spec") -> Spec:
+def parse_spec(text: str, overrides: Sequence[str] = (), source: str = "spec", folder: Path = HERE) -> Spec:
     """Read TOML text, apply overrides such as ``plant.L1=0.5`` and validate the whole.
+
+    Parameters
+    ----------
+    text : str
+    overrides : sequence of str
+    source : str
+        Where the text comes from, for errors.
+    folder : Path
+        What files that the spec names are relative to.
 
     Raises
     ------
@@ -48,7 +59,7 @@ def parse_spec(text: str, overrides: Sequence[str] = (), source: str = "spec") -
         raise SpecError(f"{source}: the spec is empty; it must state at least [plant] type and [move].")
     for override in overrides:
         _override(document, override)
-    return spec_from_dict(document)
+    return spec_from_dict(document, folder)
 
 
 def presets() -> dict[str, str]:
@@ -71,8 +82,14 @@ def preset_spec(name: str, overrides: Sequence[str] = ()) -> Spec:
     return parse_spec((files("gen_profile") / "presets" / f"{name}.toml").read_text("utf-8"), overrides, name)
 
 
-def spec_from_dict(document: Mapping[str, Any]) -> Spec:
+def spec_from_dict(document: Mapping[str, Any], folder: Path = HERE) -> Spec:
     """Validate nested plain values, as TOML or a manifest holds them.
+
+    Parameters
+    ----------
+    document : mapping
+    folder : Path
+        What files that the spec names are relative to.
 
     Raises
     ------
@@ -80,7 +97,7 @@ def spec_from_dict(document: Mapping[str, Any]) -> Spec:
         With one sentence for every fault found.
     """
     faults = Faults()
-    return structure(complete(document, faults), faults)
+    return structure(complete(document, folder, faults), faults)
 
 
 def _document(text: str, source: str) -> Table:

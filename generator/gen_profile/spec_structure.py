@@ -17,6 +17,7 @@ from cattrs.errors import (
 )
 
 from gen_profile.errors import SpecError
+from gen_profile.plants.machine_file import MachineFile
 from gen_profile.spec import Bounds, Pattern, Spec
 from gen_profile.suggestion import suggestion
 
@@ -207,6 +208,7 @@ def _converter() -> Converter:
     converter.register_structure_hook(float, _structure_float)
     converter.register_structure_hook(int, _structure_int)
     converter.register_structure_hook(str, _structure_str)
+    converter.register_structure_hook(MachineFile, lambda value, _: value)
     converter.register_structure_hook(bool, lambda value, _: value)  # none of them is typed by a person
     converter.register_structure_hook_func(_is(Literal), _structure_choice)
     converter.register_structure_hook_factory(_is(Annotated), _constrained)

@@ -6,10 +6,13 @@ Here stands whatever needs to know the machine (its parameters, axes and loads),
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import attrs
 
+from gen_profile.errors import SpecError
+from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_machine_file
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.spec import RESIDUAL_SHARE, Spec
@@ -19,11 +22,14 @@ from gen_profile.units import UNITS
 
 TABLES = tuple(field.name for field in attrs.fields(Spec) if field.name != "name")
 REQUIRED = ("plant", "move")
+FILE_KEYS = ("file", "file_sha256")
 DEFAULT_NAME = "profile"
 
 
-def complete(document: Mapping[str, Any], faults: Faults) -> Table:
+def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table:
     """Fill in what depends on the machine; where something is wrong, note it and put a harmless value.
+
+    Files that the spec names are relative to `folder`.
 
     Without a known machine, names of parameters, axes and loads cannot be judged; everything else is.
     """
@@ -33,8 +39,11 @@ def complete(document: Mapping[str, Any], faults: Faults) -> Table:
     tables = {"name": DEFAULT_NAME, **document, **{key: _table(document, key, faults) for key in TABLES}}
     tables["actuator"] = _actuator(tables["actuator"], faults)
     tables["cost"] = _cost(tables["cost"], tables["actuator"], faults)
-    plant = _machine(tables["plant"], faults)
-    tables["plant"] = _plant(tables["plant"], plant, faults)
+    own = not tables["plant"].keys().isdisjoint(FILE_KEYS)
+    file, plant = (
+        _own_machine(tables["plant"], folder, faults) if own else (None, _machine(tables["plant"], faults))
+    )
+    tables["plant"] = {"file": file, **_plant(tables["plant"], plant, faults)}
     tables["move"] = _move(tables["move"], plant, faults)
     tables["robustness"] = _robustness(tables["robustness"], tables["plant"].get("parameters"), faults)
     tables["check"] = _check(tables["check"], tables["move"], plant, faults)
@@ -49,6 +58,27 @@ def _table(document: Mapping[str, Any], key: str, faults: Faults) -> Table:
         return dict(value)
     faults.add(key, f"must be a table, found {found(value)}")
     return {}
+
+
+def _own_machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | None, Plant | None]:
+    """Load the machine that the user wrote, and take the keys that name its file out of the table."""
+    name, sha256 = table.pop("file", None), table.pop("file_sha256", None)
+    if not isinstance(name, str):
+        faults.add("plant.file", f"must name a Python file, found {found(name)}")
+        return None, None
+    if not isinstance(sha256, str | None):
+        faults.add("plant.file_sha256", f"must be text, found {found(sha256)}")
+        return None, None
+    try:
+        file = read_machine_file(folder / name, sha256)
+        plant = plant_of_file(file)
+    except SpecError as error:
+        faults.add("plant.file", str(error).removeprefix("plant.file: ").removesuffix("."))
+        return None, None
+    type_ = table.get("type", plant.type)
+    if type_ != plant.type:
+        faults.add("plant.type", f"{file.name} holds a machine of type {plant.type!r}, found {found(type_)}")
+    return file, plant
 
 
 def _machine(table: Table, faults: Faults) -> Plant | None:

@@ -12,6 +12,7 @@ from typing import cast
 
 from gen_profile.errors import SpecError
 from gen_profile.plants.plant import Plant
+from gen_profile.plants.soundness import faults_of
 
 # type → (module that holds PLANT, summary); modules load only when their machine is asked for
 BUILT_IN: dict[str, tuple[str, str]] = {
@@ -88,4 +89,7 @@ def _plant_of_plugin(entry: EntryPoint) -> Plant:
         raise SpecError(
             f"plant.type: {entry.name!r}: {entry.value} is no gen_profile.plants.plant.Plant; {cure}"
         )
+    faults = faults_of(plant)
+    if faults:
+        raise SpecError(f"plant.type: {entry.name!r}: {entry.value}: {'; '.join(faults)}; {cure}")
     return plant

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import attrs
 import numpy as np
 
+from gen_profile.errors import SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.symbolic import Array, Symbol
@@ -47,14 +48,27 @@ class Dynamics:
 
 
 def dynamics(plant: Plant) -> Dynamics:
-    """Write a plant's equations in symbols."""
+    """Write a plant's equations in symbols.
+
+    Raises
+    ------
+    SpecError
+        They are not written for symbols.
+    """
     n_u, m = len(plant.unactuated), len(plant.actuated)
     q_u, dq_u = sym.symbols("q_u", n_u), sym.symbols("dq_u", n_u)
     q_a, dq_a, ddq_a = sym.symbols("q_a", m), sym.symbols("dq_a", m), sym.symbols("ddq_a", m)
     p = sym.symbols("p", len(plant.parameters))
     named = SimpleNamespace(**dict(zip((q.name for q in plant.parameters), sym.split(p), strict=True)))
-    terms = plant.equations(sym.split(q_u), sym.split(dq_u), sym.split(q_a), sym.split(dq_a), named)
-    outputs = plant.outputs(sym.split(q_u), sym.split(q_a), named)
+    try:
+        terms = plant.equations(sym.split(q_u), sym.split(dq_u), sym.split(q_a), sym.split(dq_a), named)
+        outputs = plant.outputs(sym.split(q_u), sym.split(q_a), named)
+    except Exception as error:  # of whoever wrote the machine
+        raise SpecError(
+            f"plant.type: the equations of {plant.type!r} do not take symbols "
+            f"({type(error).__name__}: {str(error).partition(chr(10))[0]}); write them with NumPy functions "
+            "on scalars, without branches on values."
+        ) from error
     mass = sym.matrix(terms.M_uu)
     free = sym.solve(mass, sym.column(terms.K_u) + sym.column(terms.G_u))
     driven = -sym.solve(mass, sym.matrix(terms.M_au).T)

@@ -136,7 +136,7 @@ def _spec_of(manifest: Manifest | None, path: Path) -> Spec:
             f"gen-profile check {path} SPEC.toml"
         )
     try:
-        return spec_from_dict(manifest.spec)
+        return spec_from_dict(manifest.spec, path.parent)
     except SpecError as error:
         raise OutputError(f"The spec in {path.parent / FILENAME} is faulty: {error}") from error
 

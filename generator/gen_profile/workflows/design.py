@@ -121,6 +121,8 @@ def design(
         progress("exporting")
         artefacts, replayed = _export(spec, planned.trial.command, exporters, staging)
         worst = _check(spec, planned, replayed, progress) if check else None
+        if spec.plant.file is not None:  # the spec in the manifest is nothing without it
+            staging.write(spec.plant.file.name, spec.plant.file.content)
         staging.write(FILENAME, _manifest(spec, planned, artefacts, worst).to_json())
         delivered = worst is None or worst.passed or keep_failed
         if delivered:

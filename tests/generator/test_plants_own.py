@@ -1,0 +1,232 @@
+"""A user's own machine: a Python file that a spec names."""
+
+import json
+import pickle
+import shutil
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+from command_line import run_here
+from fmu.hoisting_pendulum import PLANT as WINCH
+
+from gen_profile.errors import SpecError
+from gen_profile.plants.machine_file import plant_of_file, read_machine_file
+from gen_profile.plants.plant import Coordinate, Equations
+from gen_profile.plants.registry import BUILT_IN, find_plant
+from gen_profile.plants.soundness import faults_of
+from gen_profile.problem.dynamics import dynamics
+from gen_profile.spec_reading import parse_spec, read_spec, spec_from_dict
+
+PENDULUM = '''"""A load on a rope, and nothing else."""
+
+import numpy as np
+
+from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant
+
+
+def equations(q_u, dq_u, q_a, dq_a, p):
+    (phi,), (rate,) = q_u, dq_u
+    return Equations(
+        M_uu=[[p.L]], M_au=[[-np.cos(phi)]], K_u=[-9.81 * np.sin(phi)], G_u=[-p.damping * rate]
+    )
+
+
+def outputs(q_u, q_a, p):
+    (phi,) = q_u
+    return Outputs(sway=[p.L * np.sin(phi)], height=[-p.L * np.cos(phi)], angle=[phi])
+
+
+PLANT = Plant(
+    type="plain-pendulum",
+    summary="a load on a rope",
+    parameters=(
+        Parameter(name="L", unit="m", description="rope", nominal=1.0, lower=0.1, upper=50.0),
+        Parameter(name="damping", unit="m/s", description="loss", nominal=0.0, lower=0.0, upper=10.0),
+    ),
+    actuated=(Coordinate(name="cart", unit="m"),),
+    unactuated=(Coordinate(name="phi", unit="rad"),),
+    loads=("load",),
+    equations=equations,
+    outputs=outputs,
+)
+'''
+SPEC = """
+name = "own"
+[plant]
+file = "machines/pendulum.py"
+L = 2.0
+[move]
+distance = 1.0
+duration = 5.0
+[robustness]
+uncertain = { L = 0.1 }
+[check]
+residual_sway = 0.01
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "machines").mkdir()
+    (tmp_path / "machines" / "pendulum.py").write_text(PENDULUM, "utf-8")
+    (tmp_path / "own.toml").write_text(SPEC, "utf-8")
+    return tmp_path
+
+
+def test_a_spec_finds_the_machine_beside_itself(folder):
+    spec = read_spec(folder / "own.toml")
+    assert spec.plant.type == "plain-pendulum"
+    assert spec.plant.parameters == {"L": 2.0, "damping": 0.0}
+    assert spec.machine() is read_spec(folder / "own.toml").machine()
+    assert spec.to_dict()["plant"]["file"] == "pendulum.py"  # no folder of this computer
+
+
+def test_a_spec_carries_its_machine_wherever_it_goes(folder):
+    spec = read_spec(folder / "own.toml")
+    shutil.rmtree(folder / "machines")
+    again = pickle.loads(pickle.dumps(spec.plant.file))
+    assert plant_of_file(again) is spec.machine()
+
+
+def test_the_written_machine_is_designed_for_checked_and_found_again(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    designed = run_here("own.toml", "--out", "deploy", "--json")
+    assert (designed.code, designed.errors) == (0, [])
+    assert designed.document["check"]["passed"]
+    manifest = json.loads(Path("deploy/manifest.json").read_text("utf-8"))
+    assert str(folder) not in json.dumps(manifest)
+
+    shutil.move("deploy", "elsewhere")
+    shutil.rmtree("machines")
+    judged = run_here("check", "elsewhere/own.csv", "--json")
+    assert (judged.code, judged.errors) == (0, [])
+    assert judged.document["artefact"]["manifest"] == "matches"
+
+    with Path("elsewhere/pendulum.py").open("a", encoding="utf-8") as file:
+        file.write("raise SystemExit('never run')\n")
+    refused = run_here("check", "elsewhere/own.csv")
+    assert refused.code == 2
+    assert "not the file that is meant" in refused.err
+    assert "it was not run" in refused.err
+
+
+def test_a_spec_may_pin_its_machine(folder):
+    file = read_machine_file(folder / "machines" / "pendulum.py")
+    pinned = SPEC.replace("L = 2.0", f'file_sha256 = "{file.sha256}"')
+    assert parse_spec(pinned, folder=folder).plant.file == file
+    with pytest.raises(SpecError, match="not the file that is meant"):
+        parse_spec(pinned.replace(file.sha256, "0" * 64), folder=folder)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("PLANT = 1 +", "pendulum.py, line 1: SyntaxError"),
+        ("import numpy\n1 / 0", "pendulum.py, line 2: ZeroDivisionError: division by zero"),
+        ("raise SystemExit(3)", "pendulum.py, line 1: SystemExit: 3"),
+        ("PLANT = 3", "must define PLANT, a gen_profile.plants.plant.Plant, found int"),
+        ("", "must define PLANT, a gen_profile.plants.plant.Plant, found NoneType"),
+        ("\0", "pendulum.py"),
+        (
+            PENDULUM.replace("M_uu=[[p.L]]", "M_uu=[p.L]"),
+            "M_uu must be 1 × 1 finite numbers, found the shape 1",
+        ),
+        (
+            PENDULUM.replace("p.damping", "p.c"),
+            "its equations fail with its nominal parameters: AttributeError",
+        ),
+    ],
+)
+def test_a_broken_machine_is_one_sentence(folder, text, why):
+    (folder / "machines" / "pendulum.py").write_text(text, "utf-8")
+    with pytest.raises(SpecError) as caught:
+        read_spec(folder / "own.toml")
+    (sentence,) = caught.value.faults
+    assert sentence.startswith("plant.file: ")
+    assert why in sentence
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("file = 3", "plant.file: must name a Python file, found 3."),
+        ('file = "machines/none.py"', "plant.file: cannot read"),
+        ('file = "machines"', "plant.file: 'machines' must be a Python file such as my_machine.py."),
+        ('file = "machines/pendulum.py"\nfile_sha256 = 3', "plant.file_sha256: must be text, found 3."),
+        ('file_sha256 = "00"', "plant.file: must name a Python file, found nothing."),
+        (
+            'file = "machines/pendulum.py"\ntype = "crane"',
+            "plant.type: pendulum.py holds a machine of type 'plain-pendulum', found text 'crane'.",
+        ),
+        ('file = "machines/pendulum.py"\nm = 1.0', "plant.m: unknown key"),
+    ],
+)
+def test_a_machine_file_that_cannot_be_meant(folder, line, why):
+    with pytest.raises(SpecError) as caught:
+        parse_spec(
+            SPEC.replace('file = "machines/pendulum.py"', line).replace("L = 2.0\n", ""), folder=folder
+        )
+    assert caught.value.faults[0].startswith(why)
+
+
+@pytest.mark.parametrize("type_", [*BUILT_IN, "mass-spring-chain-5"])
+def test_the_projects_own_machines_are_sound(type_):
+    assert faults_of(find_plant(type_)) == ()
+
+
+UNSOUND = {
+    "its type 'w/inch'": {"type": "w/inch"},
+    "'type' cannot name a parameter": {"parameters": [attrs.evolve(WINCH.parameters[0], name="type")]},
+    "'a b' cannot name a load": {"loads": ("a b",)},
+    "2 loads are named 'load'": {"loads": ("load", "load")},
+    "the nominal value of m": {"parameters": [attrs.evolve(WINCH.parameters[0], lower=3.0)]},
+    "the unit of phi": {"unactuated": [Coordinate(name="phi", unit="deg")]},
+    "at least one actuated": {"actuated": ()},
+    "directions must be from 1": {"directions": 2},
+}
+
+
+@pytest.mark.parametrize(("why", "change"), UNSOUND.items(), ids=UNSOUND)
+def test_what_makes_a_machine_unsound(why, change):
+    assert faults_of(WINCH) == ()
+    assert any(why in fault for fault in faults_of(attrs.evolve(WINCH, **change)))
+
+
+def changed(**terms):
+    def equations(*arguments):
+        return attrs.evolve(WINCH.equations(*arguments), **terms)
+
+    return attrs.evolve(WINCH, equations=equations)
+
+
+def test_equations_that_make_no_machine():
+    (singular,) = faults_of(changed(M_uu=[[0.0]]))
+    assert "M_uu is singular" in singular
+    (pushed,) = faults_of(changed(K_u=[1.0]))
+    assert "does not rest at q_u = 0" in pushed
+    (infinite,) = faults_of(changed(G_u=[np.inf]))
+    assert "G_u must be 1 finite numbers" in infinite
+
+    def leaning(q_u, q_a, p):
+        return attrs.evolve(WINCH.outputs(q_u, q_a, p), sway=[0.5])
+
+    (crooked,) = faults_of(attrs.evolve(WINCH, outputs=leaning))
+    assert "its sway at rest is not zero" in crooked
+
+
+def test_equations_that_do_not_take_symbols():
+    def branching(q_u, dq_u, q_a, dq_a, p):
+        push = 0.0 if q_u[0] < 1.0 else 1.0
+        return Equations(M_uu=[[1.0]], M_au=[[1.0], [0.0]], K_u=[-q_u[0]], G_u=[push])
+
+    branchy = attrs.evolve(WINCH, equations=branching)
+    assert faults_of(branchy) == ()
+    with pytest.raises(SpecError, match=r"winch' do not take symbols .*without branches on values"):
+        dynamics(branchy)
+
+
+def test_a_machine_of_its_own_survives_the_manifest(folder):
+    spec = read_spec(folder / "own.toml")
+    assert spec_from_dict(spec.to_dict(), folder / "machines") == spec
