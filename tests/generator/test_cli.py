@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from click.shell_completion import ShellComplete
 from command_line import PROGRAM, run_here, run_process
 
 from gen_profile.cli import progress
@@ -63,6 +64,20 @@ def test_plants_tell_parameters_with_units_and_bounds():
     assert crane["loads"] == ["hook", "payload"]
     assert crane["parameters"]["L1"]["unit"] == "m"
     assert crane["parameters"]["L1"]["lower"] < crane["parameters"]["L1"]["nominal"]
+
+
+@pytest.mark.parametrize(
+    ("words", "incomplete", "offered"),
+    [
+        ([], "com", {"compare"}),
+        ([], "--ex", {"--export"}),
+        (["--export"], "p", {"plc"}),
+        (["compare", "--preset"], "paper-beta5", {"paper-beta50"}),
+    ],
+)
+def test_completes_commands_options_formats_and_presets(words, incomplete, offered):
+    completion = ShellComplete(cli, {}, "gen-profile", "_GEN_PROFILE_COMPLETE")
+    assert {item.value for item in completion.get_completions(words, incomplete)} == offered
 
 
 def test_design_can_be_named(tmp_path):
