@@ -7,7 +7,8 @@ Names and the paper's symbols:
 ``u``                u: y⃛ (jerk), its derivative (snap), or ÿ_ref (reference, eq. 6)
 ``costate``          λ
 ``hamiltonian``      H = g + λᵀ f
-``running_cost``     g, eq. (26): effort + β (exp((γ d)²) − 1), d the end load's sway
+``running_cost``     g, eq. (26): effort + β (exp((γ d)²) − 1), d the end load's sway; efforts of
+                     several axes are summed, each weighed by `gen_profile.problem.axis_reach`
 ===================  =========================================================================
 
 The constant −β T leaves the optimum where it is, and keeps H from drowning in it.
@@ -63,22 +64,6 @@ class StateLayout:
         return slice(first, first + self.m)
 
     @property
-    def kinds(self) -> list[tuple[list[int], list[int]]]:
-        """States of the unactuated side by kind: coordinates, rates, and each one's sensitivities.
-
-        Each kind as its states and the coordinates that they belong to.
-        """
-        first = self.sensitivities.start
-        rows = [(row, "", row) for row in range(2 * self.n_u)]
-        rows += [(first + i, name, row) for i, (name, row) in enumerate(self.sensitivity_rows)]
-        kinds: dict[tuple[str, bool], tuple[list[int], list[int]]] = {}
-        for state, name, row in rows:
-            states, coordinates = kinds.setdefault((name, row < self.n_u), ([], []))
-            states.append(state)
-            coordinates.append(row % self.n_u)
-        return list(kinds.values())
-
-    @property
     def sensitivities(self) -> slice:
         """States that hold sensitivities."""
         return slice(2 * self.n_u + self.orders * self.m, self.size)
@@ -116,6 +101,8 @@ class Data:
     tau : float
         Any positive number where the drive is ideal.
     duration, cost_scale : float
+    effort_weights : (m,) array
+        Of the square of every axis' effort.
     offset, scale : (n,) arrays
     """
 
@@ -125,13 +112,14 @@ class Data:
     tau: float
     duration: float
     cost_scale: float
+    effort_weights: Array
     offset: Array
     scale: Array
 
     def row(self) -> Array:
         """Order the data as the functions take them, shape (1, …)."""
         weights = [self.beta, self.gamma, self.tau, self.duration, self.cost_scale]
-        return np.concatenate([self.parameters, weights, self.offset, self.scale])[None]
+        return np.concatenate([self.parameters, weights, self.effort_weights, self.offset, self.scale])[None]
 
 
 @lru_cache(maxsize=8)
@@ -153,11 +141,12 @@ def optimality_system(plant: Plant, desensitized: tuple[str, ...], effort: Effor
     by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
     reached = [sensitivities(name, pendulum_rate, pendulum, by_name[name]) for name in desensitized]
 
-    axes = _axis_chain(d, effort, tau)
+    effort_weights = sym.symbols("effort_weights", len(plant.actuated))
+    axes = _axis_chain(d, effort, tau, effort_weights)
     x = sym.column([pendulum, *axes.chain, *(s.states for s in reached)])
     f = sym.column([pendulum_rate, *axes.chain[1:], axes.top, *(s.rates for s in reached)])
-    end_sway = sym.split(d.sway)[-1]
-    g = axes.effort + beta * (sym.exp((gamma * end_sway) ** 2) - 1)
+    end_sway = d.sway[plant.end_load]
+    g = axes.effort + beta * (sym.exp(gamma**2 * sym.dot(end_sway, end_sway)) - 1)
 
     n = x.shape[0]
     x_hat, costate = sym.symbols("x_hat", n), sym.symbols("costate", n)
@@ -172,7 +161,7 @@ def optimality_system(plant: Plant, desensitized: tuple[str, ...], effort: Effor
     z = sym.column([x_hat, costate])
     flow = sym.column([sym.gradient(hamiltonian, costate), -sym.gradient(hamiltonian, x_hat)])
     quantities = [hamiltonian * cost_scale, optimal(sym.column([g, axes.top, d.sway, d.angle]))]
-    inputs = {"z": z, "data": sym.column([d.p, weights, offset, scale])}
+    inputs = {"z": z, "data": sym.column([d.p, weights, effort_weights, offset, scale])}
     layout = StateLayout(
         n_u=len(plant.unactuated),
         m=len(plant.actuated),
@@ -197,18 +186,21 @@ class _AxisChain:
     chain: list[Symbol]
     top: Symbol
     effort: Symbol
-    weight: float  # ∂² effort / ∂u²
+    weight: Symbol  # ∂² effort / ∂u² of every axis; axes do not mix
 
 
-def _axis_chain(d: Dynamics, effort: Effort, tau: Symbol) -> _AxisChain:
+def _axis_chain(d: Dynamics, effort: Effort, tau: Symbol, weights: Symbol) -> _AxisChain:
     u = sym.symbols("u", d.q_a.shape[0])
-    chain, half_square = [d.q_a, d.dq_a, d.ddq_a], sym.dot(u, u) / 2
+    chain, half_square = [d.q_a, d.dq_a, d.ddq_a], sym.dot(weights * u, u) / 2
     if effort == "jerk":
-        return _AxisChain(u=u, chain=chain, top=u, effort=half_square, weight=1.0)
+        return _AxisChain(u=u, chain=chain, top=u, effort=half_square, weight=weights)
     if effort == "reference":
-        return _AxisChain(u=u, chain=chain, top=(u - d.ddq_a) / tau, effort=half_square, weight=1.0)
+        return _AxisChain(u=u, chain=chain, top=(u - d.ddq_a) / tau, effort=half_square, weight=weights)
     jerk = sym.symbols("dddq_a", d.q_a.shape[0])
-    weight = SNAP_TIME**2
     return _AxisChain(
-        u=u, chain=[*chain, jerk], top=u, effort=sym.dot(jerk, jerk) / 2 + weight * half_square, weight=weight
+        u=u,
+        chain=[*chain, jerk],
+        top=u,
+        effort=sym.dot(weights * jerk, jerk) / 2 + SNAP_TIME**2 * half_square,
+        weight=SNAP_TIME**2 * weights,
     )

@@ -16,13 +16,11 @@ class Status(Enum):
 
     CONVERGED = "The optimality conditions are met."
     SWINGS_TOO_FAR = "The load would have to swing beyond the horizontal."
-    NOT_CONTROLLABLE = "Some part of the machine swings on, whatever the axes do."
     DIVERGED = "Newton's method found no motion that meets the optimality conditions."
 
 
 ERRORS: dict[Status, type[GenProfileError]] = {
     Status.SWINGS_TOO_FAR: InfeasibleProblem,
-    Status.NOT_CONTROLLABLE: InfeasibleProblem,
     Status.DIVERGED: SolverDiverged,
 }
 
