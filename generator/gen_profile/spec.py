@@ -73,11 +73,15 @@ class PlantSpec:
 
 @attrs.frozen(kw_only=True)
 class MoveSpec:
-    """From standstill to standstill: start and target of every axis in m (or rad), duration in s."""
+    """From standstill to standstill: start and target of every axis in m (or rad), duration in s.
+
+    Where `shortest` is set the duration is to be found, and the one given here means nothing.
+    """
 
     start: tuple[Distance, ...]
     target: tuple[Distance, ...]
     duration: Duration
+    shortest: bool = False
 
     @property
     def distance(self) -> tuple[float, ...]:
@@ -97,8 +101,9 @@ class ActuatorSpec:
 class RobustnessSpec:
     """Uncertain parameters with their relative half-ranges, and what the design does about them."""
 
-    method: Literal["none", "sensitivity"] = "none"
-    order: Literal[1] = 1
+    method: Literal["none", "sensitivity", "range"] = "none"
+    order: Literal[1, 2] = 1
+    nominal_zero: bool = False  # with method "range": the nominal machine comes to rest exactly all the same
     uncertain: Mapping[str, RelativeRange] = attrs.field(factory=dict, converter=_frozen_mapping)
 
 
@@ -109,6 +114,13 @@ class CostSpec:
     effort: Literal["jerk", "snap", "reference"] = "jerk"
     sway_weight: NotNegative = 0.0
     sway_scale: Positive | None = None
+
+
+@attrs.frozen(kw_only=True)
+class SolverSpec:
+    """Which solver: "auto" takes the indirect one where no limit binds."""
+
+    method: Literal["auto", "indirect", "direct"] = "auto"
 
 
 @attrs.frozen(kw_only=True)
@@ -211,6 +223,7 @@ class Spec:
     actuator: ActuatorSpec
     robustness: RobustnessSpec
     cost: CostSpec
+    solver: SolverSpec
     limits: LimitsSpec
     check: CheckSpec
     axis: Mapping[str, AxisSpec] = attrs.field(converter=_frozen_mapping)
@@ -242,6 +255,8 @@ class Spec:
         if self.cost.sway_scale is None:
             document["cost"]["sway_scale"] = "auto"
         del document["check"]["default"]
+        if document["move"].pop("shortest"):
+            document["move"]["duration"] = "minimum"
         return document
 
     def sha256(self) -> str:

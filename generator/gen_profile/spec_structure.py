@@ -143,6 +143,12 @@ def _structure_int(value: Any, _: type) -> int:
     return value
 
 
+def _structure_bool(value: Any, _: type) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"must be true or false, found {found(value)}")
+    return value
+
+
 def _structure_str(value: Any, _: type) -> str:
     if not isinstance(value, str):
         raise ValueError(f"must be text, found {found(value)}")
@@ -209,7 +215,7 @@ def _converter() -> Converter:
     converter.register_structure_hook(int, _structure_int)
     converter.register_structure_hook(str, _structure_str)
     converter.register_structure_hook(MachineFile, lambda value, _: value)
-    converter.register_structure_hook(bool, lambda value, _: value)  # none of them is typed by a person
+    converter.register_structure_hook(bool, _structure_bool)
     converter.register_structure_hook_func(_is(Literal), _structure_choice)
     converter.register_structure_hook_factory(_is(Annotated), _constrained)
     converter.register_structure_hook_factory(_is_fixed_tuple, _fixed_tuple)

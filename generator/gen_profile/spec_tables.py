@@ -24,6 +24,7 @@ TABLES = tuple(field.name for field in attrs.fields(Spec) if field.name != "name
 REQUIRED = ("plant", "move")
 FILE_KEYS = ("file", "file_sha256")
 DEFAULT_NAME = "profile"
+PLACEHOLDER_DURATION = 1.0  # s, until the shortest duration is found
 
 
 def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table:
@@ -47,6 +48,7 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     tables["move"] = _move(tables["move"], plant, faults)
     tables["robustness"] = _robustness(tables["robustness"], tables["plant"].get("parameters"), faults)
     tables["check"] = _check(tables["check"], tables["move"], plant, faults)
+    _limits(tables["limits"], tables["move"], faults)
     tables["axis"] = _axis(tables["axis"], plant, faults)
     tables["can"] = _can(tables["can"], plant, faults)
     return tables
@@ -143,9 +145,12 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
                     f"move.{key}",
                     f"{axis.name} must be from {axis.lower:g} to {axis.upper:g} {axis.unit}, found {value:g}",
                 )
-    if table.get("duration") == "minimum":
-        faults.add("move.duration", '"minimum" is not supported yet; state the duration in s')
-    return {**table, "start": start, "target": target}
+    if "shortest" in table:
+        faults.add("move.shortest", 'unknown key; write duration = "minimum"')
+    shortest = table.get("duration") == "minimum"
+    if shortest:
+        table = {**table, "duration": PLACEHOLDER_DURATION}
+    return {**table, "start": start, "target": target, "shortest": shortest}
 
 
 def _per_axis(value: Any, axes: int | None, where: str, faults: Faults) -> list[float]:
@@ -194,10 +199,26 @@ def _robustness(table: Table, parameters: Mapping[str, float] | None, faults: Fa
             faults.add(place(where, key), f"unknown parameter{suggestion(key, parameters)}")
         elif parameters[key] == 0.0:
             faults.add(place(where, key), "its value is 0, so a relative range is empty")
-    if table.get("method") == "sensitivity" and not uncertain:
-        faults.add(where, 'required with method = "sensitivity", such as { L1 = 0.2 }')
+    if table.get("method") in {"sensitivity", "range"} and not uncertain:
+        faults.add(where, f'required with method = "{table["method"]}", such as {{ L1 = 0.2 }}')
+    if table.get("nominal_zero") is True and table.get("method") != "range":
+        faults.add("robustness.nominal_zero", 'only with method = "range"; elsewhere it is so anyway')
+    if table.get("order") == 2 and table.get("method") == "range":
+        faults.add("robustness.order", 'only with method = "sensitivity"')
     ordered = {name: uncertain[name] for name in parameters if name in uncertain}
     return {"method": "sensitivity" if uncertain else "none", **table, "uncertain": ordered}
+
+
+def _limits(table: Table, move: Table, faults: Faults) -> None:
+    """Hold limits against the move."""
+    if move["shortest"] and not {"velocity", "acceleration", "jerk"} & table.keys():
+        faults.add("move.duration", '"minimum" needs a limit: state limits.acceleration, or velocity or jerk')
+    travel = table.get("travel")
+    if isinstance(travel, list) and len(travel) == 2 and None not in (edges := [finite(e) for e in travel]):
+        low, high = edges
+        for key in ("start", "target"):
+            if not all(low <= position <= high for position in move[key]):
+                faults.add("limits.travel", f"must contain the move's {key}, found {travel}")
 
 
 def _check(table: Table, move: Table, plant: Plant | None, faults: Faults) -> Table:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import attrs
 import numpy as np
 
 from gen_profile.errors import LimitViolation
@@ -12,8 +13,32 @@ from gen_profile.profile import Profile
 from gen_profile.spec import LimitsSpec
 
 
-def require_limits(limits: LimitsSpec, command: Profile, transient_sway: float) -> None:
-    """Hold the command, which the drive must follow, and the end load's sway to their limits.
+@attrs.frozen(kw_only=True)
+class Breach:
+    """A limit that a motion breaks.
+
+    Attributes
+    ----------
+    limit : str
+        Its key in the spec.
+    found, allowed : float
+        What the motion needs, and what it may have.
+    power : int
+        The need goes by 1 / durationᵖ; 0 where more time does not help.
+    """
+
+    limit: str
+    found: float
+    allowed: float
+    power: int
+
+    def sentence(self) -> str:
+        """Say it."""
+        return f"limits.{self.limit}: {self.allowed:g} is allowed, the motion needs {self.found:.4g}."
+
+
+def breaches(limits: LimitsSpec, command: Profile, transient_sway: float) -> tuple[Breach, ...]:
+    """Find the limits that a motion breaks.
 
     Parameters
     ----------
@@ -22,36 +47,43 @@ def require_limits(limits: LimitsSpec, command: Profile, transient_sway: float) 
         Setpoints of the drives, lag compensation included.
     transient_sway : float
         Greatest sway of the end load during the move in m, nominal machine.
+    """
+    return tuple(
+        breach for breach in _demands(limits, command, transient_sway) if breach.found > breach.allowed
+    )
+
+
+def require_limits(limits: LimitsSpec, command: Profile, transient_sway: float) -> None:
+    """Hold a motion to its limits.
 
     Raises
     ------
     LimitViolation
         Naming every limit that is broken, and a duration that would keep them all.
     """
-    broken = [
-        (name, found, allowed, power)
-        for name, found, allowed, power in _demands(limits, command, transient_sway)
-        if found > allowed
-    ]
+    broken = breaches(limits, command, transient_sway)
     if not broken:
         return
-    sentences = [
-        f"limits.{name}: {allowed:g} is allowed, the motion needs {found:.4g}."
-        for name, found, allowed, _ in broken
-    ]
-    enough = command.duration * max((found / allowed) ** (1.0 / power) for _, found, allowed, power in broken)
-    raise LimitViolation(
-        "\n".join(sentences) + f"\nAllow about {enough:.2g} s (move.duration), or raise the limits."
-    )
+    factors = [(breach.found / breach.allowed) ** (1.0 / breach.power) for breach in broken if breach.power]
+    cure = "Widen the limits."
+    if factors:
+        cure = f"Allow about {command.duration * max(factors):.2g} s (move.duration), or raise the limits."
+    raise LimitViolation("\n".join([*(breach.sentence() for breach in broken), cure]))
 
 
-def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[tuple[str, float, float, int]]:
-    """Limit, what the motion needs, what is allowed, and the power of 1/duration that the need goes by."""
+def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Breach]:
+    """List what the motion needs of every limit there is."""
     for order, (name, allowed) in enumerate(
         [("velocity", limits.velocity), ("acceleration", limits.acceleration), ("jerk", limits.jerk)], start=1
     ):
         if allowed is not None:
             _, values = command.within_segments(POINTS_PER_SEGMENT, order)
-            yield name, float(np.abs(values).max()), allowed, order
+            yield Breach(limit=name, found=float(np.abs(values).max()), allowed=allowed, power=order)
     if limits.sway is not None:
-        yield "sway", sway, limits.sway, 2
+        yield Breach(limit="sway", found=sway, allowed=limits.sway, power=2)
+    if limits.travel is not None:
+        low, high = limits.travel
+        _, values = command.within_segments(POINTS_PER_SEGMENT, 0)
+        rounding = 1e-12 * max(abs(low), abs(high))
+        yield Breach(limit="travel", found=float(values.max()) - rounding, allowed=high, power=0)
+        yield Breach(limit="travel", found=-float(values.min()) - rounding, allowed=-low, power=0)

@@ -44,14 +44,14 @@ class StateLayout:
         Unactuated and actuated coordinates.
     orders : int
         States per axis: position, velocity, acceleration, and for snap the jerk.
-    sensitivity_rows : tuple of (parameter, plant row)
+    sensitivity_rows : tuple of (parameters, plant row)
         One entry per sensitivity state; rows count q_u, then q̇_u.
     """
 
     n_u: int
     m: int
     orders: int
-    sensitivity_rows: tuple[tuple[str, int], ...]
+    sensitivity_rows: tuple[tuple[tuple[str, ...], int], ...]
 
     @property
     def size(self) -> int:
@@ -62,6 +62,22 @@ class StateLayout:
         """States that hold the given derivative of the axes' positions."""
         first = 2 * self.n_u + order * self.m
         return slice(first, first + self.m)
+
+    @property
+    def kinds(self) -> list[tuple[list[int], list[int]]]:
+        """States of the unactuated side by kind: coordinates, rates, and each one's sensitivities.
+
+        Each kind as its states and the coordinates that they belong to.
+        """
+        first = self.sensitivities.start
+        rows: list[tuple[int, tuple[str, ...], int]] = [(row, (), row) for row in range(2 * self.n_u)]
+        rows += [(first + i, names, row) for i, (names, row) in enumerate(self.sensitivity_rows)]
+        kinds: dict[tuple[tuple[str, ...], bool], tuple[list[int], list[int]]] = {}
+        for state, names, row in rows:
+            states, coordinates = kinds.setdefault((names, row < self.n_u), ([], []))
+            states.append(state)
+            coordinates.append(row % self.n_u)
+        return list(kinds.values())
 
     @property
     def sensitivities(self) -> slice:
@@ -123,7 +139,9 @@ class Data:
 
 
 @lru_cache(maxsize=8)
-def optimality_system(plant: Plant, desensitized: tuple[str, ...], effort: Effort) -> OptimalitySystem:
+def optimality_system(
+    plant: Plant, desensitized: tuple[str, ...], effort: Effort, order: int = 1
+) -> OptimalitySystem:
     """Derive the canonical equations by CasADi's differentiation.
 
     Parameters
@@ -133,13 +151,15 @@ def optimality_system(plant: Plant, desensitized: tuple[str, ...], effort: Effor
         Parameters whose sensitivities become states.
     effort : str
         ``"reference"`` brings the actuator's lag, eq. (6), into the state equations.
+    order : int
+        Of the sensitivities.
     """
     d = dynamics(plant)
     weights = sym.symbols("weights", 5)
     beta, gamma, tau, duration, cost_scale = sym.split(weights)
     pendulum, pendulum_rate = sym.column([d.q_u, d.dq_u]), sym.column([d.dq_u, d.ddq_u])
     by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
-    reached = [sensitivities(name, pendulum_rate, pendulum, by_name[name]) for name in desensitized]
+    reached = sensitivities(pendulum_rate, pendulum, by_name, desensitized, order)
 
     effort_weights = sym.symbols("effort_weights", len(plant.actuated))
     axes = _axis_chain(d, effort, tau, effort_weights)
@@ -166,9 +186,7 @@ def optimality_system(plant: Plant, desensitized: tuple[str, ...], effort: Effor
         n_u=len(plant.unactuated),
         m=len(plant.actuated),
         orders=len(axes.chain),
-        sensitivity_rows=tuple(
-            (name, row) for name, s in zip(desensitized, reached, strict=True) for row in s.rows
-        ),
+        sensitivity_rows=tuple((s.parameters, row) for s in reached for row in s.rows),
     )
     return OptimalitySystem(
         plant=plant,

@@ -8,9 +8,28 @@ from typing import Literal
 import attrs
 
 from gen_profile.plants.plant import Plant
-from gen_profile.spec import Spec
+from gen_profile.spec import LimitsSpec, Spec
 
 Effort = Literal["jerk", "snap", "reference"]
+
+
+@attrs.frozen(kw_only=True)
+class WorstCase:
+    """The residual sway of the worst machine is what counts, rather than zero sway of the nominal one.
+
+    Attributes
+    ----------
+    uncertain : mapping of str to float
+        Relative half-ranges of parameters.
+    load_limits : tuple of float
+        Allowed residual sway of every load in m: the worst is the greatest share of it.
+    nominal_zero : bool
+        Whether the nominal machine shall come to rest exactly all the same.
+    """
+
+    uncertain: Mapping[str, float]
+    load_limits: tuple[float, ...]
+    nominal_zero: bool
 
 
 @attrs.frozen(kw_only=True)
@@ -30,12 +49,17 @@ class Problem:
         Time constant in s of a first-order actuator (eq. 6); None for an ideal one.
     desensitized : tuple of str
         Parameters whose sensitivities shall vanish at both ends.
+    order : int
+        Of these sensitivities: 1, or 2 for first and second ones.
     effort : str
         What the cost's quadratic term weighs.
     sway_weight : float
         β.
     sway_scale : float or None
         γ in 1/m; None lets the solver take `AUTO_SWAY` over the peak sway of the same move with β = 0.
+    limits : LimitsSpec
+        Of the command and of the sway on the way.
+    worst_case : WorstCase or None
     """
 
     plant: Plant
@@ -48,6 +72,9 @@ class Problem:
     effort: Effort
     sway_weight: float
     sway_scale: float | None
+    order: int = 1
+    limits: LimitsSpec = attrs.field(factory=LimitsSpec)
+    worst_case: WorstCase | None = None
 
     @property
     def distance(self) -> tuple[float, ...]:
@@ -63,6 +90,14 @@ AUTO_EFFORT = 1.0655  # m/s³, root mean square jerk of the paper's move with β
 
 def problem_of(spec: Spec) -> Problem:
     """State the problem that a spec asks to solve."""
+    robustness = spec.robustness
+    worst_case = None
+    if robustness.method == "range":
+        worst_case = WorstCase(
+            uncertain=robustness.uncertain,
+            load_limits=tuple(spec.check.residual_sway.values()),
+            nominal_zero=robustness.nominal_zero,
+        )
     return Problem(
         plant=spec.machine(),
         parameters=spec.plant.parameters,
@@ -70,7 +105,10 @@ def problem_of(spec: Spec) -> Problem:
         target=spec.move.target,
         duration=spec.move.duration,
         tau=spec.actuator.tau,
-        desensitized=tuple(spec.robustness.uncertain) if spec.robustness.method == "sensitivity" else (),
+        desensitized=tuple(robustness.uncertain) if robustness.method == "sensitivity" else (),
+        order=robustness.order,
+        limits=spec.limits,
+        worst_case=worst_case,
         effort=spec.cost.effort,
         sway_weight=spec.cost.sway_weight,
         sway_scale=spec.cost.sway_scale,

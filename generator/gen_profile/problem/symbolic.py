@@ -6,7 +6,6 @@ Typing stops at `Symbol`; everything that comes out is a NumPy array or C text.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
 from typing import Any
 
 import casadi
@@ -36,6 +35,11 @@ def column(entries: Sequence[Any]) -> Symbol:
     return casadi.vertcat(*entries) if len(entries) else casadi.SX(0, 1)
 
 
+def zero() -> Symbol:
+    """Make a zero that is none by its form."""
+    return casadi.SX(1, 1)
+
+
 def matrix(rows: Sequence[Sequence[Any]]) -> Symbol:
     """Make a matrix from nested rows of scalars."""
     return casadi.vertcat(*(casadi.horzcat(*row) for row in rows))
@@ -49,6 +53,11 @@ def solve(a: Symbol, b: Symbol) -> Symbol:
 def jacobian(expression: Symbol, variables: Symbol) -> Symbol:
     """∂expression/∂variables."""
     return casadi.jacobian(expression, variables)
+
+
+def directional(expression: Symbol, variables: Symbol, change: Symbol) -> Symbol:
+    """Change of an expression for a change of its variables, ∂expression/∂variables · change."""
+    return casadi.jtimes(expression, variables, change)
 
 
 def gradient(expression: Symbol, variables: Symbol) -> Symbol:
@@ -90,15 +99,20 @@ class Function:
     name : str
     inputs : mapping of str to Symbol
         Columns; an evaluation takes each as an array (rows, points).
-    output : Symbol
-        Matrix of any shape; made dense.
+    *outputs : Symbol
+        Matrices of any shape; made dense. An evaluation gives the first one, C code has all.
     """
 
-    def __init__(self, name: str, inputs: Mapping[str, Symbol], output: Symbol) -> None:
+    def __init__(self, name: str, inputs: Mapping[str, Symbol], *outputs: Symbol) -> None:
         self._function = casadi.Function(
-            name, list(inputs.values()), [casadi.densify(output)], list(inputs), ["output"], {"cse": True}
+            name,
+            list(inputs.values()),
+            [casadi.densify(output) for output in outputs],
+            list(inputs),
+            [f"output{number}" for number in range(len(outputs))],
+            {"cse": True},
         )
-        self._shape: tuple[int, int] = output.shape
+        self._shape: tuple[int, int] = outputs[0].shape
         self._evaluators: dict[int, Callable[[Sequence[Array]], Array]] = {}
 
     def __call__(self, *arguments: Array) -> Array:
@@ -143,9 +157,10 @@ class Function:
 
         return evaluate
 
-    @cached_property
-    def c_source(self) -> str:
-        """C99 text of the function for one point, with CasADi's calling convention."""
-        generator = casadi.CodeGenerator(self._function.name(), {"with_header": False, "verbose": False})
-        generator.add(self._function)
-        return str(generator.dump())
+
+def c_source(*functions: Function) -> str:
+    """C99 text of functions for one point each, with CasADi's calling convention."""
+    generator = casadi.CodeGenerator("equations", {"with_header": False, "verbose": False})
+    for function in functions:
+        generator.add(function._function)
+    return str(generator.dump())

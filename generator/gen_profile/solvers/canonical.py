@@ -1,62 +1,150 @@
-"""A problem's boundary value problem in dimensionless numbers."""
+"""A problem's boundary value problem in dimensionless, modal coordinates."""
 
 from __future__ import annotations
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.problem.axis_reach import axis_reach, effort_weights
-from gen_profile.problem.linearization import linearize
-from gen_profile.problem.pontryagin import Data, OptimalitySystem
+from gen_profile.problem.linearization import Linearization, linearize
+from gen_profile.problem.pontryagin import Data, OptimalitySystem, StateLayout
 from gen_profile.problem.problem import Problem
 from gen_profile.problem.reachability import independent_states
 from gen_profile.profile import Array
 from gen_profile.solvers.collocation import Trajectory, newton_iterate
 
+# Shares of a state's response outside the span of the others', below which its end condition is implied.
+# What a sensitivity left at a thousandth of itself adds to the sway is far less than what second order does.
+DEPENDENT = 1e-8
+INSENSITIVE = 1e-3
+NEGLIGIBLE = 1e-8  # sway left by a mode, as a share of the move
+QUINTIC_JERK = 60.0  # with which a quintic move starts, in distances per cube of its duration
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class Canonical:
-    """A boundary value problem in dimensionless numbers.
+    """A boundary value problem whose unknowns ζ are modal coordinates ξ and their costates.
+
+    Angles, rates and sensitivities of coupled pendulums are nearly dependent on one another; the amplitudes
+    of the linear model's modes are not, and make linear equations that are well conditioned.
 
     Attributes
     ----------
     system : OptimalitySystem
     data : Data
+    basis : (n, n) array
+        The states of `system` are ``basis @ ξ``.
     final : (n,) array
-        States at the end; NaN where an end condition is implied by the others. At the start all are zero.
+        ξ at the end; NaN where no end condition is asked for. At the start ξ is zero.
+    shown : (n,) array
+        Sway in m, of the load that sways most, per unit of each state of `system` that is a mode's; 0 where
+        the mode is too fast to be excited, and for the axes.
     """
 
     system: OptimalitySystem
     data: Data
+    basis: Array
     final: Array
+    shown: Array
 
-    def iterate(self, current: Trajectory) -> Trajectory:
-        """Solve the equations linearised about a trajectory."""
-        data = self.data.row()
-        return newton_iterate(
-            lambda points: self.system.flow(points, data), current, np.zeros(len(self.final)), self.final
-        )
+    def unknowns(self, points: Array) -> Array:
+        """Turn ζ into states and costates as `system` knows them, shape (points, 2 n)."""
+        return points @ self._transform.T
+
+    def flow(self, points: Array) -> Array:
+        """Evaluate ζ' and beside it its Jacobian, shape (points, 2 n, 1 + 2 n).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When they overflow.
+        """
+        back, flow = self._inverse_transform, self.system.flow(self.unknowns(points), self.data.row())
+        if not np.isfinite(flow).all():
+            raise np.linalg.LinAlgError("the canonical equations overflow")
+        return np.concatenate([back @ flow[:, :, :1], back @ flow[:, :, 1:] @ self._transform], axis=2)
+
+    def slopes(self, points: Array) -> Array:
+        """Evaluate ζ', shape (points, 2 n)."""
+        flow = self.system.flow(self.unknowns(points), self.data.row())
+        return np.asarray(flow[:, :, 0] @ self._inverse_transform.T)
+
+    def solve_linear(self, flow: Array, trajectory: Trajectory) -> Trajectory:
+        """Solve the equations linearised about a trajectory, at whose points `flow` was evaluated.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When they have no solution.
+        """
+        return newton_iterate(flow, trajectory, np.zeros_like(self.final), self.final)
 
     def quantities(self, points: Array) -> Array:
         """H, g, highest derivatives, sways and angles; see `OptimalitySystem`."""
-        return self.system.quantities(points, self.data.row())[:, :, 0]
+        return self.system.quantities(self.unknowns(points), self.data.row())[:, :, 0]
 
     def rescaled(self, solution: Trajectory) -> tuple[Canonical, Trajectory]:
-        """Measure every state by its own greatest value, which conditions the linear equations best."""
-        n = len(self.final)
-        largest = np.abs(solution.nodes[:, :n]).max(axis=0)
-        largest = np.where(largest > 0.0, largest, 1.0)
-        data = attrs.evolve(self.data, scale=self.data.scale * largest)
-        factor = np.concatenate([1.0 / largest, largest])
+        """Measure every coordinate by its own greatest value, which conditions the linear equations best."""
+        largest = self._greatest(solution)
         return (
-            attrs.evolve(self, data=data, final=self.final / largest),
-            Trajectory(mesh=solution.mesh, nodes=solution.nodes * factor, stages=solution.stages * factor),
+            attrs.evolve(
+                self, basis=self.basis * largest, final=self.final / largest, shown=self.shown * largest
+            ),
+            solution.scaled(np.concatenate([1.0 / largest, largest])),
+        )
+
+    def weights(self, solution: Trajectory) -> Array:
+        """Tell how much each coordinate counts, shape (n,).
+
+        An axis' motion counts relative to its own greatest value, a mode's relative to the sway of the modes
+        that sways most, as much as it shows in that.
+        """
+        largest = self._greatest(solution)
+        weights = 1.0 / largest
+        for states, _ in self.system.layout.kinds:
+            sway = (self.shown * largest)[states].max()
+            weights[states] = self.shown[states] / sway if sway > 0.0 else 0.0
+        return weights
+
+    def distance(self, one: Trajectory, other: Trajectory) -> float:
+        """Root mean square difference of the coordinates at the nodes, each with its weight.
+
+        Costates are left out: those of hardly excited modes carry rounding noise that no state feels.
+        """
+        difference = (other.nodes - one.nodes)[:, : len(self.final)]
+        weights = np.minimum(self.weights(one), self.weights(other))
+        return float(np.sqrt(np.mean((weights * difference) ** 2)))
+
+    def missed(self, solution: Trajectory) -> float:
+        """Greatest share by which an end condition fails that was not asked for, as others imply it."""
+        own = slice(0, 2 * self.system.layout.n_u)
+        implied = np.isnan(self.final[own])
+        return float(
+            np.max(
+                np.abs(self.weights(solution) * solution.nodes[-1, : len(self.final)])[own][implied],
+                initial=0.0,
+            )
         )
 
     def greatest_angle(self, solution: Trajectory) -> float:
         """Greatest rope angle at the collocation points in rad."""
         loads = len(self.system.plant.loads)
         return float(np.abs(self.quantities(solution.points)[:, -loads:]).max())
+
+    def _greatest(self, solution: Trajectory) -> Array:
+        """Greatest magnitude of each coordinate at the nodes, 1 where that is zero."""
+        largest = np.abs(solution.nodes[:, : len(self.final)]).max(axis=0)
+        return np.where(largest > 0.0, largest, 1.0)
+
+    @property
+    def _transform(self) -> Array:
+        """Matrix from ζ to states and costates: canonical, so that the equations keep their form."""
+        return _blocks(self.basis, np.asarray(np.linalg.inv(self.basis)).T)
+
+    @property
+    def _inverse_transform(self) -> Array:
+        return _blocks(np.asarray(np.linalg.inv(self.basis)), self.basis.T)
 
 
 def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
@@ -90,24 +178,57 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
         offset=offset,
         scale=scale,
     )
-    return Canonical(system=system, data=data, final=final)
+    basis, shown = _modal(layout, linear, _shown(linear, reach, duration))
+    final[[state for states, _ in layout.kinds for state in states if shown[state] == 0.0]] = np.nan
+    return Canonical(system=system, data=data, basis=basis, final=final, shown=shown)
 
 
-def independence(canonical: Canonical) -> tuple[Array, tuple[str, ...]]:
+def independence(canonical: Canonical) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Find the end conditions to ask for, and the parameters whose sensitivities vanish with those."""
     layout = canonical.system.layout
-    n = layout.size
+    n, first = layout.size, layout.sensitivities.start
     rest = np.zeros((1, 2 * n))
     rest[:, layout.axis(0)] = canonical.final[layout.axis(0)] / 2.0
-    A = canonical.system.flow(rest, canonical.data.row())[0, :n, 1 : 1 + n]
-    # plants' own conditions first: a sensitivity is what gives way
-    order = np.concatenate([np.arange(2 * layout.n_u, layout.sensitivities.start), np.arange(2 * layout.n_u)])
-    order = np.concatenate([order, np.arange(layout.sensitivities.start, n)])
-    independent = np.empty(n, dtype=bool)
-    independent[order] = independent_states(
-        A[np.ix_(order, order)], np.eye(n)[order][:, layout.axis(layout.orders - 1)]
-    )
-    asked = independent[layout.sensitivities]
-    names = [name for name, _ in layout.sensitivity_rows]
-    useful = {name for name, keep in zip(names, asked, strict=True) if keep}
-    return independent, tuple(name for name in dict.fromkeys(names) if name not in useful)
+    A = canonical.flow(rest)[0, :n, 1 : 1 + n]
+    B = np.eye(n)[:, layout.axis(layout.orders - 1)]
+    # the axes' conditions first, the sensitivities', which are to give way, last
+    order = np.concatenate([np.arange(2 * layout.n_u, first), np.arange(2 * layout.n_u), np.arange(first, n)])
+    order = order[~np.isnan(canonical.final[order])]
+    asked = np.zeros(n, dtype=bool)
+    shares = np.where(order < first, DEPENDENT, INSENSITIVE)
+    asked[order] = independent_states(A, B, order, shares)
+    kept = zip(layout.sensitivity_rows, asked[layout.sensitivities], strict=True)
+    useful = {name for (names, _), keep in kept if keep for name in names}
+    every = dict.fromkeys(name for names, _ in layout.sensitivity_rows for name in names)
+    return asked, tuple(name for name in every if name not in useful)
+
+
+def _modal(layout: StateLayout, linear: Linearization, shown: Array) -> tuple[Array, Array]:
+    """Basis in which everything that swings is written in modes, and the sway that each state shows."""
+    basis, sway = np.eye(layout.size), np.zeros(layout.size)
+    for states, coordinates in layout.kinds:
+        if len(coordinates) == layout.n_u:
+            basis[np.ix_(states, states)] = linear.modes
+            sway[states] = shown
+        else:  # a parameter that does not reach all coordinates
+            sway[states] = np.abs(linear.sway_gain).max(axis=0)[coordinates]
+    return basis, sway
+
+
+def _shown(linear: Linearization, reach: Array, duration: float) -> Array:
+    """Sway in m per unit of each mode, shape (n_u,); 0 for modes that are too fast to be excited noticeably.
+
+    The jerk with which a move of distance D in time T begins leaves such a mode swinging by its gain times
+    60 D / (ω T)³; it otherwise follows the axes statically. Asking it to rest would only spoil the equations'
+    condition.
+    """
+    drive = np.abs(np.linalg.solve(linear.modes, linear.input)) @ reach
+    shown = np.abs(linear.sway_gain @ linear.modes).max(axis=0)
+    excited = QUINTIC_JERK * shown * drive / (linear.frequencies * duration) ** 3
+    return np.where(excited < NEGLIGIBLE * reach.max(), 0.0, shown)
+
+
+def _blocks(upper: Array, lower: Array) -> Array:
+    """Write two square matrices into the diagonal of one."""
+    nothing = np.zeros_like(upper)
+    return np.block([[upper, nothing], [nothing, lower]])

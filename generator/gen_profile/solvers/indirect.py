@@ -1,15 +1,12 @@
 """Indirect method: Pontryagin's conditions solved as a two-point boundary value problem.
 
-1. With β = 0 the problem is nearly linear, and Newton's method converges from a quintic move; where angles
-are
-   large it is led there through shorter moves.
+1. With β = 0 the problem is nearly linear, and Newton's method converges from the linear model's optimum;
+   where angles are large it is led there through shorter moves.
 2. From there to the β asked for, at once where that converges, else through smaller ones.
 3. Mesh intervals on which the Hamiltonian drifts or the canonical equations are missed are split.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import attrs
 import numpy as np
@@ -20,15 +17,15 @@ from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.profile import Array
 from gen_profile.solvers.canonical import Canonical, canonical_problem, independence
 from gen_profile.solvers.collocation import GAUSS, INTERPOLATION, STAGES, Trajectory, stage_times
-from gen_profile.solvers.newton import solve_newton
+from gen_profile.solvers.continuation import advance
 from gen_profile.solvers.refinement import defect, refine
 from gen_profile.solvers.solution import Optimum, Solution, Status
 
 METHOD = "indirect"
 INTERVALS = 30
-SMALLEST_ADVANCE = 1.0 / 64.0  # of a continuation's share, which runs from 0 to 1
 BETA_DECADES = 8.0  # from share 0 to 1
 HORIZONTAL = np.pi / 2.0
+TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the linear model implies
 SMALL_ANGLE = np.pi / 3.0  # what a rope angle may reach in the linear model before nonlinearity is blamed
 
 
@@ -38,40 +35,48 @@ def solve(problem: Problem) -> Solution:
     Returns
     -------
     Solution
-        Never raises for a problem that has none: the status says why.
+        Where there is none, the status says why.
+
+    Raises
+    ------
+    InfeasibleProblem
+        The machine does not hang at rest, so that it has no natural frequencies.
     """
-    system = optimality_system(problem.plant, problem.desensitized, problem.effort)
+    system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     quiet = canonical_problem(problem, system)
-    independent, redundant = independence(quiet)
+    asked, redundant = independence(quiet)
     if redundant:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
         solution = solve(attrs.evolve(problem, desensitized=kept))
         return attrs.evolve(solution, problem=problem, redundant=redundant)
-    quiet = attrs.evolve(quiet, final=np.where(independent, quiet.final, np.nan))
+    quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
     try:
-        quiet, guess = quiet.rescaled(quiet.iterate(_guess(quiet)))
+        guess = _guess(quiet)
+        quiet, guess = quiet.rescaled(quiet.solve_linear(quiet.flow(guess.points), guess))
     except np.linalg.LinAlgError:
         return _failure(
             problem, Status.DIVERGED, 1, "The end conditions contradict one another; allow more time."
         )
 
     linear_angle = quiet.greatest_angle(guess)
-    approach = _advance(lambda share: attrs.evolve(quiet, final=share * quiet.final), guess)
+    approach = advance(lambda share: attrs.evolve(quiet, final=share * quiet.final), guess, guess.scaled(0.0))
     if approach.reached < 1.0 or quiet.greatest_angle(approach.solution) > HORIZONTAL:
         return _too_hard(problem, approach.iterations, linear_angle)
     quiet, guess = quiet.rescaled(approach.solution)
     weighted = _with_sway_cost(problem, quiet, guess)
-    climb = _advance(lambda share: _lighter(weighted, share), guess)
+    climb = advance(lambda share: _lighter(weighted, share), guess)
     iterations = approach.iterations + climb.iterations
+    if climb.reached < 1.0 and linear_angle < SMALL_ANGLE:
+        return _too_heavy(problem, iterations, climb.reached)
     if climb.reached < 1.0:
-        share = 10.0 ** (BETA_DECADES * (climb.reached - 1.0))
-        cure = f"Lower cost.sway_weight (about {problem.sway_weight * share:.2g} works)"
-        cure += "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
-        return _failure(problem, Status.DIVERGED, iterations, cure)
+        return _too_hard(problem, iterations, linear_angle)
     refined = refine(weighted, climb.solution)
     best = refined.solution or climb.solution
     if weighted.greatest_angle(best) > HORIZONTAL:
         return _too_hard(problem, iterations, linear_angle)
+    if weighted.missed(best) > TOLERATED_MISS:
+        cure = "Check the machine's equations and parameters."
+        return _failure(problem, Status.NOT_CONTROLLABLE, iterations, cure)
     return Solution(
         status=Status.CONVERGED,
         method=METHOD,
@@ -97,30 +102,6 @@ def _guess(canonical: Canonical) -> Trajectory:
     mesh = np.linspace(0.0, 1.0, INTERVALS + 1)
     stages = states(stage_times(mesh)).reshape(INTERVALS, STAGES, -1)
     return Trajectory(mesh=mesh, nodes=states(mesh), stages=stages)
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class _Advance:
-    """How far a continuation came, and its solution there."""
-
-    solution: Trajectory
-    reached: float
-    iterations: int
-    residual: float
-
-
-def _advance(problem_at: Callable[[float], Canonical], guess: Trajectory) -> _Advance:
-    """Solve the problem at share 1, through problems nearer to 0 where Newton needs them."""
-    reached, advance, iterations, residual = 0.0, 1.0, 0, float("inf")
-    while reached < 1.0 and advance >= SMALLEST_ADVANCE:
-        target = min(1.0, reached + advance)
-        outcome = solve_newton(problem_at(target).iterate, guess)
-        iterations += outcome.iterations
-        if outcome.solution is None:
-            advance /= 2.0
-        else:
-            reached, guess, residual, advance = target, outcome.solution, outcome.residual, 2.0 * advance
-    return _Advance(solution=guess, reached=reached, iterations=iterations, residual=residual)
 
 
 def _with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) -> Canonical:
@@ -150,6 +131,7 @@ def _optimum(canonical: Canonical, solution: Trajectory) -> Optimum:
     system, data = canonical.system, canonical.data
     layout, n, m = system.layout, system.layout.size, system.layout.m
     loads = len(system.plant.loads)
+    nodes = canonical.unknowns(solution.nodes)
     at_nodes, at_points = canonical.quantities(solution.nodes), canonical.quantities(solution.points)
     knots = data.duration * solution.mesh
     top = np.concatenate(
@@ -159,8 +141,8 @@ def _optimum(canonical: Canonical, solution: Trajectory) -> Optimum:
     hamiltonian = at_nodes[:, 0]
     return Optimum(
         knots=knots,
-        states=data.offset + data.scale * solution.nodes[:, :n],
-        costates=data.cost_scale * data.duration / data.scale * solution.nodes[:, n:],
+        states=data.offset + data.scale * nodes[:, :n],
+        costates=data.cost_scale * data.duration / data.scale * nodes[:, n:],
         hamiltonian=hamiltonian,
         top_derivative=unit_time / np.diff(knots)[:, None, None] ** np.arange(STAGES + 1)[:, None],
         top_order=layout.orders,
@@ -181,6 +163,14 @@ def _too_hard(problem: Problem, iterations: int, linear_angle: float) -> Solutio
     enough = problem.duration * np.sqrt(linear_angle / SMALL_ANGLE)
     cure = f"Allow about {enough:.2g} s (move.duration), or shorten the move."
     return _failure(problem, Status.SWINGS_TOO_FAR, iterations, cure)
+
+
+def _too_heavy(problem: Problem, iterations: int, reached: float) -> Solution:
+    """Blame the weight of the sway, and name one that works."""
+    share = 10.0 ** (BETA_DECADES * (reached - 1.0))
+    cure = f"Lower cost.sway_weight (about {problem.sway_weight * share:.2g} works)"
+    cure += "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
+    return _failure(problem, Status.DIVERGED, iterations, cure)
 
 
 def _failure(problem: Problem, status: Status, iterations: int, cure: str) -> Solution:

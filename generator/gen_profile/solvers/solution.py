@@ -16,11 +16,15 @@ class Status(Enum):
 
     CONVERGED = "The optimality conditions are met."
     SWINGS_TOO_FAR = "The load would have to swing beyond the horizontal."
+    INFEASIBLE = "No motion meets the end conditions within the limits."
+    NOT_CONTROLLABLE = "Some part of the machine swings on, whatever the axes do."
     DIVERGED = "Newton's method found no motion that meets the optimality conditions."
 
 
 ERRORS: dict[Status, type[GenProfileError]] = {
     Status.SWINGS_TOO_FAR: InfeasibleProblem,
+    Status.INFEASIBLE: InfeasibleProblem,
+    Status.NOT_CONTROLLABLE: InfeasibleProblem,
     Status.DIVERGED: SolverDiverged,
 }
 
@@ -35,8 +39,8 @@ class Optimum:
         Times of the mesh's nodes in s.
     states, costates : (intervals + 1, n) arrays
         In the order of `gen_profile.problem.pontryagin.StateLayout`, at the nodes.
-    hamiltonian : (intervals + 1,) array
-        H at the nodes, without the constant β of the running cost.
+    hamiltonian : (intervals + 1,) array or None
+        H at the nodes, without the constant β of the running cost; None where the method has none.
     top_derivative : (intervals, points, m) array
         The highest derivative of every axis' position that is a polynomial of degree points − 1 on each
         interval, as coefficients in the interval's own time in s, lowest power first: the jerk, or the snap.
@@ -50,17 +54,17 @@ class Optimum:
         Eq. (26), in the units of the effort squared times s.
     sway_weight, sway_scale : float
         β and γ as they entered the cost, automatic ones resolved.
-    defect : float
+    defect : float or None
         Greatest relative amount by which the solution misses the canonical equations between collocation
         points.
-    hamiltonian_variation : float
+    hamiltonian_variation : float or None
         Greatest relative change of H along the nodes; zero for the exact solution.
     """
 
     knots: Array
     states: Array
     costates: Array
-    hamiltonian: Array
+    hamiltonian: Array | None
     top_derivative: Array
     top_order: int
     sway: Array
@@ -68,8 +72,8 @@ class Optimum:
     cost: float
     sway_weight: float
     sway_scale: float
-    defect: float
-    hamiltonian_variation: float
+    defect: float | None
+    hamiltonian_variation: float | None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -90,6 +94,9 @@ class Solution:
         Relative size of the last Newton step.
     redundant : tuple of str
         Uncertain parameters whose sensitivities vanish with those of the others, so that they were left out.
+    worst_case_bound : float or None
+        Residual sway of the end load in m below which no motion could bring the worst machine, as far as
+        angles are small; None where the worst machine was not what counted.
     cure : str
         What to change, a sentence; empty on success.
     """
@@ -101,6 +108,7 @@ class Solution:
     iterations: int
     residual: float
     redundant: tuple[str, ...] = ()
+    worst_case_bound: float | None = None
     cure: str = ""
 
     def raise_for_status(self) -> Optimum:

@@ -162,6 +162,7 @@ def _missed_ends(spec: Spec, setpoints: SampledProfile) -> tuple[str, ...]:
         for axis, at, due, tolerance in zip(axes, found, asked, allowed, strict=True):
             if abs(at - due) > tolerance:
                 faults.append(
-                    f"Axis {axis.name} {word} at {at:.9g} {axis.unit}, and the spec asks for {due:.9g} {axis.unit}."
+                    f"Axis {axis.name} {word} at {at:.9g} {axis.unit}, "
+                    f"and the spec asks for {due:.9g} {axis.unit}."
                 )
     return tuple(faults)

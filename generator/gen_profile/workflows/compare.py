@@ -14,10 +14,10 @@ from gen_profile.problem.problem import problem_of
 from gen_profile.profile import Profile
 from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.shapers.shaped_move import shaped_profile
-from gen_profile.solvers import indirect
+from gen_profile.solvers import choice
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.spec import Spec
-from gen_profile.workflows.planning import Trial, figures, try_motion
+from gen_profile.workflows.planning import Trial, figures, timed, try_motion
 
 SWAY_WEIGHTS = (0.0, 20.0, 50.0)  # the paper's
 
@@ -77,6 +77,7 @@ class Comparison:
 
 def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
     """Try every shaper and the optimal motion with several weights of sway on the machines of a spec."""
+    spec = timed(spec)
     rows = []
     for method, make in _methods(spec):
         progress(method)
@@ -111,7 +112,8 @@ def _shaped(spec: Spec, name: str) -> Profile:
 
 
 def _optimal(spec: Spec, sway_weight: float) -> Profile:
-    return optimal_profile(indirect.solve(attrs.evolve(problem_of(spec), sway_weight=sway_weight)))
+    problem = attrs.evolve(problem_of(spec), sway_weight=sway_weight)
+    return optimal_profile(choice.solve(problem, spec.solver.method))
 
 
 def _recommend(spec: Spec, rows: list[Row]) -> tuple[dict[str, str | None], dict[str, str]]:

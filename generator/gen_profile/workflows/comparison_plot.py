@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,22 @@ from gen_profile.workflows.compare import Comparison
 
 SAMPLES = 1500
 AFTERMATH = 0.5  # of the move's duration, shown after its end
+# suffix → metadata that keeps the clock out of the file
+METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+
+
+def require_drawable(path: Path) -> None:
+    """Find out whether a picture can be drawn, before time goes into what it shows.
+
+    Raises
+    ------
+    OutputError
+        Matplotlib is not installed, or the file's suffix is none of a picture.
+    """
+    if path.suffix.lower() not in METADATA:
+        raise OutputError(f"--plot {path}: name a file that ends in {', '.join(METADATA)}.")
+    if find_spec("matplotlib") is None:
+        raise OutputError("--plot needs Matplotlib: pip install 'gen-profile[plot]'.")
 
 
 def draw(comparison: Comparison, path: Path) -> None:
@@ -20,12 +37,10 @@ def draw(comparison: Comparison, path: Path) -> None:
     Raises
     ------
     OutputError
-        Matplotlib is not installed, does not know the file's suffix, or cannot write it.
+        The file cannot be written.
     """
-    try:
-        import matplotlib  # noqa: PLC0415  # an extra
-    except ImportError as error:
-        raise OutputError("--plot needs Matplotlib: pip install 'gen-profile[plot]'.") from error
+    import matplotlib  # noqa: PLC0415  # an extra
+
     matplotlib.use("Agg")
     from matplotlib import pyplot  # noqa: PLC0415
 
@@ -33,9 +48,8 @@ def draw(comparison: Comparison, path: Path) -> None:
     try:
         _fill(axes, comparison)
         figure.suptitle(f"{comparison.spec.name}: {comparison.spec.plant.type}")
-        figure.savefig(path, dpi=120)
-    except ValueError as error:
-        raise OutputError(f"--plot {path}: {error}.") from error
+        with matplotlib.rc_context({"svg.hashsalt": comparison.spec.name}):  # else ids are random
+            figure.savefig(path, dpi=120, metadata=METADATA[path.suffix.lower()])
     except OSError as error:
         raise OutputError(f"--plot {path}: cannot write the picture: {error.strerror or error}.") from error
     finally:

@@ -15,7 +15,7 @@ from gen_profile.manifest import FILENAME, Artefact, Manifest, sha256
 from gen_profile.profile import Profile, SampledProfile
 from gen_profile.spec import Spec
 from gen_profile.workflows.delivery import Staging, staged
-from gen_profile.workflows.planning import Plan, plan
+from gen_profile.workflows.planning import Plan, plan, timed
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import Exporter, target_of
 from gen_profile_exporters.registry import find_exporter
@@ -69,6 +69,7 @@ class Design:
                 "defect": optimum.defect,
                 "hamiltonian_variation": optimum.hamiltonian_variation,
                 "redundant": list(solution.redundant),
+                "worst_case_bound_m": solution.worst_case_bound,
             },
             "figures": self.plan.figures,
             "check": None if self.check is None else self.check.to_dict(),
@@ -116,6 +117,7 @@ def design(
     """
     exporters = {name: find_exporter(name) for name in dict.fromkeys(formats)}
     progress("solving")
+    spec = timed(spec)
     planned = plan(spec)
     with staged(folder) as staging:
         progress("exporting")

@@ -9,15 +9,16 @@ import attrs
 import numpy as np
 
 from gen_profile.check import Scenario
+from gen_profile.errors import InfeasibleProblem
 from gen_profile.metrics import greatest, length, mean_square_root, peak, root_mean_square
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import require_limits
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
-from gen_profile.profile import Array, Profile
+from gen_profile.profile import Array, Profile, grid_length, grid_times
 from gen_profile.response import Response, Swing
-from gen_profile.solvers import indirect
+from gen_profile.solvers import choice
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec import Spec
@@ -64,6 +65,26 @@ class Plan:
     figures: dict[str, float]
 
 
+def timed(spec: Spec) -> Spec:
+    """Find the shortest duration where a spec asks for it; it ends on a cycle of the controller.
+
+    Raises
+    ------
+    InfeasibleProblem
+        No duration was found to do.
+    """
+    if not spec.move.shortest:
+        return spec
+    shortest = choice.minimum_time(problem_of(spec))
+    if shortest is None:
+        raise InfeasibleProblem(
+            "move.duration: no duration keeps the limits and brings the load to rest; widen the limits."
+        )
+    cycle = spec.export.cycle_time
+    duration = float(grid_times(grid_length(shortest, cycle), cycle)[-1])
+    return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=duration, shortest=False))
+
+
 def plan(spec: Spec) -> Plan:
     """Solve a spec and try the motion on all machines.
 
@@ -72,7 +93,7 @@ def plan(spec: Spec) -> Plan:
     InfeasibleProblem, SolverDiverged, LimitViolation
     """
     began = time.perf_counter()
-    solution = indirect.solve(problem_of(spec))
+    solution = choice.solve(problem_of(spec), spec.solver.method)
     motion = optimal_profile(solution)
     solver_time = time.perf_counter() - began
     trial = try_motion(spec, motion)

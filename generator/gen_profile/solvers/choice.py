@@ -1,0 +1,83 @@
+"""Which solver for which problem."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import attrs
+
+from gen_profile.problem.actuator import lag_compensated
+from gen_profile.problem.limits import breaches
+from gen_profile.problem.problem import Problem
+from gen_profile.solvers import direct, indirect, worst_case
+from gen_profile.solvers.direct import greatest_sway
+from gen_profile.solvers.minimum_time import shortest_duration
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.solution import Solution, Status
+from gen_profile.spec import LimitsSpec
+
+Method = Literal["auto", "indirect", "direct"]
+
+
+def solve(problem: Problem, method: Method = "auto") -> Solution:
+    """Solve a problem by the method that suits it.
+
+    Parameters
+    ----------
+    problem : Problem
+    method : str
+        ``"indirect"`` knows no limits; ``"auto"`` takes it where none binds, and the direct method elsewhere.
+    """
+    if problem.worst_case is not None:
+        return _explained(worst_case.solve(problem))
+    if method == "direct":
+        return _explained(direct.solve(problem))
+    solution = indirect.solve(problem)
+    if method == "indirect" or keeps_limits(solution):
+        return solution
+    return _explained(direct.solve(problem))
+
+
+def minimum_time(problem: Problem) -> float | None:
+    """Find the shortest duration in s for a problem's limits and robustness; None where none was found."""
+    if problem.worst_case is None:
+        return shortest_duration(problem, direct.solve)
+    return shortest_duration(problem, worst_case.solve_within_limits)
+
+
+def keeps_limits(solution: Solution) -> bool:
+    """Tell whether a solution is one and keeps its problem's limits."""
+    if solution.optimum is None:
+        return False
+    problem = solution.problem
+    if problem.limits == LimitsSpec():
+        return True
+    sway = greatest_sway(solution) if problem.limits.sway is not None else 0.0
+    command = lag_compensated(optimal_profile(solution), problem.tau)
+    return not breaches(problem.limits, command, sway)
+
+
+def _explained(solution: Solution) -> Solution:
+    """Say what would make an infeasible problem feasible."""
+    if solution.status is not Status.INFEASIBLE:
+        return solution
+    problem = solution.problem
+    shortest = minimum_time(problem)
+    cures = (
+        [] if shortest is None else [f"With these limits it takes at least {_up(shortest)} s (move.duration)"]
+    )
+    for name in ("velocity", "acceleration", "jerk", "sway", "travel"):
+        if getattr(problem.limits, name) is not None:
+            without = attrs.evolve(problem, limits=attrs.evolve(problem.limits, **{name: None}))
+            if direct.solve(without).optimum is not None:
+                cures.append(f"without limits.{name} it would do in {problem.duration:g} s")
+    return attrs.evolve(solution, cure="; ".join(cures) + "." if cures else solution.cure)
+
+
+def _up(value: float) -> str:
+    """Write three digits, rounded up: what is called enough must be enough."""
+    text = f"{value:.2e}"
+    mantissa, exponent = text.split("e")
+    if float(text) < value:
+        text = f"{float(mantissa) + 0.01:.2f}e{exponent}"
+    return f"{float(text):g}"

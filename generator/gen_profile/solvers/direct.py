@@ -1,0 +1,380 @@
+"""Direct method: the motion's polynomials themselves as variables, found by a few conic programs.
+
+A machine's equations are nearly linear in the motion, and everything else is convex: effort, sway, limits on
+Bézier coefficients, and the amplitudes of the modes after the move. So the equations are linearised about the
+last motion, and the convex program that results is solved to the end, until the motion stays (sequential
+convex programming; Malyuta et al., 2022). The first of these programs, linearised at rest, bounds from below
+what any motion can do where angles are small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import attrs
+import numpy as np
+from scipy import sparse
+
+from gen_profile.metrics import peak
+from gen_profile.problem.axis_reach import axis_reach
+from gen_profile.problem.dynamics import parameter_column
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.motion_equations import motion_equations
+from gen_profile.problem.pontryagin import SNAP_TIME, optimality_system
+from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
+from gen_profile.profile import Array
+from gen_profile.response import Swing
+from gen_profile.solvers import goals
+from gen_profile.solvers.bezier import Piece, power_basis
+from gen_profile.solvers.canonical import canonical_problem, independence
+from gen_profile.solvers.condensing import IntervalMaps, axes_map
+from gen_profile.solvers.conic import ConicProgram, ConicSolution, Matrix, Verdict
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.solution import Optimum, Solution, Status
+from gen_profile.solvers.transcription import Iterate, Machine, Transcription
+from gen_profile.spec import LimitsSpec
+
+METHOD = "direct"
+INTERVALS = 40
+MAX_INTERVALS = 480
+RADIANS_PER_INTERVAL = 3.0  # of the fastest mode, which Gauss collocation still follows closely
+STEP_TOLERANCE = 1e-8  # of the motion's coordinates, relative
+STALLED = 1e-5  # step that is still taken for the programs' own tolerance when it ceases to shrink
+MAX_ITERATIONS = 30
+TRACE = 1e-11  # of effort, in the least worst case
+SWAY_ROUNDS = 4  # to account for what the sway does between collocation points
+SWAY_SAMPLES = 4001
+HORIZONTAL = np.pi / 2.0
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Setup:
+    """A problem, transcribed.
+
+    Attributes
+    ----------
+    problem : Problem
+    transcription : Transcription
+    forms : tuple of (size, size) arrays
+        Twice the effort of every axis, in units of `cost_scale`.
+    cost_scale : float
+        Of the running cost.
+    tried : tuple of Amplitudes
+        Of every machine whose residual sway is to be bounded; empty where end states are zero instead.
+    """
+
+    problem: Problem
+    transcription: Transcription
+    forms: tuple[Array, ...]
+    cost_scale: float
+    tried: tuple[goals.Amplitudes, ...] = ()
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Found:
+    """Where a sequence of programs ended."""
+
+    verdict: Verdict
+    iterate: Iterate
+    solutions: tuple[ConicSolution, ...]
+    step: float
+
+    @property
+    def iterations(self) -> int:
+        """Number of programs."""
+        return len(self.solutions)
+
+
+# program, iterate, maps → P, q; adds constraints of its own to the program
+Goal = Callable[[ConicProgram, Iterate, Sequence[IntervalMaps]], tuple[Matrix, Array]]
+
+
+def solve(problem: Problem) -> Solution:
+    """Find the motion that minimises eq. (26) within the limits and leaves neither sway nor sensitivity.
+
+    Returns
+    -------
+    Solution
+        Never raises for a problem that has none: the status says why.
+    """
+    setup, redundant = set_up(problem)
+    if redundant:
+        kept = tuple(name for name in problem.desensitized if name not in redundant)
+        solution = solve(attrs.evolve(problem, desensitized=kept))
+        return attrs.evolve(solution, problem=problem, redundant=redundant)
+    weights, iterations = resolve_weights(problem)
+    allowed = asked = problem.limits.sway
+    for _ in range(SWAY_ROUNDS):
+        found = sequence(setup, setup.transcription.rest(), least_cost(setup, weights, asked, None))
+        iterations += found.iterations
+        solution = conclude(setup, found, weights, iterations)
+        if allowed is None or asked is None or solution.optimum is None:
+            break
+        sway = greatest_sway(solution)
+        if sway <= allowed:
+            break
+        asked *= goals.WITHIN * allowed / sway
+    return solution
+
+
+def resolve_weights(problem: Problem) -> tuple[goals.Weights, int]:
+    """Give β and γ their values, and count the iterations that it took."""
+    if problem.sway_weight == 0.0 or problem.sway_scale is not None:
+        return goals.Weights(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
+    setup, _ = set_up(attrs.evolve(problem, sway_weight=0.0, limits=LimitsSpec(), worst_case=None))
+    quiet = goals.Weights(beta=0.0, gamma=1.0)
+    found = sequence(setup, setup.transcription.rest(), least_cost(setup, quiet, None, None))
+    sway = np.linalg.norm(setup.transcription.end_sway_found(found.iterate), axis=1)
+    beta = problem.sway_weight * 2.0 * _cost(setup, found.iterate, quiet) / problem.duration / AUTO_EFFORT**2
+    return goals.Weights(beta=beta, gamma=AUTO_SWAY / float(sway.max())), found.iterations
+
+
+def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tuple[Setup, tuple[str, ...]]:
+    """Transcribe a problem; also name the parameters whose sensitivities need not be asked for.
+
+    Parameters
+    ----------
+    problem : Problem
+    others : sequence of mapping of str to float
+        Parameters of further machines whose residual sway shall be bounded, with the nominal one's.
+    """
+    system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
+    canonical = canonical_problem(problem, system)
+    asked, redundant = independence(canonical)
+    layout = system.layout
+    states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
+    worst_case = problem.worst_case
+    exact = worst_case is None or worst_case.nominal_zero
+    end = np.linalg.inv(canonical.basis)[np.ix_(states[asked[states] & exact], states)]
+    parameters = [problem.parameters, *others]
+    machines = [
+        Machine(
+            equations=motion_equations(
+                problem.plant, problem.desensitized if index == 0 else (), problem.order
+            ),
+            parameters=parameter_column(problem.plant, dict(values)),
+            scale=canonical.data.scale[states] if index == 0 else canonical.data.scale[: 2 * layout.n_u],
+            end=end if index == 0 else np.zeros((0, 2 * layout.n_u)),
+        )
+        for index, values in enumerate(parameters)
+    ]
+    commands_jerk = problem.tau is not None and problem.limits.jerk is not None
+    intervals = _intervals(problem)
+    piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=1.0 / intervals)
+    reach = axis_reach(problem)
+    transcription = Transcription(
+        intervals=intervals,
+        piece=piece,
+        axes=axes_map(piece, np.array(problem.start), reach, problem.duration),
+        duration=problem.duration,
+        target=np.array(problem.distance) / reach,
+        machines=tuple(machines),
+    )
+    form, cost_scale = goals.effort_form(problem, piece), canonical.data.cost_scale
+    unit = canonical.data.effort_weights * reach**2 / problem.duration**6 / cost_scale
+    tried = (
+        ()
+        if worst_case is None
+        else tuple(
+            goals.amplitudes(problem, dict(values), worst_case.load_limits, machine.scale)
+            for values, machine in zip(parameters, machines, strict=True)
+        )
+    )
+    setup = Setup(
+        problem=problem,
+        transcription=transcription,
+        forms=tuple(share * form for share in unit),
+        cost_scale=cost_scale,
+        tried=tried,
+    )
+    return setup, redundant
+
+
+def _intervals(problem: Problem) -> int:
+    """Resolve the fastest mode and, for snap, the layers at the ends in which it acts."""
+    fastest = linearize(problem.plant, problem.parameters, problem.target).frequencies[-1]
+    enough = fastest * problem.duration / RADIANS_PER_INTERVAL
+    if problem.effort == "snap":
+        enough = max(enough, problem.duration / SNAP_TIME)
+    return int(np.clip(np.ceil(enough), INTERVALS, MAX_INTERVALS))
+
+
+def sequence(setup: Setup, start: Iterate, goal: Goal, tolerance: float = STEP_TOLERANCE) -> Found:
+    """Solve programs linearised about one another's motion until it stays."""
+    transcription, iterate = setup.transcription, start
+    extra = goals.worst_case_variables(setup.tried) if setup.tried else 0
+    solutions: list[ConicSolution] = []
+    step, verdict = float("inf"), Verdict.FAILED
+    while verdict is Verdict.FAILED and len(solutions) < MAX_ITERATIONS:
+        maps = transcription.maps(iterate)
+        program = transcription.program(maps, extra)
+        goals.keep_limits(program, setup.problem, transcription)
+        solutions.append(program.solve(*goal(program, iterate, maps)))
+        if solutions[-1].verdict is not Verdict.SOLVED:
+            verdict = solutions[-1].verdict
+            break
+        following = transcription.iterate(solutions[-1].x, maps)
+        before, step = step, _step(iterate, following)
+        iterate = following
+        if step < tolerance or (step < STALLED and step > 0.5 * before):
+            verdict = Verdict.SOLVED
+    return Found(verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)
+
+
+def _step(before: Iterate, after: Iterate) -> float:
+    return float(np.abs(after.local - before.local).max() / np.abs(after.local).max())
+
+
+def least_cost(setup: Setup, weights: goals.Weights, sway_limit: float | None, worst: float | None) -> Goal:
+    """Minimise eq. (26), with the end load's sway and the worst case within bounds."""
+
+    def pose(program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]) -> tuple[Matrix, Array]:
+        transcription = setup.transcription
+        if sway_limit is not None:
+            goals.keep_sway(program, transcription, sway_limit, iterate, maps[0])
+        if worst is not None:
+            column = goals.bound_worst(program, transcription, setup.tried)
+            row = sparse.csc_matrix(([1.0], ([0], [column])), shape=(1, program.variables))
+            program.at_most(row, np.array([worst]))
+        scaled = attrs.evolve(weights, beta=weights.beta / setup.cost_scale)
+        quadratic, linear = goals.cost(transcription, setup.forms, scaled, iterate, maps[0])
+        return _widen(quadratic, program.variables), np.pad(linear, (0, program.variables - len(linear)))
+
+    return pose
+
+
+def least_worst(setup: Setup) -> Goal:
+    """Minimise the worst share of a load's limit; a trace of effort makes the motion unique."""
+
+    def pose(program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]) -> tuple[Matrix, Array]:
+        transcription, sway_limit = setup.transcription, setup.problem.limits.sway
+        if sway_limit is not None:
+            goals.keep_sway(program, transcription, sway_limit, iterate, maps[0])
+        column = goals.bound_worst(program, transcription, setup.tried)
+        linear = np.zeros(program.variables)
+        linear[column] = 1.0
+        return TRACE * transcription.effort(setup.forms, program.variables), linear
+
+    return pose
+
+
+def _widen(matrix: Matrix, width: int) -> Matrix:
+    widened = sparse.csc_matrix(matrix)
+    widened.resize(width, width)
+    return widened
+
+
+def conclude(setup: Setup, found: Found, weights: goals.Weights, iterations: int) -> Solution:
+    """Turn the outcome of programs into a solution."""
+    problem = setup.problem
+    status, cure = Status.CONVERGED, ""
+    if found.verdict is Verdict.INFEASIBLE:
+        status, cure = Status.INFEASIBLE, "Allow more time (move.duration), or wider limits."
+    elif found.verdict is not Verdict.SOLVED:
+        status, cure = Status.DIVERGED, "Allow more time (move.duration)."
+    elif greatest_angle(setup, found.iterate) > HORIZONTAL:
+        status, cure = Status.SWINGS_TOO_FAR, "Allow more time (move.duration), or shorten the move."
+    return Solution(
+        status=status,
+        method=METHOD,
+        problem=problem,
+        optimum=_optimum(setup, found, weights) if status is Status.CONVERGED else None,
+        iterations=iterations,
+        residual=found.step,
+        cure=cure,
+    )
+
+
+def _optimum(setup: Setup, found: Found, weights: goals.Weights) -> Optimum:
+    """Return to SI units."""
+    problem, transcription = setup.problem, setup.transcription
+    piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
+    intervals, axes = transcription.intervals, len(reach)
+    local = found.iterate.local.reshape(intervals, axes, piece.size)
+    knots = duration * np.arange(intervals + 1) / intervals
+    control = np.einsum("pb,kab->kpa", power_basis(3), local[:, :, piece.order :])
+    stages, machine = found.iterate.stages[0], transcription.machines[0]
+    points = stages.reshape(-1, stages.shape[2])
+    felt = transcription.axes(found.iterate.local).reshape(len(points), -1)
+    states, costates = _nodes(setup, found)
+    return Optimum(
+        knots=knots,
+        states=states,
+        costates=costates,
+        hamiltonian=None,
+        top_derivative=control
+        * (reach / duration**piece.order)
+        / (duration / intervals) ** np.arange(control.shape[1])[:, None],
+        top_order=piece.order,
+        sway=machine.equations.sway(points, felt, machine.parameters)[:, :, 0],
+        angle=greatest_angle(setup, found.iterate),
+        cost=_cost(setup, found.iterate, weights),
+        sway_weight=weights.beta,
+        sway_scale=weights.gamma,
+        defect=None,
+        hamiltonian_variation=None,
+    )
+
+
+def _nodes(setup: Setup, found: Found) -> tuple[Array, Array]:
+    """Read the nominal machine's states and costates at the nodes off a program, in SI units.
+
+    A costate is what the cost would lose if its state were displaced there, which is the multiplier of the
+    constraint that carries the state to the node.
+    """
+    problem, transcription = setup.problem, setup.transcription
+    piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
+    axes, orders, intervals = len(reach), piece.order, transcription.intervals
+    x, multipliers, scale = (
+        found.solutions[-1].x,
+        found.solutions[-1].multipliers,
+        transcription.machines[0].scale,
+    )
+    local = x[: intervals * transcription.breadth].reshape(intervals, axes, piece.size)
+    last = np.stack([piece.derivative(order)[-1] for order in range(orders)])
+    moved = np.concatenate([local[:, :, :orders], (local[-1:] @ last.T)])
+    moved_costates = np.concatenate([-multipliers[0], multipliers[1]]).reshape(intervals + 1, axes, orders)
+    units = reach[:, None] / duration ** np.arange(orders)
+    swung, swung_costates = transcription.nodes(x, 0), -multipliers[2].reshape(intervals + 1, -1)
+    half = 2 * len(problem.plant.unactuated)
+
+    def in_order(pendulum: Array, chain: Array) -> Array:
+        by_order = chain.transpose(0, 2, 1).reshape(intervals + 1, -1)
+        return np.concatenate([pendulum[:, :half], by_order, pendulum[:, half:]], axis=1)
+
+    start = np.zeros((axes, orders))
+    start[:, 0] = problem.start
+    return (
+        in_order(swung * scale, moved * units + start),
+        setup.cost_scale * duration * in_order(swung_costates / scale, moved_costates / units),
+    )
+
+
+def greatest_angle(setup: Setup, iterate: Iterate) -> float:
+    """Greatest rope angle of the nominal machine at the collocation points, in rad."""
+    machine, stages = setup.transcription.machines[0], iterate.stages[0]
+    points = stages.reshape(-1, stages.shape[2])
+    felt = setup.transcription.axes(iterate.local).reshape(len(points), -1)
+    return float(np.abs(machine.equations.angle(points, felt, machine.parameters)).max())
+
+
+def _cost(setup: Setup, iterate: Iterate, weights: goals.Weights) -> float:
+    """Evaluate eq. (26) in SI units."""
+    transcription, duration = setup.transcription, setup.problem.duration
+    local = iterate.local.reshape(transcription.intervals, len(setup.forms), -1)
+    effort = sum(
+        0.5 * float(np.einsum("ka,ab,kb->", local[:, axis], form, local[:, axis]))
+        for axis, form in enumerate(setup.forms)
+    )
+    sway = transcription.end_sway_found(iterate)
+    growth = np.exp(weights.gamma**2 * (sway**2).sum(axis=1))
+    return duration * (setup.cost_scale * effort + weights.beta * float(transcription.quadrature() @ growth))
+
+
+def greatest_sway(solution: Solution) -> float:
+    """Greatest sway of the nominal machine's end load during the motion of a solution, in m."""
+    problem, motion = solution.problem, optimal_profile(solution)
+    swing = Swing(problem.plant, motion, [problem.parameters], motion.duration)
+    response = swing.at(np.linspace(0.0, motion.duration, SWAY_SAMPLES))[0]
+    sway = np.linalg.norm(response.sway[:, problem.plant.end_load], axis=1, keepdims=True)
+    return float(peak(sway)[0])

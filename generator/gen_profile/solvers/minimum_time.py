@@ -1,0 +1,50 @@
+"""The shortest duration in which a problem can be solved within its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import attrs
+
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.problem import Problem
+from gen_profile.solvers.solution import Solution
+
+PRECISION = 1e-3  # relative, of the duration; what is returned is the feasible end
+LONGEST = 1e3  # slowest periods, after which the search gives up
+STRIDE = 1.5
+
+
+def shortest_duration(problem: Problem, solve: Callable[[Problem], Solution]) -> float | None:
+    """Bisect the duration.
+
+    Parameters
+    ----------
+    problem : Problem
+        Whose duration does not matter.
+    solve : Problem → Solution
+        A solver that keeps limits.
+
+    Returns
+    -------
+    float or None
+        s; None where no duration was found to do.
+    """
+
+    def feasible(duration: float) -> bool:
+        return solve(attrs.evolve(problem, duration=duration, sway_weight=0.0)).optimum is not None
+
+    slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
+    period = 2.0 * 3.141592653589793 / float(slowest)
+    enough = period
+    while not feasible(enough):
+        enough *= STRIDE
+        if enough > LONGEST * period:
+            return None
+    short = enough / STRIDE
+    while feasible(short):
+        enough, short = short, short / STRIDE
+    while enough - short > PRECISION * enough:
+        middle = (enough + short) / 2.0
+        enough, short = (middle, short) if feasible(middle) else (enough, middle)
+    return enough

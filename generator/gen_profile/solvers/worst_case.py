@@ -1,0 +1,135 @@
+"""Robustness over a whole range: the least residual sway of the worst machine.
+
+Zero sway of the nominal machine is let go of, as extra-insensitive shapers do (Singhose et al., 1994), unless
+it is asked for. The machines tried are the nominal one and the corners and ends of the ranges; where the
+worst machine lies between them it is added, until none is worse. Among the motions that are nearly as good as
+the best, the one of least cost is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+import attrs
+import numpy as np
+
+from gen_profile.metrics import peak
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.problem import Problem, WorstCase
+from gen_profile.profile import Array, Profile
+from gen_profile.response import Swing
+from gen_profile.solvers.conic import Verdict
+from gen_profile.solvers.direct import (
+    conclude,
+    least_cost,
+    least_worst,
+    resolve_weights,
+    sequence,
+    set_up,
+)
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.solution import Solution, Status
+
+SLACK = 1.003  # what the least cost may give away of the least worst case
+ROUNDS = 6
+CORNERS = 6  # parameters up to which all corners are tried
+GRID = 9  # machines along each range
+DRAWS = 64  # machines within the ranges
+WORSE = 1.01  # how much worse a machine must be than those tried to be added
+ROUGHLY = 1e-3  # step at which the worst case itself no longer changes: it does not fix the motion
+WATCH_SAMPLES = 1001
+
+Parameters = Mapping[str, float]
+
+
+def solve(problem: Problem) -> Solution:
+    """Minimise the worst residual sway, each load in shares of its limit, then the cost.
+
+    Parameters
+    ----------
+    problem : Problem
+        With a `worst_case`.
+
+    Returns
+    -------
+    Solution
+        Its `worst_case_bound` is what no motion on the same intervals goes below where angles are small.
+    """
+    return _solve(problem)[0]
+
+
+def solve_within_limits(problem: Problem) -> Solution:
+    """Minimise the worst residual sway, and call it infeasible where that still breaks a load's limit."""
+    solution, share = _solve(problem)
+    if share <= 1.0:
+        return solution
+    return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
+
+
+def _solve(problem: Problem) -> tuple[Solution, float]:
+    """Solve, and find the worst share of a load's limit."""
+    worst_case = problem.worst_case
+    if worst_case is None:
+        raise ValueError("the problem has no worst case")
+    problem = attrs.evolve(problem, desensitized=())
+    weights, iterations = resolve_weights(problem)
+    tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
+    for _ in range(ROUNDS):
+        setup, _ = set_up(problem, tried)
+        best = sequence(setup, setup.transcription.rest(), least_worst(setup), ROUGHLY)
+        iterations += best.iterations
+        if best.verdict is not Verdict.SOLVED:
+            return conclude(setup, best, weights, iterations), float("inf")
+        share = SLACK * float(best.solutions[-1].x[-1])
+        found = sequence(setup, best.iterate, least_cost(setup, weights, problem.limits.sway, share))
+        iterations += found.iterations
+        solution = conclude(setup, found, weights, iterations)
+        if solution.optimum is None:
+            return solution, float("inf")
+        shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
+        if shares.max() <= WORSE * share:
+            break
+        tried = [*tried, everywhere[int(shares.argmax())]]
+    bound = float(best.solutions[0].x[-1]) * worst_case.load_limits[-1]
+    return attrs.evolve(solution, worst_case_bound=bound), float(shares.max())
+
+
+def ends(problem: Problem, worst_case: WorstCase) -> list[Parameters]:
+    """List the corners of the box of parameters, few enough of them, and the ends of every range."""
+    uncertain = worst_case.uncertain
+    corners = product((-1.0, 1.0), repeat=len(uncertain)) if len(uncertain) <= CORNERS else ()
+    units = [tuple(np.eye(len(uncertain))[k] * sign) for k in range(len(uncertain)) for sign in (-1.0, 1.0)]
+    places = dict.fromkeys([*corners, *units])
+    return [_machine(problem, worst_case, place) for place in places]
+
+
+def candidates(problem: Problem, worst_case: WorstCase) -> list[Parameters]:
+    """List machines all over the box: its ends, a grid along every range, and a Latin hypercube."""
+    count = len(worst_case.uncertain)
+    grid = [np.eye(count)[k] * share for k in range(count) for share in np.linspace(-1.0, 1.0, GRID)]
+    random = np.random.default_rng(0)
+    strata = np.array([random.permutation(DRAWS) for _ in range(count)]).T
+    draws = 2.0 * (strata + random.random((DRAWS, count))) / DRAWS - 1.0
+    return ends(problem, worst_case) + [_machine(problem, worst_case, place) for place in (*grid, *draws)]
+
+
+def residual_shares(
+    problem: Problem, worst_case: WorstCase, motion: Profile, machines: Sequence[Parameters]
+) -> Array:
+    """Find the greatest share of a load's limit that every machine sways by, shape (machines,)."""
+    slowest = min(linearize(problem.plant, p, problem.target).frequencies[0] for p in machines)
+    watch = 2.0 * 2.0 * np.pi / slowest
+    swing = Swing(problem.plant, motion, machines, motion.duration + watch)
+    after = swing.at(motion.duration + np.linspace(0.0, watch, WATCH_SAMPLES))
+    limits = np.array(worst_case.load_limits)
+    return np.array([(peak(response.sway) / limits).max() for response in after])
+
+
+def _machine(problem: Problem, worst_case: WorstCase, place: Sequence[float] | Array) -> Parameters:
+    """Give every uncertain parameter its place within its range, from −1 to 1."""
+    shifted = {
+        name: problem.parameters[name] * (1.0 + share * float(at))
+        for (name, share), at in zip(worst_case.uncertain.items(), place, strict=True)
+    }
+    return {**problem.parameters, **shifted}
