@@ -1,7 +1,6 @@
 """The picture of a comparison."""
 
 import os
-import sys
 from xml.etree import ElementTree
 
 import numpy as np
@@ -33,31 +32,51 @@ def test_a_vector_picture_is_well_formed_and_names_what_it_shows(tmp_path):
     assert sum(len(path.get("d", "")) > 2000 for path in paths) >= 15  # three curves per method
 
 
-@pytest.mark.parametrize("name", ["picture.xyz", "no/such/folder/picture.png"])
-def test_a_picture_that_cannot_be_written_is_a_sentence(tmp_path, name):
-    outcome = run_here("compare", *FEW, "--plot", tmp_path / name)
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_pictures_of_one_comparison_are_alike_to_the_byte(tmp_path, suffix, monkeypatch):
+    pictures = []
+    for clock in (1e9, 1.1e9):
+        monkeypatch.setattr("time.time", lambda clock=clock: clock)
+        assert run_here("compare", *FEW, "--plot", tmp_path / f"picture{suffix}").code == 0
+        pictures.append((tmp_path / f"picture{suffix}").read_bytes())
+    assert pictures[0] == pictures[1]
+
+
+@pytest.mark.parametrize("name", ["picture.xyz", "picture"])
+def test_a_picture_of_unknown_kind_is_refused_before_the_work(tmp_path, name):
+    outcome = run_here("compare", "--plot", tmp_path / name)
+    assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
+    assert outcome.errors == [f"Error: --plot {tmp_path / name}: name a file that ends in .png, .svg, .pdf."]
+
+
+def test_a_picture_that_cannot_be_written_is_a_sentence(tmp_path):
+    outcome = run_here("compare", *FEW, "--plot", tmp_path / "no" / "picture.png")
     assert outcome.code == 2
     (error,) = outcome.errors
-    assert error.startswith(f"Error: --plot {tmp_path / name}: ")
-    assert error.endswith(".")
+    assert error.endswith("cannot write the picture: No such file or directory.")
     assert list(tmp_path.iterdir()) == []
 
 
+HIDE = """
+import sys
+from importlib.machinery import PathFinder
+
+find = PathFinder.find_spec
+PathFinder.find_spec = lambda name, *more: None if name == "matplotlib" else find(name, *more)
+"""
 INSTALL = "Error: --plot needs Matplotlib: pip install 'gen-profile[plot]'."
 
 
 def test_without_matplotlib_the_sentence_tells_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setattr("gen_profile.workflows.comparison_plot.find_spec", lambda _: None)
     outcome = run_here("compare", *FEW, "--plot", tmp_path / "picture.png")
     assert (outcome.code, outcome.errors) == (2, [INSTALL])
-    assert list(tmp_path.iterdir()) == []
 
 
-def test_without_matplotlib_the_installed_program_says_so_too(tmp_path):
-    blocked = tmp_path / "blocked"
-    blocked.mkdir()
-    (blocked / "matplotlib.py").write_text("raise ImportError('not installed here')\n")
-    paths = [str(blocked), *filter(None, [os.environ.get("PYTHONPATH")])]
+def test_where_matplotlib_is_not_installed_the_program_says_so_too(tmp_path):
+    """A start-up file of Python hides it."""
+    (tmp_path / "sitecustomize.py").write_text(HIDE, "utf-8")
+    paths = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
     words = ("compare", *FEW, "--plot", "picture.png")
     outcome = run_process(*words, cwd=tmp_path, PYTHONPATH=os.pathsep.join(paths))
     assert (outcome.code, outcome.errors) == (2, [INSTALL])

@@ -157,11 +157,13 @@ def compare(
     from gen_profile.workflows.compare import compare as run
 
     spec = _spec(spec_path, preset, overrides)
+    if picture is not None:
+        from gen_profile.workflows.comparison_plot import draw, require_drawable
+
+        require_drawable(picture)
     with progress() as tell:
         comparison = run(spec, tell)
         if picture is not None:
-            from gen_profile.workflows.comparison_plot import draw
-
             tell("drawing")
             draw(comparison, picture)
     _print(comparison.to_dict(), words.comparison(comparison), as_json)
