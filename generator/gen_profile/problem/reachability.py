@@ -10,26 +10,30 @@ behave alike: they follow statically.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from gen_profile.profile import Array
 
 SAMPLES = 256
-DEPENDENT = 1e-8  # share of rᵢ outside the span of the others below which its condition is implied
 
 
-def independent_states(A: Array, B: Array) -> Array:
-    """Choose, in the order of the rows, states that inputs can bring to given values independently.
+def independent_states(A: Array, B: Array, order: NDArray[np.intp], shares: Array) -> NDArray[np.bool_]:
+    """Choose states that inputs can bring to given values independently, those first in `order` first.
 
     Parameters
     ----------
     A : (n, n) array
         In units in which the horizon is 1.
     B : (n, m) array
+    order : (k,) array of int
+        States to choose from.
+    shares : (k,) array
+        Share of rᵢ outside the span of the others below which condition i is implied.
 
     Returns
     -------
-    (n,) array of bool
+    (k,) array of bool
     """
     step = expm(A / SAMPLES)
     responses = np.empty((SAMPLES + 1, *B.shape))
@@ -38,13 +42,13 @@ def independent_states(A: Array, B: Array) -> Array:
         responses[k + 1] = step @ responses[k]
     rows = responses.transpose(1, 0, 2).reshape(len(A), -1)
     basis = np.empty((0, rows.shape[1]))
-    chosen = np.zeros(len(A), dtype=bool)
-    for i, row in enumerate(rows):
+    chosen = np.zeros(len(order), dtype=bool)
+    for i, (row, share) in enumerate(zip(rows[order], shares, strict=True)):
         size = np.linalg.norm(row)
         outside = row
         for _ in range(2):  # once more, against cancellation
             outside = outside - (basis @ outside) @ basis
-        chosen[i] = size > 0.0 and np.linalg.norm(outside) > DEPENDENT * size
+        chosen[i] = size > 0.0 and np.linalg.norm(outside) > share * size
         if chosen[i]:
             basis = np.vstack([basis, outside / np.linalg.norm(outside)])
     return chosen

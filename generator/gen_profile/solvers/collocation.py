@@ -8,7 +8,6 @@ first, all intervals in one batch; what is left couples neighbouring nodes only 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 
 import attrs
@@ -21,9 +20,7 @@ from gen_profile.profile import Array
 
 STAGES = 4
 
-# points (count, size) → F (count, size) beside ∂F/∂z: (count, size, 1 + size)
 IntArray = NDArray[np.intp]
-Flow = Callable[[Array], Array]
 
 
 @attrs.frozen(eq=False)
@@ -98,6 +95,10 @@ class Trajectory:
             stages=self.stages + weight * (other.stages - self.stages),
         )
 
+    def scaled(self, factors: Array | float) -> Trajectory:
+        """Multiply every unknown by its factor."""
+        return Trajectory(mesh=self.mesh, nodes=self.nodes * factors, stages=self.stages * factors)
+
     @property
     def size(self) -> int:
         """Number of unknown functions."""
@@ -114,12 +115,13 @@ def stage_times(mesh: Array) -> Array:
     return np.asarray((mesh[:-1, None] + np.diff(mesh)[:, None] * GAUSS.c).ravel())
 
 
-def newton_iterate(flow: Flow, current: Trajectory, initial: Array, final: Array) -> Trajectory:
+def newton_iterate(flow: Array, current: Trajectory, initial: Array, final: Array) -> Trajectory:
     """Solve the collocation equations linearised about a trajectory.
 
     Parameters
     ----------
-    flow : Flow
+    flow : (points, size, 1 + size) array
+        F, and beside it ∂F/∂z, at the trajectory's collocation points.
     current : Trajectory
     initial, final : (size / 2,) arrays
         Boundary values of the first half of the unknowns (the states) at both ends; entries of `final` that
@@ -133,14 +135,12 @@ def newton_iterate(flow: Flow, current: Trajectory, initial: Array, final: Array
     Raises
     ------
     numpy.linalg.LinAlgError
-        When the linearised equations are singular or not finite.
+        When the linearised equations are singular.
     """
     intervals, _, size = current.stages.shape
     integration = np.diff(current.mesh)[:, None, None] * GAUSS.A
-    values = flow(current.points).reshape(intervals, STAGES, size, 1 + size)
+    values = flow.reshape(intervals, STAGES, size, 1 + size)
     slope, jacobian = values[..., 0], values[..., 1:]
-    if not np.isfinite(values).all():
-        raise np.linalg.LinAlgError("the canonical equations overflow")
 
     # (1 − h A ⊗ J) Z = z_k + h A (F − J Z₀), for the part of Z that does not depend on z_k and the part that
     # does

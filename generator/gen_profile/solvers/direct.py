@@ -145,7 +145,8 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
     worst_case = problem.worst_case
     exact = worst_case is None or worst_case.nominal_zero
-    end = np.linalg.inv(canonical.basis)[np.ix_(states[asked[states] & exact], states)]
+    modal: Array = np.linalg.inv(canonical.basis)
+    end = modal[np.ix_(states[asked[states] & exact], states)]
     parameters = [problem.parameters, *others]
     machines = [
         Machine(

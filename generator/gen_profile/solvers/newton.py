@@ -1,24 +1,24 @@
 """Damped Newton on a collocated boundary value problem, judged by the size of its steps.
 
 The residual of a boundary value problem says little about the distance to its solution; the Newton step is
-that distance, to first order, whatever the units (Deuflhard, Newton Methods for Nonlinear Problems, 2004,
-section 3).
+that distance, to first order, whatever the units. A damped step is taken if it shortens the next step, or at
+least the simplified one, which the old Jacobian gives (the natural monotonicity test: Deuflhard, Newton
+Methods for Nonlinear Problems, 2004, section 3.3).
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import attrs
 import numpy as np
 
 from gen_profile.profile import Array
+from gen_profile.solvers.canonical import Canonical
 from gen_profile.solvers.collocation import Trajectory
 
-TOLERANCE = 1e-7  # relative step after which the next iterate's error is of the order of its square
-STALLED = 1e-5  # relative step that is still taken for rounding noise when it ceases to shrink
-SMALLEST_DAMPING = 1.0 / 256.0
-MAX_ITERATIONS = 60
+TOLERANCE = 1e-7  # step after which the next iterate's error is of the order of its square
+STALLED = 1e-5  # step that is taken for rounding noise when it ceases to shrink
+SMALLEST_DAMPING = 1.0 / 16.0
+MAX_ITERATIONS = 20
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -30,47 +30,59 @@ class NewtonOutcome:
     residual: float
 
 
-def solve_newton(iterate: Callable[[Trajectory], Trajectory], guess: Trajectory) -> NewtonOutcome:
-    """Iterate from a guess until the step of the states is small.
+@attrs.frozen(kw_only=True, eq=False)
+class _Iterate:
+    """A trajectory, the canonical equations linearised about it, and where a full Newton step leads."""
+
+    trajectory: Trajectory
+    flow: Array
+    following: Trajectory
+    step: float
+
+
+def solve_newton(problem: Canonical, guess: Trajectory) -> NewtonOutcome:
+    """Iterate from a guess until the step is small, as `Canonical.distance` measures it.
 
     Parameters
     ----------
-    iterate : Trajectory → Trajectory
-        The full Newton iterate; raises `numpy.linalg.LinAlgError` where it does not exist.
+    problem : Canonical
     guess : Trajectory
     """
-    try:
-        current, following = guess, iterate(guess)
-    except np.linalg.LinAlgError:
+    current, damping = _iterate(problem, guess), 1.0
+    if current is None:
         return NewtonOutcome(solution=None, iterations=1, residual=float("inf"))
-    step, damping = _step(current, following), 1.0
     for iteration in range(1, MAX_ITERATIONS + 1):
-        if step < TOLERANCE:
-            return NewtonOutcome(solution=following, iterations=iteration, residual=step)
-        trial = current.blend(following, damping)
-        try:
-            beyond = iterate(trial)
-            trial_step = _step(trial, beyond)
-        except np.linalg.LinAlgError:
-            trial_step = float("inf")
-        if trial_step <= (1.0 - damping / 8.0) * step:
-            current, following, step, damping = trial, beyond, trial_step, min(1.0, 2.0 * damping)
-        elif step < STALLED:
-            return NewtonOutcome(solution=following, iterations=iteration, residual=step)
+        if current.step < TOLERANCE:
+            return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
+        trial = _iterate(problem, current.trajectory.blend(current.following, damping))
+        if trial is not None and _shortens(problem, current, trial, damping):
+            current, damping = trial, min(1.0, 2.0 * damping)
+        elif current.step < STALLED:
+            return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
         else:
             damping /= 2.0
             if damping < SMALLEST_DAMPING:
                 break
-    return NewtonOutcome(solution=None, iterations=iteration, residual=step)
+    return NewtonOutcome(solution=None, iterations=iteration, residual=current.step)
 
 
-def _step(current: Trajectory, following: Trajectory) -> float:
-    """Root mean square step of the states, each relative to its own greatest value.
+def _iterate(problem: Canonical, trajectory: Trajectory) -> _Iterate | None:
+    """Take a full Newton step, if there is one."""
+    try:
+        flow = problem.flow(trajectory.points)
+        following = problem.solve_linear(flow, trajectory)
+    except np.linalg.LinAlgError:
+        return None
+    return _Iterate(
+        trajectory=trajectory, flow=flow, following=following, step=problem.distance(trajectory, following)
+    )
 
-    Costates are left out: those of hardly excited modes carry rounding noise that no state feels.
-    """
-    states = current.size // 2
-    before, after = current.nodes[:, :states], following.nodes[:, :states]
-    size: Array = np.maximum(np.abs(before).max(axis=0), np.abs(after).max(axis=0))
-    relative = (after - before) / np.where(size > 0.0, size, 1.0)
-    return float(np.sqrt(np.mean(relative**2)))
+
+def _shortens(problem: Canonical, current: _Iterate, trial: _Iterate, damping: float) -> bool:
+    """Apply the monotonicity tests to the damped step that led to `trial`."""
+    enough = (1.0 - damping / 4.0) * current.step
+    if trial.step <= enough:
+        return True
+    mixed = np.concatenate([trial.flow[..., :1], current.flow[..., 1:]], axis=-1)
+    simplified = problem.solve_linear(mixed, trial.trajectory)
+    return problem.distance(trial.trajectory, simplified) <= enough

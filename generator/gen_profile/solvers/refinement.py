@@ -10,9 +10,9 @@ from gen_profile.solvers.canonical import Canonical
 from gen_profile.solvers.collocation import GAUSS, STAGES, Trajectory
 from gen_profile.solvers.newton import NewtonOutcome, solve_newton
 
-MAX_INTERVALS = 480
-DRIFT_TOLERANCE = 1e-7  # of the Hamiltonian over an interval, relative to its size
-DEFECT_TOLERANCE = 1e-2  # see `defect`; what it costs in sway is of its square
+MAX_INTERVALS = 240
+DRIFT_TOLERANCE = 1e-6  # of the Hamiltonian over an interval, relative to its size
+DEFECT_TOLERANCE = 3e-3  # see `defect`; what it costs in sway is of its square
 
 
 def refine(canonical: Canonical, solution: Trajectory) -> NewtonOutcome:
@@ -29,7 +29,7 @@ def refine(canonical: Canonical, solution: Trajectory) -> NewtonOutcome:
         parts = np.clip(np.ceil(parts), 1, 4).astype(int)
         if parts.max() == 1 or parts.sum() > MAX_INTERVALS:
             break
-        outcome = solve_newton(canonical.iterate, solution.on(_split(solution.mesh, parts)))
+        outcome = solve_newton(canonical, solution.on(_split(solution.mesh, parts)))
         iterations += outcome.iterations
         if outcome.solution is None:
             break
@@ -52,15 +52,15 @@ def _split(mesh: Array, parts: NDArray[np.intp]) -> Array:
 
 
 def defect(canonical: Canonical, solution: Trajectory) -> Array:
-    """Greatest miss of the canonical equations between collocation points, on each interval.
+    """Greatest miss of the state equations between collocation points, on each interval.
 
-    Per interval, as a share of each unknown's greatest value.
+    Per interval, as a share of each state's size. (What is missed of the costates' shows in the Hamiltonian.)
     """
     local = np.convolve(np.concatenate([[0.0], GAUSS.c, [1.0]]), [0.5, 0.5], "valid")[:, None]
     powers, coefficients = np.arange(STAGES + 1), solution.coefficients()
     values = np.einsum("tp,kps->kts", local**powers, coefficients)
     slopes = np.einsum("tp,kps->kts", powers[1:] * local ** powers[:-1], coefficients[:, 1:])
-    flow = canonical.system.flow(values.reshape(-1, solution.size), canonical.data.row())[:, :, 0]
-    miss = np.abs(slopes - np.diff(solution.mesh)[:, None, None] * flow.reshape(values.shape))
-    largest = np.abs(solution.nodes).max(axis=0)
-    return np.asarray((miss / np.where(largest > 0.0, largest, 1.0)).max(axis=(1, 2)))
+    flow = canonical.slopes(values.reshape(-1, solution.size))
+    flow = np.diff(solution.mesh)[:, None, None] * flow.reshape(values.shape)
+    weights = canonical.weights(solution)
+    return np.asarray((np.abs(slopes - flow)[:, :, : len(weights)] * weights).max(axis=(1, 2)))
