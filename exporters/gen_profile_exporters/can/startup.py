@@ -87,6 +87,11 @@ def timeout_ms(can: CanSpec) -> int:
     return ceil(round(1e3 * can.timeout, 9))
 
 
+def heartbeat_ms(can: CanSpec) -> int:
+    """Period of the drives' own heartbeats in ms."""
+    return min(SLOWEST_HEARTBEAT, timeout_ms(can))
+
+
 def startup_lists(motion: Setpoints, target: Target) -> dict[int, tuple[Entry, ...]]:
     """List by node what its drive must be set to, in the order in which it must be set."""
     return {
@@ -141,9 +146,10 @@ def _entries(node: int, column: int, motion: Setpoints, target: Target) -> Itera
 
 
 def _monitoring(can: CanSpec) -> Iterator[Entry]:
-    waiting = timeout_ms(can)
-    yield Entry(0x1017, 0, 16, min(SLOWEST_HEARTBEAT, waiting), "heartbeat of the drive (ms)")
-    yield Entry(0x1016, 1, 32, frames.MASTER << 16 | waiting, "watch the controller's heartbeat (node, ms)")
+    yield Entry(0x1017, 0, 16, heartbeat_ms(can), "heartbeat of the drive (ms)")
+    yield Entry(
+        0x1016, 1, 32, frames.MASTER << 16 | timeout_ms(can), "watch the controller's heartbeat (node, ms)"
+    )
     microseconds = frames.period_microseconds(can)
     yield Entry(0x1006, 0, 32, microseconds, "period of SYNC (µs)", optional=True)
 

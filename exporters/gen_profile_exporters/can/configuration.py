@@ -1,0 +1,225 @@
+"""Set the drives up by SDO before anything moves, and read back that they are.
+
+Whatever matters to safety is read back from the drive, not believed: identity, mode, mapping, interpolation
+period, what it does when nobody feeds it any more, the window of the following error, limits, and where the
+axis stands.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+
+import attrs
+import can
+from canopen import SdoAbortedError
+from canopen.sdo.exceptions import SdoError
+
+from gen_profile.errors import StreamAborted
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.cia402 import FAULTS, MOVING, state_of
+from gen_profile_exporters.can.link import Link
+from gen_profile_exporters.can.scaling import Setpoints, magnitude_counts
+from gen_profile_exporters.can.startup import MODES, Entry, startup_lists
+from gen_profile_exporters.exporter import Target
+
+CIA_402 = 402  # low word of 1000h
+NOT_THERE = {0x0602_0000, 0x0609_0011}  # SDO abort codes: no such object, no such subindex
+PDO_COB_IDS = range(0x1400, 0x1C00)
+COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it was set
+START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
+WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
+
+
+@attrs.frozen(kw_only=True)
+class Node:
+    """One drive as the configuration sees it: its place on the bus and among the axes."""
+
+    number: int
+    column: int
+    name: str
+
+
+def configure(link: Link, target: Target, motion: Setpoints) -> tuple[int, ...]:
+    """Set up all drives and find each of them fit to follow.
+
+    Returns
+    -------
+    tuple of int
+        Where the axes stand, in counts.
+
+    Raises
+    ------
+    StreamAborted
+        A drive is another one, in fault, cannot be set up, watches nothing, or stands elsewhere.
+    """
+    lists = startup_lists(motion, target)
+    return tuple(
+        _configure_one(
+            link, Node(number=number, column=column, name=axis.name), target, motion, lists[number]
+        )
+        for column, (number, axis) in enumerate(zip(lists, target.axes, strict=True))
+    )
+
+
+def start(link: Link, target: Target) -> None:
+    """Command all nodes to the NMT state operational."""
+    for number in frames.nodes(target):
+        link.send(nmt(START, number))
+
+
+def release(link: Link, target: Target) -> None:
+    """Let the drives be alone again: no more heartbeats watched, no PDOs taken."""
+    for number in frames.nodes(target):
+        link.sdo(number).download(0x1016, 1, bytes(4))
+        link.send(nmt(PRE_OPERATIONAL, number))
+
+
+def nmt(command: int, node: int) -> can.Message:
+    """Make an NMT command."""
+    return can.Message(arbitration_id=frames.NMT, data=[command, node], is_extended_id=False)
+
+
+def _configure_one(
+    link: Link, node: Node, target: Target, motion: Setpoints, entries: Sequence[Entry]
+) -> int:
+    link.send(nmt(PRE_OPERATIONAL, node.number))
+    _require_identity(link, node, target)
+    _set(link, node, entries)
+    mode = MODES[target.can.mode]
+    if (shown := _read(link, node, 0x6061)) != mode:
+        raise StreamAborted(f"axis {node.name}: the drive shows mode {shown} (6061h) instead of {mode}.")
+    _require_window(link, node)
+    _require_travel(link, node, motion)
+    return _require_start(link, node, target, motion)
+
+
+def _require_identity(link: Link, node: Node, target: Target) -> None:
+    device = _read(link, node, 0x1000)
+    if device & 0xFFFF != CIA_402:
+        raise StreamAborted(
+            f"axis {node.name}: node {node.number} is no CiA 402 drive (1000h is {device:08X}h)."
+        )
+    for sub, wanted, what in ((1, target.can.vendor, "vendor"), (2, target.can.product, "product")):
+        if wanted is not None and (found := _read(link, node, 0x1018, sub)) != wanted:
+            raise StreamAborted(
+                f"axis {node.name}: node {node.number} is another drive: its {what} is {found:08X}h, and "
+                f"can.{what} asks for {wanted:08X}h; check node ids and cabling."
+            )
+    if not _read(link, node, 0x6502) >> (MODES[target.can.mode] - 1) & 1:
+        raise StreamAborted(
+            f"axis {node.name}: the drive does not know the mode {target.can.mode} (6502h); choose another "
+            "one in can.mode."
+        )
+    state = state_of(_read(link, node, 0x6041))
+    if state in FAULTS | MOVING:
+        raise StreamAborted(
+            f"axis {node.name}: the drive is in the state {state.words!r}; find out why, and reset it there."
+        )
+
+
+def _set(link: Link, node: Node, entries: Sequence[Entry]) -> None:
+    """Write the list in its order where something differs, and require what the drive then holds."""
+    final = {(entry.index, entry.sub): entry for entry in entries}
+    if not _differing(link, node, final):
+        return
+    for entry in entries:
+        try:
+            link.sdo(node.number).download(entry.index, entry.sub, entry.data)
+        except SdoAbortedError:  # fixed in this drive: what counts is what is read back
+            continue
+        except (SdoError, struct.error) as error:
+            raise _silent(node, error) from error
+    if differing := _differing(link, node, final):
+        entry, found = differing[0]
+        holds = "nothing" if found is None else f"{int.from_bytes(found, 'little'):X}h"
+        raise StreamAborted(
+            f"axis {node.name}: {entry.index:04X}h:{entry.sub:02X} ({entry.meaning}) must hold "
+            f"{int.from_bytes(entry.data, 'little'):X}h, but the drive keeps {holds} there; set the drive, "
+            "or adapt the spec to it."
+        )
+
+
+def _differing(
+    link: Link, node: Node, final: Mapping[tuple[int, int], Entry]
+) -> list[tuple[Entry, bytes | None]]:
+    found = [(entry, _upload(link, node, entry.index, entry.sub)) for entry in final.values()]
+    return [
+        (entry, data) for entry, data in found if not (entry.optional if data is None else _same(entry, data))
+    ]
+
+
+def _same(entry: Entry, data: bytes) -> bool:
+    if entry.index in PDO_COB_IDS and entry.sub == 1 and entry.index & 0x0200 == 0:
+        apart = int.from_bytes(data, "little") ^ int.from_bytes(entry.data, "little")
+        return not apart & COB_ID_BITS
+    return data == entry.data
+
+
+def _require_window(link: Link, node: Node) -> None:
+    window = _read(link, node, 0x6065)
+    if window in {0, WINDOW_OFF}:
+        raise StreamAborted(
+            f"axis {node.name}: the drive does not watch its following error (6065h is {window:X}h); set it "
+            "there, or state can.following_error."
+        )
+
+
+def _require_travel(link: Link, node: Node, motion: Setpoints) -> None:
+    ends = [_upload(link, node, 0x607D, sub) for sub in (1, 2)]
+    if ends[0] is None or ends[1] is None:
+        return
+    low, high = (int.from_bytes(end, "little", signed=True) for end in ends if end is not None)
+    column = motion.position[:, node.column]
+    if low < high and not (low <= column.min() and column.max() <= high):
+        raise StreamAborted(
+            f"axis {node.name}: the motion from {column.min()} to {column.max()} counts leaves the drive's "
+            f"travel of {low} to {high} counts (607Dh)."
+        )
+
+
+def _require_start(link: Link, node: Node, target: Target, motion: Setpoints) -> int:
+    actual = _signed(_read(link, node, 0x6064))
+    first = int(motion.position[0, node.column])
+    axis = target.axes[node.column]
+    allowed = magnitude_counts(target.can.start_tolerance, axis)
+    if abs(actual - first) > allowed:
+        raise StreamAborted(
+            f"axis {node.name}: it stands at {actual / axis.counts_per_si:.6g}, and the motion starts at "
+            f"{first / axis.counts_per_si:.6g} ({abs(actual - first)} counts apart, {allowed} allowed by "
+            "can.start_tolerance); home it, or move it there."
+        )
+    return actual
+
+
+def _read(link: Link, node: Node, index: int, sub: int = 0) -> int:
+    data = _upload(link, node, index, sub)
+    if data is None:
+        raise StreamAborted(f"axis {node.name}: the drive has no object {index:04X}h:{sub:02X}.")
+    return int.from_bytes(data, "little")
+
+
+def _upload(link: Link, node: Node, index: int, sub: int) -> bytes | None:
+    """Read an object; None where the drive has none."""
+    try:
+        data: bytes = link.sdo(node.number).upload(index, sub)
+    except SdoAbortedError as error:
+        if error.code in NOT_THERE:
+            return None
+        raise StreamAborted(
+            f"axis {node.name}: the drive refuses to tell {index:04X}h:{sub:02X} ({error})."
+        ) from error
+    except (SdoError, struct.error) as error:
+        raise _silent(node, error) from error
+    return data
+
+
+def _silent(node: Node, error: Exception) -> StreamAborted:
+    return StreamAborted(
+        f"axis {node.name}: node {node.number} does not answer properly ({error}); check power, cabling, "
+        "bit rate and node id."
+    )
+
+
+def _signed(value: int) -> int:
+    return value - (1 << 32) if value >> 31 else value

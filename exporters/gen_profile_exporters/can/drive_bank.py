@@ -1,0 +1,158 @@
+"""Simulated drives on one bus, which together move one load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import can
+import canopen
+
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.cia402 import MOVING
+from gen_profile_exporters.can.clock import NANOSECONDS, Clock
+from gen_profile_exporters.can.load import Load
+from gen_profile_exporters.can.simulated_drive import SimulatedDrive
+
+WAIT = 0.0005  # s, for a frame, before the drives look at their clocks
+
+
+class DriveBank:
+    """Drives, their bus and their load.
+
+    Parameters
+    ----------
+    bus : can.BusABC
+        Opened; it stays the caller's.
+    clock : Clock
+    drives : sequence of SimulatedDrive
+        One per axis of the load.
+    counts_per_si : sequence of float
+        Of each axis.
+    load : Load
+    """
+
+    def __init__(
+        self,
+        bus: can.BusABC,
+        clock: Clock,
+        drives: Sequence[SimulatedDrive],
+        counts_per_si: Sequence[float],
+        load: Load,
+    ) -> None:
+        self.drives = tuple(drives)
+        self._bus, self._clock, self._load = bus, clock, load
+        self._counts_per_si = tuple(counts_per_si)
+        self._network = _Network(bus, clock)
+        self._synced = clock.now()
+        self._network.subscribe(frames.NMT, self._obey_reset)
+        for drive in self.drives:
+            self._network.add_node(drive.local)
+        for drive in self.drives:
+            drive.boot()
+
+    @property
+    def finished(self) -> bool:
+        """Whether every drive had been enabled, and none is any more."""
+        return all(drive.was_enabled and drive.state not in MOVING for drive in self.drives)
+
+    def run(self, stop: Callable[[], bool]) -> None:
+        """Serve the bus until told to stop."""
+        while not stop():
+            self.poll(WAIT)
+
+    def poll(self, wait: float = 0.0) -> None:
+        """Take in what is waiting, then look at the clock."""
+        message = self._bus.recv(wait)
+        while message is not None:
+            self._take(message)
+            message = self._bus.recv(0)
+        now = self._clock.now()
+        self._network.send_due(now)
+        for drive in self.drives:
+            drive.watch(now)
+        period = round(max(drive.period for drive in self.drives) * NANOSECONDS)
+        if self._moving and now - self._synced > period + period // 2:
+            self._synced += period
+            self._advance()
+
+    @property
+    def _moving(self) -> bool:
+        return any(drive.state in MOVING for drive in self.drives)
+
+    def _take(self, message: can.Message) -> None:
+        if message.is_error_frame or message.is_extended_id or message.is_remote_frame:
+            return
+        if message.arbitration_id == frames.SYNC:
+            self._synced = self._clock.now()
+            self._advance()
+            for drive in self.drives:
+                for cob_id, data in drive.feedback():
+                    self._network.send_message(cob_id, data)
+            return
+        data = bytearray(message.data)
+        for drive in self.drives:
+            drive.receive(message.arbitration_id, bytes(data), self._clock.now())
+        if (message.arbitration_id == frames.NMT and len(data) == 2) or self._is_request(message):
+            self._network.notify(message.arbitration_id, data, message.timestamp)
+
+    def _is_request(self, message: can.Message) -> bool:
+        nodes = {drive.node for drive in self.drives}
+        return message.arbitration_id - frames.SDO_REQUEST in nodes and len(message.data) == 8
+
+    def _advance(self) -> None:
+        """Move the load by one period."""
+        goals = [drive.next_command() for drive in self.drives]
+        duration = max(drive.period for drive in self.drives)
+        scaled = [goal / counts for goal, counts in zip(goals, self._counts_per_si, strict=True)]
+        actual = self._load.advance(scaled, duration)
+        for drive, position, counts in zip(self.drives, actual, self._counts_per_si, strict=True):
+            drive.arrive(position * counts)
+
+    def _obey_reset(self, _: int, data: bytearray, __: float) -> None:
+        command, node = data
+        if command in {canopen.nmt.NMT_COMMANDS["RESET"], canopen.nmt.NMT_COMMANDS["RESET COMMUNICATION"]}:
+            for drive in self.drives:
+                if node in {0, drive.node}:
+                    drive.reset()
+
+
+@attrs.define
+class _Periodic:
+    """A frame to be repeated: canopen's heartbeat, on our clock."""
+
+    cob_id: int
+    data: bytes
+    period: int
+    due: int
+    stopped: bool = False
+
+    def stop(self) -> None:
+        self.stopped = True
+
+    def update(self, data: Sequence[int]) -> None:
+        self.data = bytes(data)
+
+
+class _Network(canopen.Network):  # type: ignore[misc]
+    """canopen's network without its threads: frames come by `notify`, periodic ones go by `send_due`."""
+
+    def __init__(self, bus: can.BusABC, clock: Clock) -> None:
+        super().__init__(bus)
+        self._clock = clock
+        self._periodic: list[_Periodic] = []
+
+    def send_periodic(self, can_id: int, data: Any, period: float, remote: bool = False) -> _Periodic:
+        del remote
+        interval = round(period * NANOSECONDS)
+        task = _Periodic(can_id, bytes(data), interval, self._clock.now() + interval)
+        self._periodic.append(task)
+        return task
+
+    def send_due(self, now: int) -> None:
+        self._periodic = [task for task in self._periodic if not task.stopped]
+        for task in self._periodic:
+            if now >= task.due:
+                task.due = max(task.due + task.period, now)
+                self.send_message(task.cob_id, task.data)

@@ -1,0 +1,153 @@
+"""Object dictionary of the simulated drive, and its EDS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from io import StringIO
+
+import attrs
+import canopen
+from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
+
+from gen_profile_exporters.can.startup import OFF
+
+U8, U16, U32 = datatypes.UNSIGNED8, datatypes.UNSIGNED16, datatypes.UNSIGNED32
+I8, I16, I32 = datatypes.INTEGER8, datatypes.INTEGER16, datatypes.INTEGER32
+PDOS = range(4)
+MAPPED = 8  # entries of a mapping
+VENDOR, PRODUCT = 0x0000_02E5, 0x4750_0001
+WINDOW = 1 << 31  # counts; a drive's own following error window, wide open but watched
+
+
+@attrs.frozen(kw_only=True)
+class Make:
+    """How one maker's drive differs from another's.
+
+    Attributes
+    ----------
+    vendor, product : int
+        1018h.
+    miss : str
+        What it does without a new setpoint: ``"extrapolate"`` (and fault after `misses`), ``"hold"`` the last
+        one, or ``"stop"`` after `misses`.
+    misses : int
+        Periods in a row.
+    fixed_period : (int, int) or None
+        60C2h cannot be changed: digits and power of ten.
+    own_mapping : bool
+        Its PDOs come with another content and other COB-IDs than CiA 402 proposes.
+    following_error : int
+        6065h, in counts.
+    modes : int
+        6502h.
+    """
+
+    vendor: int = VENDOR
+    product: int = PRODUCT
+    miss: str = "extrapolate"
+    misses: int = 3
+    fixed_period: tuple[int, int] | None = None
+    own_mapping: bool = False
+    following_error: int = WINDOW
+    modes: int = 1 << 7 | 1 << 6  # csp and ip
+
+
+def dictionary(node: int, make: Make) -> canopen.ObjectDictionary:
+    """Build the object dictionary of one node."""
+    found = canopen.ObjectDictionary()
+    found.node_id = node
+    information = found.device_information
+    information.vendor_name, information.product_name = "gen-profile", "simulated CiA 402 drive"
+    information.vendor_number, information.product_number = make.vendor, make.product
+    for index, name, kind, access, value in _variables(make):
+        found.add_object(_variable(index, 0, name, kind, access=access, value=value))
+    for index, name, kind, access, values in _records(node, make):
+        record = ODRecord(name, index) if index != 0x1016 else ODArray(name, index)
+        record.add_member(_count(index, values))
+        for sub, value in enumerate(values, start=1):
+            if isinstance(kind, dict) and sub not in kind:
+                continue
+            of = kind[sub] if isinstance(kind, dict) else kind
+            record.add_member(_variable(index, sub, f"{name} {sub}", of, access=access, value=value))
+        found.add_object(record)
+    return found
+
+
+def eds(node: int, make: Make) -> str:
+    """Render the electronic data sheet (CiA 306)."""
+    text = StringIO()
+    canopen.export_od(dictionary(node, make), text, "eds")
+    return text.getvalue()
+
+
+def _variables(make: Make) -> Iterator[tuple[int, str, int, str, int]]:
+    yield 0x1000, "Device type", U32, "ro", 0x0002_0192
+    yield 0x1001, "Error register", U8, "ro", 0
+    yield 0x1006, "Communication cycle period", U32, "rw", 0
+    yield 0x1017, "Producer heartbeat time", U16, "rw", 0
+    yield 0x6007, "Abort connection option code", I16, "rw", 1
+    yield 0x6040, "Controlword", U16, "rw", 0
+    yield 0x6041, "Statusword", U16, "ro", 0
+    yield 0x605A, "Quick stop option code", I16, "rw", 2
+    yield 0x6060, "Modes of operation", I8, "rw", 0
+    yield 0x6061, "Modes of operation display", I8, "ro", 0
+    yield 0x6064, "Position actual value", I32, "ro", 0
+    yield 0x6065, "Following error window", U32, "rw", make.following_error
+    yield 0x6066, "Following error time out", U16, "rw", 10
+    yield 0x607A, "Target position", I32, "rw", 0
+    yield 0x6085, "Quick stop deceleration", U32, "rw", 1_000_000
+    yield 0x60B1, "Velocity offset", I32, "rw", 0
+    yield 0x60B2, "Torque offset", I16, "rw", 0
+    yield 0x6502, "Supported drive modes", U32, "ro", make.modes
+
+
+def _records(node: int, make: Make) -> Iterator[tuple[int, str, int | dict[int, int], str, tuple[int, ...]]]:
+    yield 0x1016, "Consumer heartbeat time", U32, "rw", (0,)
+    yield 0x1018, "Identity object", U32, "ro", (make.vendor, make.product, 1, 1)
+    yield 0x607D, "Software position limit", I32, "rw", (0, 0)
+    for index, name in (
+        (0x608F, "Position encoder resolution"),
+        (0x6091, "Gear ratio"),
+        (0x6092, "Feed constant"),
+    ):
+        yield index, name, U32, "rw", (1, 1)
+    yield 0x60C1, "Interpolation data record", I32, "rw", (0,)
+    access = "rw" if make.fixed_period is None else "ro"
+    period = (1, -3) if make.fixed_period is None else make.fixed_period
+    yield 0x60C2, "Interpolation time period", {1: U8, 2: I8}, access, period
+    for pdo in PDOS:
+        received, sent = _default_mapping(make, pdo)
+        for base, cob_id, mapping, word in (
+            (0x1400, 0x200, received, "RPDO"),
+            (0x1800, 0x180, sent, "TPDO"),
+        ):
+            used = cob_id + 0x100 * pdo + node if mapping else OFF | cob_id + 0x100 * pdo + node
+            kinds = {1: U32, 2: U8, 5: U16}
+            yield base + pdo, f"{word} {pdo + 1} parameter", kinds, "rw", (used, 255, 0, 0, 0)
+            entries = (*mapping, *(0,) * (MAPPED - len(mapping)))
+            yield base + 0x200 + pdo, f"{word} {pdo + 1} mapping", U32, "rw", entries
+
+
+def _default_mapping(make: Make, pdo: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Entries of an RPDO and a TPDO as they come: CiA 402's proposal, or the maker's own."""
+    proposed = {
+        0: ((0x6040_0010,), (0x6041_0010,)),
+        1: ((0x6040_0010, 0x6060_0008), (0x6041_0010, 0x6061_0008)),
+    }
+    own = {0: ((0x607A_0020, 0x6040_0010), (0x6064_0020,)), 3: ((0x60B1_0020,), (0x6041_0010, 0x6064_0020))}
+    return (own if make.own_mapping else proposed).get(pdo, ((), ()))
+
+
+def _count(index: int, values: tuple[int, ...]) -> ODVariable:
+    """Make subindex 0; in a mapping it counts the objects that are in use."""
+    if index & 0x0200 and index < 0x1C00:
+        used = len(values) - values.count(0)
+        return _variable(index, 0, "Number of mapped objects", U8, access="rw", value=used)
+    return _variable(index, 0, "Highest sub-index supported", U8, access="const", value=len(values))
+
+
+def _variable(index: int, sub: int, name: str, kind: int, *, access: str, value: int) -> ODVariable:
+    variable = ODVariable(name, index, sub)
+    variable.data_type, variable.access_type, variable.default = kind, access, value
+    variable.pdo_mappable = index >= 0x6000
+    return variable

@@ -1,0 +1,120 @@
+"""One CAN bus and one clock: frames go out, frames that came in are handed to whoever asked for them.
+
+Nothing here has a thread of its own: frames are taken in when the streamer has time for them, in the order in
+which they came. That also makes it run on a clock that a test holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import can
+import canopen
+from canopen.sdo import SdoClient
+
+from gen_profile.errors import StreamAborted
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.clock import NANOSECONDS, Clock
+
+POLL = NANOSECONDS // 5000  # between two looks at the bus, while an answer is awaited
+ANSWER_TIMEOUT = NANOSECONDS // 2
+FRAMES_AT_ONCE = 64  # a flooded bus must not keep the streamer from its deadline
+
+
+class Link:
+    """A bus with a clock.
+
+    Parameters
+    ----------
+    bus : can.BusABC
+        Opened; it stays the caller's.
+    clock : Clock
+    """
+
+    def __init__(self, bus: can.BusABC, clock: Clock) -> None:
+        self.bus = bus
+        self.clock = clock
+        self._takers: list[Callable[[can.Message], None]] = []
+        self._network: Any = canopen.Network(bus)
+        self._sdos: dict[int, _Sdo] = {}
+
+    def subscribe(self, take: Callable[[can.Message], None]) -> None:
+        """Hand every frame received from now on to `take`."""
+        self._takers.append(take)
+
+    def send(self, message: can.Message) -> None:
+        """Send one frame, or say why not.
+
+        Raises
+        ------
+        StreamAborted
+        """
+        try:
+            self.bus.send(message)
+        except (can.CanError, OSError) as error:
+            raise StreamAborted(
+                f"Frame {message.arbitration_id:03X}h cannot be sent ({error}): the transmit buffer is full "
+                "or the bus is down; check cable, termination, bit rate and `ip -details link`."
+            ) from error
+
+    def receive(self) -> bool:
+        """Take in one frame, if one is waiting.
+
+        Raises
+        ------
+        StreamAborted
+            The interface fails.
+        """
+        try:
+            message = self.bus.recv(0)
+        except (can.CanError, OSError) as error:
+            raise StreamAborted(f"The bus cannot be read ({error}): the interface went down.") from error
+        if message is None:
+            return False
+        for take in self._takers:
+            take(message)
+        node = message.arbitration_id - frames.SDO_ANSWER
+        if node in self._sdos and not message.is_extended_id and len(message.data) == 8:
+            self._network.notify(message.arbitration_id, message.data, message.timestamp)
+        return True
+
+    def drain(self) -> None:
+        """Take in what is waiting."""
+        for _ in range(FRAMES_AT_ONCE):
+            if not self.receive():
+                return
+
+    def wait_until(self, instant: int) -> None:
+        """Take in frames until an instant."""
+        while self.clock.now() < instant:
+            self.drain()
+            self.clock.sleep_until(min(instant, self.clock.now() + POLL))
+
+    def sdo(self, node: int) -> _Sdo:
+        """Open the SDO channel of a node."""
+        if node not in self._sdos:
+            channel = _Sdo(self, node)
+            channel.network = self._network
+            self._network.subscribe(channel.tx_cobid, channel.on_response)
+            self._sdos[node] = channel
+        return self._sdos[node]
+
+
+class _Sdo(SdoClient):  # type: ignore[misc]
+    """canopen's SDO client, which waits for answers by the link instead of by a thread."""
+
+    def __init__(self, link: Link, node: int) -> None:
+        super().__init__(frames.SDO_REQUEST + node, frames.SDO_ANSWER + node, canopen.ObjectDictionary())
+        self._link = link
+
+    def read_response(self) -> bytes:
+        """Wait for the answer, and fail as canopen does when none comes."""
+        deadline = self._link.clock.now() + ANSWER_TIMEOUT
+        while self.responses.empty() and self._link.clock.now() < deadline:
+            if not self._link.receive():
+                self._link.clock.sleep_until(self._link.clock.now() + POLL)
+        if self.responses.empty():
+            raise canopen.SdoCommunicationError("no answer")
+        answer: bytes = super().read_response()
+        return answer

@@ -1,0 +1,82 @@
+"""What a stream will send: read from the artefact, encoded before the first cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+import can
+
+from gen_profile.errors import ExportError
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.exporter import read_setpoints, replay, setpoint_ids
+from gen_profile_exporters.can.scaling import Setpoints
+from gen_profile_exporters.exporter import Target
+
+Cycle = tuple[can.Message, ...]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class StreamPlan:
+    """A motion in frames.
+
+    Attributes
+    ----------
+    target : Target
+    motion : Setpoints
+    cycles : tuple of tuple of can.Message
+        The setpoints of each cycle, one per axis; SYNC follows them.
+    """
+
+    target: Target
+    motion: Setpoints
+    cycles: tuple[Cycle, ...]
+
+    def preload(self, position: Sequence[int]) -> Cycle:
+        """Make setpoints at which the axes stand still."""
+        fields = frames.setpoint_fields(self.target.can)
+        pack = frames.packing(fields).pack
+        rest = [0] * (len(fields) - 1)
+        return tuple(
+            message(cob_id, pack(at, *rest))
+            for cob_id, at in zip(setpoint_ids(self.target), position, strict=True)
+        )
+
+
+def plan_of(content: bytes, target: Target) -> StreamPlan:
+    """Read a log that `gen_profile_exporters.can.exporter.encode` wrote.
+
+    Raises
+    ------
+    ExportError
+        It is none, is damaged, or has another period than the target.
+    """
+    motion = replay(content, target)
+    if motion.cycle_time != target.can.sync_period:
+        raise ExportError(
+            f"can.sync_period: the log's cycle is {motion.cycle_time:g} s and the spec's "
+            f"{target.can.sync_period:g} s; export the log again."
+        )
+    taken, _ = read_setpoints(content, target)
+    fields = frames.packing(frames.setpoint_fields(target.can))
+    cob_ids = setpoint_ids(target)
+    return StreamPlan(
+        target=target,
+        motion=Setpoints(
+            period=motion.cycle_time,
+            position=taken[:, :, 0],
+            offset=taken[:, :, 1] if taken.shape[2] > 1 else None,
+        ),
+        cycles=tuple(
+            tuple(
+                message(cob_id, fields.pack(*map(int, values)))
+                for cob_id, values in zip(cob_ids, cycle, strict=True)
+            )
+            for cycle in taken
+        ),
+    )
+
+
+def message(cob_id: int, data: bytes) -> can.Message:
+    """Make a frame with an 11-bit identifier."""
+    return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False)

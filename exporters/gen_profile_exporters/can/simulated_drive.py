@@ -1,0 +1,276 @@
+"""A CiA 402 drive on the bus, simulated: object dictionary, state machine, PDOs, and what it does in trouble.
+
+It takes its setpoint at each SYNC and leads its axis there within its interpolation period 60C2h, as real
+drives in csp and ip do. Without SYNC it goes on by its own clock.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import canopen
+
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.cia402 import (
+    FOLLOWING_ERROR,
+    FOLLOWS,
+    IP_ENABLE,
+    LIMIT_ACTIVE,
+    REMOTE,
+    VOLTAGE,
+    Controlword,
+    State,
+)
+from gen_profile_exporters.can.clock import NANOSECONDS
+from gen_profile_exporters.can.drive_dictionary import MAPPED, PDOS, Make, dictionary
+from gen_profile_exporters.can.startup import MODES, OFF
+
+HEARTBEAT_LOST, SETPOINT_LOST = 0x8130, 0x8250  # EMCY codes of CiA 301
+FOLLOWING, SYNC_LOST = 0x8611, 0x8700  # and of CiA 402
+POWERED = {State.SWITCHED_ON, State.ENABLED, State.QUICK_STOP, State.FAULT_REACTION}
+
+
+class SimulatedDrive:
+    """One node.
+
+    Parameters
+    ----------
+    node : int
+    make : Make
+    position : int
+        Where the axis stands, in counts.
+    """
+
+    def __init__(self, node: int, make: Make, position: int) -> None:
+        self.node, self.make = node, make
+        self.state = State.SWITCH_ON_DISABLED
+        self.command = self.actual = float(position)
+        self.velocity = 0.0  # counts/s, of the command
+        self.was_enabled = False
+        self._misses, self._fresh, self._flags, self._late = 0, False, 0, 0.0
+        self._controlword = 0
+        self._setpoint_heard: int | None = None
+        self._master_heard: int | None = None
+        self.local: Any = canopen.LocalNode(node, dictionary(node, make))
+        self.local.add_write_callback(self._written)
+        self._pack_feedback()
+
+    @property
+    def period(self) -> float:
+        """Interpolation period 60C2h in s."""
+        return float(self.value(0x60C2, 1) * 10.0 ** self.value(0x60C2, 2))
+
+    @property
+    def operational(self) -> bool:
+        """Whether PDOs are exchanged."""
+        return bool(self.local.nmt.state == "OPERATIONAL")
+
+    def value(self, index: int, sub: int = 0) -> int:
+        """Read an object."""
+        entry = self.local.object_dictionary.get_variable(index, sub)
+        return int(entry.decode_raw(self.local.get_data(index, sub)))
+
+    def store(self, index: int, sub: int, value: int) -> None:
+        """Set an object, as the drive itself does."""
+        entry = self.local.object_dictionary.get_variable(index, sub)
+        self.local.set_data(index, sub, entry.encode_raw(value))
+
+    def boot(self) -> None:
+        """Begin as after power-on: boot-up message, then pre-operational."""
+        self.local.nmt.state = "INITIALISING"
+        self.local.nmt.state = "PRE-OPERATIONAL"
+
+    def reset(self) -> None:
+        """Drop power and settings, and boot again."""
+        self.state, self.velocity = State.SWITCH_ON_DISABLED, 0.0
+        self.local.data_store.clear()
+        self.local.nmt.stop_heartbeat()
+        self._setpoint_heard = self._master_heard = None
+        self.boot()
+
+    def receive(self, cob_id: int, data: bytes, now: int) -> None:
+        """Take a frame that may be one of its RPDOs, or the master's heartbeat."""
+        if cob_id == frames.HEARTBEAT + (self.value(0x1016, 1) >> 16 & 0x7F):
+            self._master_heard = now
+        if not self.operational:
+            return
+        for pdo in PDOS:
+            if self.value(0x1400 + pdo, 1) == cob_id:
+                for index, sub, value in _unpacked(self._mapping(0x1600 + pdo), data):
+                    self.store(index, sub, value)
+                    if index in {0x607A, 0x60C1}:
+                        self._fresh, self._setpoint_heard = True, now
+
+    def watch(self, now: int) -> None:
+        """Look for a master that fell silent."""
+        if self.state is not State.ENABLED:
+            return
+        wait = self.value(0x1016, 1) & 0xFFFF
+        if wait and self._master_heard is not None and _over(now, self._master_heard, wait):
+            self._lose_connection(HEARTBEAT_LOST)
+        wait = self.value(0x1401, 5)
+        if wait and self._setpoint_heard is not None and _over(now, self._setpoint_heard, wait):
+            self._lose_connection(SETPOINT_LOST)
+
+    def next_command(self) -> float:
+        """Advance the command by one period and return it, in counts."""
+        before = self.command
+        if self.state is State.ENABLED:
+            self._follow()
+        if self.state in {State.QUICK_STOP, State.FAULT_REACTION}:
+            self._brake()
+        elif self.state is not State.ENABLED:
+            self.command = self.actual
+        if self.state is State.ENABLED:
+            self.velocity = (self.command - before) / self.period
+        return self.command
+
+    def arrive(self, actual: float) -> None:
+        """Be told where the axis is at the end of the period."""
+        self.actual = actual
+        self._watch_following_error()
+        self._pack_feedback()
+
+    def feedback(self) -> list[tuple[int, bytes]]:
+        """List the TPDOs due after a SYNC."""
+        sent = []
+        for pdo in PDOS:
+            cob_id, kind = self.value(0x1800 + pdo, 1), self.value(0x1800 + pdo, 2)
+            if self.operational and not cob_id & OFF and kind == 1:
+                sent.append((cob_id & 0x7FF, self._packed(self._mapping(0x1A00 + pdo))))
+        return sent
+
+    def fault(self, code: int) -> None:
+        """Report an emergency, brake, and stay in fault."""
+        if self.state not in {State.FAULT, State.FAULT_REACTION}:
+            self.local.emcy.send(code, 1)
+            self.state = State.FAULT_REACTION if self.state in POWERED else State.FAULT
+            self._pack_feedback()
+
+    def _written(self, index: int, subindex: int, od: object, data: bytes) -> None:
+        del subindex, od
+        if index == 0x6040:
+            self._obey(int.from_bytes(data, "little"))
+        elif index == 0x6060:
+            self.store(0x6061, 0, int.from_bytes(data, "little", signed=True))
+
+    def _obey(self, word: int) -> None:
+        """Change state as a controlword commands (CiA 402-2, table of transitions)."""
+        rising = word & ~self._controlword
+        self._controlword = word
+        state = self.state
+        if state is State.FAULT:
+            if rising & Controlword.FAULT_RESET:
+                self.state = State.SWITCH_ON_DISABLED
+        elif state is State.FAULT_REACTION:
+            pass
+        elif not word & 0x02:
+            self.state = State.SWITCH_ON_DISABLED
+        elif not word & 0x04:
+            self.state = (
+                State.QUICK_STOP if state in {State.ENABLED, State.QUICK_STOP} else State.SWITCH_ON_DISABLED
+            )
+        elif state is not State.QUICK_STOP:
+            self._obey_switch(word)
+        self._pack_feedback()
+
+    def _obey_switch(self, word: int) -> None:
+        match word & 0x0F:
+            case Controlword.SHUTDOWN:
+                self.state = State.READY
+            case Controlword.SWITCH_ON if self.state is not State.SWITCH_ON_DISABLED:
+                self.state = State.SWITCHED_ON
+            case Controlword.ENABLE if self.state in {State.SWITCHED_ON, State.ENABLED}:
+                if self.state is State.SWITCHED_ON:
+                    self.command, self.velocity, self._misses = self.actual, 0.0, 0
+                self.state, self.was_enabled = State.ENABLED, True
+            case _:
+                pass
+
+    def _follow(self) -> None:
+        if self._fresh:
+            self._fresh, self._misses = False, 0
+            index, sub = (0x60C1, 1) if self.value(0x6061) == MODES["ip"] else (0x607A, 0)
+            self.command = self._within_travel(float(self.value(index, sub)))
+            return
+        self._misses += 1
+        if self.make.miss == "extrapolate":
+            self.command = self._within_travel(self.command + self.velocity * self.period)
+        if self._misses > self.make.misses:
+            if self.make.miss == "extrapolate":
+                self.fault(SYNC_LOST)
+            elif self.make.miss == "stop":
+                self.state = State.QUICK_STOP
+
+    def _brake(self) -> None:
+        change = self.value(0x6085) * self.period
+        speed = max(0.0, abs(self.velocity) - change)
+        self.velocity = speed if self.velocity > 0 else -speed
+        self.command += self.velocity * self.period
+        if not speed:
+            self.state = State.FAULT if self.state is State.FAULT_REACTION else State.SWITCH_ON_DISABLED
+
+    def _within_travel(self, position: float) -> float:
+        low, high = self.value(0x607D, 1), self.value(0x607D, 2)
+        within = min(max(position, low), high) if low < high else position
+        self._flags = LIMIT_ACTIVE if within != position else 0
+        return within
+
+    def _watch_following_error(self) -> None:
+        window = self.value(0x6065)
+        apart = abs(self.command - self.actual) > window and window != 0xFFFF_FFFF
+        self._late = self._late + self.period if apart and self.state is State.ENABLED else 0.0
+        if self._late * 1e3 > self.value(0x6066):
+            self._flags |= FOLLOWING_ERROR
+            self.fault(FOLLOWING)
+
+    def _lose_connection(self, code: int) -> None:
+        """React as 6007h asks."""
+        match self.value(0x6007):
+            case 1:
+                self.fault(code)
+            case 2:
+                self.local.emcy.send(code, 1)
+                self.state = State.SWITCH_ON_DISABLED
+            case 3:
+                self.local.emcy.send(code, 1)
+                self.state = State.QUICK_STOP
+
+    def _pack_feedback(self) -> None:
+        interpolating = self.value(0x6061) != MODES["ip"] or self._controlword & IP_ENABLE
+        follows = FOLLOWS if self.state is State.ENABLED and interpolating else 0
+        voltage = VOLTAGE if self.state in POWERED else 0
+        self.store(0x6041, 0, self.state.bits | follows | voltage | REMOTE | self._flags)
+        self.store(0x6064, 0, _int32(round(self.actual)))
+
+    def _mapping(self, index: int) -> list[int]:
+        return [self.value(index, sub) for sub in range(1, min(self.value(index), MAPPED) + 1)]
+
+    def _packed(self, mapping: list[int]) -> bytes:
+        parts = []
+        for entry in mapping:
+            data = self.local.get_data(entry >> 16, entry >> 8 & 0xFF)
+            parts.append(data[: (entry & 0xFF) // 8])
+        return b"".join(parts)
+
+
+def _unpacked(mapping: list[int], data: bytes) -> list[tuple[int, int, int]]:
+    """Split a PDO: index, subindex and value of each object; nothing from one that is too short."""
+    if 8 * len(data) < sum(entry & 0xFF for entry in mapping):
+        return []
+    parts, start = [], 0
+    for entry in mapping:
+        length = (entry & 0xFF) // 8
+        signed = entry >> 16 in {0x607A, 0x60C1, 0x60B1, 0x60B2, 0x6060}
+        value = int.from_bytes(data[start : start + length], "little", signed=signed)
+        parts.append((entry >> 16, entry >> 8 & 0xFF, value))
+        start += length
+    return parts
+
+
+def _over(now: int, since: int, milliseconds: int) -> bool:
+    return now - since > milliseconds * NANOSECONDS // 1000
+
+
+def _int32(value: int) -> int:
+    return min(max(value, -(2**31)), 2**31 - 1)

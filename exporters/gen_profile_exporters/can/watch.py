@@ -1,0 +1,185 @@
+"""What the drives say on the bus, and which of it must end a stream."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum
+
+import attrs
+import can
+
+from gen_profile.errors import StreamAborted
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, MOVING, State, state_of
+from gen_profile_exporters.can.clock import NANOSECONDS, Clock
+
+OPERATIONAL = 5
+LATE_CYCLES = 2  # without an answer, after which a drive counts as gone
+HEARTBEATS_MISSED = 3
+BUS_OFF, CONTROLLER_STATE, PASSIVE = 0x40, 0x04, 0x30  # of SocketCAN's error frames (linux/can/error.h)
+
+
+class Alert(IntEnum):
+    """How much is demanded of the drives; each level includes those before."""
+
+    LISTENING = 0  # no one else in command
+    CONFIGURING = 1  # no reset
+    CYCLIC = 2  # answers to every SYNC, heartbeats
+    FOLLOWING = 3  # enabled and following
+
+
+@attrs.define
+class Axis:
+    """Last words of one drive.
+
+    Attributes
+    ----------
+    name : str
+    node : int
+    statusword, position : int
+        Of its last feedback; the statusword is 0 before the first one.
+    heard, beat : int
+        Instants in ns of the last feedback and heartbeat.
+    """
+
+    name: str
+    node: int
+    statusword: int = 0
+    position: int = 0
+    heard: int = 0
+    beat: int = 0
+
+    @property
+    def state(self) -> State:
+        """State that the statusword tells."""
+        return state_of(self.statusword)
+
+
+class Watch:
+    """Take in every frame, keep the first fault found.
+
+    Parameters
+    ----------
+    names, nodes : sequences
+        Of the axes.
+    clock : Clock
+    period, heartbeat : int
+        SYNC period, and period of the drives' heartbeats, in ns.
+    """
+
+    def __init__(
+        self, names: Sequence[str], nodes: Sequence[int], clock: Clock, period: int, heartbeat: int
+    ) -> None:
+        self.axes = tuple(Axis(name, node) for name, node in zip(names, nodes, strict=True))
+        self.alert = Alert.LISTENING
+        self.fault: str | None = None
+        self._clock, self._period, self._heartbeat = clock, period, heartbeat
+        self._feedback = frames.packing(frames.FEEDBACK)
+        self._takers = {
+            base + axis.node: (take, axis)
+            for axis in self.axes
+            for base, take in (
+                (frames.TPDO1, self._take_feedback),
+                (frames.EMCY, self._take_emergency),
+                (frames.HEARTBEAT, self._take_heartbeat),
+            )
+        }
+        ours = (frames.RPDO1, frames.RPDO2, frames.SDO_REQUEST)
+        self._ours = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER}
+        self._ours |= {base + axis.node for base in ours for axis in self.axes}
+
+    def take(self, message: can.Message) -> None:
+        """Take in one frame, whatever it is."""
+        if message.is_error_frame:
+            self._take_error(message)
+        elif not (message.is_extended_id or message.is_remote_frame):
+            if message.arbitration_id in self._ours:
+                self._find(
+                    f"Frame {message.arbitration_id:03X}h came from somebody else: a second controller is on "
+                    "the bus; disconnect it, or choose other nodes."
+                )
+            elif message.arbitration_id in self._takers:
+                take, axis = self._takers[message.arbitration_id]
+                take(axis, bytes(message.data))
+
+    def raise_alert(self, alert: Alert) -> None:
+        """Demand more from now on."""
+        if self.alert < Alert.CYCLIC <= alert:
+            for axis in self.axes:
+                axis.heard = axis.beat = self._clock.now()
+        self.alert = alert
+
+    def require_well(self) -> None:
+        """Raise the first fault found, or what is overdue or out of order now.
+
+        Raises
+        ------
+        StreamAborted
+        """
+        if self.alert >= Alert.CYCLIC:
+            self._look_for_silence()
+        for axis in self.axes:
+            self._look_at(axis)
+        if self.fault is not None:
+            raise StreamAborted(self.fault)
+
+    @property
+    def standing(self) -> bool:
+        """Whether every drive said that it is no longer powered to move."""
+        return all(axis.statusword and axis.state not in MOVING for axis in self.axes)
+
+    def _find(self, fault: str) -> None:
+        self.fault = self.fault or fault
+
+    def _take_feedback(self, axis: Axis, data: bytes) -> None:
+        if len(data) == self._feedback.size:
+            axis.statusword, axis.position = self._feedback.unpack(data)
+            axis.heard = self._clock.now()
+        elif self.alert >= Alert.CYCLIC:
+            self._find(
+                f"axis {axis.name}: feedback of {len(data)} bytes instead of {self._feedback.size}; "
+                "the drive's mapping was changed."
+            )
+
+    def _take_emergency(self, axis: Axis, data: bytes) -> None:
+        code = int.from_bytes(data[:2], "little")
+        if code:
+            self._find(f"axis {axis.name}: the drive reports emergency {code:04X}h; see its manual.")
+
+    def _take_heartbeat(self, axis: Axis, data: bytes) -> None:
+        axis.beat = self._clock.now()
+        state = data[0] & 0x7F if data else None
+        if state == 0 and self.alert >= Alert.CONFIGURING:
+            self._find(f"axis {axis.name}: the drive was reset; find out why before moving it again.")
+        elif state != OPERATIONAL and self.alert >= Alert.FOLLOWING:
+            self._find(f"axis {axis.name}: the drive left the NMT state operational.")
+
+    def _take_error(self, message: can.Message) -> None:
+        flags, data = message.arbitration_id, bytes(message.data)
+        if flags & BUS_OFF:
+            self._find("The CAN controller is bus-off; check cable, termination and bit rate.")
+        elif flags & CONTROLLER_STATE and len(data) > 1 and data[1] & PASSIVE:
+            self._find("The CAN controller is error-passive; check cable, termination and bit rate.")
+
+    def _look_for_silence(self) -> None:
+        now = self._clock.now()
+        for axis in self.axes:
+            if now - axis.heard > (LATE_CYCLES + 1) * self._period:
+                self._find(
+                    f"axis {axis.name}: no feedback for {(now - axis.heard) / NANOSECONDS * 1e3:.3g} ms; "
+                    "the drive, the cable or SYNC failed."
+                )
+            if now - axis.beat > HEARTBEATS_MISSED * self._heartbeat + self._period:
+                self._find(f"axis {axis.name}: no heartbeat; the drive or the cable failed.")
+
+    def _look_at(self, axis: Axis) -> None:
+        if axis.state in FAULTS:
+            self._find(f"axis {axis.name}: the drive is in the state {axis.state.words!r}.")
+        if self.alert < Alert.FOLLOWING:
+            return
+        if axis.statusword & FOLLOWING_ERROR:
+            self._find(f"axis {axis.name}: following error; the axis is blocked, or too slow for the motion.")
+        if axis.state is not State.ENABLED:
+            self._find(f"axis {axis.name}: the drive went to the state {axis.state.words!r}.")
+        elif not axis.statusword & FOLLOWS:
+            self._find(f"axis {axis.name}: the drive no longer follows the setpoints (statusword bit 12).")
