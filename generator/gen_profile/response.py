@@ -116,6 +116,58 @@ class Swing:
         return tuple(responses)
 
 
+def free_swing(
+    plant: Plant, machines: Array, *, q_a: Sequence[float], starts: Array, times: Array
+) -> tuple[Array, Array]:
+    """Let machines swing from given states while their axes stand still.
+
+    Parameters
+    ----------
+    plant : Plant
+    machines : (machines, parameters) array
+        In the order of `Plant.parameters`.
+    q_a : (m,) sequence of float
+        Where the axes stand.
+    starts : (machines, 2 n_u) array
+        q_u, then q̇_u, of every machine at the first of the times.
+    times : (samples,) array
+        s, rising.
+
+    Returns
+    -------
+    sway, angle : (machines, samples, loads) arrays
+
+    Raises
+    ------
+    CosimulationError
+        The integration fails.
+    """
+    acceleration, outputs = _functions(plant)
+    shape = (2, len(machines), len(plant.unactuated))
+    position = np.array([q_a], dtype=np.float64)
+    axes = np.concatenate([position, np.zeros((1, 2 * position.size))], axis=1)
+
+    def rate(_: float, state: Array) -> Array:
+        q_u, dq_u = state.reshape(shape)
+        return np.concatenate([dq_u.ravel(), acceleration(q_u, dq_u, axes, machines).ravel()])
+
+    start = starts.reshape(len(machines), 2, -1).swapaxes(0, 1).ravel()
+    integral = solve_ivp(
+        rate, (times[0], times[-1]), start, method="DOP853", t_eval=times, rtol=1e-8, atol=1e-11
+    )
+    if not integral.success:
+        raise CosimulationError(f"The {plant.type}'s swing cannot be integrated: {integral.message}")
+    q_u = integral.y.reshape(*shape, len(times))[0].transpose(0, 2, 1)
+    seen = np.stack(
+        [
+            outputs(np.ascontiguousarray(q), position, machine[None])[:, :, 0]
+            for q, machine in zip(q_u, machines, strict=True)
+        ]
+    )
+    loads = len(plant.loads)
+    return seen[:, :, :loads], seen[:, :, loads:]
+
+
 @cache
 def _functions(plant: Plant) -> tuple[Function, Function]:
     """q̈_u of (q_u, q̇_u, axes' motion, p), and sway and angle of (q_u, q_a, p)."""

@@ -1,5 +1,6 @@
 """The command line: arguments in, a workflow called, words and exit codes out."""
 
+from gen_profile.cli import identify
 from gen_profile.cli.commands import main
 
-__all__ = ["main"]
+__all__ = ["identify", "main"]

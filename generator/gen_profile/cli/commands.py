@@ -44,7 +44,7 @@ def _complete_presets(_: click.Context, __: click.Parameter, incomplete: str) ->
     ]
 
 
-def _spec_options(command: Command) -> Command:
+def spec_options(command: Command) -> Command:
     """Add what every command that takes a spec takes."""
     for decorate in (
         click.option(
@@ -66,8 +66,8 @@ def _spec_options(command: Command) -> Command:
     return command
 
 
-_json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
-_debug_option = click.option(
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
+debug_option = click.option(
     "--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."
 )
 
@@ -82,7 +82,7 @@ def cli() -> None:
 
 
 @cli.command(epilog="Example: gen-profile --preset paper --export plc --export can --out deploy")
-@_spec_options
+@spec_options
 @click.option(
     "--export",
     "formats",
@@ -103,8 +103,8 @@ def cli() -> None:
 @click.option("--cycle-time", metavar="SECONDS", help="Cycle of the controller, and SYNC period of the bus.")
 @click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
-@_json_option
-@_debug_option
+@json_option
+@debug_option
 def design(
     spec_path: Path | None,
     preset: str | None,
@@ -123,10 +123,10 @@ def design(
 
     if cycle_time is not None:
         overrides += (f"export.cycle_time={cycle_time}", f"can.sync_period={cycle_time}")
-    spec = _spec(spec_path, preset, overrides)
+    spec = chosen_spec(spec_path, preset, overrides)
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
-    _print(outcome.to_dict(), words.design(outcome), as_json)
+    print_outcome(outcome.to_dict(), words.design(outcome), as_json)
     if not outcome.passed and outcome.check is not None:
         _fail(
             outcome.check.reasons(), "The files were kept." if outcome.artefacts else "Nothing was written."
@@ -134,7 +134,7 @@ def design(
 
 
 @cli.command(epilog="Example: gen-profile compare --preset paper --plot comparison.png")
-@_spec_options
+@spec_options
 @click.option(
     "--plot",
     "picture",
@@ -142,8 +142,8 @@ def design(
     type=click.Path(path_type=Path),
     help="Draw the comparison (png, svg or pdf).",
 )
-@_json_option
-@_debug_option
+@json_option
+@debug_option
 def compare(
     spec_path: Path | None,
     preset: str | None,
@@ -156,7 +156,7 @@ def compare(
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.compare import compare as run
 
-    spec = _spec(spec_path, preset, overrides)
+    spec = chosen_spec(spec_path, preset, overrides)
     if picture is not None:
         from gen_profile.workflows.comparison_plot import draw, require_drawable
 
@@ -166,14 +166,14 @@ def compare(
         if picture is not None:
             tell("drawing")
             draw(comparison, picture)
-    _print(comparison.to_dict(), words.comparison(comparison), as_json)
+    print_outcome(comparison.to_dict(), words.comparison(comparison), as_json)
 
 
 @cli.command(epilog="Example: gen-profile check deploy/paper.st")
 @click.argument("artefact", type=click.Path(path_type=Path))
-@_spec_options
-@_json_option
-@_debug_option
+@spec_options
+@json_option
+@debug_option
 def check(
     artefact: Path, spec_path: Path | None, preset: str | None, overrides: tuple[str, ...], as_json: bool
 ) -> None:
@@ -188,27 +188,29 @@ def check(
     given = spec_path is not None or preset is not None
     if overrides and not given:
         raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")
-    spec = _spec(spec_path, preset, overrides) if given else None
+    spec = chosen_spec(spec_path, preset, overrides) if given else None
     with progress() as tell:
         tell("checking by co-simulation")
         judgement = check_artefact(artefact, spec, lambda: tell("compiling the plant's FMU, once"))
-    _print(judgement.to_dict(), words.judgement(judgement), as_json)
+    print_outcome(judgement.to_dict(), words.judgement(judgement), as_json)
     if not judgement.check.passed:
         _fail(judgement.check.reasons(), "Do not deploy it.")
 
 
 @cli.command(epilog="Example: gen-profile formats")
-@_json_option
+@json_option
 def formats(as_json: bool) -> None:
     """List the export formats."""
     from gen_profile_exporters.registry import formats as known
 
     rows = {name: f"{form.summary} ({form.suffix}; {form.proof})" for name, form in known().items()}
-    _print({"formats": {name: form._asdict() for name, form in known().items()}}, _definitions(rows), as_json)
+    print_outcome(
+        {"formats": {name: form._asdict() for name, form in known().items()}}, _definitions(rows), as_json
+    )
 
 
 @cli.command(epilog="Example: gen-profile plants")
-@_json_option
+@json_option
 def plants(as_json: bool) -> None:
     """List the machines with their parameters."""
     from gen_profile.plants.registry import find_plant, plant_types
@@ -230,16 +232,16 @@ def plants(as_json: bool) -> None:
             for q in plant.parameters
         }
         blocks.append(f"{type_}: {plant.summary}\n{_definitions(values)}")
-    _print({"plants": document}, "\n\n".join(blocks), as_json)
+    print_outcome({"plants": document}, "\n\n".join(blocks), as_json)
 
 
 @cli.command(epilog="Example: gen-profile presets")
-@_json_option
+@json_option
 def presets(as_json: bool) -> None:
     """List the built-in specs."""
     from gen_profile.spec_reading import presets as known
 
-    _print({"presets": known()}, _definitions(known()), as_json)
+    print_outcome({"presets": known()}, _definitions(known()), as_json)
 
 
 def main() -> None:
@@ -261,7 +263,8 @@ def main() -> None:
         sys.exit(_report(error, as_json))
 
 
-def _spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
+def chosen_spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
+    """Read the spec that the command line names, or the default preset."""
     from gen_profile.spec_reading import preset_spec, read_spec
 
     if path is not None and preset is not None:
@@ -282,7 +285,8 @@ def _command_meant(word: str) -> str:
     return near if "did you mean" in near else "."
 
 
-def _print(document: dict[str, Any], text: str, as_json: bool) -> None:
+def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
+    """Print an outcome for people, or for programs."""
     click.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else text)
 
 

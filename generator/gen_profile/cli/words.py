@@ -11,11 +11,14 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gen_profile.check import Check
     from gen_profile.spec import Spec
     from gen_profile.workflows.check import Judgement
     from gen_profile.workflows.compare import Comparison
     from gen_profile.workflows.design import Design
+    from gen_profile.workflows.identify import Identification
 
 MANIFEST_WORDS = {
     "matches": "the file is the one that was exported",
@@ -89,6 +92,38 @@ def comparison(found: Comparison) -> str:
         f"{kind}: {method or 'none'}. {found.reasons[kind]}" for kind, method in found.recommended.items()
     ]
     return "\n".join([f"{found.spec.name}: {_move(found.spec)}", _text(table), *left_out, *advice])
+
+
+def identification(found: Identification, path: Path) -> str:
+    """Tell what was identified, how well, and how the measurements agree with it."""
+    document = found.to_dict()
+    rows = [
+        (
+            name,
+            f"{row['value']:.6g} ± {row['half_range']:.2g} {row['unit']} "
+            f"(±{100.0 * row['half_range'] / abs(row['value'] or 1.0):.2g} %; {row['given']:g} before)",
+        )
+        for name, row in document["parameters"].items()
+    ]
+    for row in document["readings"]:
+        what = row["parameter"] if "parameter" in row else f"period of mode {row['mode']}"
+        read = row["value"] if "parameter" in row else row["seconds"]
+        off = (read - row["model"]) / row["uncertainty"]
+        rows.append((f"read {what}", f"{read:.6g} ± {row['uncertainty']:.2g}, {off:+.1f} σ off the model"))
+    rows += [
+        (
+            f"log of {row['load']}",
+            f"{row['samples']} samples of its {row['quantity']}, noise {row['noise']:.2g}",
+        )
+        for row in document["logs"]
+    ]
+    if found.estimate.contradiction > 1.0:
+        widened = (
+            f"the readings contradict one another; ranges widened {found.estimate.contradiction:.2g} times"
+        )
+        rows.append(("BEWARE", widened))
+    rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]
+    return _block(found.spec.name, rows)
 
 
 def _move(spec: Spec) -> str:

@@ -120,7 +120,7 @@ class Function:
 
         Parameters
         ----------
-        *arguments : (points, rows) arrays, C-contiguous
+        *arguments : (points, rows) arrays
             One per input; an input with one point is used for all.
 
         Returns
@@ -129,13 +129,9 @@ class Function:
             In Fortran order within a point, so that a one-column output is contiguous.
         """
         points = max(len(argument) for argument in arguments)
-        spread = [
-            np.ascontiguousarray(np.broadcast_to(argument, (points, argument.shape[1])), dtype=np.float64)
-            for argument in arguments
-        ]
         if points not in self._evaluators:
             self._evaluators[points] = self._evaluator(points)
-        return self._evaluators[points](spread)
+        return self._evaluators[points](arguments)
 
     def _evaluator(self, points: int) -> Callable[[Sequence[Array]], Array]:
         """Bind a mapped function to fixed buffers: CasADi's own conversions cost more than its evaluation."""

@@ -127,12 +127,12 @@ def _recommend(spec: Spec, rows: list[Row]) -> tuple[dict[str, str | None], dict
         reason = f"No method keeps the residual sway below {1e3 * limit:.3g} mm on all machines."
         return {"fastest": None, "gentlest": None}, {"fastest": reason, "gentlest": reason}
     fastest = min(safe, key=lambda row: row.figures["acceleration_max_m_per_s2"])
-    unit = spec.machine().actuated[0].unit
+    acceleration, unit = fastest.figures["acceleration_max_m_per_s2"], spec.machine().actuated[0].unit
     gentlest = min(safe, key=lambda row: row.figures["sway_transient_peak_m"])
     return {"fastest": fastest.method, "gentlest": gentlest.method}, {
         "fastest": (
             f"Of the methods that keep the residual sway below {1e3 * limit:.3g} mm on all machines, "
-            f"it asks for the least acceleration ({fastest.figures['acceleration_max_m_per_s2']:.3g} {unit}/s²): "
+            f"it asks for the least acceleration ({acceleration:.3g} {unit}/s²): "
             "the same drive could make the move in the shortest time with it."
         ),
         "gentlest": (

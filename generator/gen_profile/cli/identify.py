@@ -1,0 +1,112 @@
+"""The command that turns measurements into a spec."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
+from gen_profile.errors import SpecError
+
+
+@cli.command(epilog="Example: gen-profile identify crane.toml --measured L1=6.2±0.1 --period 51.3±0.3/10")
+@spec_options
+@click.option(
+    "--measured",
+    "readings",
+    metavar="NAME=VALUE±U",
+    multiple=True,
+    help="A parameter read off a tape or scale, with its standard deviation (+- will do for ±). Repeatable.",
+)
+@click.option(
+    "--period",
+    "periods",
+    metavar="[MODE:]S±U[/N]",
+    multiple=True,
+    help="N small swings by stopwatch, of the slowest mode (1) by default. Repeatable.",
+)
+@click.option(
+    "--swing",
+    "log",
+    metavar="CSV",
+    type=click.Path(path_type=Path),
+    help="A swing logged while the axes stood still.",
+)
+@click.option("--columns", metavar="TIME,VALUE", default="1,2", help="Columns of the log: names, or numbers.")
+@click.option(
+    "--signal",
+    metavar="SIGNAL",
+    default="angle",
+    help="What the log's values are: angle or sway, of the first load or, as in angle:hook, of another.",
+)
+@click.option("--unit", metavar="UNIT", help="Unit of the log's values: rad, deg, m, mm or um.")
+@click.option(
+    "--after",
+    metavar="SECONDS",
+    type=float,
+    default=0.0,
+    help="Leave out what the log holds before this time.",
+)
+@click.option(
+    "--free",
+    metavar="NAME",
+    multiple=True,
+    help="Identify a parameter that was not read directly. Repeatable.",
+)
+@click.option(
+    "--at", metavar="POSITION,…", help="Where the axes stood, in m or rad; at the move's target by default."
+)
+@click.option(
+    "--out",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    default=Path("identified.toml"),
+    help="Spec to write; ./identified.toml by default.",
+)
+@json_option
+@debug_option
+def identify(
+    spec_path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    *,
+    readings: tuple[str, ...],
+    periods: tuple[str, ...],
+    log: Path | None,
+    columns: str,
+    signal: str,
+    unit: str | None,
+    after: float,
+    free: tuple[str, ...],
+    at: str | None,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Find parameters from measurements on site, and write a spec."""
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import progress
+    from gen_profile.identification.measurements import Measurement, parse_period, parse_reading
+    from gen_profile.workflows.identify import identify as run
+    from gen_profile.workflows.identify import read_swing, write_spec
+
+    spec = chosen_spec(spec_path, preset, overrides)
+    measurements: list[Measurement] = [*map(parse_reading, readings), *map(parse_period, periods)]
+    with progress() as tell:
+        tell("identifying")
+        if log is not None:
+            time, comma, value = columns.partition(",")
+            if not comma:
+                raise SpecError(f"--columns {columns!r}: write TIME,VALUE, such as 1,2 or time,angle.")
+            read = read_swing(log, spec, columns=(time, value), signal=signal, unit=unit, after=after)
+            measurements.append(read)
+        found = run(spec, measurements, free, None if at is None else _positions(at))
+        write_spec(found.spec, out)
+    print_outcome({**found.to_dict(), "path": str(out)}, words.identification(found, out), as_json)
+
+
+def _positions(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise SpecError(f"--at {text!r}: write one number per axis, such as 3.5 or 0,3.5.") from error

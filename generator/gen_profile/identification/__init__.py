@@ -1,0 +1,1 @@
+"""A machine's parameters from what can be measured on site."""

@@ -1,0 +1,177 @@
+"""What can be measured on a machine: parameters by tape or scale, periods by stopwatch, a logged swing.
+
+Every uncertainty is one standard deviation.
+"""
+
+from __future__ import annotations
+
+import re
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import OutputError, SpecError
+from gen_profile.profile import Array, read_only
+from gen_profile.suggestion import suggestion
+from gen_profile.units import UNITS
+
+_NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
+_VALUE = rf"({_NUMBER})\s*(?:±|\+-|\+/-)\s*({_NUMBER})"
+LEAST_SAMPLES = 16
+
+
+@attrs.frozen(kw_only=True)
+class DirectReading:
+    """A parameter read off a tape, a scale or a data sheet, in SI units."""
+
+    parameter: str
+    value: float
+    uncertainty: float
+
+
+@attrs.frozen(kw_only=True)
+class Period:
+    """How long one free swing takes.
+
+    Attributes
+    ----------
+    mode : int
+        1 for the slowest mode.
+    seconds, uncertainty : float
+        Of one period.
+    """
+
+    mode: int
+    seconds: float
+    uncertainty: float
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class SwingLog:
+    """A free swing, logged while the axes stood still.
+
+    Attributes
+    ----------
+    times : (samples,) array
+        s, rising; not necessarily evenly spaced.
+    values : (samples,) array
+        Of one output of one load in rad or m, which may be off by a constant.
+    quantity : str
+        ``"angle"`` or ``"sway"``, as `gen_profile.plants.plant.Outputs` defines them.
+    load : str
+    """
+
+    times: Array = attrs.field(converter=read_only)
+    values: Array = attrs.field(converter=read_only)
+    quantity: str
+    load: str
+
+
+Measurement = DirectReading | Period | SwingLog
+
+
+def parse_reading(text: str) -> DirectReading:
+    """Read ``L1=0.47±0.005``.
+
+    Raises
+    ------
+    SpecError
+    """
+    found = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", text)
+    if found is None:
+        raise SpecError(f"--measured {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-).")
+    name, value, uncertainty = found.groups()
+    return DirectReading(
+        parameter=name,
+        value=float(value),
+        uncertainty=_positive(f"--measured {text!r}", "uncertainty", float(uncertainty)),
+    )
+
+
+def parse_period(text: str) -> Period:
+    """Read ``17.3±0.2/10``: ten swings in 17.3 s; ``2:0.70±0.01`` is one swing of the second mode.
+
+    Raises
+    ------
+    SpecError
+    """
+    found = re.fullmatch(rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", text)
+    if found is None:
+        raise SpecError(
+            f"--period {text!r}: write SECONDS±UNCERTAINTY, such as 1.73±0.02, or 17.3±0.2/10 for ten "
+            "swings, or 2:0.70±0.01 for the second mode (+- will do for ±)."
+        )
+    mode, seconds, uncertainty, swings = found.groups()
+    where, count = f"--period {text!r}", int(swings or 1)
+    return Period(
+        mode=int(_positive(where, "mode", float(mode or 1))),
+        seconds=_positive(where, "time", float(seconds)) / _positive(where, "number of swings", count),
+        uncertainty=_positive(where, "uncertainty", float(uncertainty)) / count,
+    )
+
+
+def parse_swing(
+    text: str, source: str, *, columns: tuple[str, str], unit: str, after: float, quantity: str, load: str
+) -> SwingLog:
+    """Read columns of a table whose columns are separated by commas, semicolons or tabs.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        Where it comes from, for errors.
+    columns : (str, str)
+        Of time in s and of the value: names in the first line, or numbers from 1.
+    unit : str
+        Of the value: rad, deg, m, mm or um.
+    after : float
+        Time in s from which on the axes stood still; earlier rows are left out.
+    quantity, load : str
+        What the value is; see `SwingLog`.
+
+    Raises
+    ------
+    OutputError
+        The table cannot be read.
+    """
+    lines = [re.split(r"[,;\t]", line) for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise OutputError(f"{source}: the log is empty.")
+    names = [cell.strip().strip('"') for cell in lines[0]]
+    headed = not all(map(_is_number, names))
+    places = [_column(column, names if headed else [], len(names), source) for column in columns]
+    rows = []
+    for number, line in enumerate(lines[headed:], start=1 + headed):
+        cells = [line[place].strip() if place < len(line) else "" for place in places]
+        if not all(map(_is_number, cells)):
+            raise OutputError(
+                f"{source}, row {number}: expected numbers, found {' and '.join(map(repr, cells))}."
+            )
+        rows.append([float(cell) for cell in cells])
+    table = np.array(rows).reshape(-1, 2)
+    table = table[table[:, 0] >= after]
+    if len(table) < LEAST_SAMPLES:
+        raise OutputError(f"{source}: a swing needs at least {LEAST_SAMPLES} samples, found {len(table)}.")
+    if not (np.diff(table[:, 0]) > 0.0).all():
+        raise OutputError(f"{source}: the times must rise from row to row.")
+    return SwingLog(
+        times=table[:, 0] - table[0, 0], values=table[:, 1] / UNITS[unit][1], quantity=quantity, load=load
+    )
+
+
+def _column(column: str, names: list[str], count: int, source: str) -> int:
+    if column in names:
+        return names.index(column)
+    if column.isdecimal() and 1 <= int(column) <= count:
+        return int(column) - 1
+    raise OutputError(f"{source}: there is no column {column!r}{suggestion(column, names)}.")
+
+
+def _is_number(text: str) -> bool:
+    return re.fullmatch(_NUMBER, text) is not None
+
+
+def _positive(where: str, what: str, value: float) -> float:
+    if not (np.isfinite(value) and value > 0.0):
+        raise SpecError(f"{where}: the {what} must be greater than 0.")
+    return value

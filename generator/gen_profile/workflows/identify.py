@@ -1,0 +1,230 @@
+"""From measurements on site to a spec whose machine they determine, and whose uncertainty they state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import tomli_w
+
+from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
+from gen_profile.identification.estimation import CONFIDENCE, Estimate, Machine, estimate
+from gen_profile.identification.measurements import DirectReading, Measurement, Period, SwingLog, parse_swing
+from gen_profile.plants.plant import Plant
+from gen_profile.spec import Spec
+from gen_profile.suggestion import suggestion
+from gen_profile.units import UNITS
+from gen_profile.workflows.delivery import staged
+
+WIDEST = 0.9  # relative half-range that a spec can state
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Identification:
+    """Outcome of an identification.
+
+    Attributes
+    ----------
+    given, spec : Spec
+        What the search began with, and what it ended in.
+    readings : tuple of DirectReading or Period
+    logs : tuple of SwingLog
+    estimate : Estimate
+    """
+
+    given: Spec
+    spec: Spec
+    readings: tuple[DirectReading | Period, ...]
+    logs: tuple[SwingLog, ...]
+    estimate: Estimate
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        found, units = self.estimate, {q.name: q.unit for q in self.spec.machine().parameters}
+        return {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "confidence": CONFIDENCE,
+            "contradiction": found.contradiction,
+            "parameters": {
+                name: {
+                    "unit": units[name],
+                    "given": self.given.plant.parameters[name],
+                    "value": value,
+                    "standard_uncertainty": found.standard_uncertainty[name],
+                    "half_range": found.half_range[name],
+                }
+                for name, value in found.values.items()
+            },
+            "readings": [
+                {**attrs.asdict(reading), "model": model}
+                for reading, model in zip(self.readings, found.model, strict=True)
+            ],
+            "logs": [
+                {"load": log.load, "quantity": log.quantity, "samples": len(log.times), "noise": noise}
+                for log, noise in zip(self.logs, found.noise, strict=True)
+            ],
+        }
+
+
+def read_swing(
+    path: Path, spec: Spec, *, columns: tuple[str, str], signal: str, unit: str | None, after: float
+) -> SwingLog:
+    """Read a logged swing of a spec's machine.
+
+    Parameters
+    ----------
+    path : Path
+        Table with a column of times in s and one of values.
+    columns : (str, str)
+        Their names in the first line, or their numbers from 1.
+    signal : str
+        What the values are: ``angle`` or ``sway`` of the first load, or of a named one, ``angle:hook``.
+    unit : str or None
+        Of the values; rad or m by default.
+    after : float
+        Time in s from which on the axes stood still.
+
+    Raises
+    ------
+    SpecError
+        The machine has no such signal.
+    OutputError
+        The file cannot be read.
+    """
+    loads = spec.machine().loads
+    quantity, _, named = signal.partition(":")
+    load = named or loads[0]
+    si_units = {"angle": "rad", "sway": "m"}
+    if quantity not in si_units:
+        raise SpecError(f"--signal: unknown signal {quantity!r}{suggestion(quantity, si_units)}.")
+    if load not in loads:
+        raise SpecError(f"--signal: unknown load {load!r}{suggestion(load, loads)}.")
+    unit = unit or si_units[quantity]
+    if unit not in UNITS or UNITS[unit][0] != si_units[quantity]:
+        fitting = [name for name, (si, _) in UNITS.items() if si == si_units[quantity]]
+        raise SpecError(f"--unit: {unit!r} does not measure an {quantity}{suggestion(unit, fitting)}.")
+    try:
+        text = path.read_text("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise OutputError(
+            f"Cannot read the log {path}: {getattr(error, 'strerror', None) or error}."
+        ) from error
+    return parse_swing(text, str(path), columns=columns, unit=unit, after=after, quantity=quantity, load=load)
+
+
+def identify(
+    spec: Spec,
+    measurements: Sequence[Measurement],
+    free: Sequence[str] = (),
+    q_a: Sequence[float] | None = None,
+) -> Identification:
+    """Identify parameters of a spec's machine, and put them and their ranges into the spec.
+
+    Parameters
+    ----------
+    spec : Spec
+        Its parameters are where the search starts; those that are not identified are taken as exact.
+    measurements : sequence of Measurement
+    free : sequence of str
+        Parameters to identify, beside those that were read directly.
+    q_a : (m,) sequence of float, optional
+        Where the axes stood while periods and swings were measured; the target of the move by default.
+
+    Raises
+    ------
+    SpecError
+        A measurement or parameter does not belong to the machine.
+    InfeasibleProblem
+        The measurements do not determine the parameters, or not well enough to be of use.
+    """
+    plant = spec.machine()
+    logs = tuple(m for m in measurements if isinstance(m, SwingLog))
+    readings = tuple(m for m in measurements if not isinstance(m, SwingLog))
+    read = [reading.parameter for reading in readings if isinstance(reading, DirectReading)]
+    asked = {*free, *read}
+    _require_known(plant, readings, asked)
+    stood = tuple(spec.move.target if q_a is None else q_a)
+    if len(stood) != len(plant.actuated):
+        raise SpecError(f"--at: must hold one position per axis ({len(plant.actuated)}), found {len(stood)}.")
+    found = estimate(
+        Machine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
+        [q.name for q in plant.parameters if q.name in asked],
+        readings,
+        logs,
+    )
+    return Identification(
+        given=spec, spec=_identified(spec, found), readings=readings, logs=logs, estimate=found
+    )
+
+
+def write_spec(spec: Spec, path: Path) -> None:
+    """Write a spec as TOML, complete, and the machine's file beside it where the user wrote one.
+
+    Raises
+    ------
+    OutputError
+    """
+    with staged(path.parent) as staging:
+        if spec.plant.file is not None:
+            staging.write(spec.plant.file.name, spec.plant.file.content)
+        staging.write(path.name, tomli_w.dumps(spec.to_dict()).encode("utf-8"))
+        staging.deliver()
+
+
+def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], asked: set[str]) -> None:
+    names = [q.name for q in plant.parameters]
+    faults = [f"{name}: unknown parameter{suggestion(name, names)}" for name in sorted(asked - set(names))]
+    modes = len(plant.unactuated)
+    faults += [
+        f"--period: the machine has {modes} modes, found mode {reading.mode}."
+        for reading in readings
+        if isinstance(reading, Period) and reading.mode > modes
+    ]
+    if not asked:
+        faults.append(
+            "Name what to identify: --free NAME, or read it directly, --measured NAME=VALUE±UNCERTAINTY."
+        )
+    if faults:
+        raise SpecError(*faults)
+
+
+def _identified(spec: Spec, found: Estimate) -> Spec:
+    """Put the parameters and their ranges into a spec."""
+    shares = {
+        name: found.half_range[name] / abs(value) for name, value in found.values.items() if value != 0.0
+    }
+    wide = {name: share for name, share in shares.items() if share > WIDEST}
+    if wide:
+        words = " and ".join(f"{name} to ±{100.0 * share:.0f} % only" for name, share in wide.items())
+        raise InfeasibleProblem(f"The measurements determine {words}; measure better, or take it as known.")
+    values = {name: _rounded(value, found.standard_uncertainty[name]) for name, value in found.values.items()}
+    robustness = spec.robustness
+    robust = robustness.method if robustness.uncertain else "sensitivity"
+    uncertain = {**robustness.uncertain, **{name: _rounded_up(share) for name, share in shares.items()}}
+    order = [name for name in spec.plant.parameters if name in uncertain]
+    return attrs.evolve(
+        spec,
+        plant=attrs.evolve(
+            spec.plant,
+            parameters={**spec.plant.parameters, **values},
+            defaults=tuple(name for name in spec.plant.defaults if name not in found.values),
+        ),
+        robustness=attrs.evolve(
+            robustness, method=robust, uncertain={name: uncertain[name] for name in order}
+        ),
+    )
+
+
+def _rounded(value: float, uncertainty: float) -> float:
+    """Leave out the digits that are worth less than a hundredth of the uncertainty."""
+    return round(value, 2 - math.floor(math.log10(uncertainty)))
+
+
+def _rounded_up(share: float) -> float:
+    """Keep two digits of a share, rounded up."""
+    digits = 1 - math.floor(math.log10(share))
+    return math.ceil(share * 10.0**digits) / 10.0**digits

@@ -1,0 +1,319 @@
+"""Identification against simulated machines whose parameters are known."""
+
+import numpy as np
+import pytest
+from command_line import run_here
+from generator.lagrangian_machines import Lagrange
+from scipy.integrate import solve_ivp
+
+from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
+from gen_profile.identification.estimation import Machine, estimate
+from gen_profile.identification.measurements import (
+    DirectReading,
+    Period,
+    SwingLog,
+    parse_period,
+    parse_reading,
+    parse_swing,
+)
+from gen_profile.plants.registry import find_plant
+from gen_profile.spec_reading import preset_spec, read_spec
+from gen_profile.workflows.identify import identify, write_spec
+
+CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
+
+
+def periods(m1, m2, L1, L2, g=9.81, **_):
+    """A textbook's two periods of a double pendulum."""
+    half = (m1 + m2) * g * (L1 + L2) / (2.0 * m1 * L1 * L2)
+    root = np.sqrt(half**2 - (m1 + m2) * g**2 / (m1 * L1 * L2))
+    return 2.0 * np.pi / np.sqrt([half - root, half + root])
+
+
+def swing(parameters, times, start, axes=(0.0, 4.0), type_="single-pendulum-crane"):
+    """Angle of a machine's first unactuated coordinate, by other equations and another integrator."""
+    lagrange, n = Lagrange(type_), len(start) // 2
+    still = np.zeros(len(axes))
+
+    def rates(_, x):
+        q, dq = np.concatenate([x[:n], axes]), np.concatenate([x[n:], still])
+        return np.concatenate([x[n:], lagrange.accelerations(q, dq, still, parameters)])
+
+    return solve_ivp(rates, (0.0, times[-1]), start, "LSODA", times, rtol=1e-9, atol=1e-11).y[0]
+
+
+def inside(found, true):
+    return all(abs(found.values[name] - true[name]) <= found.half_range[name] for name in found.values)
+
+
+# ── what is recovered, and how often ─────────────────────────────────────────────────────────────────────
+
+
+def test_tape_and_stopwatch_hold_the_machine_in_their_ranges():
+    """Read with stated noise, 300 times: the box of the ranges misses the machine in one of a hundred."""
+    true = CRANE.nominal() | {"L1": 0.52, "L2": 0.36, "m2": 0.25}
+    machine = Machine(plant=CRANE, parameters=CRANE.nominal() | {"m2": 0.25}, q_a=(0.0,))
+    slow, fast = periods(**true)
+    random, hits, errors = np.random.default_rng(7), 0, []
+    for _ in range(300):
+        readings = [
+            DirectReading(parameter="L1", value=random.normal(0.52, 0.005), uncertainty=0.005),
+            Period(mode=1, seconds=random.normal(slow, 0.01), uncertainty=0.01),
+            Period(mode=2, seconds=random.normal(fast, 0.004), uncertainty=0.004),
+        ]
+        found = estimate(machine, ["L1", "L2"], readings)
+        hits += inside(found, true)
+        errors.append([(found.values[n] - true[n]) / found.standard_uncertainty[n] for n in ("L1", "L2")])
+    assert hits >= 0.98 * 300
+    np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.12)  # neither too wide nor too narrow
+    np.testing.assert_allclose(np.mean(errors, axis=0), 0.0, atol=0.2)
+
+
+def test_a_logged_swing_holds_the_machine_in_its_ranges():
+    """Rope and damping from 25 noisy logs of a crane that is a fifth off, zero error included."""
+    true = HOIST.nominal() | {"L0": 2.3, "c": 300.0}
+    machine = Machine(plant=HOIST, parameters=HOIST.nominal() | {"c": 100.0}, q_a=(0.0, 4.0))
+    times = np.arange(0.0, 25.0, 0.1)
+    exact = swing(true, times, [0.15, -0.1])
+    random, errors, hits = np.random.default_rng(11), [], 0
+    for _ in range(25):
+        values = exact + 0.03 + random.normal(0.0, 3e-3, len(times))
+        log = SwingLog(times=times, values=values, quantity="angle", load="payload")
+        found = estimate(machine, ["L0", "c"], [], [log])
+        hits += inside(found, true)
+        errors.append([(found.values[n] - true[n]) / found.standard_uncertainty[n] for n in ("L0", "c")])
+        assert found.noise[0] == pytest.approx(3e-3, rel=0.25)
+    assert hits >= 24
+    np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.35)
+
+
+def test_a_log_and_a_tape_together_find_both_ropes_of_a_double_pendulum():
+    true = CRANE.nominal() | {"L1": 0.52, "L2": 0.36, "c1": 2e-3}
+    times = np.sort(np.random.default_rng(3).uniform(0.0, 12.0, 500))  # unevenly spaced
+    exact = swing(true, times, [0.1, -0.05, 0.2, 0.3], (0.0,), "double-pendulum-crane")
+    noisy = exact + np.random.default_rng(5).normal(0.0, 2e-3, len(times))
+    log = SwingLog(times=times, values=noisy, quantity="angle", load="hook")
+    machine = Machine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
+    tape = DirectReading(parameter="L1", value=0.523, uncertainty=0.005)
+    found = estimate(machine, ["L1", "L2", "c1"], [tape], [log])
+    assert inside(found, true)
+    assert found.half_range["L2"] < 0.005
+
+
+def test_noise_that_lasts_from_sample_to_sample_counts_for_less():
+    times = np.arange(0.0, 25.0, 0.05)
+    exact = swing(HOIST.nominal() | {"c": 300.0}, times, [0.15, 0.0])
+    machine = Machine(plant=HOIST, parameters=HOIST.nominal() | {"c": 300.0}, q_a=(0.0, 4.0))
+    white = np.random.default_rng(2).normal(0.0, 3e-3, len(times) + 9)
+    lasting = np.convolve(white, np.full(10, 10**-0.5), "valid")  # as strong, but alike over ten samples
+
+    def range_of(noise):
+        log = SwingLog(times=times, values=exact + noise, quantity="angle", load="payload")
+        return estimate(machine, ["L0"], [], [log]).half_range["L0"]
+
+    assert range_of(lasting) > 2.0 * range_of(white[: len(times)])
+
+
+def test_an_exact_log_is_identified_exactly():
+    times = np.arange(0.0, 20.0, 0.1)
+    log = SwingLog(
+        times=times, values=swing(HOIST.nominal(), times, [0.3, 0.0]), quantity="angle", load="payload"
+    )
+    machine = Machine(plant=HOIST, parameters=HOIST.nominal() | {"L0": 1.5}, q_a=(0.0, 4.0))
+    assert estimate(machine, ["L0"], [], [log]).values["L0"] == pytest.approx(2.0, abs=1e-6)
+
+
+def test_contradictory_readings_widen_the_ranges():
+    machine = Machine(plant=HOIST, parameters=HOIST.nominal(), q_a=(0.0, 0.0))
+
+    def read(*lengths):
+        tape = [DirectReading(parameter="L0", value=length, uncertainty=0.01) for length in lengths]
+        return estimate(machine, ["L0"], tape)
+
+    agreeing, torn = read(2.0, 2.01, 1.99), read(2.0, 2.2, 1.8)
+    assert agreeing.contradiction == 1.0
+    assert torn.contradiction == pytest.approx(20.0, rel=1e-6)
+    assert torn.standard_uncertainty["L0"] == pytest.approx(20.0 * 0.01 / np.sqrt(3.0), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("names", "readings", "blamed"),
+    [
+        (["L1", "L2"], [Period(mode=1, seconds=1.7, uncertainty=0.01)], "L1 and L2"),
+        (["L1", "c1"], [Period(mode=1, seconds=1.7, uncertainty=0.01)], "L1 and c1"),
+        (
+            ["L1", "m1", "m2"],
+            [Period(mode=n, seconds=s, uncertainty=0.01) for n in (1, 2) for s in (1.7 / n, 1.71 / n)],
+            "m1 and m2",
+        ),
+        (["g"], [DirectReading(parameter="L1", value=0.5, uncertainty=0.1)], "g"),
+    ],
+)
+def test_what_is_not_determined_is_named(names, readings, blamed):
+    machine = Machine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
+    with pytest.raises(InfeasibleProblem, match=rf"do not determine {blamed};"):
+        estimate(machine, names, readings)
+
+
+# ── from text ────────────────────────────────────────────────────────────────────────────────────────────
+
+
+@pytest.mark.parametrize("sign", ["±", "+-", "+/-", " ± "])
+def test_readings(sign):
+    reading = parse_reading(f"L1=0.47{sign}5e-3")
+    assert reading == DirectReading(parameter="L1", value=0.47, uncertainty=0.005)
+    assert parse_period(f"17.3{sign}0.2/10") == Period(mode=1, seconds=1.73, uncertainty=0.02)
+    assert parse_period(f"2:0.7{sign}.01") == Period(mode=2, seconds=0.7, uncertainty=0.01)
+
+
+@pytest.mark.parametrize("text", ["L1=0.47", "0.47±0.1", "L1=0.47±0", "L1=±0.1", "L1=0.47±-1", ""])
+def test_faulty_readings(text):
+    with pytest.raises(SpecError, match="--measured"):
+        parse_reading(text)
+
+
+@pytest.mark.parametrize("text", ["1.7", "1.7±0", "0:1.7±0.1", "1.7±0.1/0", "0±1", "a:1±1", "1.7±0.1/2.5"])
+def test_faulty_periods(text):
+    with pytest.raises(SpecError, match="--period"):
+        parse_period(text)
+
+
+def log_of(text, columns=("1", "2"), unit="deg", after=0.0):
+    return parse_swing(
+        text, "swing.csv", columns=columns, unit=unit, after=after, quantity="angle", load="hook"
+    )
+
+
+ROWS = [(0.1 * k, 10.0 * (-1) ** k) for k in range(40)]
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " ; "])
+def test_logs_with_and_without_a_header(separator):
+    bare = "\n".join(f"{t:.1f}{separator}{v}" for t, v in ROWS)
+    headed = log_of(f'"t"{separator}angle\n\n{bare}\n', ("t", "angle"))
+    for log in (headed, log_of(bare), log_of(f"t{separator}angle\n{bare}")):
+        np.testing.assert_allclose(log.times, [t for t, _ in ROWS])
+        np.testing.assert_allclose(log.values, np.radians([v for _, v in ROWS]))
+    late = log_of(bare, after=1.0)
+    assert (len(late.times), late.times[0]) == (30, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "the log is empty"),
+        ("t;a\n1;2\n", "needs at least 16 samples, found 1"),
+        ("t;a\n1;x\n", "row 2: expected numbers, found '1' and 'x'"),
+        ("1;2\n1\n", "row 2: expected numbers, found '1' and ''"),
+        ("\n".join("0;1" for _ in range(20)), "the times must rise"),
+    ],
+)
+def test_faulty_logs(text, why):
+    with pytest.raises(OutputError, match=why):
+        log_of(text)
+
+
+@pytest.mark.parametrize("column", ["angel", "3", "0"])
+def test_columns_that_are_not_there(column):
+    with pytest.raises(OutputError, match=f"there is no column '{column}'"):
+        log_of("t;angle\n0;1\n", ("1", column))
+
+
+# ── the whole way ────────────────────────────────────────────────────────────────────────────────────────
+
+
+def test_an_identified_spec_is_designed_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    slow, fast = periods(**(CRANE.nominal() | {"L1": 0.5, "L2": 0.38}))
+    found = run_here(
+        "identify", "--preset", "paper", "--measured", "L1=0.502±0.004", "--free", "L2",
+        "--period", f"{10 * slow:.2f}±0.1/10", "--period", f"2:{10 * fast:.2f}±0.1/10", "--json",
+    )  # fmt: skip
+    assert (found.code, found.errors) == (0, [])
+    document = found.document
+    assert document["path"] == "identified.toml"
+    assert document["contradiction"] == 1.0
+    assert document["parameters"]["L1"]["given"] == 0.47
+    assert document["parameters"]["L1"]["value"] == pytest.approx(0.5, abs=0.01)
+    spec = read_spec(tmp_path / "identified.toml")
+    assert spec.sha256() == document["spec_sha256"]
+    assert spec.plant.parameters["L2"] == pytest.approx(document["parameters"]["L2"]["value"], abs=1e-4)
+    for name, row in document["parameters"].items():
+        share = row["half_range"] / row["value"]
+        assert share <= spec.robustness.uncertain[name] < 1.1 * share + 0.01
+    assert run_here("identified.toml", "--set", "check.residual_sway=0.02", "--no-check").code == 0
+
+
+def test_a_log_is_read_and_told_of(tmp_path):
+    times = np.arange(0.0, 20.0, 0.1)
+    exact = swing(HOIST.nominal() | {"L0": 3.0, "c": 200.0, "m": 2000.0}, times, [0.15, 0.0], (12.0, 2.0))
+    noisy = np.degrees(exact + np.random.default_rng(1).normal(0.0, 2e-3, len(times)))
+    rows = "".join(f"{t:.2f};{v:.4f}\n" for t, v in zip(times + 30.0, noisy, strict=True))
+    (tmp_path / "log.csv").write_text("time;angle\n29.0;80.0\n" + rows, "utf-8")
+    found = run_here(
+        "identify", "--preset", "single-pendulum-crane", "--set", "plant.L0=2.6", "--free", "L0",
+        "--swing", tmp_path / "log.csv", "--columns", "time,angle", "--unit", "deg", "--after", "30",
+        "--at", "12,2", "--out", tmp_path / "new.toml",
+    )  # fmt: skip
+    assert (found.code, found.errors) == (0, [])
+    assert "log of payload" in found.out
+    assert "200 samples of its angle" in found.out
+    assert read_spec(tmp_path / "new.toml").plant.parameters["L0"] == pytest.approx(3.0, abs=0.02)
+
+
+def test_a_contradiction_is_told(tmp_path):
+    found = run_here(
+        "identify", "--measured", "L1=0.5±0.001", "--measured", "L1=0.6±0.001", "--out", tmp_path / "x.toml"
+    )
+    assert found.code == 0
+    assert "the readings contradict one another" in found.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "why"),
+    [
+        ([], 2, "Name what to identify"),
+        (["--free", "L9"], 2, "L9: unknown parameter"),
+        (["--free", "L1", "--period", "3:1±0.1"], 2, "the machine has 2 modes, found mode 3"),
+        (["--free", "L1", "--period", "1±0.1", "--at", "1,2"], 2, "one position per axis (1), found 2"),
+        (["--free", "L1", "--period", "1±0.1", "--at", "x"], 2, "write one number per axis"),
+        (["--free", "L1", "--swing", "none.csv"], 2, "Cannot read the log none.csv"),
+        (["--free", "L1", "--swing", "none.csv", "--signal", "speed"], 2, "unknown signal 'speed'"),
+        (["--free", "L1", "--swing", "none.csv", "--signal", "angle:crate"], 2, "unknown load 'crate'"),
+        (["--free", "L1", "--swing", "none.csv", "--unit", "mm"], 2, "'mm' does not measure an angle"),
+        (["--free", "L1", "--swing", "none.csv", "--columns", "1"], 2, "write TIME,VALUE"),
+        (["--free", "L1"], 3, "do not determine L1"),
+        (["--measured", "L1=0.5±0.4"], 3, "determine L1 to ±206 % only"),
+    ],
+)
+def test_what_cannot_be_identified(tmp_path, monkeypatch, arguments, code, why):
+    monkeypatch.chdir(tmp_path)
+    outcome = run_here("identify", "--preset", "paper", *arguments)
+    assert outcome.code == code
+    assert why in outcome.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unwritable_spec(tmp_path):
+    (tmp_path / "file").write_text("", "utf-8")
+    with pytest.raises(OutputError, match="Cannot write"):
+        write_spec(preset_spec("paper"), tmp_path / "file" / "spec.toml")
+
+
+@pytest.mark.parametrize("preset", ["paper", "tower-crane", "mass-spring-chain"])
+def test_a_written_spec_reads_back_the_same(tmp_path, preset):
+    spec = preset_spec(preset)
+    write_spec(spec, tmp_path / "spec.toml")
+    assert read_spec(tmp_path / "spec.toml") == spec
+
+
+def test_other_ranges_of_the_spec_stay_as_they_are():
+    spec = preset_spec("paper", ["robustness.uncertain={L2=0.2}", "robustness.method=none"])
+    found = identify(spec, [parse_reading("L1=0.5±0.005")])
+    assert dict(found.spec.robustness.uncertain) == {"L1": 0.026, "L2": 0.2}
+    assert found.spec.robustness.method == "none"
+    bare = identify(
+        preset_spec("paper", ["robustness.uncertain={}", "robustness.method=none"]),
+        [parse_reading("L1=0.5±0.005")],
+    )
+    assert bare.spec.robustness.method == "sensitivity"
