@@ -7,7 +7,7 @@ from typing import Protocol
 import attrs
 
 from gen_profile.profile import Profile, SampledProfile
-from gen_profile.spec import CanSpec, Spec
+from gen_profile.spec import CanSpec, ExportSpec, Spec
 from gen_profile.units import AxisScale
 
 
@@ -21,16 +21,21 @@ class Target:
         Of the motion; files and program blocks are named after it.
     axes : tuple of AxisScale
         How each axis is counted, in the profile's order.
-    cycle_time : float
-        Of the controller's task, in s.
+    export : ExportSpec
+        The controller's cycle, and what each format leaves to choose.
     can : CanSpec
         The bus and the drives on it.
     """
 
     name: str
     axes: tuple[AxisScale, ...]
-    cycle_time: float
+    export: ExportSpec
     can: CanSpec
+
+    @property
+    def cycle_time(self) -> float:
+        """Of the controller's task, in s."""
+        return self.export.cycle_time
 
 
 @attrs.frozen(kw_only=True)
@@ -67,4 +72,4 @@ class Exporter(Protocol):
 
 def target_of(spec: Spec) -> Target:
     """Pick from a spec what exporters need."""
-    return Target(name=spec.name, axes=spec.axis_scales(), cycle_time=spec.export.cycle_time, can=spec.can)
+    return Target(name=spec.name, axes=spec.axis_scales(), export=spec.export, can=spec.can)

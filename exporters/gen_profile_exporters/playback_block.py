@@ -1,129 +1,25 @@
-"""Template of the playback function block in Structured Text, filled in for writing and matched for reading.
-
-Lines with ``~`` are repeated for every axis, with the axis's suffix in its place. ``@name`` is a hole: the
-exporter puts a value there, the reader finds it there; nothing else may differ. Comments are free.
-"""
+"""The playback block's template, filled in for writing and matched for reading."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import attrs
 
 from gen_profile.errors import ExportError
+from gen_profile_exporters.playback_template import BODY, HEADER, INTERFACE, LAYOUTS
 
-HEADER = """\
-(*
-    @name: motion table and playback block, IEC 61131-3 Structured Text, from gen-profile.
-
-    @samples samples, one per cycle of @cycle s, @kilobytes kB.
-    Axis @axis~, @unit~: @first~ to @final~, peaks @peak_velocity~ @unit~/s and @peak_acceleration~ @unit~/s2.
-    SHA-256 of cycle time and positions: @sha256
-
-    Call the block once in every cycle of its task. Give its outputs to the drive while bBusy, bDone or
-    bAborted; before, and after an error, they mean nothing. A rising edge of bExecute starts. Dropping
-    bExecute does not stop the motion, it ends the hold at the target. bAbort brakes every axis with its
-    fStopDeceleration; the load sways after that, as it does after any stop that was not planned.
-
-    nErrorId: 0 none
-              1 fCycleTime is not the cycle time of the table
-              2 fActPosition is farther than fStartTolerance from the start of the table
-              3 fStopDeceleration is not greater than zero
-              4 bAbort was set at the start
-*)
-"""
-
-BLOCK = """\
-FUNCTION_BLOCK @block
-VAR_INPUT
-    bExecute : BOOL; (* rising edge: start *)
-    bAbort : BOOL; (* brake to standstill *)
-    fCycleTime : LREAL; (* s, of the task that calls this block *)
-    fActPosition~ : LREAL; (* @unit~, where the axis stands *)
-    fStartTolerance~ : LREAL := @start_tolerance~; (* @unit~ *)
-    fStopDeceleration~ : LREAL := @stop_deceleration~; (* @unit~/s2, taken over at the start *)
-END_VAR
-VAR_OUTPUT
-    fPosition~ : LREAL := @start~; (* @unit~ *)
-    fVelocity~ : LREAL; (* @unit~/s *)
-    fAcceleration~ : LREAL; (* @unit~/s2 *)
-    bBusy : BOOL; (* plays or brakes *)
-    bDone : BOOL; (* holds the target *)
-    bAborted : BOOL; (* holds where it braked to *)
-    bError : BOOL; (* did not start, see nErrorId *)
-    nErrorId : INT;
-END_VAR
-VAR
-    nState : INT;
-    nIndex : DINT; (* of the sample issued last *)
-    bExecuteBefore : BOOL;
-    fDeceleration~ : LREAL;
-    fVelocityStep~ : LREAL;
-END_VAR
-VAR CONSTANT
-    cIdle : INT := 0;
-    cPlaying : INT := 1;
-    cBraking : INT := 2;
-    cDone : INT := 3;
-    cAborted : INT := 4;
-    cFailed : INT := 5;
-    cLast : DINT := @last;
-    cCycleTime : LREAL := @cycle_time; (* s *)
-    aPosition~ : ARRAY @range OF LREAL := @position~;
-    aVelocity~ : ARRAY @range OF LREAL := @velocity~;
-    aAcceleration~ : ARRAY @range OF LREAL := @acceleration~;
-END_VAR
-
-IF bExecute AND NOT bExecuteBefore AND (nState <> cPlaying) AND (nState <> cBraking) THEN
-    nState := cPlaying;
-    nIndex := -1;
-    nErrorId := 0;
-    IF bAbort THEN nErrorId := 4; END_IF;
-    (* Not-a-number fails every comparison, so the checks ask for what must hold. *)
-    IF NOT (fStopDeceleration~ > 0.0) THEN nErrorId := 3; END_IF;
-    IF NOT (ABS(fActPosition~ - aPosition~[0]) <= fStartTolerance~) THEN nErrorId := 2; END_IF;
-    IF NOT (ABS(fCycleTime - cCycleTime) <= 1.0E-6 * cCycleTime) THEN nErrorId := 1; END_IF;
-    IF nErrorId <> 0 THEN nState := cFailed; END_IF;
-    fDeceleration~ := fStopDeceleration~;
-ELSIF NOT bExecute AND (nState <> cPlaying) AND (nState <> cBraking) THEN
-    nState := cIdle;
-    nErrorId := 0;
-END_IF;
-bExecuteBefore := bExecute;
-
-IF bAbort AND (nState = cPlaying) THEN nState := cBraking; END_IF;
-
-IF nState = cPlaying THEN
-    nIndex := nIndex + 1;
-    fPosition~ := aPosition~[nIndex];
-    fVelocity~ := aVelocity~[nIndex];
-    fAcceleration~ := aAcceleration~[nIndex];
-    IF nIndex >= cLast THEN nState := cDone; END_IF;
-ELSIF nState = cBraking THEN
-    nState := cAborted;
-    fVelocityStep~ := LIMIT(-fDeceleration~ * cCycleTime, fVelocity~, fDeceleration~ * cCycleTime);
-    fPosition~ := fPosition~ + (fVelocity~ - 0.5 * fVelocityStep~) * cCycleTime;
-    fVelocity~ := fVelocity~ - fVelocityStep~;
-    fAcceleration~ := -fVelocityStep~ / cCycleTime;
-    IF fVelocity~ <> 0.0 THEN nState := cBraking; END_IF;
-ELSE
-    fVelocity~ := 0.0;
-    fAcceleration~ := 0.0;
-END_IF;
-
-bBusy := (nState = cPlaying) OR (nState = cBraking);
-bDone := nState = cDone;
-bAborted := nState = cAborted;
-bError := nState = cFailed;
-END_FUNCTION_BLOCK
-"""
+VALUES_PER_CYCLE = 8  # that enter the checksum: some 10 µs on an industrial PC
 
 _COMMENT = re.compile(r"\(\*.*?\*\)", re.DOTALL)
 _HOLE = re.compile(r"@(\w+)")
-# An array's initialiser, a name or hole, a number with its sign, an operator.
+_LINES = re.compile(r"^\$(\w+)\n", re.MULTILINE)
+_PART = re.compile(r"\$(\w+)(?:\(([^()]*)\))?")
+# An array's initialiser or an index, a name or hole, a number with its sign, an operator.
 _TOKEN = re.compile(
-    r"\[[^\[\]]*\]|@?[A-Za-z_]\w*|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?|:=|<=|>=|<>|\S", re.ASCII
+    r"\[[^\[\]]*\]|@?[A-Za-z_]\w*|16#[0-9A-Fa-f]+|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?|:=|<=|>=|<>|\S",
+    re.ASCII,
 )
 
 
@@ -135,25 +31,25 @@ class Token:
     line: int
 
 
-def fill(values: Mapping[str, str], suffixes: Sequence[str]) -> str:
-    """Write a block: a value for every hole, by the hole's name with the axis's suffix."""
-    return _HOLE.sub(lambda hole: values[hole[1]], _expand(HEADER + BLOCK, suffixes))
+def fill(values: Mapping[str, str], layout: str, axes: int) -> str:
+    """Write a block: a value for every hole, by its name."""
+    return _HOLE.sub(lambda hole: values[hole[1]], HEADER + _program(layout, axes))
 
 
-def match(text: str, suffixes: Sequence[str]) -> dict[str, Token]:
-    """Read a block: what stands in every hole, by the hole's name with the axis's suffix.
+def match(text: str, layout: str, axes: int) -> dict[str, Token]:
+    """Read a block: what stands in every hole, by its name.
 
     Raises
     ------
     ExportError
         The text differs from the template elsewhere, or one value from place to place.
     """
-    found, due = _tokens(text), _tokens(_expand(BLOCK, suffixes))
+    found, due = _tokens(text), _tokens(_program(layout, axes))
     values: dict[str, Token] = {}
     for token, expected in zip(found, due, strict=False):
         hole = _HOLE.fullmatch(expected.text)
         known = values.setdefault(hole[1], token).text if hole else expected.text
-        if token.text.lower() != known.lower():
+        if token.text != known and _bare(token.text) != _bare(known):
             raise ExportError(
                 f"line {token.line}: {token.text[:40]!r} stands where the exported block has {known[:40]!r}; "
                 "only numbers and comments may be edited in it, export it again."
@@ -164,12 +60,35 @@ def match(text: str, suffixes: Sequence[str]) -> dict[str, Token]:
     return values
 
 
-def _expand(template: str, suffixes: Sequence[str]) -> str:
-    """Repeat every line with ``~`` for every axis."""
-    lines = []
-    for line in template.splitlines(keepends=True):
-        lines += [line.replace("~", suffix) for suffix in suffixes] if "~" in line else [line]
-    return "".join(lines)
+def layout_of(text: str) -> str:
+    """Tell the layout of a block's table by what the table declares."""
+    if re.search(r"\bcPower0\b", text, re.IGNORECASE):
+        return "segments"
+    whole = re.search(r"\bcPosition\s*:\s*ARRAY\s*\[[^\]]*\]\s*OF\s*DINT\b", text, re.IGNORECASE)
+    return "counts" if whole else "samples"
+
+
+def _program(layout: str, axes: int) -> str:
+    """Put the layout's parts in, and settle what the number of axes decides."""
+    array = f"ARRAY [1..{axes}] OF " if axes > 1 else ""
+    parts = LAYOUTS[layout] | {
+        "axes": str(axes),
+        "number": "DINT" if layout == "counts" else "LREAL",
+        "reals": f"{array}LREAL",
+        "real": "DINT_TO_LREAL({})" if layout == "counts" else "{}",
+        "row": "{} * cAxes + nAxis - 1" if axes > 1 else "{}",
+        "per_axis": "{} / cAxes" if axes > 1 else "{}",
+        "values_per_cycle": str(VALUES_PER_CYCLE),
+        "whole_numbers": f"{array}DINT",
+    }
+    text = _LINES.sub(lambda lines: parts[lines[1]], INTERFACE + BODY)
+    text = _PART.sub(lambda part: parts[part[1]].format(part[2]), text)
+    lines = text.replace("~", "[nAxis]" if axes > 1 else "").splitlines(keepends=True)
+    return "".join(line.replace("%", "", 1) for line in lines if axes > 1 or not line.startswith("%"))
+
+
+def _bare(text: str) -> str:
+    return "".join(text.split()).lower()
 
 
 def _tokens(text: str) -> list[Token]:

@@ -1,17 +1,16 @@
 """Playback function block in IEC 61131-3 Structured Text, for any controller that takes this language.
 
-The block (`gen_profile_exporters.playback_block`) holds the motion as tables of LREAL, one entry per cycle of
-its task, and issues position, velocity and acceleration. It keeps to what independent compilers have in
-common: ASCII, ``(* *)`` comments, one-dimensional arrays in ``VAR CONSTANT``, literals such as ``-1.5E-3``.
+The block (`gen_profile_exporters.playback_template`) holds the motion as a table, by default as quintic
+segments, and issues position, velocity and acceleration every cycle of its task. It keeps to what independent
+compilers have in common: ASCII, ``(* *)`` comments, one-dimensional arrays in ``VAR CONSTANT``, literals such
+as ``-1.5E-3`` that a REAL could hold.
 Each literal reads back to the same double, and the block counts cycles instead of adding up times.
 
-- A rising edge of ``bExecute`` starts, if the task's cycle and the actual position are those of the table.
-  Dropping it does not stop the motion; at the end the last sample is held until it drops.
-- ``bAbort`` brakes each axis along its own direction of travel with the constant deceleration
-  ``fStopDeceleration``, so neither position nor velocity jumps. The default is the motion's own peak
-  acceleration a. Braking from anywhere, an axis then stays within the range of its move (to within a T² / 8,
-  T being the cycle), as the move itself could not have turned back sooner.
-- An axis that counts in ``counts`` gets whole numbers from the table; while it brakes they are not rounded.
+- A rising edge of ``bExecute`` starts, if the task's cycle, the actual position and the table's CRC-32 are
+  right. Dropping it does not stop the motion; at the end the target is held until it drops.
+- ``bHold``, ``bAbort`` and ``rOverride`` change the rate at which the path is played: all axes stay on it,
+  and keep to the motion's own peaks of velocity and acceleration (`gen_profile_exporters.path_limits`).
+- Where there are several axes, inputs and outputs are arrays, in the order of the machine's axes.
 """
 
 from __future__ import annotations
@@ -28,146 +27,246 @@ from gen_profile.units import AxisScale
 from gen_profile_exporters import playback_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback_block import Token
-from gen_profile_exporters.setpoints import AxisTable, axis_table, motion_of, plausible_cycle_time, sampled
+from gen_profile_exporters.playback_table import PlaybackTable, counted_axes, tabulate
+from gen_profile_exporters.quintic_segments import ACCELERATION_ERROR, POSITION_ERROR
+from gen_profile_exporters.setpoints import plausible_cycle_time
 
-MOST_SAMPLES = 100_001  # larger tables were not seen to compile
 START_TOLERANCE = 1e-3  # m (or rad), the default
 VALUES_PER_LINE = 4
-QUANTITIES = ("position", "velocity", "acceleration")
+SEGMENT_COLUMNS = tuple(f"power{power}" for power in range(6))
+SAMPLE_COLUMNS = ("position", "velocity", "acceleration")
+ROUNDING = 1e-12  # relative, of an evaluated quintic
+MOST_CYCLES = 10_000_000  # of a motion that is read
 
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _NUMBER = re.compile(r"\s*[-+]?\d+(\.\d+)?([eE][-+]?\d+)?\s*", re.ASCII)
 
 
 def encode(profile: Profile, target: Target) -> tuple[File, ...]:
-    """Write the block with the motion, sampled at the target's cycle time.
+    """Write the block with the motion, on the grid of the target's cycle time.
 
     Raises
     ------
     ExportError
         A position does not fit the axis's counts, or the table is too long to compile.
     """
-    motion = sampled(profile, target, target.cycle_time, "export.cycle_time", MOST_SAMPLES)
-    table = axis_table(motion, target.axes)
-    suffixes = _suffixes(target.axes)
-    values = _table_values(table, target)
-    for column, (suffix, axis) in enumerate(zip(suffixes, target.axes, strict=True)):
-        values |= {key + suffix: value for key, value in _axis_values(table, axis, column).items()}
-    text = playback_block.fill(values, suffixes)
-    return (File(filename=f"{target.name}.st", content=text.encode("ascii")),)
+    return (File(filename=f"{target.name}.st", content=block_text(profile, target).encode("ascii")),)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
-    """Read the tables, after making sure that nothing but numbers and comments was edited in the block.
+    """Work out what the block issues, after making sure that it is one and that its checksum is right.
 
     Raises
     ------
     ExportError
-        The text is no such block, was cut off, or is for other axes than the target's.
+        The text is no such block, was altered or cut off, or is for other axes than the target's.
     """
-    suffixes = _suffixes(target.axes)
-    values = playback_block.match(content.decode("latin-1"), suffixes)
-    if not _NAME.fullmatch(values["block"].text):
-        raise ExportError(
-            f"line {values['block'].line}: {values['block'].text!r} stands where a name is due."
-        )
-    columns = {
-        quantity: np.column_stack([_array(values[quantity + suffix], values) for suffix in suffixes])
-        for quantity in QUANTITIES
-    }
-    for suffix in suffixes:
-        for parameter in ("start", "start_tolerance", "stop_deceleration"):
-            _number(values[parameter + suffix].text, values[parameter + suffix].line)
-    cycle = values["cycle_time"]
-    table = AxisTable(
-        cycle_time=plausible_cycle_time(_number(cycle.text, cycle.line), cycle.line),
-        position=columns["position"],
-        velocity=columns["velocity"],
-        acceleration=columns["acceleration"],
-        jerk=None,
-    )
-    return motion_of(table, target.axes)
+    return read_block(content.decode("latin-1"), target)
 
 
-def _table_values(table: AxisTable, target: Target) -> dict[str, str]:
-    samples = len(table.position)
-    return {
-        "name": _plain(target.name),
-        "block": f"FB_{_identifier(target.name)}",
-        "samples": str(samples),
-        "cycle": repr(table.cycle_time),
-        "kilobytes": f"{samples * len(target.axes) * len(QUANTITIES) * 8 / 1000:.3g}",
-        "sha256": motion_of(table, target.axes).payload_hash(),
-        "last": str(samples - 1),
-        "range": f"[0..{samples - 1}]",
-        "cycle_time": _literal(table.cycle_time),
-    }
+def block_text(profile: Profile, target: Target) -> str:
+    """Write the block, see `encode`."""
+    table = tabulate(profile, target)
+    values = _values(table) | _header_values(table, target)
+    return playback_block.fill(values, table.layout, len(table.axes))
 
 
-def _axis_values(table: AxisTable, axis: AxisScale, column: int) -> dict[str, str]:
-    position, velocity, acceleration = (getattr(table, quantity)[:, column] for quantity in QUANTITIES)
-    peak = float(np.abs(acceleration).max())
-    return {
-        "axis": _plain(axis.name),
-        "unit": axis.unit,
-        "first": f"{position[0]:g}",
-        "final": f"{position[-1]:g}",
-        "peak_velocity": f"{np.abs(velocity).max():g}",
-        "peak_acceleration": f"{peak:g}",
-        "start": _literal(position[0]),
-        "start_tolerance": _literal(START_TOLERANCE * abs(axis.factor)),
-        "stop_deceleration": _literal(peak or 1.0),  # the block asks for one even of an axis that stays
-        "position": _literals(position),
-        "velocity": _literals(velocity),
-        "acceleration": _literals(acceleration),
-    }
+def read_block(text: str, target: Target) -> SampledProfile:
+    """Work out what a block issues, see `replay`."""
+    layout = playback_block.layout_of(text)
+    found = playback_block.match(text, layout, len(target.axes))
+    if not _NAME.fullmatch(found["block"].text):
+        raise ExportError(f"line {found['block'].line}: {found['block'].text!r} stands where a name is due.")
+    _array(found["start_tolerance"])
+    table = _table(found, layout, target)
+    _verify(found, table)
+    return table.motion()
 
 
-def _suffixes(axes: Sequence[AxisScale]) -> list[str]:
-    """Tell the axes' variables apart: nothing for a single axis, else their names."""
-    if len(axes) == 1:
-        return [""]
-    names = [f"_{_identifier(axis.name)}" for axis in axes]
-    distinct = len({name.lower() for name in names}) == len(names)
-    return names if distinct else [f"{name}{number}" for number, name in enumerate(names, start=1)]
+def block_name(name: str) -> str:
+    """Name the block after the motion: letters, digits and single underscores, as every compiler takes."""
+    return f"FB_{re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_') or 'motion'}"
 
 
-def _identifier(name: str) -> str:
-    """Letters, digits and single underscores inside, as every compiler takes after a letter prefix."""
-    return re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_") or "motion"
-
-
-def _plain(name: str) -> str:
-    """Text that can neither end a comment nor leave ASCII."""
-    return re.sub(r"[^A-Za-z0-9._ -]", "_", name)
-
-
-def _literal(value: float) -> str:
+def literal(value: float) -> str:
     """Shortest LREAL literal that reads back to the same double, such as ``-1.5E-3``."""
     return np.format_float_scientific(value, trim="0", exp_digits=1).upper()
 
 
+def plain(name: str) -> str:
+    """Text that can neither end a comment nor leave ASCII."""
+    return re.sub(r"[^A-Za-z0-9._ -]", "_", name)
+
+
+def _values(table: PlaybackTable) -> dict[str, str]:
+    """Fill every hole of the program that follows from the table."""
+    limits = table.limits()
+    write = _whole_numbers if table.layout == "counts" else _literals
+    names = SAMPLE_COLUMNS if table.first is None else SEGMENT_COLUMNS
+    values = {name: write(column.ravel()) for name, column in zip(names, table.columns, strict=True)}
+    rows = table.columns[0].size
+    if table.first is not None:
+        values |= {
+            "last_segment": str(len(table.first) - 1),
+            "segments": f"[0..{len(table.first) - 1}]",
+            "first": _whole_numbers(table.first),
+        }
+    return values | {
+        "last": str(table.last),
+        "last_row": str(rows - 1),
+        "rows": f"[0..{rows - 1}]",
+        "cycle_time": literal(table.cycle_time),
+        "slope": literal(limits.slope),
+        "slope_rate": literal(limits.slope_rate),
+        "room": _per_axis(limits.room),
+        "inverse": _per_axis(limits.inverse_velocity),
+        "start": _per_axis(table.start),
+        "target": _per_axis(table.target),
+        "crc": f"16#{table.crc():08X}",
+    }
+
+
+def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
+    values = table.columns.size + (0 if table.first is None else table.columns[0].size)
+    units = [axis.unit for axis in table.axes]
+    size = table.columns.size * (4 if table.layout == "counts" else 8)
+    return {
+        "name": plain(target.name),
+        "block": block_name(target.name),
+        "layout": table.layout if table.first is None else f"{len(table.first)} quintic segments",
+        "accuracy": "Every cycle is tabulated."
+        if table.first is None
+        else f"Fit error at the cycles below\n    {POSITION_ERROR:g} m and {ACCELERATION_ERROR:g} m/s2.",
+        "samples": str(table.last),
+        "cycle": repr(table.cycle_time),
+        "kilobytes": f"{size / 1000:.3g}",
+        "check_cycles": str(-(-values // playback_block.VALUES_PER_CYCLE)),
+        "axis_lines": "\n".join(_axis_lines(table)),
+        "units": units[0] if len(set(units)) == 1 else ", ".join(units),
+        "sha256": table.motion().payload_hash(),
+        "start_tolerance": _per_axis(np.array([START_TOLERANCE * abs(axis.factor) for axis in table.axes])),
+    }
+
+
+def _axis_lines(table: PlaybackTable) -> list[str]:
+    velocity, acceleration, _ = table.peaks()
+    jerk = table.limits().jerk
+    return [
+        f"    Axis {number + 1}, {plain(axis.name)}: {table.start[number]:g} to {table.target[number]:g} "
+        f"{axis.unit}, peaks {velocity[number]:.4g} {axis.unit}/s and {acceleration[number]:.4g} "
+        f"{axis.unit}/s2,\n"
+        f"        stop jerk {jerk[number]:.4g} {axis.unit}/s3."
+        for number, axis in enumerate(table.axes)
+    ]
+
+
+def _table(found: Mapping[str, Token], layout: str, target: Target) -> PlaybackTable:
+    """Read the table; too few values would compile all the same, and leave zeros."""
+    axes = counted_axes(target, layout)
+    names = SEGMENT_COLUMNS if layout == "segments" else SAMPLE_COLUMNS
+    columns = [_array(found[name]) for name in names]
+    rows = len(columns[0])
+    first = _array(found["first"]) if layout == "segments" else None
+    lengths = [(found[name], len(column), rows) for name, column in zip(names, columns, strict=True)]
+    if first is not None:
+        lengths.append((found["first"], len(first) * len(axes), rows))
+    for token, length, due in lengths:
+        if length != due or due % len(axes) or found["rows"].text != f"[0..{due - 1}]":
+            raise ExportError(
+                f"line {token.line}: {length} values in an array {found['rows'].text[:40]} for {len(axes)} "
+                "axes; values are missing or too many, export the block again."
+            )
+    cycle, last = found["cycle_time"], _number(found["last"].text, found["last"].line)
+    cycles = rows // len(axes) - 1 if first is None else last
+    if last != cycles or not 1 <= last <= MOST_CYCLES or (first is not None and not _rise(first, last)):
+        raise ExportError(
+            f"line {found['last'].line}: cLast = {last:g} does not belong to the table; "
+            "export the block again."
+        )
+    columns_by_axis = np.array(columns).reshape(len(names), -1, len(axes))
+    return PlaybackTable(
+        layout=layout,
+        cycle_time=plausible_cycle_time(_number(cycle.text, cycle.line), cycle.line),
+        axes=axes,
+        first=first,
+        columns=columns_by_axis,
+        last=int(last),
+        target=columns_by_axis[0, -1] if first is None else _end(found["target"], axes),
+    )
+
+
+def _end(token: Token, axes: Sequence[AxisScale]) -> Array:
+    target = _array(token)
+    if len(target) != len(axes):
+        raise ExportError(
+            f"line {token.line}: {len(target)} targets for {len(axes)} axes; export the block again."
+        )
+    return target
+
+
+def _rise(first: Array, last: float) -> bool:
+    """Whether segments begin at whole cycles, one after the other, before the end."""
+    cycles = np.append(first, last)
+    return bool(first[0] == 0.0 and (cycles == np.floor(cycles)).all() and (np.diff(cycles) >= 1.0).all())
+
+
+def _verify(found: Mapping[str, Token], table: PlaybackTable) -> None:
+    """Refuse a block that would refuse to start, or whose limits are those of another motion."""
+    crc = f"16#{table.crc():08X}"
+    if found["crc"].text.upper() != crc:
+        raise ExportError(
+            f"line {found['crc'].line}: the table's CRC-32 is {crc}, not {found['crc'].text[:40]}: "
+            "it was altered, and the block would refuse to start (nErrorId 5); export it again."
+        )
+    due = _values(table)
+    for name, token in found.items():
+        if name in due and _numbers(token) != _numbers(Token(due[name], 0)):
+            raise ExportError(
+                f"line {token.line}: {token.text[:40]} stands where the table asks for {due[name][:40]}; "
+                "export the block again."
+            )
+    missed = np.abs(table.arrival() - table.target)
+    factor = np.abs([axis.factor for axis in table.axes])
+    if (missed > POSITION_ERROR * factor + ROUNDING * np.abs(table.target)).any():
+        raise ExportError(
+            f"line {found['target'].line}: cTarget = {found['target'].text[:40]} is not where the table "
+            "ends; export the block again."
+        )
+
+
+def _per_axis(values: Array) -> str:
+    texts = [literal(value) for value in values.tolist()]
+    return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
+
+
 def _literals(values: Array) -> str:
-    texts = [_literal(value) for value in values]
+    return _initialiser([literal(value) for value in values])
+
+
+def _whole_numbers(values: Array) -> str:
+    return _initialiser([str(int(value)) for value in values])
+
+
+def _initialiser(texts: Sequence[str]) -> str:
     rows = [", ".join(texts[k : k + VALUES_PER_LINE]) for k in range(0, len(texts), VALUES_PER_LINE)]
     return "[\n        " + ",\n        ".join(rows) + "\n    ]"
 
 
-def _array(token: Token, values: Mapping[str, Token]) -> Array:
-    """Read an initialiser; too few values would compile all the same, and leave zeros."""
-    texts = token.text.strip("[]").split(",")
-    last, declared = values["last"].text, values["range"].text
-    if len(texts) < 2 or last != str(len(texts) - 1) or declared != f"[0..{last}]":
-        raise ExportError(
-            f"line {token.line}: {len(texts)} values in an array {declared[:40]} with cLast = {last[:40]}; "
-            "values are missing or too many, export the block again."
-        )
+def _array(token: Token) -> Array:
+    """Read an initialiser, or a single number."""
     numbers = []
     line = token.line
-    for text in texts:
+    for text in token.text.strip("[]").split(","):
         line += text.rstrip().count("\n")
         numbers.append(_number(text, line))
     return np.array(numbers)
+
+
+def _numbers(token: Token) -> list[float] | str:
+    """Compare by value where it is numbers, else by text."""
+    if token.text.startswith(("16#", "[0..")):
+        return token.text.upper()
+    return [float(number) for number in _array(token).tolist()]
 
 
 def _number(text: str, line: int) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gen_profile.profile import Profile
-from gen_profile.spec import CanSpec
+from gen_profile.spec import CanSpec, ExportSpec
 from gen_profile.units import AxisScale, axis_factor
 from gen_profile_exporters.exporter import Target
 
@@ -18,7 +18,18 @@ def quintic(*moves, duration=1.0):
     return Profile(knots=[0.0, duration], coefficients=[coefficients], target=end, method="quintic")
 
 
-def target(*names, unit="m", sign=1, counts_per_si=1e6, cycle_time=0.01, name="bay-3", **can):
+def bang_bang(acceleration=1.2):
+    """Full acceleration for half a second, then full deceleration: nothing could stop it sooner."""
+    a = acceleration
+    return Profile(
+        knots=[0.0, 0.5, 1.0],
+        coefficients=[[[0.1], [0.0], [a / 2]], [[0.1 + a / 8], [a / 2], [-a / 2]]],
+        target=[0.1 + a / 4],
+        method="bang-bang",
+    )
+
+
+def target(*names, unit="m", sign=1, counts_per_si=1e6, cycle_time=0.01, name="bay-3", export=None, **can):
     scales = tuple(
         AxisScale(
             name=axis,
@@ -28,4 +39,9 @@ def target(*names, unit="m", sign=1, counts_per_si=1e6, cycle_time=0.01, name="b
         )
         for axis in names or ("cart",)
     )
-    return Target(name=name, axes=scales, cycle_time=cycle_time, can=CanSpec(**can))
+    return Target(
+        name=name,
+        axes=scales,
+        export=ExportSpec(cycle_time=cycle_time, **(export or {})),
+        can=CanSpec(**can),
+    )

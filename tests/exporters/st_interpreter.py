@@ -1,17 +1,22 @@
 """Interpreter for a subset of IEC 61131-3 Structured Text: an oracle that knows nothing of the exporter.
 
-One function block per text, with variables of BOOL, INT, DINT, LREAL and one-dimensional arrays of them;
-assignments, IF, CASE over integers, expressions with the standard's precedence (third edition, table 71), ABS
-and LIMIT. It is strict where compilers are: every type must fit, integers must not overflow, indices must lie
-within bounds, inputs and constants are not written, initialisers fill their array.
+One function block per text, with variables of BOOL, INT, DINT, LREAL, DWORD and one-dimensional arrays of
+them; assignments, IF, CASE over integers, FOR, WHILE, expressions with the standard's precedence (third
+edition, table 71), and a few standard functions. It is strict where compilers are: every type must fit,
+integers must not overflow, indices must lie within bounds, inputs and constants are not written, initialisers
+fill their array.
+
+The text is translated to Python once, so that many cycles can be run.
 """
 
 import math
+from functools import lru_cache
 
-from lark import Lark, Token, Transformer, v_args
+from lark import Lark, Token, Tree
+from lark.visitors import Interpreter
 
 GRAMMAR = r"""
-    start: "FUNCTION_BLOCK"i NAME block* statement* "END_FUNCTION_BLOCK"i
+    start: "FUNCTION_BLOCK"i NAME block* body "END_FUNCTION_BLOCK"i
 
     block: SECTION CONSTANT? declaration* "END_VAR"i
     declaration: NAME ":" type [":=" initial] ";"
@@ -19,25 +24,27 @@ GRAMMAR = r"""
         | "ARRAY"i "[" INTEGER ".." INTEGER "]" "OF"i TYPE -> array
     ?initial: literal
         | "[" literal ("," literal)* "]" -> values
-    literal: [SIGN] (REAL | INTEGER | BOOLEAN)
+    literal: [SIGN] (REAL | INTEGER | BOOLEAN | BITS)
 
+    body: statement*
     statement: variable ":=" expression ";" -> assign
         | "IF"i branch ("ELSIF"i branch)* ["ELSE"i body] "END_IF"i ";" -> choose
         | "CASE"i expression "OF"i label+ ["ELSE"i body] "END_CASE"i ";" -> case
+        | "FOR"i NAME ":=" expression "TO"i expression "DO"i body "END_FOR"i ";" -> count
+        | "WHILE"i expression "DO"i body "END_WHILE"i ";" -> repeat
     branch: expression "THEN"i body
     label: INTEGER ("," INTEGER)* ":" body
-    body: statement*
 
     ?expression: disjunction
-    ?disjunction: exclusion | disjunction "OR"i exclusion -> or_
-    ?exclusion: conjunction | exclusion "XOR"i conjunction -> xor_
-    ?conjunction: equality | conjunction "AND"i equality -> and_
-    ?equality: comparison | equality EQUALS comparison -> binary
-    ?comparison: sum | comparison ORDER sum -> binary
-    ?sum: term | sum SIGN term -> binary
-    ?term: unary | term FACTOR unary -> binary
-    ?unary: primary | "NOT"i unary -> not_ | SIGN unary -> signed
-    ?primary: REAL -> real | INTEGER -> integer | BOOLEAN -> boolean
+    ?disjunction: exclusion | disjunction OR exclusion -> logic
+    ?exclusion: conjunction | exclusion XOR conjunction -> logic
+    ?conjunction: equality | conjunction AND equality -> logic
+    ?equality: comparison | equality EQUALS comparison -> compare
+    ?comparison: sum | comparison ORDER sum -> compare
+    ?sum: term | sum SIGN term -> arithmetic
+    ?term: unary | term FACTOR unary -> arithmetic
+    ?unary: primary | "NOT"i unary -> negation | SIGN unary -> signed
+    ?primary: REAL -> real | INTEGER -> integer | BOOLEAN -> boolean | BITS -> bits
         | "(" expression ")"
         | NAME "(" expression ("," expression)* ")" -> call
         | variable
@@ -45,8 +52,12 @@ GRAMMAR = r"""
 
     SECTION.3: /VAR_INPUT\b|VAR_OUTPUT\b|VAR\b/i
     CONSTANT.3: /CONSTANT\b/i
-    TYPE.3: /BOOL\b|INT\b|DINT\b|LREAL\b/i
+    TYPE.3: /BOOL\b|INT\b|DINT\b|LREAL\b|DWORD\b/i
     BOOLEAN.3: /TRUE\b|FALSE\b/i
+    OR.3: /OR\b/i
+    XOR.3: /XOR\b/i
+    AND.3: /AND\b/i
+    BITS.3: /16#[0-9A-Fa-f]+/
     REAL.2: /[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?/
     INTEGER: /[0-9]+/
     EQUALS.2: "=" | "<>"
@@ -59,8 +70,23 @@ GRAMMAR = r"""
     %ignore /[ \t\r\n]+/
 """
 
-INTEGERS = {"INT": 2**15, "DINT": 2**31}
-ZERO = {"BOOL": False, "INT": 0, "DINT": 0, "LREAL": 0.0}
+LIMITS = {"INT": (-(2**15), 2**15 - 1), "DINT": (-(2**31), 2**31 - 1), "DWORD": (0, 2**32 - 1)}
+ZERO = {"BOOL": False, "INT": 0, "DINT": 0, "LREAL": 0.0, "DWORD": 0}
+LITERAL = "integer literal"  # fits INT and DINT
+INTEGERS = ("INT", "DINT", LITERAL)
+MOST_TURNS = 10_000  # of one WHILE
+
+# name → types of the arguments ("number": LREAL or integer, all the same), type of the result, Python
+FUNCTIONS = {
+    "abs": (("number",), "number", "abs({})"),
+    "limit": (("number", "number", "number"), "number", "_limit({}, {}, {})"),
+    "sqrt": (("LREAL",), "LREAL", "_sqrt({})"),
+    "shr": (("DWORD", "INT"), "DWORD", "({} >> {})"),
+    "lreal_to_dint": (("LREAL",), "DINT", "_rounded({})"),
+    "dint_to_lreal": (("DINT",), "LREAL", "float({})"),
+    "dint_to_dword": (("DINT",), "DWORD", "({} & 0xFFFFFFFF)"),
+    "dword_to_dint": (("DWORD",), "DINT", "_signed({})"),
+}
 
 
 class StError(Exception):
@@ -72,223 +98,298 @@ def _check(condition, message):
         raise StError(message)
 
 
-@v_args(inline=True)
-class _Compiler(Transformer):
-    """From the tree to closures over the block's variables."""
-
-    def literal(self, sign, token):
-        value = {"REAL": float, "INTEGER": int, "BOOLEAN": lambda text: text.upper() == "TRUE"}[token.type](
-            token
-        )
-        return -value if sign == "-" else value
-
-    def values(self, *values):
-        return list(values)
-
-    def scalar(self, type_):
-        return (type_.upper(), None)
-
-    def array(self, low, high, type_):
-        return (type_.upper(), (int(low), int(high)))
-
-    def declaration(self, name, type_, initial):
-        return (str(name).lower(), type_, initial)
-
-    def block(self, section, *rest):
-        constant = bool(rest) and isinstance(rest[0], Token)
-        return ("CONSTANT" if constant else section.upper(), list(rest[constant:]))
-
-    def start(self, name, *parts):
-        blocks = [part for part in parts if isinstance(part, tuple)]
-        return (str(name), blocks, list(parts[len(blocks) :]))
-
-    def real(self, token):
-        return lambda _: float(token)
-
-    def integer(self, token):
-        return lambda _: int(token)
-
-    def boolean(self, token):
-        return lambda _: token.upper() == "TRUE"
-
-    def variable(self, name, index):
-        return _Variable(str(name).lower(), index)
-
-    def call(self, name, *arguments):
-        function = {"abs": _abs, "limit": _limit}.get(name.lower())
-        _check(function, f"{name} is not known")
-        return lambda block: function(*(argument(block) for argument in arguments))
-
-    def not_(self, operand):
-        return lambda block: not _boolean(operand(block))
-
-    def signed(self, sign, operand):
-        return lambda block: -_number(operand(block)) if sign == "-" else _number(operand(block))
-
-    def binary(self, left, operator, right):
-        return lambda block: _binary(str(operator), left(block), right(block))
-
-    def and_(self, left, right):
-        # Both sides are evaluated: the standard has no short circuit.
-        return lambda block: bool(_boolean(left(block)) & _boolean(right(block)))
-
-    def or_(self, left, right):
-        return lambda block: bool(_boolean(left(block)) | _boolean(right(block)))
-
-    def xor_(self, left, right):
-        return lambda block: bool(_boolean(left(block)) ^ _boolean(right(block)))
-
-    def assign(self, variable, expression):
-        return lambda block: variable.assign(block, expression(block))
-
-    def body(self, *statements):
-        def run(block):
-            for statement in statements:
-                statement(block)
-
-        return run
-
-    def branch(self, condition, body):
-        return (condition, body)
-
-    def label(self, *parts):
-        return ({int(value) for value in parts[:-1]}, parts[-1])
-
-    def choose(self, *parts):
-        *branches, otherwise = parts
-
-        def run(block):
-            for condition, body in branches:
-                if _boolean(condition(block)):
-                    return body(block)
-            return otherwise and otherwise(block)
-
-        return run
-
-    def case(self, selector, *parts):
-        *labels, otherwise = parts
-
-        def run(block):
-            value = selector(block)
-            for values, body in labels:
-                if value in values:
-                    return body(block)
-            return otherwise and otherwise(block)
-
-        return run
+def _limit(least, value, most):
+    return min(max(value, least), most)
 
 
-class _Variable:
-    def __init__(self, name, index):
-        self.name, self.index = name, index
-
-    def _position(self, block):
-        bounds = block.types[self.name][1]
-        _check((bounds is None) == (self.index is None), f"{self.name} is used against its type")
-        if bounds is None:
-            return None
-        index = self.index(block)
-        _check(
-            type(index) is int and bounds[0] <= index <= bounds[1], f"{self.name}[{index}] is out of bounds"
-        )
-        return index - bounds[0]
-
-    def __call__(self, block):
-        _check(self.name in block.types, f"{self.name} is not declared")
-        position = self._position(block)
-        return block.values[self.name] if position is None else block.values[self.name][position]
-
-    def assign(self, block, value):
-        _check(self.name in block.types, f"{self.name} is not declared")
-        _check(block.sections[self.name] in ("VAR", "VAR_OUTPUT"), f"{self.name} must not be written")
-        position = self._position(block)
-        value = _fitting(block.types[self.name][0], value, self.name)
-        if position is None:
-            block.values[self.name] = value
-        else:
-            block.values[self.name][position] = value
+def _sqrt(value):
+    _check(not value < 0.0, "SQRT of a negative number")
+    return math.sqrt(value)
 
 
-def _boolean(value):
-    _check(isinstance(value, bool), f"{value!r} is no BOOL")
+def _rounded(value):
+    """Half to even, as IEC 60559 rounds."""
+    _check(abs(value) < 2.0**31, f"{value} does not fit DINT")
+    return round(value)
+
+
+def _signed(bits):
+    return bits - 2**32 if bits >= 2**31 else bits
+
+
+def _within(value, least, most, what):
+    if not least <= value <= most:
+        raise StError(f"{what} does not take {value}")
     return value
 
 
-def _number(value):
-    _check(type(value) in (int, float), f"{value!r} is no number")
-    return value
-
-
-def _fitting(type_, value, name):
-    expected = {"BOOL": bool, "LREAL": float}.get(type_, int)
-    _check(type(value) is expected, f"{name} : {type_} cannot hold {value!r}")
-    if type_ in INTEGERS:
-        _check(-INTEGERS[type_] <= value < INTEGERS[type_], f"{name} : {type_} overflows with {value}")
-    return value
-
-
-def _binary(operator, left, right):
-    _check(type(left) is type(right), f"{left!r} {operator} {right!r} mixes types")
-    if operator in ("=", "<>"):
-        return (left == right) == (operator == "=")
-    _number(left)
-    match operator:
-        case "<":
-            return left < right
-        case "<=":
-            return left <= right
-        case ">":
-            return left > right
-        case ">=":
-            return left >= right
-        case "+":
-            return left + right
-        case "-":
-            return left - right
-        case "*":
-            return left * right
+def _divided(left, right):
     _check(right != 0, "division by zero")
     # Integer division truncates towards zero.
     return left / right if isinstance(left, float) else math.trunc(left / right)
 
 
-def _abs(value):
-    return abs(_number(value))
+def _turn(turns):
+    _check(turns < MOST_TURNS, "WHILE goes on and on")
+    return turns + 1
 
 
-def _limit(least, value, most):
-    _check(type(least) is type(value) is type(most), "LIMIT mixes types")
-    return min(max(_number(value), least), most)
+RUNTIME = {
+    function.__name__: function for function in (_limit, _sqrt, _rounded, _signed, _within, _divided, _turn)
+}
 
 
-_PARSER = Lark(GRAMMAR, parser="lalr")
+def _fits(type_, expected):
+    return type_ == expected or (type_ == LITERAL and expected in ("INT", "DINT"))
+
+
+def _common(left, right):
+    """Type of both operands."""
+    _check(_fits(left, right) or _fits(right, left), f"{left} and {right} are mixed")
+    return right if left == LITERAL else left
+
+
+class _Declarations(Interpreter):
+    """Variables with section, type and initial value."""
+
+    def __init__(self):
+        self.sections, self.types, self.initial = {}, {}, {}
+
+    def block(self, tree):
+        section, *rest = tree.children
+        if rest and isinstance(rest[0], Token):
+            section = rest.pop(0)
+        for name, type_, initial in (declaration.children for declaration in rest):
+            key = name.lower()
+            _check(key not in self.types, f"{name} is declared twice")
+            scalar = type_.children[-1].upper()
+            bounds = tuple(map(int, type_.children[:-1])) or None
+            self.sections[key], self.types[key] = section.upper(), (scalar, bounds)
+            self.initial[key] = self._value(name, scalar, bounds, initial)
+
+    def _value(self, name, scalar, bounds, initial):
+        if bounds is None:
+            return ZERO[scalar] if initial is None else _constant(scalar, initial, name)
+        length = bounds[1] - bounds[0] + 1
+        if initial is None:
+            return [ZERO[scalar]] * length
+        values = initial.children if initial.data == "values" else [initial]
+        _check(
+            initial.data == "values" and len(values) == length, f"{name} has {len(values)} of {length} values"
+        )
+        return [_constant(scalar, value, name) for value in values]
+
+
+def _constant(scalar, tree, name):
+    sign, token = tree.children
+    kind = {"REAL": "LREAL", "INTEGER": LITERAL, "BOOLEAN": "BOOL", "BITS": "DWORD"}[token.type]
+    _check(
+        _fits(kind, scalar) and (sign is None or kind in ("LREAL", LITERAL)), f"{name} cannot hold {token}"
+    )
+    convert = {"LREAL": float, LITERAL: int, "BOOL": _truth, "DWORD": _bits}[kind]
+    value = -convert(token) if sign == "-" else convert(token)
+    return value if scalar in ("BOOL", "LREAL") else _within(value, *LIMITS[scalar], name)
+
+
+def _truth(token):
+    return token.upper() == "TRUE"
+
+
+def _bits(token):
+    return int(token[3:], 16)
+
+
+class _Translator(Interpreter):
+    """From the tree to Python: an expression to its type and code, a statement to lines."""
+
+    def __init__(self, declarations):
+        self.sections, self.types = declarations.sections, declarations.types
+        self.loops = 0
+
+    def real(self, tree):
+        return "LREAL", repr(float(tree.children[0]))
+
+    def integer(self, tree):
+        return LITERAL, str(int(tree.children[0]))
+
+    def boolean(self, tree):
+        return "BOOL", str(_truth(tree.children[0]))
+
+    def bits(self, tree):
+        return "DWORD", str(_within(_bits(tree.children[0]), *LIMITS["DWORD"], "DWORD"))
+
+    def variable(self, tree):
+        name, index = tree.children
+        key = name.lower()
+        _check(key in self.types, f"{name} is not declared")
+        scalar, bounds = self.types[key]
+        _check((bounds is None) == (index is None), f"{name} is used against its type")
+        if bounds is None:
+            return scalar, f"v_{key}"
+        type_, code = self.visit(index)
+        _check(type_ in INTEGERS, f"{name} has an index that is no integer")
+        return scalar, f"v_{key}[_within({code}, {bounds[0]}, {bounds[1]}, 'index of {key}') - {bounds[0]}]"
+
+    def call(self, tree):
+        name, *arguments = tree.children
+        _check(name.lower() in FUNCTIONS, f"{name} is not known")
+        due, result, code = FUNCTIONS[name.lower()]
+        _check(len(due) == len(arguments), f"{name} takes {len(due)} arguments")
+        given = [self.visit(argument) for argument in arguments]
+        generic = None
+        for (type_, _), expected in zip(given, due, strict=True):
+            if expected == "number":
+                _check(type_ in ("LREAL", *INTEGERS), f"{name} does not take {type_}")
+                generic = type_ if generic is None else _common(generic, type_)
+            else:
+                _check(_fits(type_, expected), f"{name} does not take {type_}")
+        return generic if result == "number" else result, code.format(*(argument for _, argument in given))
+
+    def negation(self, tree):
+        ((type_, code),) = self.visit_children(tree)
+        _check(type_ == "BOOL", f"NOT does not take {type_}")
+        return "BOOL", f"(not {code})"
+
+    def signed(self, tree):
+        sign, (type_, code) = tree.children[0], self.visit(tree.children[1])
+        _check(type_ in ("LREAL", *INTEGERS), f"{sign} does not take {type_}")
+        return type_, f"({sign}{code})"
+
+    def logic(self, tree):
+        # Both sides are evaluated: the standard has no short circuit.
+        (left, one), operator, (right, other) = self._operands(tree)
+        _check(_common(left, right) in ("BOOL", "DWORD"), f"{operator} does not take {left}")
+        return left, f"({one} { {'OR': '|', 'XOR': '^', 'AND': '&'}[operator.upper()] } {other})"
+
+    def compare(self, tree):
+        (left, one), operator, (right, other) = self._operands(tree)
+        type_ = _common(left, right)
+        _check(operator in ("=", "<>") or type_ != "BOOL", f"{operator} does not take BOOL")
+        return "BOOL", f"({one} { {'=': '==', '<>': '!='}.get(operator, operator) } {other})"
+
+    def arithmetic(self, tree):
+        (left, one), operator, (right, other) = self._operands(tree)
+        type_ = _common(left, right)
+        _check(type_ in ("LREAL", *INTEGERS), f"{operator} does not take {type_}")
+        return type_, f"_divided({one}, {other})" if operator == "/" else f"({one} {operator} {other})"
+
+    def _operands(self, tree):
+        return self.visit(tree.children[0]), tree.children[1], self.visit(tree.children[2])
+
+    def assign(self, tree):
+        name = tree.children[0].children[0].lower()
+        scalar, place = self.visit(tree.children[0])
+        type_, code = self.visit(tree.children[1])
+        _check(self.sections[name] in ("VAR", "VAR_OUTPUT"), f"{name} must not be written")
+        _check(_fits(type_, scalar), f"{name} : {scalar} cannot hold {type_}")
+        if scalar in LIMITS:
+            code = f"_within({code}, {LIMITS[scalar][0]}, {LIMITS[scalar][1]}, '{name}')"
+        return [f"{place} = {code}"]
+
+    def body(self, tree):
+        return [line for statement in tree.children for line in self.visit(statement)] or ["pass"]
+
+    def branch(self, tree):
+        condition, body = tree.children
+        return self._condition(condition), self.visit(body)
+
+    def choose(self, tree):
+        *branches, otherwise = tree.children
+        return self._chain([self.visit(branch) for branch in branches], otherwise)
+
+    def case(self, tree):
+        selector, *labels, otherwise = tree.children
+        type_, code = self.visit(selector)
+        _check(type_ in INTEGERS, f"CASE does not take {type_}")
+        branches = []
+        for label in labels:
+            values = ", ".join(str(int(value)) for value in label.children[:-1])
+            branches.append((f"{code} in ({values},)", self.visit(label.children[-1])))
+        return self._chain(branches, otherwise)
+
+    def count(self, tree):
+        name, first, last, body = tree.children
+        variable = Tree("variable", [name, None])
+        scalar, place = self.visit(variable)
+        _check(self.sections[name.lower()] == "VAR", f"{name} must not be written")
+        (start, low), (end, high) = self.visit(first), self.visit(last)
+        _check(scalar in INTEGERS and _fits(start, scalar) and _fits(end, scalar), "FOR mixes types")
+        return [f"for {place} in range({low}, {high} + 1):", *_indented(self.visit(body)), f"{place} += 1"]
+
+    def repeat(self, tree):
+        self.loops += 1
+        turns = f"turns_{self.loops}"
+        condition, body = self._condition(tree.children[0]), self.visit(tree.children[1])
+        return [f"{turns} = 0", f"while {condition}:", *_indented([f"{turns} = _turn({turns})", *body])]
+
+    def _condition(self, tree):
+        type_, code = self.visit(tree)
+        _check(type_ == "BOOL", f"{type_} is no condition")
+        return code
+
+    def _chain(self, branches, otherwise):
+        lines = []
+        for word, (condition, body) in zip(["if", *["elif"] * len(branches)], branches, strict=False):
+            lines += [f"{word} {condition}:", *_indented(body)]
+        return lines + (["else:", *_indented(self.visit(otherwise))] if otherwise else [])
+
+
+def _indented(lines):
+    return [f"  {line}" for line in lines]
+
+
+_PARSER = Lark(GRAMMAR, parser="lalr", maybe_placeholders=True)
+
+
+@lru_cache(maxsize=32)
+def _translated(text):
+    tree = _PARSER.parse(text)
+    declarations = _Declarations()
+    for part in tree.children[1:-1]:
+        declarations.visit(part)
+    lines = _Translator(declarations).visit(tree.children[-1])
+    names = ", ".join(f"v_{name}" for name in declarations.types)
+    source = ["def run():", *_indented([f"global {names}" if names else "pass", *lines])]
+    return str(tree.children[0]), declarations, compile("\n".join(source), "<structured text>", "exec")
 
 
 class FunctionBlock:
     """An instance: `call` runs it once with the given inputs and returns its outputs, by lower-case name."""
 
     def __init__(self, text):
-        self.name, blocks, self._statements = _Compiler().transform(_PARSER.parse(text))
-        self.types, self.sections, self.values = {}, {}, {}
-        for section, declarations in blocks:
-            for name, type_, initial in declarations:
-                _check(name not in self.types, f"{name} is declared twice")
-                self.types[name], self.sections[name] = type_, section
-                self.values[name] = self._initial(name, type_, initial)
-
-    def _initial(self, name, type_, initial):
-        scalar, bounds = type_
-        if bounds is None:
-            return _fitting(scalar, ZERO[scalar] if initial is None else initial, name)
-        length = bounds[1] - bounds[0] + 1
-        values = [ZERO[scalar]] * length if initial is None else initial
-        _check(len(values) == length, f"{name} has {len(values)} values for {length} elements")
-        return [_fitting(scalar, value, name) for value in values]
+        self.name, declarations, code = _translated(text)
+        self.types, self.sections = declarations.types, declarations.sections
+        self._space = dict(RUNTIME)
+        for name, value in declarations.initial.items():
+            self._space[f"v_{name}"] = list(value) if isinstance(value, list) else value
+        exec(code, self._space)
+        self._outputs = [name for name, section in self.sections.items() if section == "VAR_OUTPUT"]
 
     def call(self, **inputs):
         for name, value in inputs.items():
-            _check(self.sections.get(name.lower()) == "VAR_INPUT", f"{name} is no input")
-            self.values[name.lower()] = _fitting(self.types[name.lower()][0], value, name)
-        for statement in self._statements:
-            statement(self)
-        return {name: value for name, value in self.values.items() if self.sections[name] == "VAR_OUTPUT"}
+            key = name.lower()
+            _check(self.sections.get(key) == "VAR_INPUT", f"{name} is no input")
+            self._space[f"v_{key}"] = self._input(key, value)
+        self._space["run"]()
+        return {name: self[name] for name in self._outputs}
+
+    def __getitem__(self, name):
+        value = self._space[f"v_{name.lower()}"]
+        return list(value) if isinstance(value, list) else value
+
+    def alter(self, name, index, value):
+        """Change an element of an array as failing memory would, constant or not."""
+        self._space[f"v_{name.lower()}"][index] = value
+
+    def _input(self, name, value):
+        scalar, bounds = self.types[name]
+        if bounds is None:
+            return _given(scalar, value, name)
+        _check(len(value) == bounds[1] - bounds[0] + 1, f"{name} takes another number of values")
+        return [_given(scalar, item, name) for item in value]
+
+
+def _given(scalar, value, name):
+    expected = {"BOOL": bool, "LREAL": float}.get(scalar, int)
+    _check(type(value) is expected, f"{name} : {scalar} cannot hold {value!r}")
+    return value if scalar in ("BOOL", "LREAL") else _within(value, *LIMITS[scalar], name)

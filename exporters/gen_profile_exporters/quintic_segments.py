@@ -1,0 +1,163 @@
+"""A sampled motion as quintic segments whose knots lie on the cycle grid.
+
+A segment from cycle ``first[k]`` to ``first[k + 1]`` takes position, velocity and acceleration of the motion
+over at both ends (quintic Hermite interpolation), so the whole is twice continuously differentiable. Segments
+are as long as the error at the cycles between allows; a single cycle always fits.
+"""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile.profile import Array, SampledProfile, read_only
+
+POSITION_ERROR = 1e-9  # m (or rad), of a segment at the cycles inside it
+ACCELERATION_ERROR = 1e-6  # m/s²
+POINTS = 16, 4096  # where peaks are looked for: per segment, and of all, at least
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class QuinticSegments:
+    """Piecewise quintic motion; after its last cycle it holds `target`.
+
+    Attributes
+    ----------
+    cycle_time : float
+        s.
+    first : (segments + 1,) array of int
+        Cycle at which each segment begins, and the cycle of the end.
+    coefficients : (segments, 6, axes) array
+        Lowest power first, of the time in s since the segment's begin.
+    target : (axes,) array
+    """
+
+    cycle_time: float
+    first: NDArray[np.int64]
+    coefficients: Array = attrs.field(converter=read_only)
+    target: Array = attrs.field(converter=read_only)
+
+    def at_cycles(self) -> tuple[Array, Array, Array]:
+        """Evaluate position, velocity and acceleration at every cycle, each of shape (samples, axes).
+
+        The operations and their order are those of the playback block, so that both round alike.
+        """
+        cycles = np.arange(self.first[-1])
+        segment = np.searchsorted(self.first, cycles, side="right") - 1
+        time: Array = (cycles - self.first[segment]) * np.float64(self.cycle_time)
+        position, velocity, acceleration = horner(self.coefficients[segment], time[:, None])
+        still = np.zeros((1, len(self.target)))
+        return (
+            np.concatenate([position, self.target[None]]),
+            np.concatenate([velocity, still]),
+            np.concatenate([acceleration, still]),
+        )
+
+    def peaks(self) -> Array:
+        """Bound the magnitudes of velocity, acceleration and jerk, between cycles too; shape (3, axes).
+
+        Between points that are δ apart, a function exceeds the greater of its values there by at most δ²/8
+        times the greatest magnitude of its second derivative.
+        """
+        length = np.diff(self.first) * self.cycle_time
+        points = max(POINTS[0], POINTS[1] // len(length))
+        time = length[:, None] * np.linspace(0.0, 1.0, points)
+        powers = time[:, :, None] ** np.arange(5)
+        size: dict[int, Array] = {}
+        for order in (5, 4, 3, 2, 1):
+            factors = np.array([_falling(power, order) for power in range(order, 6)])
+            scaled = self.coefficients[:, order:, :] * factors[:, None]
+            values = np.abs(powers[:, :, : 6 - order] @ scaled)
+            spacing = (length / (points - 1))[:, None]
+            size[order] = values.max(axis=1) + spacing**2 / 8.0 * size.get(order + 2, 0.0)
+        return np.array([size[order].max(axis=0) for order in (1, 2, 3)])
+
+
+def fit(motion: SampledProfile) -> QuinticSegments:
+    """Cover a motion that carries velocity and acceleration with as few segments as its errors allow."""
+    if motion.velocity is None or motion.acceleration is None:
+        raise ValueError("quintic segments are fitted to velocity and acceleration, too")
+    samples = np.stack([motion.position, motion.velocity, motion.acceleration])
+    last = samples.shape[1] - 1
+    first, pieces = [0], []
+    length = 1
+    while first[-1] < last:
+        begin = first[-1]
+        length = _longest(samples, begin, min(length, last - begin), last - begin, motion.cycle_time)
+        pieces.append(hermite(samples[:, begin], samples[:, begin + length], length * motion.cycle_time))
+        first.append(begin + length)
+    return QuinticSegments(
+        cycle_time=motion.cycle_time,
+        first=np.array(first),
+        coefficients=np.array(pieces),
+        target=motion.position[-1],
+    )
+
+
+def hermite(begin: Array, end: Array, duration: float) -> Array:
+    """Interpolate by a quintic; `begin` and `end` hold position, velocity, acceleration.
+
+    Parameters
+    ----------
+    begin, end : (3, axes) array
+    duration : float
+        s.
+
+    Returns
+    -------
+    (6, axes) array
+        Coefficients, lowest power first.
+    """
+    (p0, v0, a0), (p1, v1, a1) = begin, end
+    t = duration
+    missing = p1 - p0 - t * (v0 + 0.5 * t * a0)
+    speed = t * (v1 - v0 - t * a0)
+    push = 0.5 * t * t * (a1 - a0)
+    return np.array(
+        [
+            p0,
+            v0,
+            0.5 * a0,
+            (10.0 * missing - 4.0 * speed + push) / t**3,
+            (-15.0 * missing + 7.0 * speed - 2.0 * push) / t**4,
+            (6.0 * missing - 3.0 * speed + push) / t**5,
+        ]
+    )
+
+
+def horner(coefficients: Array, time: Array) -> tuple[Array, Array, Array]:
+    """Evaluate position, velocity and acceleration as the playback block does, operation by operation."""
+    c0, c1, c2, c3, c4, c5 = np.moveaxis(coefficients, -2, 0)
+    return (
+        c0 + time * (c1 + time * (c2 + time * (c3 + time * (c4 + time * c5)))),
+        c1 + time * (2.0 * c2 + time * (3.0 * c3 + time * (4.0 * c4 + time * (5.0 * c5)))),
+        2.0 * c2 + time * (6.0 * c3 + time * (12.0 * c4 + time * (20.0 * c5))),
+    )
+
+
+def _longest(samples: Array, begin: int, guess: int, most: int, cycle_time: float) -> int:
+    """Double from a guess while it fits, then halve the gap to what does not: 2 log₂ trials."""
+    fits, fails = 1, most + 1
+    while fails - fits > 1:
+        length = max(fits + 1, guess)
+        if _fits(samples[:, begin : begin + length + 1], cycle_time):
+            fits, guess = length, min(2 * length, (length + fails) // 2 if fails <= most else most)
+        else:
+            fails, guess = length, (fits + length) // 2
+    return fits
+
+
+def _fits(samples: Array, cycle_time: float) -> bool:
+    cycles = np.arange(1, samples.shape[1] - 1)
+    coefficients = hermite(samples[:, 0], samples[:, -1], (len(cycles) + 1) * cycle_time)
+    position, _, acceleration = horner(coefficients[None], (cycles * cycle_time)[:, None])
+    return bool(
+        (np.abs(position - samples[0, 1:-1]) <= POSITION_ERROR).all()
+        and (np.abs(acceleration - samples[2, 1:-1]) <= ACCELERATION_ERROR).all()
+    )
+
+
+def _falling(power: int, order: int) -> float:
+    """Factor that differentiating a power so often brings down."""
+    return float(np.prod(np.arange(power, power - order, -1)))
