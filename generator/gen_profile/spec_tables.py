@@ -135,7 +135,7 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
     else:
         faults.add("move.distance", "required, but missing; state distance, or start and target")
         target = [1.0] * (axes or 1)
-    start = _per_axis(0.0 if start is None else start, len(target), "move.start", faults)
+    start = _per_axis([0.0] * len(target) if start is None else start, len(target), "move.start", faults)
     if start == target:
         faults.add("move.distance", "must not be zero on every axis")
     for key, values in (("start", start), ("target", target)):
@@ -154,8 +154,8 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
 
 
 def _per_axis(value: Any, axes: int | None, where: str, faults: Faults) -> list[float]:
-    """One finite number per axis; a single one holds for all."""
-    values = value if isinstance(value, list) else [value] * (axes or 1)
+    """One finite number per axis; a machine with one axis may leave the brackets out."""
+    values = value if isinstance(value, list) else [value]
     if axes is not None and len(values) != axes:
         faults.add(where, f"must hold one number per axis ({axes}), found {len(values)}")
         return [1.0] * axes
@@ -199,7 +199,7 @@ def _robustness(table: Table, parameters: Mapping[str, float] | None, faults: Fa
             faults.add(place(where, key), f"unknown parameter{suggestion(key, parameters)}")
         elif parameters[key] == 0.0:
             faults.add(place(where, key), "its value is 0, so a relative range is empty")
-    if table.get("method") in {"sensitivity", "range"} and not uncertain:
+    if table.get("method") in ("sensitivity", "range") and not uncertain:
         faults.add(where, f'required with method = "{table["method"]}", such as {{ L1 = 0.2 }}')
     if table.get("nominal_zero") is True and table.get("method") != "range":
         faults.add("robustness.nominal_zero", 'only with method = "range"; elsewhere it is so anyway')

@@ -1,0 +1,128 @@
+"""Specs of machines with several axes, in metres and radians."""
+
+import numpy as np
+import pytest
+
+from gen_profile.errors import SpecError
+from gen_profile.metrics import length
+from gen_profile.problem.axis_reach import axis_reach, effort_weights
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.problem import problem_of
+from gen_profile.solvers import indirect
+from gen_profile.spec_reading import parse_spec, preset_spec
+
+
+def fault_of(preset, *overrides):
+    with pytest.raises(SpecError) as caught:
+        preset_spec(preset, overrides)
+    (sentence,) = caught.value.faults
+    return sentence
+
+
+@pytest.mark.parametrize(
+    ("preset", "override", "sentence"),
+    [
+        ("gantry-crane", "move.distance=3", "move.distance: must hold one number per axis (2), found 1."),
+        ("gantry-crane", "move.distance=[0, 0]", "move.distance: must not be zero on every axis."),
+        (
+            "single-pendulum-crane",
+            "move.target=[12.0, -1.0]",
+            "move.target: hoist must be from 0 to inf m, found -1.",
+        ),
+        ("tower-crane", "move.start=[0.0, -2.0]", "move.start: trolley must be from 0 to inf m, found -2."),
+        (
+            "tower-crane",
+            "axis.trolley.unit=deg",
+            "axis.trolley.unit: 'deg' does not measure an axis that moves in m.",
+        ),
+        ("tower-crane", "axis.hook.unit=m", "axis.hook: unknown axis (known: slew, trolley)."),
+        (
+            "mass-spring-chain",
+            "plant.type=mass-spring-chain-99",
+            "plant.type: unknown machine 'mass-spring-chain-99'; did you mean 'mass-spring-chain-2'?",
+        ),
+    ],
+)
+def test_faults_of_moves_with_several_axes(preset, override, sentence):
+    assert fault_of(preset, override) == sentence
+
+
+def test_a_limit_of_sway_has_no_default_where_axes_turn_only():
+    text = '[plant]\ntype = "flexible-joint"\n[move]\ndistance = 1.0\nduration = 1.0\n'
+    with pytest.raises(SpecError, match=r"check\.residual_sway: required where no axis moves in m"):
+        parse_spec(text)
+    spec = parse_spec(text + "[check]\nresidual_sway = 0.01\n")
+    assert spec.check.residual_sway == {"tip": 0.01}
+
+
+def test_a_default_limit_is_a_share_of_the_longest_move_in_metres():
+    move = "[move]\nstart = [0.0, 20.0]\ntarget = [3.0, 18.0]\nduration = 60.0\n"
+    spec = parse_spec(f'[plant]\ntype = "tower-crane"\n{move}')
+    assert set(spec.check.residual_sway.values()) == {0.02}
+
+
+# ── effort ───────────────────────────────────────────────────────────────────────────────────────────────
+
+
+@pytest.mark.parametrize(
+    ("preset", "overrides", "reach"),
+    [
+        ("paper", [], [0.3]),
+        ("gantry-crane", [], [12.0, 4.0]),
+        ("gantry-crane", ["move.distance=[-12.0, 0.0]"], [12.0, 12.0]),
+        # at 25 m, 1 rad is an arc of 25 m
+        ("tower-crane", ["move.start=[0, 25]", "move.target=[1, 25]"], [1.0, 25.0]),
+        ("tower-crane", ["move.start=[0, 20]", "move.target=[0, 30]"], [10.0 / 25.0, 10.0]),
+        ("tower-crane", ["move.start=[0, 0]", "move.target=[1, 0]"], [1.0, 1.0]),  # nothing swings
+        ("single-pendulum-crane", ["move.start=[0, 3]", "move.target=[-8, 3]"], [8.0, 8.0]),
+        ("single-pendulum-crane", ["move.start=[0, 3]", "move.target=[0, 1]"], [2.0, 2.0]),
+    ],
+)
+def test_every_axis_is_measured_by_its_own_move(preset, overrides, reach):
+    found = axis_reach(problem_of(preset_spec(preset, overrides)))
+    np.testing.assert_allclose(found, reach, rtol=1e-12)
+    np.testing.assert_allclose(effort_weights(found), (reach[0] / np.array(reach)) ** 2)
+
+
+def test_a_gantry_treats_its_axes_alike():
+    """Exchanging the distances of x and y exchanges the motions, as far as the rope swings little."""
+
+    def profile_of(distance):
+        overrides = [f"move.distance={distance}", "cost.sway_weight=0", "move.duration=20"]
+        solution = indirect.solve(problem_of(preset_spec("gantry-crane", overrides)))
+        optimum = solution.raise_for_status()
+        return optimum.top_derivative
+
+    one, other = profile_of([4.0, 2.0]), profile_of([2.0, 4.0])
+    np.testing.assert_allclose(one[:, 0], other[:, 0, ::-1], atol=1e-3 * np.abs(one).max())
+
+
+def test_an_axis_that_is_not_asked_to_move_stays_where_nothing_is_won_by_it():
+    overrides = ["move.distance=[12.0, 0.0]", "cost.sway_weight=0"]
+    optimum = indirect.solve(problem_of(preset_spec("gantry-crane", overrides))).raise_for_status()
+    assert np.abs(optimum.top_derivative[..., 1]).max() < 1e-9 * np.abs(optimum.top_derivative[..., 0]).max()
+
+
+def test_a_trolley_answers_the_pull_of_the_slew():
+    """A slewing load flies outward; only the trolley, which ends where it began, can bring it to rest."""
+    overrides = ["move.start=[0, 20]", "move.target=[1.5, 20]", "cost.sway_weight=0"]
+    optimum = indirect.solve(problem_of(preset_spec("tower-crane", overrides))).raise_for_status()
+    assert np.abs(optimum.top_derivative[..., 1]).max() > 0.0
+    states = optimum.states
+    np.testing.assert_allclose(states[-1, :4], 0.0, atol=1e-9)  # angles and rates
+
+
+# ── loads that swing in two directions ───────────────────────────────────────────────────────────────────
+
+
+def test_one_frequency_counts_once():
+    spec = preset_spec("gantry-crane")
+    linear = linearize(spec.machine(), spec.plant.parameters)
+    assert (len(linear.frequencies), len(linear.distinct_frequencies)) == (2, 1)
+    paper = preset_spec("paper")
+    assert len(linearize(paper.machine(), paper.plant.parameters).distinct_frequencies) == 2
+
+
+def test_the_length_of_a_sway():
+    np.testing.assert_allclose(length(np.array([[3.0, 4.0], [0.0, -2.0]])), [[5.0], [2.0]])
+    np.testing.assert_allclose(length(np.array([[-3.0], [2.0]])), [[-3.0], [2.0]])
