@@ -121,12 +121,14 @@ def resolve_weights(problem: Problem) -> tuple[goals.Weights, int]:
     """Give β and γ their values, and count the iterations that it took."""
     if problem.sway_weight == 0.0 or problem.sway_scale is not None:
         return goals.Weights(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
-    setup, _ = set_up(attrs.evolve(problem, sway_weight=0.0, limits=LimitsSpec(), worst_case=None))
-    quiet = goals.Weights(beta=0.0, gamma=1.0)
-    found = sequence(setup, setup.transcription.rest(), least_cost(setup, quiet, None, None))
-    sway = np.linalg.norm(setup.transcription.end_sway_found(found.iterate), axis=1)
-    beta = problem.sway_weight * 2.0 * _cost(setup, found.iterate, quiet) / problem.duration / AUTO_EFFORT**2
-    return goals.Weights(beta=beta, gamma=AUTO_SWAY / float(sway.max())), found.iterations
+    quiet = attrs.evolve(problem, sway_weight=0.0, sway_scale=1.0, limits=LimitsSpec(), worst_case=None)
+    solution = solve(quiet)
+    if solution.optimum is None:
+        return goals.Weights(beta=0.0, gamma=1.0), solution.iterations
+    effort = solution.optimum.cost / problem.duration
+    return goals.Weights(
+        beta=problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2, gamma=AUTO_SWAY / greatest_sway(solution)
+    ), solution.iterations
 
 
 def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tuple[Setup, tuple[str, ...]]:
@@ -145,7 +147,7 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
     worst_case = problem.worst_case
     exact = worst_case is None or worst_case.nominal_zero
-    modal: Array = np.linalg.inv(canonical.basis)
+    modal = np.asarray(np.linalg.inv(canonical.basis), dtype=np.float64)
     end = modal[np.ix_(states[asked[states] & exact], states)]
     parameters = [problem.parameters, *others]
     machines = [

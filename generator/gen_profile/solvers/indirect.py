@@ -12,6 +12,7 @@ import attrs
 import numpy as np
 from numpy.polynomial import polynomial
 
+from gen_profile.metrics import peak
 from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.profile import Array
@@ -23,6 +24,7 @@ from gen_profile.solvers.solution import Optimum, Solution, Status
 
 METHOD = "indirect"
 INTERVALS = 30
+SWAY_SAMPLES = 1001
 BETA_DECADES = 8.0  # from share 0 to 1
 HORIZONTAL = np.pi / 2.0
 TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the linear model implies
@@ -105,12 +107,12 @@ def _guess(canonical: Canonical) -> Trajectory:
 
 
 def _with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) -> Canonical:
-    values = quiet.quantities(solution.points)
-    sway = values[:, 2 + quiet.system.layout.m :][:, problem.plant.end_load]
     beta, gamma = problem.sway_weight, problem.sway_scale
     if gamma is None:
-        gamma = AUTO_SWAY / float(np.linalg.norm(sway, axis=1).max())
-        beta *= 2.0 * _integral(solution, values[:, 1]) / AUTO_EFFORT**2
+        between = quiet.quantities(solution(np.linspace(0.0, 1.0, SWAY_SAMPLES)))
+        sway = between[:, 2 + quiet.system.layout.m :][:, problem.plant.end_load]
+        gamma = AUTO_SWAY / float(peak(np.linalg.norm(sway, axis=1, keepdims=True))[0])
+        beta *= 2.0 * _integral(solution, quiet.quantities(solution.points)[:, 1]) / AUTO_EFFORT**2
     return attrs.evolve(quiet, data=attrs.evolve(quiet.data, beta=beta, gamma=gamma))
 
 
