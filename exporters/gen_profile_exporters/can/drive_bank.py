@@ -42,7 +42,7 @@ class DriveBank:
         load: Load,
     ) -> None:
         self.drives = tuple(drives)
-        self._bus, self._clock, self._load = bus, clock, load
+        self._bus, self._clock, self.load = bus, clock, load
         self._counts_per_si = tuple(counts_per_si)
         self._network = _Network(bus, clock)
         self._synced = clock.now()
@@ -86,10 +86,10 @@ class DriveBank:
             return
         if message.arbitration_id == frames.SYNC:
             self._synced = self._clock.now()
-            self._advance()
-            for drive in self.drives:
+            for drive in self.drives:  # where they are now; then they set out for the next SYNC
                 for cob_id, data in drive.feedback():
                     self._network.send_message(cob_id, data)
+            self._advance()
             return
         data = bytearray(message.data)
         for drive in self.drives:
@@ -106,7 +106,7 @@ class DriveBank:
         goals = [drive.next_command() for drive in self.drives]
         duration = max(drive.period for drive in self.drives)
         scaled = [goal / counts for goal, counts in zip(goals, self._counts_per_si, strict=True)]
-        actual = self._load.advance(scaled, duration)
+        actual = self.load.advance(scaled, duration)
         for drive, position, counts in zip(self.drives, actual, self._counts_per_si, strict=True):
             drive.arrive(position * counts)
 

@@ -17,9 +17,9 @@ from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.clock import NANOSECONDS, Clock
 
-POLL = NANOSECONDS // 5000  # between two looks at the bus, while an answer is awaited
+POLL = NANOSECONDS // 5000  # between two looks for an awaited answer
 ANSWER_TIMEOUT = NANOSECONDS // 2
-FRAMES_AT_ONCE = 64  # a flooded bus must not keep the streamer from its deadline
+FRAMES_AT_ONCE = 200  # a flooded bus must not keep the streamer from its deadline
 
 
 class Link:
@@ -86,10 +86,9 @@ class Link:
                 return
 
     def wait_until(self, instant: int) -> None:
-        """Take in frames until an instant."""
-        while self.clock.now() < instant:
-            self.drain()
-            self.clock.sleep_until(min(instant, self.clock.now() + POLL))
+        """Sleep until an instant, then take in what came meanwhile."""
+        self.clock.sleep_until(instant)
+        self.drain()
 
     def sdo(self, node: int) -> _Sdo:
         """Open the SDO channel of a node."""

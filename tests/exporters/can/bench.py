@@ -1,0 +1,151 @@
+"""A streamer and drives on python-can's virtual bus, in one thread, on a clock that nobody waits for.
+
+What the tests judge is the bus alone: a third party on it takes down every frame, as candump does.
+"""
+
+import itertools
+
+import attrs
+import can
+from motions import quintic, target
+
+from gen_profile_exporters.can import exporter
+from gen_profile_exporters.can.drive_bank import DriveBank
+from gen_profile_exporters.can.drive_dictionary import Make
+from gen_profile_exporters.can.load import RigidLoad
+from gen_profile_exporters.can.plan import plan_of
+from gen_profile_exporters.can.simulated_drive import SimulatedDrive
+from gen_profile_exporters.can.streamer import Streamer
+
+MS = 1_000_000
+BEGINNING = 1_000 * MS
+QUICK_STOP = b"\x02\x00"
+_channels = itertools.count()
+
+
+class FakeClock:
+    """Time that passes only while somebody sleeps, and lets everybody else act meanwhile."""
+
+    def __init__(self, step):
+        self._now = BEGINNING
+        self._step = step
+        self.actors = []
+
+    def now(self):
+        return self._now
+
+    def sleep_until(self, instant):
+        while self._now < instant:
+            self._now = min(self._now + self._step, instant)
+            for act in self.actors:
+                act()
+
+    def stall(self, duration):
+        """Let time pass while nobody else acts: this machine was busy."""
+        self._now += duration
+
+
+class Tampered:
+    """One end of a bus, with something wrong with it."""
+
+    def __init__(self, bus):
+        self._bus = bus
+        self.sending = lambda message: True  # whether a frame really goes out
+        self.receiving = lambda message: message
+        self.inbox = []
+
+    def send(self, message):
+        if self.sending(message):
+            self._bus.send(message)
+
+    def recv(self, timeout=None):
+        return self.receiving(self.inbox.pop() if self.inbox else self._bus.recv(timeout))
+
+
+@attrs.frozen
+class Heard:
+    """A frame on the bus, at an instant in ms."""
+
+    at: float
+    cob_id: int
+    data: bytes
+
+
+class Bench:
+    """Everything on one bus."""
+
+    def __init__(self, *names, profile=None, make=None, load=None, stand=None, step=MS // 4, **options):
+        channel = f"bench-{next(_channels)}"
+        self.clock = FakeClock(step)
+        self.target = target(*names, **options)
+        files = exporter.encode(profile or quintic((0.1, 0.4)), self.target)
+        self.plan = plan_of(files[0].content, self.target)
+        self._buses = [can.Bus(channel, interface="virtual") for _ in range(3)]
+        self.witness = self._buses[0]
+        self.drive_end, self.streamer_end = map(Tampered, self._buses[1:])
+        self.heard = []
+        self.clock.actors.append(self._listen)
+        self.drives = self._drives(make or Make(), load, stand)
+        self.drives_alive = True
+        self.clock.actors.append(lambda: self.drives.poll() if self.drives_alive else None)
+        self.phases = []
+        self.streamer = Streamer(self.streamer_end, self.clock, self.plan, self.phases.append)
+        self.fault_at = None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for bus in self._buses:
+            bus.shutdown()
+
+    @property
+    def drive(self):
+        return self.drives.drives[0]
+
+    @property
+    def now(self):
+        """ms since the beginning."""
+        return (self.clock.now() - BEGINNING) / MS
+
+    def at_cycle(self, cycle, act):
+        """Do something once so many setpoints have been streamed, and note when."""
+
+        def look():
+            if self.fault_at is None and self.streamer.cycles_sent >= cycle:
+                self.fault_at = self.now
+                act()
+
+        self.clock.actors.insert(0, look)
+
+    def say(self, cob_id, data=b"", **options):
+        """Speak up as somebody else on the bus; the witness hears itself, too."""
+        options.setdefault("is_extended_id", False)
+        self.witness.send(can.Message(arbitration_id=cob_id, data=data, **options))
+
+    def run(self):
+        record = self.streamer.run()
+        self.wait(2)
+        return record
+
+    def wait(self, milliseconds):
+        self.clock.sleep_until(self.clock.now() + int(milliseconds * MS))
+
+    def of(self, cob_id):
+        return [frame for frame in self.heard if frame.cob_id == cob_id]
+
+    def positions(self):
+        """What the first drive told: instants, and positions in counts."""
+        told = self.of(0x180 + self.target.can.node)
+        return [(frame.at, int.from_bytes(frame.data[2:6], "little", signed=True)) for frame in told]
+
+    def _listen(self):
+        while (message := self.witness.recv(0)) is not None:
+            self.heard.append(Heard(self.now, message.arbitration_id, bytes(message.data)))
+
+    def _drives(self, make, load, stand):
+        first = [int(at) for at in (self.plan.motion.position[0] if stand is None else stand)]
+        counts = [axis.counts_per_si for axis in self.target.axes]
+        drives = [SimulatedDrive(self.target.can.node + n, make, at) for n, at in enumerate(first)]
+        rest = [at / count for at, count in zip(first, counts, strict=True)]
+        return DriveBank(self.drive_end, self.clock, drives, counts, load or RigidLoad(rest))

@@ -1,0 +1,233 @@
+"""Whole streams on a fake clock, judged by what a witness on the bus took down."""
+
+import re
+from types import SimpleNamespace
+
+import can
+import numpy as np
+import pytest
+from exporters.can.bench import QUICK_STOP, Bench
+from motions import quintic
+
+from gen_profile_exporters.can.candump import read
+from gen_profile_exporters.can.drive_dictionary import Make
+from gen_profile_exporters.can.exporter import encode
+from gen_profile_exporters.can.load import RigidLoad
+from gen_profile_exporters.can.streamer import Phase
+
+PHASES = ["configure", "align", "enable", "stream", "hold", "disable"]
+PERIOD = 4  # ms
+OTHER_MAKE = Make(own_mapping=True, fixed_period=(4, -3), miss="hold")
+
+
+def sent(bench, cob_ids=(0x301,)):
+    """Setpoints and SYNCs in the order in which they were on the bus."""
+    return [(frame.cob_id, frame.data) for frame in bench.heard if frame.cob_id in {*cob_ids, 0x080}]
+
+
+def exported(profile, target):
+    return [(frame.cob_id, frame.data) for frame in read(encode(profile, target)[0].content)]
+
+
+def find(haystack, needle):
+    return [k for k in range(len(haystack) - len(needle) + 1) if haystack[k : k + len(needle)] == needle]
+
+
+class TestWholeStream:
+    @pytest.mark.parametrize("make", [Make(), OTHER_MAKE])
+    def test_every_setpoint_once_in_order_byte_for_byte(self, make):
+        with Bench(make=make) as bench:
+            record = bench.run()
+        assert (record.phase, record.reason, record.sent) == (Phase.DONE, "", 251)
+        assert bench.phases == PHASES
+        frames, log = sent(bench), exported(quintic((0.1, 0.4)), bench.target)
+        (begin, *_) = find(frames, log)
+        before, after = frames[:begin], frames[begin + len(log) :]
+        assert {data for cob_id, data in before if cob_id == 0x301} == {log[0][1]}
+        assert {data for cob_id, data in after if cob_id == 0x301} == {log[-2][1]}
+        assert [cob_id for cob_id, _ in frames] == [0x301, 0x080] * (len(frames) // 2)
+
+    def test_syncs_are_even(self):
+        with Bench() as bench:
+            bench.run()
+        instants = np.array([frame.at for frame in bench.of(0x080)])
+        np.testing.assert_allclose(np.diff(instants[:-1]), PERIOD, atol=1e-9)
+
+    def test_the_axis_arrives(self):
+        with Bench() as bench:
+            record = bench.run()
+        assert record.final == (400_000,)
+        np.testing.assert_array_equal(record.actual[1:, 0], bench.plan.motion.position[:-1, 0])
+        assert record.told.all()
+        assert bench.positions()[-1][1] == 400_000
+
+    def test_several_axes_in_interpolated_position_mode(self):
+        profile = quintic((0.1, 0.4), (1.2, -0.7))
+        with Bench("bridge", "trolley", profile=profile, node=5, mode="ip") as bench:
+            record = bench.run()
+        assert (record.reason, record.final) == ("", (400_000, -700_000))
+        assert len(find(sent(bench, (0x305, 0x306)), exported(profile, bench.target))) == 1
+
+    @pytest.mark.parametrize(
+        "options", [{"feed_forward": "velocity"}, {"feed_forward": "torque", "torque_per_acceleration": 50.0}]
+    )
+    def test_feed_forward_goes_along(self, options):
+        with Bench(**options) as bench:
+            record = bench.run()
+            index = 0x60B1 if options["feed_forward"] == "velocity" else 0x60B2
+            assert bench.drive.value(index) == 0
+        assert record.phase is Phase.DONE
+        assert len(find(sent(bench), exported(quintic((0.1, 0.4)), bench.target))) == 1
+
+    def test_a_lagging_axis_is_waited_for(self):
+        load = RigidLoad([0.1], lag=0.97)
+        with Bench(load=load) as bench:
+            record = bench.run()
+        assert record.phase is Phase.DONE
+        assert abs(record.final[0] - 400_000) < 1000
+        assert len(bench.of(0x080)) > 251 + 100
+
+    def test_an_axis_that_never_arrives_is_stopped(self):
+        class Leaning(RigidLoad):
+            def advance(self, position, duration):
+                return [0.99 * at for at in super().advance(position, duration)]
+
+        with Bench(load=Leaning([0.1]), stand=[99_500]) as bench:
+            record = bench.run()
+        assert record.phase is Phase.ABORTED
+        assert "do not settle" in record.reason
+
+    def test_no_drift_in_an_hour(self):
+        hour = quintic((0.0, 1.0), duration=3600.0)
+        with Bench(profile=hour, sync_period=0.1, step=25_000_000) as bench:
+            record = bench.run()
+        assert record.sent == 36_001
+        assert abs(record.lateness.drift) < 1e-12
+        assert record.lateness.percentile(100) == 0.0
+
+    def test_drives_are_left_alone_afterwards(self):
+        with Bench() as bench:
+            bench.run()
+            assert bench.drive.value(0x1016, 1) == 0
+            assert bench.drive.local.nmt.state == "PRE-OPERATIONAL"
+            heard = len(bench.of(0x081))
+            bench.wait(1000)
+            assert len(bench.of(0x081)) == heard == 0
+
+
+def say(cob_id, data):
+    return lambda bench: bench.say(cob_id, data)
+
+
+def emergency(bench):
+    bench.say(0x081, bytes.fromhex("2031010000000000"))
+
+
+def tamper_feedback(change):
+    """Change the statusword that the drive tells."""
+
+    def act(bench):
+        told = bench.drive.feedback
+        bench.drive.feedback = lambda: [
+            (cob_id, change(int.from_bytes(data[:2], "little")).to_bytes(2, "little") + data[2:])
+            for cob_id, data in told()
+        ]
+
+    return act
+
+
+def block(bench):
+    at = bench.drives.load.position
+    bench.drives.load = SimpleNamespace(advance=lambda position, duration: at)
+
+
+def lose_sync(bench):
+    bench.drive_end.receiving = lambda message: (
+        None if message is not None and message.arbitration_id == 0x080 else message
+    )
+
+
+def bus_error(flags, data):
+    def act(bench):
+
+        bench.streamer_end.inbox.append(can.Message(is_error_frame=True, arbitration_id=flags, data=data))
+
+    return act
+
+
+def buffer_full(bench):
+
+    left = [3]
+
+    def refuse(message):
+        if left[0]:
+            left[0] -= 1
+            raise can.CanOperationError("No buffer space available", 105)
+        return True
+
+    bench.streamer_end.sending = refuse
+
+
+def kill_drives(bench):
+    bench.drives_alive = False
+
+
+def silence(bench):
+    bench.drive.feedback = list
+
+
+# what goes wrong, cycles until the quick stop is on the bus, what the reason says
+FAULTS = {
+    "EMCY": (emergency, 1, r"emergency 3120h"),
+    "fault bit": (tamper_feedback(lambda word: word & ~0x6F | 0x08), 2, r"state 'fault'"),
+    "bit 12 lost": (tamper_feedback(lambda word: word & ~0x1000), 2, r"no longer follows"),
+    "bit 13 set": (tamper_feedback(lambda word: word | 0x2000), 2, r"following error"),
+    "limit of the drive: switched off": (tamper_feedback(lambda word: 0x0250), 2, r"'switch on disabled'"),
+    "axis blocked": (block, 8, r"following error|emergency 8611h"),
+    "heartbeat lost": (lambda bench: bench.drive.local.nmt.stop_heartbeat(), 17, r"no heartbeat"),
+    "NMT stopped": (say(0x701, b"\x04"), 1, r"left the NMT state"),
+    "TPDO late": (silence, 4, r"no feedback"),
+    "TPDO cut short": (say(0x181, b"\x37\x12"), 1, r"feedback of 2 bytes"),
+    "bus-off": (bus_error(0x40, b""), 1, r"bus-off"),
+    "error-passive": (bus_error(0x04, bytes([0, 0x20, 0, 0, 0, 0, 0, 0])), 1, r"error-passive"),
+    "transmit buffer full": (buffer_full, 2, r"transmit buffer is full"),
+    "node reset": (lambda bench: bench.drive.reset(), 1, r"was reset"),
+    "drive killed": (kill_drives, 4, r"no feedback"),
+    "SYNC lost": (lose_sync, 4, r"no feedback|emergency"),
+    "second master's setpoint": (say(0x301, bytes(4)), 1, r"second controller"),
+    "second master's SYNC": (say(0x080, b""), 1, r"second controller"),
+    "second master's NMT": (say(0x000, b"\x80\x01"), 1, r"second controller"),
+    "asked to stop": (lambda bench: bench.streamer.ask_to_stop("Interrupted."), 1, r"^Interrupted\."),
+}
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        Make(following_error=2000),
+        Make(own_mapping=True, fixed_period=(4, -3), miss="hold", following_error=2000),
+    ],
+    ids=["usual", "other"],
+)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_fault_stops_the_axis(fault, make):
+    act, cycles, reason = FAULTS[fault]
+    with Bench(make=make, timeout=0.02) as bench:
+        bench.at_cycle(120, lambda: act(bench))
+        record = bench.run()
+        bench.drive_end.receiving = lambda message: message
+        bench.wait(300)
+    assert record.phase is Phase.ABORTED
+    assert re.search(reason, record.reason), record.reason
+    stops = [frame.at for frame in bench.of(0x201) if frame.data == QUICK_STOP]
+    assert stops[0] <= bench.fault_at + cycles * PERIOD
+    ours = [frame for frame in bench.of(0x301) if frame.data != bytes(4)]
+    assert max(frame.at for frame in ours) <= stops[0]
+    assert_stands(bench, since=stops[0])
+
+
+def assert_stands(bench, since):
+    """The axis came to rest on its ramp: within 0.3 s it stood, and stayed there, off the target."""
+    at_rest = {position for at, position in bench.positions() if at > since + 300}
+    assert len(at_rest) <= 1
+    assert abs(bench.drive.actual - 400_000) > 50_000
