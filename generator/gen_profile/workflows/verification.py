@@ -60,7 +60,7 @@ def cosimulate(
                     setpoints,
                     machine.parameters,
                     tau=tau,
-                    max_step=_max_step(spec, machine),
+                    max_step=max_step(spec, machine),
                     settle=STANDSTILL * tau + watch_time(spec, machines),
                     output_step=output_step,
                 ),
@@ -118,7 +118,8 @@ def _arrival(spec: Spec, setpoints: SampledProfile) -> float:
     return float(setpoints.times[-1]) + STANDSTILL * (spec.actuator.tau or 0.0)
 
 
-def _max_step(spec: Spec, machine: Scenario) -> float:
+def max_step(spec: Spec, machine: Scenario) -> float:
+    """Choose the longest integration step in s that a machine's fastest mode permits."""
     ends = (spec.move.start, spec.move.target)
     fastest = max(linearize(spec.machine(), machine.parameters, q_a).frequencies[-1] for q_a in ends)
     return min(LONGEST_STEP, STEP_PHASE / float(fastest))
