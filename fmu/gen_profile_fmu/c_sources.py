@@ -1,59 +1,67 @@
-"""C sources of a plant FMU: CasADi's equations, the variable table and the hand-written files."""
+"""C sources of an FMU: CasADi's equations, the tables, and the hand-written files."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from gen_profile.plants.plant import Plant
+import numpy as np
+
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import Dynamics
-from gen_profile.problem.symbolic import Symbol
-from gen_profile_fmu.variables import Variable, VariableTable
+from gen_profile.problem.symbolic import Function
+from gen_profile.profile import Profile
+from gen_profile_fmu.variables import DERIVATIVES, STATES, Kind, Type, Variable, VariableTable
 
-HAND_WRITTEN = (
-    "driven_plant.c",
-    "driven_plant.h",
-    "fmi2_cosimulation.c",
-    "plant_equations.h",
-)
+FOLDER = Path(__file__).parent / "c"
+FEWEST_POWERS = 4  # so that there is a jerk
 
 
-def c_sources(plant: Plant, equations: Dynamics, table: VariableTable) -> dict[str, str]:
-    """Collect the texts that make the FMU's binary, all but `identity_header`, by file name."""
-    folder = Path(__file__).parent
-    return {
-        **{name: (folder / name).read_text(encoding="utf-8") for name in HAND_WRITTEN},
-        "variables.h": _variables_header(plant, table),
-        "plant_acceleration.c": _equation("plant_acceleration", equations, equations.ddq_u),
-        "plant_jump.c": _equation("plant_jump", equations, equations.driven @ equations.ddq_a),
-        "plant_outputs.c": _equation(
-            "plant_outputs", equations, sym.column([equations.sway, equations.height, equations.angle])
-        ),
+def hand_written(*names: str) -> dict[str, str]:
+    """Read the hand-written files of these names, and those that every model has."""
+    return {name: (FOLDER / name).read_text(encoding="utf-8") for name in ("model.h", *names)}
+
+
+def equations_source(equations: Dynamics) -> str:
+    """Write a plant's equations as C, with the arguments that equations.h declares."""
+    e = equations
+    arguments = {
+        "q_u": e.q_u,
+        "dq_u": e.dq_u,
+        "q_a": e.q_a,
+        "dq_a": e.dq_a,
+        "input": e.ddq_a,
+        "parameters": e.p,
     }
+    seen = sym.column([e.sway, e.height, e.angle])
+    seeds = {name: sym.symbols(f"change_of_{name}", column.shape[0]) for name, column in arguments.items()}
+    everything, change = sym.column(list(arguments.values())), sym.column(list(seeds.values()))
+    tangents = [sym.directional(expression, everything, change) for expression in (e.ddq_u, seen)]
+    changes = {f"change_of_{name}": column for name, column in seeds.items()}
+    return '#include "equations.h"\n#define CASADI_SYMBOL_EXPORT static\n' + sym.c_source(
+        Function("equations_acceleration", arguments, e.ddq_u),
+        Function("equations_jump", arguments, e.driven @ e.ddq_a),
+        Function("equations_outputs", arguments, seen),
+        Function("equations_tangent", {**arguments, **changes}, *tangents),
+    )
 
 
-def identity_header(guid: str) -> str:
-    """Write the header that ties the binary to its model description."""
-    return f'#define MODEL_GUID "{guid}"\n'
+def variables_header(table: VariableTable, n_a: int, n_u: int, constants: Mapping[str, str]) -> str:
+    """Write the table of variables.
 
-
-def _equation(name: str, equations: Dynamics, output: Symbol) -> str:
-    """Write a column of expressions as C, with the arguments that plant_equations.h declares."""
-    inputs = {
-        "q_u": equations.q_u,
-        "dq_u": equations.dq_u,
-        "q_a": equations.q_a,
-        "dq_a": equations.dq_a,
-        "input": equations.ddq_a,
-        "parameters": equations.p,
-    }
-    # CasADi exports every function of its own on Windows unless it is told how to export
-    return "#define CASADI_SYMBOL_EXPORT\n" + sym.Function(name, inputs, output).c_source
-
-
-def _variables_header(plant: Plant, table: VariableTable) -> str:
-    offsets = ",\n".join(f"    {block} = {table.offset(block)}" for block in table.blocks)
-    rows = ",\n".join(_variable_row(variable) for variable in table.variables)
+    Parameters
+    ----------
+    table : VariableTable
+    n_a, n_u : int
+        Number of actuated and unactuated coordinates.
+    constants : mapping of str to str
+        Further macros.
+    """
+    states = next((block for block in STATES if block in table.blocks), None)
+    counts = {"N_A": n_a, "N_U": n_u, "N_VALUES": len(table.variables), "N_STATES": len(table.states)}
+    offsets = {block: table.offset(block) for block in table.blocks}
+    offsets["STATES"] = 0 if states is None else table.offset(states)
+    offsets.setdefault(DERIVATIVES, 0)
     return f"""\
 /* The FMU's variables; a variable's value reference is its index. */
 #ifndef VARIABLES_H
@@ -61,30 +69,69 @@ def _variables_header(plant: Plant, table: VariableTable) -> str:
 
 #include <float.h>
 
-enum {{ N_U = {len(plant.unactuated)}, N_A = {len(plant.actuated)}, N_VALUES = {len(table.variables)} }};
+enum {{ {", ".join(f"{name} = {value}" for name, value in counts.items())} }};
 
 /* First value reference of every block. */
 enum {{
-{offsets}
+{_lines(f"    {block} = {offset}" for block, offset in offsets.items())}
 }};
 
-typedef enum {{ FIXED_PARAMETER, TUNABLE_PARAMETER, INPUT, OUTPUT }} Kind;
-
+typedef enum {{ {", ".join(type_.name for type_ in Type)} }} Type;
+typedef enum {{ {", ".join(kind.name for kind in Kind)} }} Kind;
+enum {{ ACCELERATION_INPUT, VELOCITY_INPUT, SETPOINT_INPUT }};
+{"".join(f"#define {name} ({value}){chr(10)}" for name, value in constants.items())}
 typedef struct {{
     const char *name;
+    Type type;
     Kind kind;
     double start, lower, upper;
 }} Variable;
 
 static const Variable VARIABLES[N_VALUES] = {{
-{rows}
+{_lines(map(_variable_row, table.variables))}
 }};
 
 #endif
 """
 
 
+def motion_table(profile: Profile) -> str:
+    """Write a motion's numbers."""
+    segments, powers, axes = profile.coefficients.shape
+    padded = np.zeros((segments, max(powers, FEWEST_POWERS), axes))
+    padded[:, :powers] = profile.coefficients
+    rows = ("    {" + ", ".join("{" + _numbers(power) + "}" for power in segment) + "}" for segment in padded)
+    return f"""\
+/* A motion's knots in s; coefficients of its positions, lowest power first, by segment, power and axis. */
+#ifndef MOTION_TABLE_H
+#define MOTION_TABLE_H
+
+enum {{ N_SEGMENTS = {segments}, N_POWERS = {padded.shape[1]} }};
+
+static const double KNOTS[N_SEGMENTS + 1] = {{{_numbers(profile.knots)}}};
+
+static const double TARGET[] = {{{_numbers(profile.target)}}};
+
+static const double COEFFICIENTS[N_SEGMENTS][N_POWERS][{axes}] = {{
+{_lines(rows)}
+}};
+
+#endif
+"""
+
+
+def _numbers(values: object) -> str:
+    return ", ".join(repr(float(value)) for value in np.asarray(values))
+
+
+def _lines(items: Iterable[str]) -> str:
+    return ",\n".join(items)
+
+
 def _variable_row(variable: Variable) -> str:
     lower = "-DBL_MAX" if variable.lower is None else repr(float(variable.lower))
     upper = "DBL_MAX" if variable.upper is None else repr(float(variable.upper))
-    return f'    {{"{variable.name}", {variable.kind.name}, {float(variable.start)!r}, {lower}, {upper}}}'
+    return (
+        f'    {{"{variable.name}", {variable.type.name}, {variable.kind.name}, '
+        f"{float(variable.start)!r}, {lower}, {upper}}}"
+    )

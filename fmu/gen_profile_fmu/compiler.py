@@ -14,19 +14,13 @@ from platform import machine
 import attrs
 
 from gen_profile.errors import CosimulationError
+from gen_profile_fmu.platforms import PLATFORMS, host_platform
 
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CC"
 # contraction to fused multiply-add would make results depend on the processor
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
-# no newer C library than this is needed by what Zig links
-_TARGETS = {
-    ("linux", "x86_64"): "x86_64-linux-gnu.2.17",
-    ("linux", "aarch64"): "aarch64-linux-gnu.2.17",
-    ("darwin", "x86_64"): "x86_64-macos.11.0",
-    ("darwin", "aarch64"): "aarch64-macos.11.0",
-    ("win32", "x86_64"): "x86_64-windows-gnu",
-}
-_MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
+# names as they are in a shared library; a library of several FMUs linked statically has prefixed ones
+DEFINITIONS = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
 
 
 @attrs.frozen(kw_only=True)
@@ -45,51 +39,55 @@ class Compiler:
     identity: str
 
 
-def find_compiler() -> Compiler:
-    """Choose the compiler: `GEN_PROFILE_CC` where that is set, else Zig's.
+def find_compiler(platform: str | None = None) -> Compiler:
+    """Choose the compiler: Zig's or, for this computer, `GEN_PROFILE_CC` where that is set.
+
+    Parameters
+    ----------
+    platform : str, optional
+        One of `PLATFORMS`; this computer's if not given.
 
     Raises
     ------
     CosimulationError
-        When there is none for this computer, or the one named does not run.
+        When there is none, or the one named does not run.
     """
     named = os.environ.get(ENVIRONMENT_VARIABLE, "").strip()
-    return _named_compiler(named) if named else _zig_compiler()
+    if named and platform is None:
+        return _named_compiler(named)
+    return _zig_compiler(PLATFORMS[platform or host_platform()].target)
 
 
 def _named_compiler(text: str) -> Compiler:
-    command = (*shlex.split(text), *FLAGS)
+    command = (*shlex.split(text), *FLAGS, *DEFINITIONS)
     reported = _run((command[0], "--version"), folder=None, environment=None)
     return Compiler(command=command, identity="\n".join((text, *FLAGS, sys.platform, machine(), reported)))
 
 
-def _zig_compiler() -> Compiler:
-    processor = machine().lower()
-    target = _TARGETS.get((sys.platform, _MACHINES.get(processor, processor)))
+def _zig_compiler(target: str) -> Compiler:
     spec = importlib.util.find_spec("ziglang")
-    if target is None or spec is None or not spec.submodule_search_locations:
+    if spec is None or not spec.submodule_search_locations:
         raise CosimulationError(
-            f"There is no compiler for the plant's FMU on {sys.platform} {processor}. "
-            "Install the package ziglang, or name a C compiler in the environment variable "
-            f"{ENVIRONMENT_VARIABLE}."
+            "There is no compiler for the plant's FMU. Install the package ziglang, "
+            f"or name a C compiler in the environment variable {ENVIRONMENT_VARIABLE}."
         )
     program = Path(spec.submodule_search_locations[0]) / ("zig.exe" if sys.platform == "win32" else "zig")
-    options = ("-target", target, *FLAGS, "-s")
+    options = ("-target", target, *FLAGS, *DEFINITIONS, "-s")
     return Compiler(
         command=(str(program), "cc", *options), identity="\n".join(("ziglang", version("ziglang"), *options))
     )
 
 
-def compile_library(compiler: Compiler, folder: Path, output: str, zig_cache: Path) -> None:
-    """Compile all C files of a folder to one shared library beside them.
+def compile_library(compiler: Compiler, folder: Path, source: str, output: str, zig_cache: Path) -> None:
+    """Compile a C file of a folder to a shared library beside it.
 
     Parameters
     ----------
     compiler : Compiler
     folder : Path
         Files are named relative to it, so that no path of this computer gets into the library.
-    output : str
-        File name of the library.
+    source, output : str
+        File names of the C file and the library.
     zig_cache : Path
         Where Zig keeps the parts of a C library that it has built.
 
@@ -98,13 +96,12 @@ def compile_library(compiler: Compiler, folder: Path, output: str, zig_cache: Pa
     CosimulationError
         With the compiler's words.
     """
-    sources = sorted(path.name for path in folder.glob("*.c"))
     environment = {
         **os.environ,
         "ZIG_GLOBAL_CACHE_DIR": str(zig_cache),
         "ZIG_LOCAL_CACHE_DIR": str(zig_cache),
     }
-    _run((*compiler.command, "-I.", "-o", output, *sources, "-lm"), folder=folder, environment=environment)
+    _run((*compiler.command, "-I.", "-o", output, source, "-lm"), folder=folder, environment=environment)
 
 
 def _run(command: tuple[str, ...], folder: Path | None, environment: dict[str, str] | None) -> str:

@@ -28,7 +28,7 @@ from gen_profile.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.response import Response
 from gen_profile_fmu.cache import ENVIRONMENT_VARIABLE
 from gen_profile_fmu.plant_fmu import PlantFmu, plant_fmu
-from gen_profile_fmu.variables import MAX_STEP, TAU
+from gen_profile_fmu.plant_variables import MAX_STEP, TAU
 
 # blocks of variables that are read after every step, and what a Response calls them
 _OBSERVED = {
@@ -76,10 +76,8 @@ class PlantCosimulation:
         self._callbacks = _callbacks(self._messages)
         self._slave = _load(self._fmu, self._callbacks, self._messages)
         variables = self._fmu.variables
-        self._setpoints = _references(variables.references("SETPOINT"))
-        self._outputs = _references(
-            [reference for block in _OBSERVED for reference in variables.references(block)]
-        )
+        self._setpoints = _references(variables.references("INPUTS"))
+        self._outputs = _references(variables.references(*_OBSERVED))
         self._output_blocks = np.cumsum([len(variables.blocks[block]) for block in _OBSERVED])[:-1]
 
     def __enter__(self) -> Self:

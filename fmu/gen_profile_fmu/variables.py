@@ -1,4 +1,4 @@
-"""The one table of a plant FMU's variables, from which its XML, its C code and its users take their facts.
+"""The one table of an FMU's variables, from which its XML, its C code and its users take their facts.
 
 A variable's value reference is its index in the table, and in the C code's array of values. Blocks of like
 variables lie side by side there, so that the equations can read and write them in place.
@@ -6,48 +6,62 @@ variables lie side by side there, so that the equations can read and write them 
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
+from collections.abc import Sequence
 from enum import Enum
 
 import attrs
 
 from gen_profile.errors import CosimulationError
-from gen_profile.plants.plant import Plant
 
-TAU = "tau"
-MAX_STEP = "max_step"
+DERIVATIVES = "DERIVATIVES"
+# blocks of the continuous states, in the order of their derivatives
+STATES = ("Q_U", "DQ_U", "Q_A", "DQ_A")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 
 
+class Type(Enum):
+    """What values a variable has."""
+
+    REAL = "Float64"
+    BOOLEAN = "Boolean"
+
+
 class Kind(Enum):
-    """What an importer may do with a variable, as FMI's causality and variability."""
+    """What an importer may do with a variable, as FMI's causality, variability and initial."""
 
-    FIXED_PARAMETER = ("parameter", "fixed")
-    TUNABLE_PARAMETER = ("parameter", "tunable")
-    INPUT = ("input", "continuous")
-    OUTPUT = ("output", "continuous")
+    FIXED_PARAMETER = ("parameter", "fixed", "exact")
+    TUNABLE_PARAMETER = ("parameter", "tunable", "exact")
+    INPUT = ("input", "continuous", None)
+    DISCRETE_INPUT = ("input", "discrete", None)
+    STATE = ("output", "continuous", "exact")
+    OUTPUT = ("output", "continuous", "calculated")
+    DISCRETE_OUTPUT = ("output", "discrete", "calculated")
+    DERIVATIVE = ("local", "continuous", "calculated")
+    INDEPENDENT = ("independent", "continuous", None)
+
+    def __init__(self, causality: str, variability: str, initial: str | None) -> None:
+        self.causality = causality
+        self.variability = variability
+        self.initial = initial
 
     @property
-    def causality(self) -> str:
-        """FMI's attribute of that name."""
-        return self.value[0]
-
-    @property
-    def variability(self) -> str:
-        """FMI's attribute of that name."""
-        return self.value[1]
+    def has_start(self) -> bool:
+        """Whether a variable has a value that an importer may set before the start."""
+        return self.initial == "exact" or self.causality == "input"
 
 
 @attrs.frozen(kw_only=True)
 class Variable:
-    """A real variable.
+    """A scalar variable.
 
     Attributes
     ----------
     name, description, unit : str
+        `unit` is empty for booleans.
     kind : Kind
+    type : Type
     start : float
         Value before anything is set; for outputs, which are calculated, that of the C code's memory.
     lower, upper : float or None
@@ -58,6 +72,7 @@ class Variable:
     description: str
     unit: str
     kind: Kind
+    type: Type = Type.REAL
     start: float = 0.0
     lower: float | None = None
     upper: float | None = None
@@ -70,7 +85,7 @@ class VariableTable:
     Attributes
     ----------
     blocks : dict of str to tuple of Variable
-        By the block's name in the C code (``P``, ``SETPOINT``, ``Q_U`` …).
+        By the block's name in the C code (``P``, ``Q_U`` …); a block may be empty.
     """
 
     blocks: dict[str, tuple[Variable, ...]]
@@ -85,130 +100,51 @@ class VariableTable:
         names = list(self.blocks)
         return sum(len(self.blocks[name]) for name in names[: names.index(block)])
 
-    def references(self, block: str) -> range:
-        """Value references of a block."""
-        return range(self.offset(block), self.offset(block) + len(self.blocks[block]))
+    def references(self, *blocks: str) -> list[int]:
+        """Value references of blocks, in the order asked for."""
+        return [self.offset(block) + index for block in blocks for index in range(len(self.blocks[block]))]
+
+    def references_of(self, *kinds: Kind) -> list[int]:
+        """Value references of all variables of some kinds, rising."""
+        return [reference for reference, variable in enumerate(self.variables) if variable.kind in kinds]
+
+    @property
+    def states(self) -> list[int]:
+        """Value references of the continuous states."""
+        return self.references(*(block for block in STATES if block in self.blocks))
+
+    @property
+    def derivatives(self) -> list[int]:
+        """Value references of the states' derivatives, in the states' order."""
+        return self.references(DERIVATIVES) if DERIVATIVES in self.blocks else []
 
 
-def plant_variables(plant: Plant) -> VariableTable:
-    """List the variables of a plant's FMU.
+def require_good_names(owner: str, names: Sequence[str], table: VariableTable) -> None:
+    """Refuse names that importers do not take.
+
+    Parameters
+    ----------
+    owner : str
+        Whose names they are, for the sentence.
+    names : sequence of str
+        Parts of the variables' names.
+    table : VariableTable
 
     Raises
     ------
     CosimulationError
         When two variables would share a name, or a name is none that importers take.
     """
-    table = VariableTable(
-        blocks={
-            "P": _plant_parameters(plant),
-            "TAU": (_lag(),),
-            "MAX_STEP": (_longest_step(),),
-            "START": _axis_variables(
-                plant, "start", "position at rest before the first step", Kind.FIXED_PARAMETER
-            ),
-            "SETPOINT": _axis_variables(
-                plant, "setpoint", "position to reach at the end of the step", Kind.INPUT
-            ),
-            "Q_U": _unactuated(plant, rate=False),
-            "DQ_U": _unactuated(plant, rate=True),
-            "Q_A": _axis_variables(plant, "position", "position", Kind.OUTPUT),
-            "DQ_A": _axis_variables(plant, "velocity", "velocity", Kind.OUTPUT, rate=True),
-            "SWAY": _load_outputs(plant, "sway", "m", "horizontal distance from the place at rest"),
-            "HEIGHT": _load_outputs(plant, "height", "m", "height above the suspension point"),
-            "ANGLE": _load_outputs(plant, "angle", "rad", "angle of the rope from the vertical"),
-        }
-    )
-    _require_good_names(plant, table)
-    return table
-
-
-def _plant_parameters(plant: Plant) -> tuple[Variable, ...]:
-    return tuple(
-        Variable(
-            name=parameter.name,
-            description=parameter.description,
-            unit=parameter.unit,
-            kind=Kind.TUNABLE_PARAMETER,
-            start=parameter.nominal,
-            lower=_bound(parameter.lower),
-            upper=_bound(parameter.upper),
-        )
-        for parameter in plant.parameters
-    )
-
-
-def _bound(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _lag() -> Variable:
-    # fixed: position + tau * velocity is the interpolated setpoint only while tau stays as it is
-    return Variable(
-        name=TAU,
-        description="time constant of the drives' first-order lag; 0: ideal drives",
-        unit="s",
-        kind=Kind.FIXED_PARAMETER,
-        lower=0.0,
-    )
-
-
-def _longest_step() -> Variable:
-    return Variable(
-        name=MAX_STEP,
-        description="longest integration step",
-        unit="s",
-        kind=Kind.TUNABLE_PARAMETER,
-        start=1e-3,
-        lower=1e-6,
-        upper=1.0,
-    )
-
-
-def _axis_variables(
-    plant: Plant, suffix: str, description: str, kind: Kind, *, rate: bool = False
-) -> tuple[Variable, ...]:
-    return tuple(
-        Variable(
-            name=f"{axis.name}.{suffix}",
-            description=description,
-            unit=f"{axis.unit}/s" if rate else axis.unit,
-            kind=kind,
-        )
-        for axis in plant.actuated
-    )
-
-
-def _unactuated(plant: Plant, *, rate: bool) -> tuple[Variable, ...]:
-    return tuple(
-        Variable(
-            name=f"der({coordinate.name})" if rate else coordinate.name,
-            description="rate of an unactuated coordinate" if rate else "unactuated coordinate",
-            unit=f"{coordinate.unit}/s" if rate else coordinate.unit,
-            kind=Kind.OUTPUT,
-        )
-        for coordinate in plant.unactuated
-    )
-
-
-def _load_outputs(plant: Plant, quantity: str, unit: str, description: str) -> tuple[Variable, ...]:
-    return tuple(
-        Variable(name=f"{quantity}.{load}", description=description, unit=unit, kind=Kind.OUTPUT)
-        for load in plant.loads
-    )
-
-
-def _require_good_names(plant: Plant, table: VariableTable) -> None:
-    coordinates = (q.name for q in (*plant.actuated, *plant.unactuated))
-    for name in (*(p.name for p in plant.parameters), *coordinates, *plant.loads):
+    for name in names:
         if not _NAME.fullmatch(name):
             raise CosimulationError(
-                f"Plant {plant.type}: {name!r} cannot name a variable of an FMU. "
+                f"{owner}: {name!r} cannot name a variable of an FMU. "
                 "Use letters, digits, hyphens and underscores, and a letter first."
             )
     counts = Counter(variable.name for variable in table.variables)
     for name, count in counts.items():
         if count > 1:
             raise CosimulationError(
-                f"Plant {plant.type}: its FMU would have {count} variables named {name!r}. "
-                f"Rename the plant's parameter or coordinate ({TAU!r} and {MAX_STEP!r} are the drive's)."
+                f"{owner}: its FMU would have {count} variables named {name!r}. "
+                "Rename the plant's parameter or coordinate (the FMU has variables of its own, too)."
             )

@@ -176,7 +176,7 @@ def test_a_library_that_does_not_load_is_a_sentence(crane, monkeypatch):
     fmu = plant_fmu(crane)
     for other, reason in [
         (attrs.evolve(fmu, folder=fmu.folder / "nowhere"), "Cannot find shared library"),
-        (attrs.evolve(fmu, guid="another"), "The GUID of the model description is not the binary's"),
+        (attrs.evolve(fmu, guid="another"), "The identity in the model description is not the binary's"),
     ]:
         monkeypatch.setattr("gen_profile_fmu.cosimulation.plant_fmu", lambda *_, other=other: other)
         with pytest.raises(CosimulationError, match=reason):

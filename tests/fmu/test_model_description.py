@@ -1,10 +1,12 @@
-"""The model description, judged by other people's readers and against the equations."""
+"""The model descriptions, judged by other people's readers and against the equations."""
 
+import io
 import math
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import attrs
 import casadi
@@ -15,15 +17,24 @@ import ziglang
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from fmu.hoisting_pendulum import PLANT as WINCH
+from fmu.kinds import INPUTS, KINDS, model_of
 
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Coordinate, Parameter
-from gen_profile.plants.registry import find_plant
-from gen_profile_fmu.model_description import BASE_UNITS, model_identifier
-from gen_profile_fmu.plant_fmu import plant_fmu
-from gen_profile_fmu.variables import plant_variables
+from gen_profile.plants.registry import BUILT_IN, find_plant
+from gen_profile_fmu.base_units import BASE_UNITS
+from gen_profile_fmu.fmu_files import Version, archive, fmu_files, sources
+from gen_profile_fmu.model import identifier_of
+from gen_profile_fmu.plant_fmu import cached_fmu, plant_fmu
 
-PLANTS = [find_plant("double-pendulum-crane"), WINCH]
+PLANTS = [*(find_plant(name) for name in BUILT_IN), WINCH]
+CRANE = find_plant("double-pendulum-crane")
+
+
+def read(model, version):
+    """The model description as FMPy reads it, from an FMU without binaries."""
+    packed = archive(fmu_files(sources(model, version), {}, with_extras=False))
+    return read_model_description(io.BytesIO(packed), validate=True)
 
 
 @pytest.fixture(params=PLANTS, ids=lambda plant: plant.type)
@@ -31,26 +42,37 @@ def plant(request):
     return request.param
 
 
-@pytest.fixture
-def description(plant):
-    return read_model_description(str(plant_fmu(plant).archive), validate=True)
+@pytest.fixture(params=Version)
+def version(request):
+    return request.param
 
 
-def test_fmpy_finds_no_fault(plant):
-    assert validate_fmu(str(plant_fmu(plant).archive)) == []
+@pytest.fixture(params=KINDS)
+def kind(request):
+    return request.param
 
 
-def test_fmutool_finds_no_fault(plant):
+def test_fmpy_finds_no_fault(plant, kind, version, tmp_path):
+    path = tmp_path / "model.fmu"
+    path.write_bytes(archive(fmu_files(sources(model_of(kind, plant), version), {}, with_extras=False)))
+    assert validate_fmu(str(path)) == []
+
+
+def test_fmutool_finds_no_fault(kind, version):
     tool = Path(sys.executable).with_name("fmutool")
-    command = [str(tool), "-input", str(plant_fmu(plant).archive), "-check"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    built = cached_fmu(model_of(kind, CRANE), version).archive
+    done = subprocess.run(
+        [str(tool), "-input", str(built), "-check"], capture_output=True, text=True, check=False
+    )
     words = done.stdout + done.stderr
     assert done.returncode == 0, words
-    assert "seems to be compliant with FMI-2.0" in words
+    assert f"seems to be compliant with FMI-{version.value}.0" in words
     assert "No semantic error" in words
 
 
-def test_says_what_the_plant_says(plant, description):
+@pytest.mark.parametrize("kind", INPUTS)
+def test_says_what_the_plant_says(plant, kind, version):
+    description = read(model_of(kind, plant), version)
     variables = {variable.name: variable for variable in description.modelVariables}
     assert description.modelName == plant.type
     for parameter in plant.parameters:
@@ -59,47 +81,107 @@ def test_says_what_the_plant_says(plant, description):
         assert (variable.causality, variable.variability) == ("parameter", "tunable")
         found = [float(value) for value in (variable.start, variable.min, variable.max)]
         assert found == [parameter.nominal, parameter.lower, parameter.upper]
+    suffix, order = {
+        "plant-acceleration": ("setpoint_acceleration", "/s^2"),
+        "plant-velocity": ("setpoint_velocity", "/s"),
+        "plant-setpoint": ("setpoint", ""),
+    }[kind]
     for axis in plant.actuated:
-        names = [f"{axis.name}.{suffix}" for suffix in ("start", "setpoint", "position", "velocity")]
+        names = [f"{axis.name}.{name}" for name in ("start", suffix, "position", "velocity")]
         kinds = [(variables[name].causality, variables[name].unit) for name in names]
-        assert kinds == [("parameter", "m"), ("input", "m"), ("output", "m"), ("output", "m/s")]
+        unit = axis.unit
+        assert kinds == [
+            ("parameter", unit),
+            ("input", unit + order),
+            ("output", unit),
+            ("output", unit + "/s"),
+        ]
     for load in plant.loads:
         units = [variables[f"{quantity}.{load}"].unit for quantity in ("sway", "height", "angle")]
         assert units == ["m", "m", "rad"]
 
 
-def test_claims_the_capabilities_importers_look_for(description):
-    assert description.fmiVersion == "2.0"
-    cosimulation = description.coSimulation
-    assert cosimulation.canHandleVariableCommunicationStepSize
-    assert cosimulation.canGetAndSetFMUstate
-    assert cosimulation.canSerializeFMUstate
-    assert not cosimulation.needsExecutionTool
-    assert not cosimulation.canBeInstantiatedOnlyOncePerProcess
-    assert float(description.defaultExperiment.tolerance) > 0.0
+def test_claims_the_capabilities_importers_look_for(kind, version):
+    root = ElementTree.fromstring(sources(model_of(kind, CRANE), version).description)
+    assert root.get("fmiVersion") == f"{version.value}.0"
+    names = {
+        Version.FMI2: ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"),
+        Version.FMI3: (
+            "canGetAndSetFMUState",
+            "canSerializeFMUState",
+            "providesDirectionalDerivatives",
+            "providesAdjointDerivatives",
+        ),
+    }[version]
+    for title in ("ModelExchange", "CoSimulation"):
+        interface = root.find(title)
+        assert interface.get("needsExecutionTool", "false") == "false"
+        assert interface.get("canBeInstantiatedOnlyOncePerProcess", "false") == "false"
+        assert [interface.get(name) for name in names] == ["true"] * len(names)
+    assert interface.get("canHandleVariableCommunicationStepSize") == "true"
+    if version is Version.FMI2:
+        takes_slopes = kind in {"plant-acceleration", "plant-velocity"}
+        assert interface.get("canInterpolateInputs") == str(takes_slopes).lower()
+    assert float(root.find("DefaultExperiment").get("tolerance")) > 0.0
 
 
-def test_every_output_is_listed_with_its_dependencies(plant, description):
-    """Start values depend on what the Jacobian of a swinging load's outputs says, and on nothing else."""
-    outputs = [variable for variable in description.modelVariables if variable.causality == "output"]
-    assert [unknown.variable for unknown in description.outputs] == outputs
-    assert [unknown.variable for unknown in description.initialUnknowns] == outputs
-    assert all(unknown.dependencies == [] for unknown in description.outputs)
+def names(unknown):
+    return {variable.name for variable in unknown.dependencies}
 
-    names = [parameter.name for parameter in plant.parameters]
-    starts = [f"{axis.name}.start" for axis in plant.actuated]
-    p, q_a = casadi.MX.sym("p", len(names)), casadi.MX.sym("q_a", len(starts))
-    q_u = np.linspace(0.3, 0.4, len(plant.unactuated))
-    seen = plant.outputs(list(q_u), casadi.vertsplit(q_a), _named(names, casadi.vertsplit(p)))
-    expected = {f"{axis.name}.position": {f"{axis.name}.start"} for axis in plant.actuated}
+
+@pytest.mark.parametrize("kind", [*INPUTS, "system"])
+def test_dependencies_are_those_of_the_equations(plant, kind, version):
+    """What an output and a derivative follows from, against a Jacobian of our own making."""
+    description = read(model_of(kind, plant), version)
+    states = [derivative.variable.derivative.name for derivative in description.derivatives]
+    n_u, n_a = len(plant.unactuated), len(plant.actuated)
+    assert states == [
+        *(q.name for q in plant.unactuated),
+        *(f"{q.name}.rate" for q in plant.unactuated),
+        *(f"{q.name}.position" for q in plant.actuated),
+        *(f"{q.name}.velocity" for q in plant.actuated),
+    ]
+    x, ddq_a = casadi.SX.sym("x", len(states)), casadi.SX.sym("ddq_a", n_a)
+    p = casadi.SX.sym("p", len(plant.parameters))
+    q_u, dq_u, q_a, dq_a = casadi.vertsplit(x, np.cumsum([0, n_u, n_u, n_a, n_a]).tolist())
+    named = _named([q.name for q in plant.parameters], casadi.vertsplit(p))
+    each = [casadi.vertsplit(column) for column in (q_u, dq_u, q_a, dq_a)]
+    terms = plant.equations(*each, named)
+    push = casadi.vertcat(*(casadi.horzcat(*row) for row in terms.M_au)).T @ ddq_a
+    ddq_u = casadi.solve(
+        casadi.vertcat(*(casadi.horzcat(*row) for row in terms.M_uu)),
+        casadi.vertcat(*terms.K_u) + casadi.vertcat(*terms.G_u) - push,
+    )
+    accelerations = {
+        "plant-acceleration": lambda axis: {f"{axis}.setpoint_acceleration"},
+        "plant-velocity": lambda axis: {f"{axis}.setpoint_velocity", f"{axis}.velocity"},
+        "plant-setpoint": lambda axis: {f"{axis}.velocity"},
+        "system": lambda axis: {f"{axis}.velocity", "time"},
+    }[kind]
+    drives = [accelerations(axis.name) for axis in plant.actuated]
+
+    def sources_of(expression):
+        """Names of the states and inputs that have an influence on an expression."""
+        occurring = casadi.jacobian(casadi.SX(expression), casadi.vertcat(x, ddq_a))
+        columns = casadi.sparsify(casadi.simplify(occurring)).sparsity().get_triplet()[1]
+        each_column = [*({state} for state in states), *drives]
+        return set().union(*(each_column[column] for column in columns))
+
+    found = {unknown.variable.name: names(unknown) for unknown in description.derivatives}
+    expected = {
+        **{f"der({q.name})": {f"{q.name}.rate"} for q in plant.unactuated},
+        **{f"der({q.name}.rate)": sources_of(ddq_u[i]) for i, q in enumerate(plant.unactuated)},
+        **{f"der({q.name}.position)": {f"{q.name}.velocity"} for q in plant.actuated},
+        **{f"der({q.name}.velocity)": drives[i] for i, q in enumerate(plant.actuated)},
+    }
+    assert found == expected
+    seen = plant.outputs(each[0], each[2], named)
+    found = {unknown.variable.name: names(unknown) for unknown in description.outputs}
     for quantity in ("sway", "height", "angle"):
         for load, value in zip(plant.loads, getattr(seen, quantity), strict=True):
-            jacobian = casadi.jacobian(casadi.MX(value), casadi.vertcat(p, q_a)).sparsity()
-            _, columns = jacobian.get_triplet()
-            expected[f"{quantity}.{load}"] = {[*names, *starts][column] for column in columns}
-    for unknown in description.initialUnknowns:
-        found = {variable.name for variable in unknown.dependencies}
-        assert found == expected.get(unknown.variable.name, set()), unknown.variable.name
+            assert found[f"{quantity}.{load}"] == sources_of(value)
+    for state in states:
+        assert found[state] == {state}
 
 
 def _named(names, values):
@@ -112,19 +194,45 @@ def _named(names, values):
     return named
 
 
-def test_units_have_the_right_exponents(description):
+@pytest.mark.parametrize("kind", INPUTS)
+def test_start_values_follow_from_parameters_and_start_states(plant, kind, version):
+    description = read(model_of(kind, plant), version)
+    starting = {unknown.variable.name: names(unknown) for unknown in description.initialUnknowns}
+    calculated = {v.name for v in description.modelVariables if v.initial == "calculated"}
+    assert set(starting) == calculated
+    parameters = {parameter.name for parameter in plant.parameters}
+    coordinates = {q.name for q in plant.unactuated}
+    for axis in plant.actuated:
+        assert starting[f"{axis.name}.position"] == {f"{axis.name}.start"}
+        assert starting[f"{axis.name}.velocity"] == set()
+    starts = {f"{axis.name}.start" for axis in plant.actuated}
+    for load in plant.loads:
+        assert starting[f"angle.{load}"] <= parameters | coordinates | starts
+    for unknown in description.derivatives:
+        name = unknown.variable.name
+        assert names(unknown) & coordinates == starting[name] & coordinates, name
+    used = set().union(*starting.values())
+    assert parameters <= used | {
+        "g"
+    }  # every parameter matters to something, but gravity not on every machine
+
+
+def test_units_have_the_right_exponents(plant, version):
+    description = read(model_of("system", plant), version)
     units = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
-    damping = units.get("N m s/rad")
-    if damping is not None:
-        assert (damping.kg, damping.m, damping.s, damping.rad) == (1, 2, -1, -1)
-    assert (units["m/s^2"].m, units["m/s^2"].s, units["m/s^2"].kg) == (1, -2, 0)
+    used = {variable.unit for variable in description.modelVariables} - {None}
+    assert used == set(units)
+    assert all(units[unit] is not None for unit in used - {"N m s"})
+    for unit, order in (("m/s", 1), ("m/s^2", 2), ("rad/s", 1)):
+        if unit in units:
+            assert (units[unit].s, units[unit].kg) == (-order, 0)
 
 
 @pytest.mark.parametrize("unit", BASE_UNITS)
 def test_base_units_follow_from_the_units_name(unit):
     """Read "N m s/rad" as arithmetic with the base units as powers of primes."""
     primes = {"kg": 2, "m": 3, "s": 5, "rad": 7}
-    values = {**primes, "N": 2 * 3 / 5**2, "1": 1}
+    values = {**primes, "N": 2 * 3 / 5**2, "Pa": 2 / 3 / 5**2, "1": 1}
     above, *below = unit.split("/")
     expected = 1.0
     for part, sign in [(factor, 1) for factor in above.split()] + [(divisor, -1) for divisor in below]:
@@ -134,25 +242,23 @@ def test_base_units_follow_from_the_units_name(unit):
     assert np.prod([float(primes[base]) ** power for base, power in exponents]) == pytest.approx(expected)
 
 
-def test_an_unknown_unit_stays_without_base_units(tmp_path):
+def test_an_unknown_unit_stays_without_base_units(version):
     parameter = attrs.evolve(WINCH.parameters[0], unit="stone")
     odd = attrs.evolve(WINCH, parameters=(parameter, *WINCH.parameters[1:]))
-    archive = plant_fmu(odd).archive
-    assert validate_fmu(str(archive)) == []
-    units = {unit.name: unit.baseUnit for unit in read_model_description(str(archive)).unitDefinitions}
+    units = {unit.name: unit.baseUnit for unit in read(model_of("system", odd), version).unitDefinitions}
     assert units["stone"] is None
 
 
-def test_a_plant_may_have_unbounded_parameters_and_constant_outputs():
+def test_a_plant_may_have_unbounded_parameters_and_constant_outputs(version):
     parameter = attrs.evolve(WINCH.parameters[0], lower=-math.inf, upper=math.inf)
     flat = attrs.evolve(
         WINCH,
         parameters=(parameter, *WINCH.parameters[1:]),
         outputs=lambda *arguments: attrs.evolve(WINCH.outputs(*arguments), height=[-1.0]),
     )
-    archive = plant_fmu(flat).archive
-    assert validate_fmu(str(archive)) == []
-    described = read_model_description(str(archive)).modelVariables[0]
+    built = cached_fmu(model_of("plant-setpoint", flat), version).archive
+    assert validate_fmu(str(built)) == []
+    described = read_model_description(str(built)).modelVariables[0]
     assert (described.name, described.min, described.max) == ("m", None, None)
 
 
@@ -161,39 +267,41 @@ def test_a_plant_may_have_unbounded_parameters_and_constant_outputs():
     [("double-pendulum-crane", "double_pendulum_crane"), ("2-axis winch", "_2_axis_winch"), ("ü", "_")],
 )
 def test_the_model_identifier_is_a_c_identifier(type_, identifier):
-    assert model_identifier(attrs.evolve(WINCH, type=type_)) == identifier
+    assert identifier_of(type_) == identifier
 
 
 @pytest.mark.parametrize("name", ["sling", "front-sling"])
-def test_names_are_structured_where_they_can_be(name):
+def test_names_are_structured_where_they_can_be(name, version):
     plant = attrs.evolve(WINCH, unactuated=(Coordinate(name=name, unit="rad"),))
-    description = read_model_description(str(plant_fmu(plant).archive))
+    description = read(model_of("plant-setpoint", plant), version)
     assert description.variableNamingConvention == ("flat" if "-" in name else "structured")
 
 
-@pytest.mark.parametrize("name", ["tau", "max_step", "phi"])
+@pytest.mark.parametrize("name", ["tau", "max_step", "phi", "time"])
 def test_two_variables_of_one_name_are_refused(name):
     taken = Parameter(name=name, unit="m", description="", nominal=1.0, lower=0.0, upper=2.0)
+    plant = attrs.evolve(WINCH, parameters=(*WINCH.parameters, taken))
     with pytest.raises(CosimulationError, match=f"2 variables named '{name}'"):
-        plant_variables(attrs.evolve(WINCH, parameters=(*WINCH.parameters, taken)))
+        model_of("plant-setpoint", plant)
 
 
 @pytest.mark.parametrize("load", ["the load", "100%", 'say "so"', "Ä", ""])
-def test_names_that_importers_do_not_take_are_refused(load):
+@pytest.mark.parametrize("kind", ["plant-setpoint", "system"])
+def test_names_that_importers_do_not_take_are_refused(load, kind):
     with pytest.raises(CosimulationError, match="cannot name a variable"):
-        plant_variables(attrs.evolve(WINCH, loads=(load,)))
+        model_of(kind, attrs.evolve(WINCH, loads=(load,)))
 
 
 def test_the_archive_holds_the_unpacked_files(plant):
     fmu = plant_fmu(plant)
-    with zipfile.ZipFile(fmu.archive) as archive:
-        assert archive.testzip() is None
-        names = archive.namelist()
-        assert "modelDescription.xml" in names
-        assert len(names) == 2
-        for name in names:
-            assert archive.read(name) == (fmu.folder / name).read_bytes()
-            assert archive.getinfo(name).date_time == (1980, 1, 1, 0, 0, 0)
+    with zipfile.ZipFile(fmu.archive) as packed:
+        assert packed.testzip() is None
+        contents = packed.namelist()
+        assert "modelDescription.xml" in contents
+        assert len(contents) == 2
+        for name in contents:
+            assert packed.read(name) == (fmu.folder / name).read_bytes()
+            assert packed.getinfo(name).date_time == (1980, 1, 1, 0, 0, 0)
 
 
 def test_no_path_of_this_computer_gets_out(plant):

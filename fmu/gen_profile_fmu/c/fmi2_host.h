@@ -1,0 +1,23 @@
+/* Logging and memory, as an importer of FMI 2.0 hands them over. */
+#ifndef FMI2_HOST_H
+#define FMI2_HOST_H
+
+#include "fmi2Functions.h"
+
+typedef struct {
+    const fmi2CallbackFunctions *callbacks;
+} Host;
+
+/* Messages are complete texts without a percent sign: they are safe as the format string that FMI wants. */
+static void host_log(const Host *host, const char *name, int status, const char *category, const char *text) {
+    const fmi2CallbackFunctions *callbacks = host->callbacks;
+    if (callbacks->logger) {
+        callbacks->logger(callbacks->componentEnvironment, name, (fmi2Status)status, category, text);
+    }
+}
+
+static void *host_allocate(const Host *host, size_t size) { return host->callbacks->allocateMemory(1, size); }
+
+static void host_free(const Host *host, void *memory) { host->callbacks->freeMemory(memory); }
+
+#endif

@@ -1,0 +1,51 @@
+/*
+ * What an FMU's model is to the interfaces of FMI, whose names and types it does not know.
+ *
+ * variables.h, which is generated, lists the variables. The continuous states lie side by side from STATES on,
+ * their derivatives in the same order from DERIVATIVES on.
+ */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include "variables.h"
+
+enum { N_SLOPES = 3 };             /* time derivatives of an input that a step takes */
+
+typedef struct {
+    double values[N_VALUES];       /* every variable; a variable's value reference is its index */
+    double time;
+    double start_time;
+    double next_event;             /* time of the next event; infinite where none is to come */
+    double reached[N_A];           /* where the drives' reference velocity has led to: position + tau * velocity */
+    double held[N_A];              /* reference velocity between two samples of a setpoint, in model exchange */
+    double slopes[N_A][N_SLOPES];  /* time derivatives of the inputs from SLOPED_INPUTS on, for the coming step */
+    double began;                  /* when the motion began; infinite before */
+    int segment;                   /* of the motion; -1 before it, N_SEGMENTS after it */
+    int samples;                   /* setpoints taken in model exchange */
+} Model;
+
+/* Set what follows from the parameters at the start, as often as they change. */
+static void model_start(Model *model);
+
+/* Act on what happens at the present time. Returns whether states jumped. Sets next_event. */
+static int model_event(Model *model);
+
+/* Calculate the outputs from the states, the parameters and the time. */
+static void model_outputs(Model *model);
+
+/* Calculate the derivatives of the continuous states. */
+static void model_derivatives(Model *model);
+
+/* Push a change of states, inputs and parameters on to outputs and derivatives; both lie in `tangent`. */
+static void model_tangent(const Model *model, double tangent[N_VALUES]);
+
+/* Bring the changes of parameters to what they set at the start. */
+static void model_start_tangent(double tangent[N_VALUES]);
+
+/* Number of integration steps that `step` seconds take. */
+static double model_substeps(const Model *model, double step);
+
+/* Move states and time on by `step` seconds. */
+static void model_advance(Model *model, double step);
+
+#endif

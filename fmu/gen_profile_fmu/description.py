@@ -1,0 +1,75 @@
+"""What the model descriptions of FMI 2 and 3 have in common."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+from gen_profile_fmu.base_units import BASE_UNITS
+from gen_profile_fmu.model import Model
+from gen_profile_fmu.variables import Variable, VariableTable
+
+LOG_CATEGORIES = {
+    "logEvents": "life cycle of an instance",
+    "logStatusWarning": "warnings",
+    "logStatusError": "errors and discarded steps",
+}
+_STRUCTURED = re.compile(r"\w+(\.\w+)*|der\(\w+(\.\w+)*\)", re.ASCII)
+
+
+def root_element(model: Model, version: str, **identity: str) -> ElementTree.Element:
+    """Begin a model description; `identity` is what ties it to its binary."""
+    structured = all(_STRUCTURED.fullmatch(variable.name) for variable in model.variables.variables)
+    attributes = {
+        "fmiVersion": version,
+        "modelName": model.name,
+        **identity,
+        "description": model.summary,
+        "generationTool": "gen-profile",
+        "license": "Apache-2.0",
+        "variableNamingConvention": "structured" if structured else "flat",
+    }
+    return ElementTree.Element("fmiModelDescription", attributes)
+
+
+def add_units(root: ElementTree.Element, table: VariableTable) -> None:
+    """List the units in use, with their base units where these are known."""
+    definitions = ElementTree.SubElement(root, "UnitDefinitions")
+    for name in sorted({variable.unit for variable in table.variables} - {""}):
+        unit = ElementTree.SubElement(definitions, "Unit", name=name)
+        if name in BASE_UNITS:
+            exponents = {base: str(exponent) for base, exponent in BASE_UNITS[name].items()}
+            ElementTree.SubElement(unit, "BaseUnit", exponents)
+
+
+def add_log_categories(root: ElementTree.Element) -> None:
+    """List the log categories."""
+    categories = ElementTree.SubElement(root, "LogCategories")
+    for name, description in LOG_CATEGORIES.items():
+        ElementTree.SubElement(categories, "Category", name=name, description=description)
+
+
+def add_experiment(root: ElementTree.Element, model: Model) -> None:
+    """State a sensible simulation."""
+    ElementTree.SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0.0",
+        stopTime=repr(model.stop_time),
+        tolerance="1e-06",
+        stepSize=repr(model.step),
+    )
+
+
+def value_attributes(variable: Variable) -> dict[str, str]:
+    """Give unit and bounds as both versions write them."""
+    bounds = {"min": variable.lower, "max": variable.upper}
+    unit = {"unit": variable.unit} if variable.unit else {}
+    return {**unit, **{name: repr(float(bound)) for name, bound in bounds.items() if bound is not None}}
+
+
+def to_bytes(root: ElementTree.Element) -> bytes:
+    """Write XML in UTF-8 with line feeds."""
+    ElementTree.indent(root)
+    text: str = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

@@ -1,0 +1,96 @@
+"""modelDescription.xml and buildDescription.xml of FMI 3.0 (sections 2.4 and 2.5.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from xml.etree import ElementTree
+
+from gen_profile_fmu.dependencies import Dependencies
+from gen_profile_fmu.description import (
+    add_experiment,
+    add_log_categories,
+    add_units,
+    root_element,
+    to_bytes,
+    value_attributes,
+)
+from gen_profile_fmu.model import Model
+from gen_profile_fmu.variables import Kind, Type, VariableTable
+
+
+def model_description(model: Model, token: str) -> bytes:
+    """Write the XML text; `token` ties it to its binary."""
+    root = root_element(model, "3.0", instantiationToken=token)
+    _add_interfaces(root, model)
+    add_units(root, model.variables)
+    add_log_categories(root)
+    add_experiment(root, model)
+    _add_variables(root, model.variables)
+    _add_structure(root, model)
+    return to_bytes(root)
+
+
+def build_description(model: Model, source_file: str) -> bytes:
+    """Say how to compile the sources."""
+    root = ElementTree.Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = ElementTree.SubElement(root, "BuildConfiguration", modelIdentifier=model.identifier)
+    files = ElementTree.SubElement(configuration, "SourceFileSet", language="C99")
+    ElementTree.SubElement(files, "SourceFile", name=source_file)
+    return to_bytes(root)
+
+
+def _add_interfaces(root: ElementTree.Element, model: Model) -> None:
+    common = {
+        "modelIdentifier": model.identifier,
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": "true",
+        "providesAdjointDerivatives": "true",
+    }
+    ElementTree.SubElement(root, "ModelExchange", common)
+    ElementTree.SubElement(root, "CoSimulation", common | {"canHandleVariableCommunicationStepSize": "true"})
+
+
+def _add_variables(root: ElementTree.Element, table: VariableTable) -> None:
+    variables = ElementTree.SubElement(root, "ModelVariables")
+    state_of = dict(zip(table.derivatives, table.states, strict=True))
+    for reference, variable in enumerate(table.variables):
+        kind = variable.kind
+        element = ElementTree.SubElement(
+            variables,
+            variable.type.value,
+            name=variable.name,
+            valueReference=str(reference),
+            description=variable.description,
+            causality=kind.causality,
+            variability=kind.variability,
+        )
+        if kind.initial is not None:
+            element.set("initial", kind.initial)
+        for name, text in value_attributes(variable).items():
+            element.set(name, text)
+        if kind.has_start:
+            boolean = variable.type is Type.BOOLEAN
+            element.set(
+                "start", str(bool(variable.start)).lower() if boolean else repr(float(variable.start))
+            )
+        if reference in state_of:
+            element.set("derivative", str(state_of[reference]))
+
+
+def _add_structure(root: ElementTree.Element, model: Model) -> None:
+    table, structure = model.variables, model.structure
+    outputs = table.references_of(Kind.STATE, Kind.OUTPUT, Kind.DISCRETE_OUTPUT)
+    calculated = table.references_of(Kind.OUTPUT, Kind.DISCRETE_OUTPUT, Kind.DERIVATIVE)
+    element = ElementTree.SubElement(root, "ModelStructure")
+    _add_unknowns(element, "Output", outputs, structure.running)
+    _add_unknowns(element, "ContinuousStateDerivative", table.derivatives, structure.running)
+    _add_unknowns(element, "InitialUnknown", calculated, structure.starting)
+
+
+def _add_unknowns(
+    structure: ElementTree.Element, title: str, unknowns: Iterable[int], known: Dependencies
+) -> None:
+    for unknown in unknowns:
+        dependencies = " ".join(map(str, known[unknown]))
+        ElementTree.SubElement(structure, title, valueReference=str(unknown), dependencies=dependencies)

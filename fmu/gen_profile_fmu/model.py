@@ -1,0 +1,194 @@
+"""What goes into an FMU, whatever FMI's version: variables, their structure, C sources and words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import attrs
+
+from gen_profile.plants.plant import Coordinate
+from gen_profile.problem.dynamics import dynamics
+from gen_profile.profile import Profile
+from gen_profile_fmu.c_sources import (
+    equations_source,
+    hand_written,
+    motion_table,
+    variables_header,
+)
+from gen_profile_fmu.dependencies import Structure, plant_structure, profile_structure
+from gen_profile_fmu.documentation import motion_page, plant_page, system_page
+from gen_profile_fmu.plant_variables import (
+    InputKind,
+    Machine,
+    plant_variables,
+    profile_variables,
+    system_variables,
+)
+from gen_profile_fmu.variables import VariableTable
+
+INPUT_ORDER = 3  # of the time derivatives that a step takes of an input: N_SLOPES in model.h
+PLANT_FILES = ("driven_plant.h", "driven_plant.c", "equations.h")
+MOTION_FILES = ("motion.h", "motion.c")
+NO_INPUTS = {"N_SLOPED_INPUTS": "0", "SLOPED_INPUTS": "0"}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Model:
+    """An FMU's content.
+
+    Attributes
+    ----------
+    name, identifier, summary : str
+        `identifier` is the name as C takes it: that of the binary.
+    variables : VariableTable
+    structure : Structure
+    interpolates_inputs : bool
+        Whether inputs take time derivatives.
+    code : mapping of str to str
+        C files by name, all but those of FMI itself.
+    order : tuple of str
+        The C files to be compiled, as one translation unit, in this order.
+    page : () → str
+        Writes HTML for people, which takes a simulation.
+    stop_time, step : float
+        A sensible experiment, in s.
+    """
+
+    name: str
+    identifier: str
+    summary: str
+    variables: VariableTable
+    structure: Structure
+    interpolates_inputs: bool
+    code: Mapping[str, str]
+    order: tuple[str, ...]
+    page: Callable[[], str]
+    stop_time: float
+    step: float
+
+
+def identifier_of(name: str) -> str:
+    """Make a C identifier of a name."""
+    return re.sub(r"\W|^(?=\d)", "_", name, flags=re.ASCII)
+
+
+def plant_model(machine: Machine, kind: InputKind, name: str | None = None) -> Model:
+    """Make the FMU's content of a plant with inputs.
+
+    Parameters
+    ----------
+    machine : Machine
+    kind : InputKind
+        What its drives are asked for.
+    name : str, optional
+        The plant's type, if not given.
+
+    Raises
+    ------
+    CosimulationError
+        The plant's names cannot be those of an FMU's variables.
+    """
+    plant, table = machine.plant, plant_variables(machine, kind)
+    equations = dynamics(plant)
+    tau, velocity, inputs = (table.references(block) for block in ("TAU", "DQ_A", "INPUTS"))
+    sloped = kind is not InputKind.SETPOINT
+    lagging = kind is not InputKind.ACCELERATION
+    drives = {
+        axis: {*inputs[axis : axis + sloped], *velocity[axis : axis + lagging], *tau}
+        for axis in range(len(inputs))
+    }
+    origins = {axis: {reference} for axis, reference in enumerate(table.references("START"))}
+    orders = {
+        InputKind.ACCELERATION: INPUT_ORDER + 2,
+        InputKind.VELOCITY: INPUT_ORDER + 1,
+        InputKind.SETPOINT: 1,
+    }[kind]
+    constants = {
+        "INPUT_KIND": f"{kind.name}_INPUT",
+        "N_ORDERS": str(orders),
+        "N_SLOPED_INPUTS": str(len(inputs) if sloped else 0),
+        "SLOPED_INPUTS": "INPUTS",
+    }
+    name = name or plant.type
+    return Model(
+        name=name,
+        identifier=identifier_of(name),
+        summary=plant.summary,
+        variables=table,
+        structure=plant_structure(equations, table, drives, origins),
+        interpolates_inputs=sloped,
+        code={
+            **hand_written(*PLANT_FILES, "plant_model.c"),
+            "variables.h": variables_header(table, len(plant.actuated), len(plant.unactuated), constants),
+            "equations.c": equations_source(equations),
+        },
+        order=("equations.c", "driven_plant.c", "plant_model.c"),
+        page=partial(plant_page, name, plant, table, kind),
+        stop_time=10.0,
+        step=0.001,
+    )
+
+
+def profile_model(name: str, axes: Sequence[Coordinate], profile: Profile) -> Model:
+    """Make the FMU's content of a motion; parameters and errors as `plant_model`."""
+    table = profile_variables(axes)
+    return Model(
+        name=name,
+        identifier=identifier_of(name),
+        summary="motion of the axes",
+        variables=table,
+        structure=profile_structure(table),
+        interpolates_inputs=False,
+        code={
+            **hand_written(*MOTION_FILES, "profile_model.c"),
+            "variables.h": variables_header(table, len(axes), 0, NO_INPUTS),
+            "motion_table.h": motion_table(profile),
+        },
+        order=("motion.c", "profile_model.c"),
+        page=partial(motion_page, name, axes, profile, table),
+        stop_time=profile.duration + 1.0,
+        step=0.001,
+    )
+
+
+def system_model(name: str, machine: Machine, command: Profile) -> Model:
+    """Make the FMU's content of a plant whose drives follow a motion.
+
+    Parameters
+    ----------
+    name : str
+    machine : Machine
+    command : Profile
+        What the drives are asked for.
+
+    Raises
+    ------
+    CosimulationError
+        The plant's names cannot be those of an FMU's variables.
+    """
+    plant, table = machine.plant, system_variables(machine)
+    equations = dynamics(plant)
+    tau, velocity, time = (table.references(block) for block in ("TAU", "DQ_A", "TIME"))
+    trigger = table.references("START_TIME", "WAIT", "TRIGGER")
+    drives = {axis: {velocity[axis], *tau, *time, *trigger} for axis in range(len(plant.actuated))}
+    constants = {"N_ORDERS": "N_POWERS - 1", **NO_INPUTS}
+    return Model(
+        name=name,
+        identifier=identifier_of(name),
+        summary=f"{plant.summary}, following a motion",
+        variables=table,
+        structure=plant_structure(equations, table, drives, {axis: set() for axis in drives}),
+        interpolates_inputs=False,
+        code={
+            **hand_written(*PLANT_FILES, *MOTION_FILES, "system_model.c"),
+            "variables.h": variables_header(table, len(plant.actuated), len(plant.unactuated), constants),
+            "motion_table.h": motion_table(command),
+            "equations.c": equations_source(equations),
+        },
+        order=("equations.c", "motion.c", "driven_plant.c", "system_model.c"),
+        page=partial(system_page, name, machine, command, table),
+        stop_time=command.duration + 4.0,
+        step=0.001,
+    )

@@ -1,0 +1,38 @@
+"""FMUs of every kind, for tests that hold for all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gen_profile.plants.plant import Plant
+from gen_profile.profile import Profile
+from gen_profile_fmu.model import Model, plant_model, profile_model, system_model
+from gen_profile_fmu.plant_variables import InputKind, Machine
+
+INPUTS = {f"plant-{kind.value}": kind for kind in InputKind}
+KINDS = (*INPUTS, "profile", "system")
+
+
+def machine_of(plant: Plant, **changes: float) -> Machine:
+    return Machine(plant=plant, parameters={**plant.nominal(), **changes})
+
+
+def motion(axes: int) -> Profile:
+    """Two pieces per axis, with a jump of the acceleration between them: 0.3 (0.15 …) in 3 s, from 0.1."""
+    distance = 0.3 / np.arange(1.0, axes + 1.0)
+    first = np.array([0.0, 0.0, 4.0 / 9.0])[:, None] * distance
+    rest = np.array([0.25, 2.0 / 3.0, -5.0 / 9.0, 5.0 / 27.0])[:, None] * distance
+    coefficients = np.zeros((2, 4, axes))
+    coefficients[0, :3], coefficients[1] = first, rest
+    coefficients[:, 0] += 0.1
+    end = coefficients[1].T @ 1.5 ** np.arange(4.0)
+    return Profile(knots=[0.0, 0.75, 2.25], coefficients=coefficients, target=end, method="test")
+
+
+def model_of(kind: str, plant: Plant, profile: Profile | None = None) -> Model:
+    profile = profile or motion(len(plant.actuated))
+    if kind == "profile":
+        return profile_model("paper profile", plant.actuated, profile)
+    if kind == "system":
+        return system_model("paper system", machine_of(plant), profile)
+    return plant_model(machine_of(plant), INPUTS[kind])
