@@ -15,10 +15,15 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.linalg import lapack
+from threadpoolctl import ThreadpoolController
 
 from gen_profile.profile import Array
 
 STAGES = 4
+
+# Matrices of a hundred rows are too small to share: threads that wait for a busy machine's other core cost up
+# to a hundredfold, and how they share the work would show in the last bits.
+BLAS = ThreadpoolController()
 
 IntArray = NDArray[np.intp]
 
@@ -152,7 +157,8 @@ def newton_iterate(flow: Array, current: Trajectory, initial: Array, final: Arra
     right = np.empty((intervals, STAGES, size, 1 + size))
     right[..., 0] = integration @ constant
     right[..., 1:] = np.eye(size)
-    response = np.linalg.solve(inner, right.reshape(intervals, STAGES * size, 1 + size))
+    with BLAS.limit(limits=1, user_api="blas"):
+        response = np.linalg.solve(inner, right.reshape(intervals, STAGES * size, 1 + size))
     response = response.reshape(intervals, STAGES, size, 1 + size)
 
     # z_{k+1} = (1 − Σ w) z_k + Σ w_i Z_i
