@@ -12,10 +12,12 @@ import logging
 import os
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import platformdirs
+
+from gen_profile.errors import CosimulationError
 
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CACHE"
 _CHECKSUMS = "checksums.json"
@@ -62,6 +64,41 @@ def _private_temporary_folder() -> Path | None:
         _logger.warning("The folder %s is not this user's alone; it is not used as a cache.", folder)
         return None
     return folder
+
+
+def cached(name: str, make: Callable[[Path], Mapping[str, bytes]]) -> Path:
+    """Find an entry, or make it.
+
+    Parameters
+    ----------
+    name : str
+    make : Path → mapping of str to bytes
+        Makes the files, with the cache's folder for what it needs on the way.
+
+    Returns
+    -------
+    Path
+        The entry's folder.
+
+    Raises
+    ------
+    CosimulationError
+        When there is no folder to keep it in.
+    """
+    refusals = []
+    for cache in cache_folders():
+        try:
+            if not is_intact(cache / name):
+                cache.mkdir(parents=True, exist_ok=True, mode=0o700)
+                write_entry(cache / name, make(cache))
+        except OSError as error:
+            refusals.append(f"{cache}: {error.strerror or error}")
+        else:
+            return cache / name
+    raise CosimulationError(
+        f"There is no folder to keep the plant's FMU in ({'; '.join(refusals)}). "
+        f"Name one that can be written in the environment variable {ENVIRONMENT_VARIABLE}."
+    )
 
 
 def is_intact(entry: Path) -> bool:

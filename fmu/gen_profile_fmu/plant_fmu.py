@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import attrs
 import fmpy
 
-from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Plant
-from gen_profile_fmu.cache import ENVIRONMENT_VARIABLE, cache_folders, is_intact, write_entry
-from gen_profile_fmu.compiler import Compiler, compile_library, find_compiler
-from gen_profile_fmu.fmu_files import SOURCE_FILE, Sources, Version, archive, digest, flat, fmu_files, sources
+from gen_profile_fmu.building import compile_sources, sources_key
+from gen_profile_fmu.cache import cached
+from gen_profile_fmu.compiler import find_compiler
+from gen_profile_fmu.fmu_files import Version, archive, fmu_files, sources
 from gen_profile_fmu.model import Model, plant_model
 from gen_profile_fmu.plant_variables import InputKind, Machine
 from gen_profile_fmu.variables import VariableTable
@@ -65,52 +64,19 @@ def cached_fmu(model: Model, version: Version, on_build: Callable[[], None] | No
     Raises as `plant_fmu` does.
     """
     made, compiler = sources(model, version), find_compiler()
-    key = digest(compiler.identity.encode("utf-8"), made.description, *flat(made.code))
-    name = f"{model.identifier}-{key[:32]}"
-    refusals = []
-    for cache in cache_folders():
-        try:
-            if not is_intact(cache / name):
-                write_entry(cache / name, _build(made, compiler, cache, on_build))
-        except OSError as error:
-            refusals.append(f"{cache}: {error.strerror or error}")
-        else:
-            return PlantFmu(
-                archive=cache / name / f"{model.identifier}.fmu",
-                folder=cache / name,
-                guid=made.identity,
-                model_identifier=model.identifier,
-                variables=model.variables,
-            )
-    raise CosimulationError(
-        f"There is no folder to keep the plant's FMU in ({'; '.join(refusals)}). "
-        f"Name one that can be written in the environment variable {ENVIRONMENT_VARIABLE}."
+    library = model.identifier + fmpy.sharedLibraryExtension
+    platform = fmpy.platform if version is Version.FMI2 else fmpy.platform_tuple
+
+    def make(cache: Path) -> dict[str, bytes]:
+        binary = compile_sources(made, compiler, library, cache, on_build)
+        laid = fmu_files(made, {f"binaries/{platform}/{library}": binary}, with_extras=False)
+        return {**laid, f"{model.identifier}.fmu": archive(laid)}
+
+    entry = cached(f"{model.identifier}-{sources_key(made, compiler)}", make)
+    return PlantFmu(
+        archive=entry / f"{model.identifier}.fmu",
+        folder=entry,
+        guid=made.identity,
+        model_identifier=model.identifier,
+        variables=model.variables,
     )
-
-
-def _build(
-    made: Sources, compiler: Compiler, cache: Path, on_build: Callable[[], None] | None
-) -> dict[str, bytes]:
-    name = made.model.identifier + fmpy.sharedLibraryExtension
-    platform = fmpy.platform if made.version is Version.FMI2 else fmpy.platform_tuple
-    library = compile_sources(made, compiler, name, cache, on_build)
-    laid = fmu_files(made, {f"binaries/{platform}/{name}": library}, with_extras=False)
-    return {**laid, f"{made.model.identifier}.fmu": archive(laid)}
-
-
-def compile_sources(
-    made: Sources,
-    compiler: Compiler,
-    name: str,
-    cache: Path,
-    on_build: Callable[[], None] | None = None,
-) -> bytes:
-    """Compile a library of this name in a folder that is gone afterwards; its bytes."""
-    cache.mkdir(parents=True, exist_ok=True, mode=0o700)
-    with tempfile.TemporaryDirectory(dir=cache, prefix="build-") as folder:
-        if on_build is not None:
-            on_build()
-        for file, text in made.code.items():
-            Path(folder, file).write_text(text, encoding="utf-8", newline="\n")
-        compile_library(compiler, Path(folder), SOURCE_FILE, name, zig_cache=cache / "zig")
-        return Path(folder, name).read_bytes()

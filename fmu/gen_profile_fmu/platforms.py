@@ -23,8 +23,8 @@ class Platform:
     target : str
         As Zig calls it; no newer C library or system than named there is needed.
     fmi2, fmi3 : str
-        Folder of binaries (2.0.4 section 2.3.1, 3.0 section 2.5.1.3). FMI 2.0 has no name for ARM: there
-        FMI 3.0's stands in.
+        Folder of binaries (2.0.4 section 2.3.1, 3.0 section 2.5.1.3). FMI 2.0 has no name for Linux on ARM:
+        there FMI 3.0's stands in. On macOS it has one, for a universal binary of both processors.
     extension : str
     """
 
@@ -53,7 +53,7 @@ PLATFORMS = {
         target="x86_64-macos.11.0", fmi2="darwin64", fmi3="x86_64-darwin", extension=".dylib"
     ),
     "macos-arm64": Platform(
-        target="aarch64-macos.11.0", fmi2="aarch64-darwin", fmi3="aarch64-darwin", extension=".dylib"
+        target="aarch64-macos.11.0", fmi2="darwin64", fmi3="aarch64-darwin", extension=".dylib"
     ),
 }
 

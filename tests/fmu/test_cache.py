@@ -156,7 +156,7 @@ class TestPlantFmu:
         def refuse(*_):
             raise PermissionError(13, "Permission denied")
 
-        monkeypatch.setattr("gen_profile_fmu.plant_fmu.write_entry", refuse)
+        monkeypatch.setattr("gen_profile_fmu.cache.write_entry", refuse)
         assert builds.get() == first
 
     def test_says_where_it_could_not_be_written(self, tmp_path, builds, monkeypatch):
