@@ -9,7 +9,8 @@ import time
 from pathlib import Path
 
 import pytest
-from command_line import PROGRAM, run_here
+from command_line import PROGRAM, run_here, run_process
+from fmu.caches import share_zig
 
 STRICT = ("--set", "check.residual_sway=0.0001")
 
@@ -93,12 +94,12 @@ def test_a_full_disk_is_one_sentence(tmp_path):
     assert tree(tmp_path) == {"old.txt": b"old"}
 
 
-def interrupted(folder, word, delay, number):
+def interrupted(folder, word, delay, number, **environment):
     """Send a signal some time after a word of progress; return the code and stderr of what ends."""
     with subprocess.Popen(
         [PROGRAM, "--export", "csv", "--export", "plc", "--out", "deploy"],
         cwd=folder,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        env={**os.environ, "PYTHONUNBUFFERED": "1", **environment},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -133,6 +134,17 @@ def test_an_interrupted_run_leaves_all_or_nothing(tmp_path, word, delay, number)
         assert code == 130
         assert stderr.endswith("Error: Interrupted.\n")
         assert tree(tmp_path) == {}
+
+
+def test_a_run_that_is_interrupted_while_it_compiles_can_be_repeated(tmp_path, cache):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    share_zig(cache, tmp_path / "cache")
+    cold = {"GEN_PROFILE_CACHE": str(tmp_path / "cache")}
+    code, stderr = interrupted(folder, "compiling", 0.02, signal.SIGINT, **cold)
+    assert (code, stderr.splitlines()[-1]) == (130, "Error: Interrupted.")
+    assert tree(folder) == {}
+    assert run_process("--out", folder, **cold).code == 0
 
 
 def test_an_interruption_between_two_files_leaves_the_old_manifest_to_tell(tmp_path, monkeypatch):
