@@ -1,4 +1,4 @@
-"""Table of comma-separated values (RFC 4180): one line per cycle, with all derivatives.
+"""Table of comma-separated values: one line per cycle.
 
 ::
 
@@ -9,7 +9,10 @@
 Units are the axis's own; where there are several axes, each column begins with the axis's name. Times are
 exact decimals and other numbers the shortest text that reads back to the same double (at most 17 digits).
 Positions of an axis that counts in ``counts`` are whole numbers: the absolute position rounded half to even.
-The text is UTF-8 without byte-order mark, its lines end in a line feed.
+The text is UTF-8 without byte-order mark. Separators and line ends are those of the dialect (`csv_dialects`).
+
+``export.csv_columns`` chooses the columns. Velocity without position is for speed-controlled drives: they are
+taken to interpolate linearly between the setpoints, so the replayed position is the trapezoidal sum.
 
 Reading takes what editors and spreadsheets do to such a file (byte-order mark, quotes, carriage returns,
 blank lines at the end, columns in another order) and refuses what changes its meaning.
@@ -17,11 +20,9 @@ blank lines at the end, columns in another order) and refuses what changes its m
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from decimal import Decimal
 
 import numpy as np
@@ -29,10 +30,13 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.profile import Array, Profile, SampledProfile, grid_times
 from gen_profile.units import AXIS_UNITS, COUNTS, AxisScale
+from gen_profile_exporters import csv_dialects
+from gen_profile_exporters.csv_dialects import DIALECTS, Dialect, Row
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.setpoints import (
     AxisTable,
     axis_table,
+    in_axis_units,
     is_count,
     motion_of,
     plausible_cycle_time,
@@ -53,20 +57,27 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     Raises
     ------
     ExportError
-        A position does not fit the axis's counts, or there are too many samples.
+        A position does not fit the axis's counts, there are too many samples, or the dialect holds fewer axes
+        or quantities.
     """
-    motion = sampled(profile, target, target.cycle_time, "export.cycle_time")
+    dialect = _dialect(target)
+    motion = sampled(profile, target, target.cycle_time, "export.cycle_time", dialect.most)
+    if len(motion.position) < dialect.least:
+        raise ExportError(
+            f"export.csv_dialect: {target.export.csv_dialect} needs {dialect.least} points or more, the motion "
+            f"has {len(motion.position)}; lower export.cycle_time."
+        )
     table = axis_table(motion, target.axes)
     columns = [_time_texts(len(table.position), target.cycle_time)]
     for number, axis in enumerate(target.axes):
-        for quantity in QUANTITIES:
+        for quantity in target.export.csv_columns:
             values = getattr(table, quantity)[:, number].tolist()
             whole = quantity == "position" and axis.unit == COUNTS
             columns.append(
                 [str(int(value)) for value in values] if whole else [repr(value) for value in values]
             )
-    lines = [",".join(_header(target.axes)), *map(",".join, zip(*columns, strict=True))]
-    return (File(filename=f"{target.name}.csv", content=("\n".join(lines) + "\n").encode("utf-8")),)
+    text = csv_dialects.write(dialect, _header(target), columns)
+    return (File(filename=f"{target.name}.csv", content=text.encode("utf-8")),)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
@@ -75,36 +86,74 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     Raises
     ------
     ExportError
-        The text is no such table, was cut off, or is in other units than the target's.
+        The text is no such table, was cut off, or is in other units or another dialect than the target's.
     """
-    rows = _rows(_text(content))
-    first = next(rows, None)
-    if first is None:
+    dialect = _dialect(target)
+    text = _text(content)
+    rows = csv_dialects.read(dialect, text)
+    if not rows:
         raise ExportError("The CSV file is empty; export it again.")
-    order = _column_order(first[1], target.axes)
-    numbered = list(rows)
-    while numbered and not any(cell.strip() for cell in numbered[-1][1]):
-        numbered.pop()
-    if len(numbered) < 2:
+    header = rows.pop(0)[1] if dialect.header else _header(target)
+    order = _column_order(header, target)
+    if len(rows) < 2:
         raise ExportError(
-            f"The CSV file holds {len(numbered)} samples, a motion needs 2 or more; export it again."
+            f"The CSV file holds {len(rows)} samples, a motion needs 2 or more; export it again."
         )
-    lines = [line for line, _ in numbered]
-    values = np.array([_numbers(line, cells, first[1]) for line, cells in numbered])[:, order]
+    return _motion(rows, header, order, target)
+
+
+def _motion(
+    rows: Sequence[Row], header: Sequence[str], order: Sequence[int], target: Target
+) -> SampledProfile:
+    lines = [line for line, _ in rows]
+    values = np.array([_numbers(line, cells, header) for line, cells in rows])[:, order]
     cycle_time = _cycle_time(values[:, 0], lines)
-    by_axis = values[:, 1:].reshape(len(values), len(target.axes), len(QUANTITIES))
-    position, velocity, acceleration, jerk = np.moveaxis(by_axis, 2, 0)
-    _check_counts(position, target.axes, lines)
+    by_axis = values[:, 1:].reshape(len(values), len(target.axes), len(target.export.csv_columns))
+    found = dict(zip(target.export.csv_columns, np.moveaxis(by_axis, 2, 0), strict=True))
+    factor = np.array([axis.factor for axis in target.axes])
+    if "position" in found:
+        _check_counts(found["position"], target.axes, lines)
+    else:
+        found["position"] = _integrated(
+            found["velocity"], cycle_time, in_axis_units(np.array(target.start), factor)
+        )
     table = AxisTable(
-        cycle_time=cycle_time, position=position, velocity=velocity, acceleration=acceleration, jerk=jerk
+        cycle_time=cycle_time,
+        position=found["position"],
+        velocity=found.get("velocity"),
+        acceleration=found.get("acceleration"),
+        jerk=found.get("jerk"),
     )
     return motion_of(table, target.axes)
 
 
-def _header(axes: Sequence[AxisScale]) -> list[str]:
+def _integrated(velocity: Array, cycle_time: float, start: Array) -> Array:
+    """Positions of a drive that interpolates linearly between velocities."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = 0.5 * cycle_time * (velocity[1:] + velocity[:-1])
+        return np.concatenate([start[None], start + np.cumsum(steps, axis=0)])
+
+
+def _dialect(target: Target) -> Dialect:
+    dialect = DIALECTS[target.export.csv_dialect]
+    if not dialect.header and (len(target.axes) > 1 or len(target.export.csv_columns) > 1):
+        raise ExportError(
+            f"export.csv_dialect: {target.export.csv_dialect} holds one quantity of one axis; set "
+            'export.csv_columns = ["position"] (or --csv-columns position), and take another dialect for '
+            "several axes."
+        )
+    return dialect
+
+
+def _header(target: Target) -> list[str]:
+    axes = target.axes
     return [
         TIME,
-        *(_column(axis, quantity, axis.unit, len(axes)) for axis in axes for quantity in QUANTITIES),
+        *(
+            _column(axis, quantity, axis.unit, len(axes))
+            for axis in axes
+            for quantity in target.export.csv_columns
+        ),
     ]
 
 
@@ -133,26 +182,14 @@ def _text(content: bytes) -> str:
     return text
 
 
-def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Line numbers and cells."""
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        for cells in reader:
-            yield reader.line_num, cells
-    except csv.Error as error:
-        raise ExportError(
-            f"line {reader.line_num}: not comma-separated values ({error}); export it again."
-        ) from error
-
-
-def _column_order(found: Sequence[str], axes: Sequence[AxisScale]) -> list[int]:
+def _column_order(found: Sequence[str], target: Target) -> list[int]:
     """Where each expected column stands; the header must hold exactly those."""
     names = [name.strip() for name in found]
-    expected = _header(axes)
+    axes, expected = target.axes, _header(target)
     if len(names) == 1 and len(re.split(r"[;\t]", names[0])) > 1:
         raise ExportError(
-            "line 1: columns are separated by semicolons or tabs, not commas: a spreadsheet rewrote it; "
-            "export it again and do not save it from the spreadsheet."
+            "line 1: columns are separated by semicolons or tabs, not commas: a spreadsheet rewrote it, or it "
+            "is of another export.csv_dialect; export it again and do not save it from the spreadsheet."
         )
     for axis in axes:
         for quantity in QUANTITIES:

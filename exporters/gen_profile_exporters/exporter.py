@@ -21,6 +21,8 @@ class Target:
         Of the motion; files and program blocks are named after it.
     axes : tuple of AxisScale
         How each axis is counted, in the profile's order.
+    start : tuple of float
+        Where each axis stands before the motion, in m (or rad).
     export : ExportSpec
         The controller's cycle, and what each format leaves to choose.
     can : CanSpec
@@ -29,6 +31,7 @@ class Target:
 
     name: str
     axes: tuple[AxisScale, ...]
+    start: tuple[float, ...]
     export: ExportSpec
     can: CanSpec
 
@@ -72,4 +75,6 @@ class Exporter(Protocol):
 
 def target_of(spec: Spec) -> Target:
     """Pick from a spec what exporters need."""
-    return Target(name=spec.name, axes=spec.axis_scales(), export=spec.export, can=spec.can)
+    return Target(
+        name=spec.name, axes=spec.axis_scales(), start=spec.move.start, export=spec.export, can=spec.can
+    )

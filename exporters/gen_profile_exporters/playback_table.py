@@ -148,7 +148,8 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
             target=_literal(in_axis_units(segments.target, factor)),
         )
     table = axis_table(motion, axes)
-    columns = np.stack([table.position, table.velocity, table.acceleration])
+    quantities = (table.position, table.velocity, table.acceleration)
+    columns = np.stack([values for values in quantities if values is not None])
     if target.export.plc_layout == "counts":
         columns = _whole(columns, axes)
     columns = _literal(columns)

@@ -28,16 +28,16 @@ class AxisTable:
     ----------
     cycle_time : float
         s.
-    position, velocity, acceleration : (samples, axes) array
-        In axis units per s⁰, s, s²; positions of axes that count in ``counts`` are whole numbers.
-    jerk : (samples, axes) array or None
-        In axis units per s³, where the format carries it.
+    position : (samples, axes) array
+        In axis units; whole numbers for axes that count in ``counts``.
+    velocity, acceleration, jerk : (samples, axes) array or None
+        In axis units per s, s², s³, where the format carries them.
     """
 
     cycle_time: float
     position: Array
-    velocity: Array
-    acceleration: Array
+    velocity: Array | None
+    acceleration: Array | None
     jerk: Array | None
 
 
@@ -84,8 +84,8 @@ def motion_of(table: AxisTable, axes: tuple[AxisScale, ...]) -> SampledProfile:
     return SampledProfile(
         cycle_time=table.cycle_time,
         position=in_si(table.position, factor),
-        velocity=in_si(table.velocity, factor),
-        acceleration=in_si(table.acceleration, factor),
+        velocity=None if table.velocity is None else in_si(table.velocity, factor),
+        acceleration=None if table.acceleration is None else in_si(table.acceleration, factor),
         jerk=None if table.jerk is None else in_si(table.jerk, factor),
         resolution=in_si(np.array([float(axis.unit == COUNTS) for axis in axes]), np.abs(factor)),
     )

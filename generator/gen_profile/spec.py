@@ -50,6 +50,7 @@ NotNegative = Annotated[float, Bounds(least=0.0)]
 RelativeRange = Annotated[float, Bounds(above=0.0, most=0.9)]
 CycleTime = Annotated[float, Bounds(least=1e-5, most=10.0)]
 Duration = Annotated[float, Bounds(least=1e-3, most=1e5)]
+Column = Literal["position", "velocity", "acceleration", "jerk"]
 Distance = Annotated[float, Bounds(least=-1e5, most=1e5)]
 Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]
 
@@ -157,6 +158,8 @@ class ExportSpec:
 
     cycle_time: CycleTime = 0.001
     plc_layout: Literal["segments", "samples", "counts"] = "segments"
+    csv_dialect: Literal["rfc4180", "excel-de", "sew", "kollmorgen", "lenze"] = "rfc4180"
+    csv_columns: tuple[Column, ...] = ("position", "velocity", "acceleration", "jerk")
 
 
 @attrs.frozen(kw_only=True)

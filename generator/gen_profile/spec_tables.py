@@ -50,6 +50,7 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     tables["check"] = _check(tables["check"], tables["move"], plant, faults)
     _limits(tables["limits"], tables["move"], faults)
     tables["axis"] = _axis(tables["axis"], plant, faults)
+    _check_columns(tables["export"].get("csv_columns"), faults)
     tables["can"] = _can(tables["can"], plant, faults)
     return tables
 
@@ -290,3 +291,16 @@ def _can(table: Table, plant: Plant | None, faults: Faults) -> Table:
     if table.get("mode") == "ip" and table.get("feed_forward", "none") != "none":
         faults.add("can.feed_forward", 'only with mode = "csp"; remove it or set the mode')
     return table
+
+
+def _check_columns(columns: Any, faults: Faults) -> None:
+    """Hold a choice of columns to what can be played; their names are judged elsewhere."""
+    where = "export.csv_columns"
+    if columns is None:
+        return
+    if not isinstance(columns, list | tuple):
+        faults.add(where, f'must be a list such as ["position", "velocity"], found {found(columns)}')
+    elif len(set(map(str, columns))) != len(columns):
+        faults.add(where, "names a column twice")
+    elif not {"position", "velocity"} & set(map(str, columns)):
+        faults.add(where, 'must hold "position" or "velocity": nothing else can be played')

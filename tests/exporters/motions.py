@@ -42,6 +42,7 @@ def target(*names, unit="m", sign=1, counts_per_si=1e6, cycle_time=0.01, name="b
     return Target(
         name=name,
         axes=scales,
+        start=(0.0,) * len(scales),
         export=ExportSpec(cycle_time=cycle_time, **(export or {})),
         can=CanSpec(**can),
     )

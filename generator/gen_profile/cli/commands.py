@@ -101,6 +101,11 @@ def cli() -> None:
     help="Folder to write to; ./gen-profile-out by default.",
 )
 @click.option("--cycle-time", metavar="SECONDS", help="Cycle of the controller, and SYNC period of the bus.")
+@click.option("--plc-layout", metavar="LAYOUT", help="Table of a PLC block: segments, samples or counts.")
+@click.option("--csv-dialect", metavar="NAME", help="rfc4180, excel-de, sew, kollmorgen or lenze.")
+@click.option(
+    "--csv-columns", metavar="NAME,…", help="Of position, velocity, acceleration, jerk; all by default."
+)
 @click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
 @json_option
@@ -112,6 +117,9 @@ def design(
     formats: tuple[str, ...],
     folder: Path,
     cycle_time: str | None,
+    plc_layout: str | None,
+    csv_dialect: str | None,
+    csv_columns: str | None,
     no_check: bool,
     keep_failed: bool,
     as_json: bool,
@@ -123,6 +131,12 @@ def design(
 
     if cycle_time is not None:
         overrides += (f"export.cycle_time={cycle_time}", f"can.sync_period={cycle_time}")
+    if plc_layout is not None:
+        overrides += (f"export.plc_layout={plc_layout}",)
+    if csv_dialect is not None:
+        overrides += (f"export.csv_dialect={csv_dialect}",)
+    if csv_columns is not None:
+        overrides += (f"export.csv_columns={[name.strip() for name in csv_columns.split(',')]}",)
     spec = chosen_spec(spec_path, preset, overrides)
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
