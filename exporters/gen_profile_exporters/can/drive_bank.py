@@ -87,8 +87,8 @@ class DriveBank:
         if message.arbitration_id == frames.SYNC:
             self._synced = self._clock.now()
             for drive in self.drives:  # where they are now; then they set out for the next SYNC
-                for cob_id, data in drive.feedback():
-                    self._network.send_message(cob_id, data)
+                for cob_id, told in drive.feedback():
+                    self._network.send_message(cob_id, told)
             self._advance()
             return
         data = bytearray(message.data)
@@ -135,7 +135,7 @@ class _Periodic:
         self.data = bytes(data)
 
 
-class _Network(canopen.Network):  # type: ignore[misc]
+class _Network(canopen.Network):
     """canopen's network without its threads: frames come by `notify`, periodic ones go by `send_due`."""
 
     def __init__(self, bus: can.BusABC, clock: Clock) -> None:
@@ -143,7 +143,7 @@ class _Network(canopen.Network):  # type: ignore[misc]
         self._clock = clock
         self._periodic: list[_Periodic] = []
 
-    def send_periodic(self, can_id: int, data: Any, period: float, remote: bool = False) -> _Periodic:
+    def send_periodic(self, can_id: int, data: Any, period: float, remote: bool = False) -> Any:
         del remote
         interval = round(period * NANOSECONDS)
         task = _Periodic(can_id, bytes(data), interval, self._clock.now() + interval)

@@ -59,8 +59,8 @@ def dictionary(node: int, make: Make) -> canopen.ObjectDictionary:
     information = found.device_information
     information.vendor_name, information.product_name = "gen-profile", "simulated CiA 402 drive"
     information.vendor_number, information.product_number = make.vendor, make.product
-    for index, name, kind, access, value in _variables(make):
-        found.add_object(_variable(index, 0, name, kind, access=access, value=value))
+    for index, name, of, access, value in _variables(make):
+        found.add_object(_variable(index, 0, name, of, access=access, value=value))
     for index, name, kind, access, values in _records(node, make):
         record = ODRecord(name, index) if index != 0x1016 else ODArray(name, index)
         record.add_member(_count(index, values))

@@ -11,7 +11,7 @@ from typing import Any
 
 import can
 import canopen
-from canopen.sdo import SdoClient
+from canopen.sdo.client import SdoClient
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
@@ -100,7 +100,7 @@ class Link:
         return self._sdos[node]
 
 
-class _Sdo(SdoClient):  # type: ignore[misc]
+class _Sdo(SdoClient):
     """canopen's SDO client, which waits for answers by the link instead of by a thread."""
 
     def __init__(self, link: Link, node: int) -> None:

@@ -19,11 +19,29 @@ from gen_profile.units import AxisScale
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.exporter import Target
 
-INT32 = np.iinfo(np.int32)
-INT16 = np.iinfo(np.int16)
 NEAR_TIE = 1e-6  # of a count; doubles decide the rounding of what is further from a half
 DECELERATION_MARGIN = 2.0  # of a quick stop, over the motion's own greatest acceleration
 DIFFERENCE = 0.02  # s; velocities so far apart tell an acceleration without the noise of rounding
+
+
+@attrs.frozen
+class Range:
+    """Signed whole numbers of some length."""
+
+    bits: int
+
+    @property
+    def min(self) -> int:
+        """Lowest."""
+        return -(1 << self.bits - 1)
+
+    @property
+    def max(self) -> int:
+        """Highest."""
+        return (1 << self.bits - 1) - 1
+
+
+INT32, INT16 = Range(32), Range(16)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -160,7 +178,7 @@ def _offsets(motion: SampledProfile, target: Target) -> Integers | None:
     return np.column_stack(columns)
 
 
-def _require(counts: Integers, limits: np.iinfo, what: str, cure: str, period: float) -> None:  # type: ignore[type-arg]
+def _require(counts: Integers, limits: Range, what: str, cure: str, period: float) -> None:
     outside = np.flatnonzero((counts < limits.min) | (counts > limits.max))
     if outside.size:
         first = int(outside[0])

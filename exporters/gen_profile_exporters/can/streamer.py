@@ -118,6 +118,7 @@ class Streamer:
         self._due = 0
         self._stop_asked = ""
         self._answers_for = -1  # cycle whose answers are still to come
+        self._sent_at = 0
         cycles = len(plan.cycles)
         self._late = np.full(cycles, -1, dtype=np.int64)
         self._actual = np.zeros((cycles, len(self._nodes)), dtype=np.int64)
@@ -190,7 +191,8 @@ class Streamer:
                 cycle += missed
                 continue
             self._send(self._plan.cycles[cycle])
-            self._late[cycle] = self._clock.now() - self._due
+            self._sent_at = self._clock.now()
+            self._late[cycle] = self._sent_at - self._due
             cycle += 1
             self._answers_for = cycle - 1
         self._due = start + cycle * self._period
@@ -273,7 +275,7 @@ class Streamer:
         self._require_well()
         if self._answers_for >= 0:
             self._actual[self._answers_for] = [axis.position for axis in self._watch.axes]
-            self._told[self._answers_for] = True
+            self._told[self._answers_for] = all(axis.heard >= self._sent_at for axis in self._watch.axes)
             self._answers_for = -1
 
     def _require_well(self) -> None:

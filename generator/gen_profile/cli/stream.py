@@ -1,0 +1,233 @@
+"""The commands that put a motion on a CAN bus, and a drive that follows it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
+from gen_profile.errors import OutputError, SpecError, StreamAborted
+
+if TYPE_CHECKING:
+    from gen_profile.workflows.stream import Outcome, Source
+
+VIRTUAL = ("virtual", "gen-profile")
+_MISSES = ("extrapolate", "hold", "stop")
+
+
+def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    for decorate in (
+        click.option("--channel", metavar="NAME", help="Channel of that interface, such as can0."),
+        click.option(
+            "--interface",
+            metavar="NAME",
+            help="Interface as python-can names it: socketcan, pcan, slcan, udp_multicast …",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+@cli.command(epilog="Example: gen-profile stream deploy/paper.log --interface socketcan --channel can0")
+@spec_options
+@_bus_options
+@click.option("--mode", type=click.Choice(["csp", "ip"]), help="Mode of the drives, for a spec.")
+@click.option("--node", type=int, help="CANopen node of the first axis, for a spec.")
+@click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
+@click.option("--self-test", is_flag=True, help="First measure whether this machine can hold the cycle.")
+@click.option("--dry-run", is_flag=True, help="Print the plan, and touch no bus.")
+@click.option("--accept-unverified", is_flag=True, help="Stream what was exported without its check.")
+@click.option(
+    "--log",
+    "table",
+    metavar="CSV",
+    type=click.Path(path_type=Path),
+    help="Write planned and actual positions side by side.",
+)
+@json_option
+@debug_option
+def stream(
+    spec_path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    interface: str | None,
+    channel: str | None,
+    mode: str | None,
+    node: int | None,
+    simulate_drive: bool,
+    self_test: bool,
+    dry_run: bool,
+    accept_unverified: bool,
+    table: Path | None,
+    as_json: bool,
+) -> None:
+    """Stream setpoints to CiA 402 drives, and stop them safely.
+
+    Takes the log that --export can wrote, with its manifest beside it, or a spec, which is designed and
+    checked first. No safety function: emergency stop and STO stay in hardware.
+    """
+    from gen_profile.cli.progress import progress
+    from gen_profile.workflows import stream as run
+
+    run.require_extra()
+    if mode is not None:
+        overrides += (f"can.mode={mode}",)
+    if node is not None:
+        overrides += (f"can.node={node}",)
+    with progress() as tell:
+        source = _source(spec_path, preset, overrides, accept_unverified, tell)
+        if dry_run:
+            plan = run.summary(source)
+            print_outcome(plan, _plan_words(plan), as_json)
+            return
+        port = run.Port(**_port(interface, channel, simulate_drive))
+        if self_test:
+            tell("measuring this machine")
+            run.self_test(source)
+        outcome = run.stream(source, port, simulate_drive=simulate_drive, tell=tell)
+    if table is not None:
+        _write(table, outcome.table())
+    print_outcome(outcome.to_dict(), _outcome_words(outcome), as_json)
+    if not outcome.done:
+        click.echo(f"Stream aborted: {outcome.record.reason}", err=True)
+        sys.exit(StreamAborted.exit_code)
+
+
+@cli.command(
+    "drive-sim", epilog="Example: gen-profile drive-sim --preset paper --interface socketcan --channel vcan0"
+)
+@spec_options
+@_bus_options
+@click.option(
+    "--miss", type=click.Choice(_MISSES), default="extrapolate", help="What it does without a setpoint."
+)
+@click.option("--own-mapping", is_flag=True, help="Start with another PDO mapping than CiA 402 proposes.")
+@click.option("--eds", metavar="FILE", type=click.Path(path_type=Path), help="Write its EDS, and end.")
+@json_option
+@debug_option
+def drive_sim(
+    spec_path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    interface: str | None,
+    channel: str | None,
+    miss: str,
+    own_mapping: bool,
+    eds: Path | None,
+    as_json: bool,
+) -> None:
+    """Simulate CiA 402 drives that move the machine's FMU.
+
+    Ends after one stream, when all drives have been switched off again, and tells how far the load sways.
+    """
+    from gen_profile.cli.progress import progress
+    from gen_profile.workflows import stream as run
+
+    run.require_extra()
+    from gen_profile.workflows.crane_load import CraneLoad
+    from gen_profile_exporters.can import drive_dictionary
+
+    spec = chosen_spec(spec_path, preset, overrides)
+    make = drive_dictionary.Make(miss=miss, own_mapping=own_mapping)
+    if eds is not None:
+        _write(eds, drive_dictionary.eds(spec.can.node, make).encode("utf-8"))
+        return
+    port = run.Port(**_port(interface, channel, False))
+    with (
+        progress() as tell,
+        CraneLoad(spec, lambda: tell("compiling the plant's FMU, once")) as load,
+        port.open(spec.can.bitrate) as bus,
+    ):
+        bank = run.drive_bank(spec, bus, load, make)
+        tell("waiting for a stream")
+        bank.run(lambda: bank.finished)
+        sway = load.residual_sway()
+    scales = [axis.counts_per_si for axis in spec.axis_scales()]
+    document = {
+        "position_m": [drive.actual / scale for drive, scale in zip(bank.drives, scales, strict=True)],
+        "states": [drive.state.words for drive in bank.drives],
+        "sway_residual_peak_m": sway,
+    }
+    print_outcome(document, f"axes at {document['position_m']} m, residual sway {1e3 * sway:.4g} mm", as_json)
+
+
+def _source(
+    path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    accept_unverified: bool,
+    tell: Callable[[str], None],
+) -> Source:
+    """Take an artefact, or design one for a spec."""
+    from gen_profile.workflows.stream import verified
+
+    if path is not None and path.suffix.lower() != ".toml":
+        if preset is not None or overrides:
+            raise SpecError(
+                f"{path}: an artefact is streamed as it is; --preset, --set, --mode and --node are for specs."
+            )
+        return verified(path, accept_unverified=accept_unverified)
+    from gen_profile.errors import CheckFailed
+    from gen_profile.workflows.design import design
+
+    spec = chosen_spec(path, preset, overrides)
+    with TemporaryDirectory(prefix="gen-profile-") as folder:
+        outcome = design(spec, ("can",), Path(folder), progress=tell)
+        if not outcome.artefacts:
+            raise CheckFailed("\n".join(outcome.check.reasons() if outcome.check else ()))
+        return verified(Path(folder) / outcome.artefacts[0].path)
+
+
+def _port(interface: str | None, channel: str | None, simulated: bool) -> dict[str, str]:
+    if interface is None and channel is None and simulated:
+        return dict(zip(("interface", "channel"), VIRTUAL, strict=True))
+    if interface is None or channel is None:
+        raise SpecError("--interface and --channel: name the bus, as --interface socketcan --channel can0.")
+    return {"interface": interface, "channel": channel}
+
+
+def _write(path: Path, content: bytes) -> None:
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
+
+
+def _plan_words(plan: dict[str, Any]) -> str:
+    axes = [
+        f"  {axis['name']}: node {axis['node']}, from {axis['start_m']:g} to {axis['target_m']:g}"
+        for axis in plan["axes"]
+    ]
+    objects = [
+        f"  node {entry['node']}  {entry['object']} = {entry['value']}  {entry['meaning']}"
+        for entry in plan["startup"]
+    ]
+    head = (
+        f"{plan['cycles_planned']} cycles of {1e3 * plan['period_s']:g} ms, bus load at most "
+        f"{plan['bus_load']:.0%}"
+    )
+    return "\n".join([head, *axes, "Before anything moves, each drive is set to, and must hold:", *objects])
+
+
+def _outcome_words(outcome: Outcome) -> str:
+    told, late = outcome.to_dict(), outcome.record.lateness
+    lines = [
+        f"{told['state']}: {told['cycles_sent']} of {told['cycles_planned']} setpoints sent",
+        f"lateness: half below {late.percentile(50):.3g} µs, 99 % below {late.percentile(99):.3g} µs, all "
+        f"below {late.percentile(100):.3g} µs; drift {late.drift:.2g} s",
+        *outcome.notes,
+    ]
+    drive = told["drive"]
+    if drive is not None:
+        lines.append(
+            f"axis: {1e3 * drive['position_error_m']:.3g} mm off the target, at most "
+            f"{1e3 * drive['following_error_max_m']:.3g} mm off the plan on the way"
+        )
+        if drive["sway_residual_peak_m"] is not None:
+            lines.append(f"residual sway of the simulated load: {1e3 * drive['sway_residual_peak_m']:.3g} mm")
+    return "\n".join(lines)

@@ -1,0 +1,341 @@
+"""Streaming an artefact to the drives on a CAN bus, or to simulated ones, and telling what became of it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from threading import Event, Thread
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import OutputError, SpecError, StreamAborted
+from gen_profile.manifest import FILENAME, parse_manifest, sha256
+from gen_profile.profile import Array, grid_times
+from gen_profile.spec import Spec
+from gen_profile.spec_reading import spec_from_dict
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.clock import SystemClock
+from gen_profile_exporters.can.lateness import Lateness, rehearse
+from gen_profile_exporters.can.plan import StreamPlan, plan_of
+from gen_profile_exporters.can.realtime import real_time
+from gen_profile_exporters.can.startup import startup_lists
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.registry import format_of
+
+if TYPE_CHECKING:
+    import can
+
+    from gen_profile.workflows.crane_load import CraneLoad
+    from gen_profile_exporters.can.drive_bank import DriveBank
+    from gen_profile_exporters.can.drive_dictionary import Make
+    from gen_profile_exporters.can.streamer import Record, Streamer
+
+Tell = Callable[[str], None]
+SPIN = 200_000  # ns before each cycle, where a processor can be spared for it
+SWITCH_INTERVAL = 1e-4  # s; threads of simulated drives must not hold up the streamer
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Source:
+    """A verified motion and the spec that it was designed for."""
+
+    spec: Spec
+    plan: StreamPlan
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Port:
+    """A CAN interface as python-can names it, and its channel."""
+
+    interface: str
+    channel: str
+
+    def open(self, bitrate: int) -> can.BusABC:
+        """Open it.
+
+        Raises
+        ------
+        SpecError
+            There is none of that name, or it cannot be opened.
+        """
+        import can  # noqa: PLC0415  # 0.1 s that a dry run does not need
+
+        try:
+            return can.Bus(channel=self.channel, interface=self.interface, bitrate=bitrate)
+        except (can.CanError, OSError, ValueError, ImportError, NotImplementedError) as error:
+            raise SpecError(
+                f"--interface {self.interface} --channel {self.channel}: cannot be opened ({error}); see "
+                "python-can's documentation for its interfaces."
+            ) from error
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Outcome:
+    """What became of a stream; see the command-line contract.
+
+    Attributes
+    ----------
+    source : Source
+    record : Record
+    notes : tuple of str
+        What limited this machine's punctuality.
+    sway : float or None
+        Of the simulated machine after the move, in m.
+    """
+
+    source: Source
+    record: Record
+    notes: tuple[str, ...]
+    sway: float | None
+
+    @property
+    def done(self) -> bool:
+        """Whether the motion was carried out to its end."""
+        return not self.record.reason
+
+    @property
+    def planned(self) -> Array:
+        """Position that each axis is led to by the instant of each SYNC, in m, shape (cycles, axes)."""
+        position = self.source.plan.motion.position
+        return self._si(np.concatenate([position[:1], position[:-1]]))
+
+    @property
+    def actual(self) -> Array:
+        """Position that each drive told at each SYNC, in m; not a number where none was told."""
+        return np.where(self.record.told[:, None], self._si(self.record.actual), np.nan)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        told = self.record.told
+        apart = np.abs(self.actual - self.planned)[told]
+        target = self._si(self.source.plan.motion.position[-1])
+        drive = {
+            "position_error_m": float(np.abs(self._si(np.array(self.record.final)) - target).max()),
+            "following_error_max_m": float(apart.max()) if told.any() else None,
+            "sway_residual_peak_m": self.sway,
+        }
+        return {
+            "state": self.record.phase.value,
+            "cycles_sent": self.record.sent,
+            "cycles_planned": len(self.source.plan.cycles),
+            "lateness_us": self.record.lateness.to_dict(),
+            "drift_s": self.record.lateness.drift,
+            "drive": drive if told.any() else None,
+            "reason": self.record.reason,
+            "notes": list(self.notes),
+        }
+
+    def table(self) -> bytes:
+        """Render plan and reality side by side (RFC 4180)."""
+        axes = [axis.name for axis in self.source.plan.target.axes]
+        heads = [f"{axis}_{what}_m" for axis in axes for what in ("planned", "actual")]
+        times = grid_times(len(self.planned) - 1, self.source.plan.motion.period)
+        columns = np.stack([self.planned, self.actual], axis=2).reshape(len(times), -1)
+        rows = [
+            ",".join([f"{time:.9g}", *("" if np.isnan(cell) else f"{cell:.9g}" for cell in row)])
+            for time, row in zip(times, columns, strict=True)
+        ]
+        return ("\n".join([",".join(["time_s", *heads]), *rows]) + "\n").encode("ascii")
+
+    def _si(self, counts: Any) -> Array:
+        scale = np.array([axis.counts_per_si for axis in self.source.plan.target.axes])
+        return np.asarray(counts / scale)
+
+
+def require_extra() -> None:
+    """Refuse to go on without what only streaming needs.
+
+    Raises
+    ------
+    OutputError
+    """
+    if find_spec("canopen") is None:
+        raise OutputError("Streaming needs canopen: pip install 'gen-profile[can]'.")
+
+
+def verified(path: Path, *, accept_unverified: bool = False) -> Source:
+    """Read an artefact, and require that its manifest vouches for it.
+
+    Raises
+    ------
+    OutputError
+        It or its manifest cannot be read.
+    SpecError
+        It is no CAN log, was altered, or failed its check or never had one.
+    ExportError
+        It is damaged.
+    """
+    if format_of(path) != "can":
+        raise SpecError(f"{path}: only the log of the format can is streamed; export with --export can.")
+    beside = path.parent / FILENAME
+    content = _read(path)
+    manifest = parse_manifest(_read(beside), str(beside))
+    if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == "can"}:
+        raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
+    if manifest.check is None and not accept_unverified:
+        raise SpecError(f"{path} is unverified: export it with its check, or say --accept-unverified.")
+    if manifest.check is not None and not manifest.check.get("passed"):
+        raise SpecError(f"{path} failed its check, as {beside} tells; it is not streamed.")
+    spec = spec_from_dict(manifest.spec)
+    return Source(spec=spec, plan=plan_of(content, target_of(spec)))
+
+
+def summary(source: Source) -> dict[str, Any]:
+    """List what a stream will do, without doing it."""
+    target, motion = source.plan.target, source.plan.motion
+    return {
+        "state": "planned",
+        "cycles_sent": 0,
+        "cycles_planned": len(source.plan.cycles),
+        "period_s": motion.period,
+        "bus_load": frames.cycle_bits(target) / target.can.bitrate / motion.period,
+        "axes": [
+            {
+                "name": axis.name,
+                "node": node,
+                "start_m": float(motion.position[0, column] / axis.counts_per_si),
+                "target_m": float(motion.position[-1, column] / axis.counts_per_si),
+            }
+            for column, (axis, node) in enumerate(zip(target.axes, frames.nodes(target), strict=True))
+        ],
+        "startup": [
+            {"node": node, "object": f"{e.index:04X}h:{e.sub:02X}", "value": e.value, "meaning": e.meaning}
+            for node, entries in startup_lists(motion, target).items()
+            for e in entries
+        ],
+    }
+
+
+def self_test(source: Source) -> Lateness:
+    """Keep the cycle without a bus, and refuse one that this machine cannot hold.
+
+    Raises
+    ------
+    StreamAborted
+    """
+    period = frames.period_microseconds(source.spec.can) * 1000
+    with real_time() as refused:
+        found = rehearse(_clock(refused), period)
+    if found.percentile(100) * 1e3 >= period / 2:
+        raise StreamAborted(
+            f"This machine cannot hold a cycle of {period / 1e6:g} ms: it was late by up to "
+            f"{found.percentile(100) / 1e3:.3g} ms (half a cycle is allowed). {' '.join(refused)} "
+            "Choose a longer can.sync_period, or relieve the machine."
+        )
+    return found
+
+
+def stream(
+    source: Source, port: Port, *, simulate_drive: bool = False, tell: Tell = lambda _: None
+) -> Outcome:
+    """Stream a motion, and stop the axes whatever happens.
+
+    Parameters
+    ----------
+    source : Source
+    port : Port
+    simulate_drive : bool
+        Put simulated drives on the bus, which move the spec's nominal machine.
+    tell : callable
+        Told each phase.
+
+    Raises
+    ------
+    SpecError
+        The interface cannot be opened.
+    CosimulationError
+        The simulated machine cannot be built.
+    """
+    from gen_profile_exporters.can.streamer import Streamer  # noqa: PLC0415  # canopen is an extra
+
+    with ExitStack() as stack:
+        bus = stack.enter_context(port.open(source.spec.can.bitrate))
+        load = None
+        if simulate_drive:
+            load = stack.enter_context(_simulated(source, port, tell))
+        refused = stack.enter_context(real_time())
+        streamer = Streamer(bus, _clock(refused), source.plan, tell)
+        stack.enter_context(_stopped_by_signals(streamer))
+        record = streamer.run()
+    return Outcome(source=source, record=record, notes=refused, sway=load.sway if load else None)
+
+
+def drive_bank(source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make) -> DriveBank:
+    """Put a simulated drive on the bus for every axis, at rest at the start of the move."""
+    from gen_profile_exporters.can.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
+    from gen_profile_exporters.can.simulated_drive import SimulatedDrive  # noqa: PLC0415
+
+    target = target_of(source_spec)
+    scales = [axis.counts_per_si for axis in target.axes]
+    drives = [
+        SimulatedDrive(node, make, round(at * scale))
+        for node, at, scale in zip(frames.nodes(target), source_spec.move.start, scales, strict=True)
+    ]
+    return DriveBank(bus, SystemClock(), drives, scales, load)
+
+
+@attrs.define
+class _Simulation:
+    """What simulated drives leave behind."""
+
+    sway: float | None = None
+
+
+@contextmanager
+def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
+    """Serve the bus with simulated drives by a thread of their own."""
+    from gen_profile.workflows.crane_load import CraneLoad  # noqa: PLC0415  # FMPy and CasADi, 0.5 s
+    from gen_profile_exporters.can.drive_dictionary import Make  # noqa: PLC0415  # canopen is an extra
+
+    found, over, interval = _Simulation(), Event(), sys.getswitchinterval()
+    with (
+        CraneLoad(source.spec, lambda: tell("compiling the plant's FMU, once")) as load,
+        port.open(source.spec.can.bitrate) as bus,
+    ):
+        bank = drive_bank(source.spec, bus, load, Make())
+        thread = Thread(target=bank.run, args=(over.is_set,), name="simulated drives")
+        sys.setswitchinterval(SWITCH_INTERVAL)
+        thread.start()
+        try:
+            yield found
+        finally:
+            over.set()
+            thread.join()
+            sys.setswitchinterval(interval)
+        found.sway = load.residual_sway()
+
+
+@contextmanager
+def _stopped_by_signals(streamer: Streamer) -> Iterator[None]:
+    """Have Ctrl-C and SIGTERM stop the axes as any other fault does."""
+
+    def stop(number: int, _: FrameType | None) -> None:
+        streamer.ask_to_stop(f"Stopped by {signal.Signals(number).name}.")
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _clock(refused: tuple[str, ...]) -> SystemClock:
+    """Spin before each cycle where that takes the processor from nobody."""
+    spare = not refused and len(os.sched_getaffinity(0)) > 1
+    return SystemClock(SPIN if spare else 0)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise OutputError(f"Cannot read {path}: {error.strerror or error}.") from error
