@@ -170,7 +170,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     data = Data(
         parameters=np.array([problem.parameters[q.name] for q in problem.plant.parameters]),
         beta=0.0,
-        gamma=1.0,
+        gamma=0.0,  # where β is zero, too, an overflowing exponential would make NaN
         tau=problem.tau or 1.0,
         duration=duration,
         cost_scale=float(weights @ reach**2) / duration**6,
@@ -225,7 +225,8 @@ def _shown(linear: Linearization, reach: Array, duration: float) -> Array:
     drive = np.abs(np.linalg.solve(linear.modes, linear.input)) @ reach
     shown = np.abs(linear.sway_gain @ linear.modes).max(axis=0)
     excited = QUINTIC_JERK * shown * drive / (linear.frequencies * duration) ** 3
-    return np.where(excited < NEGLIGIBLE * reach.max(), 0.0, shown)
+    # a mode that no axis drives is not too fast: whether it rests must be seen
+    return np.where((drive > 0.0) & (excited < NEGLIGIBLE * reach.max()), 0.0, shown)
 
 
 def _blocks(upper: Array, lower: Array) -> Array:

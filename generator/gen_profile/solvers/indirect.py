@@ -28,6 +28,7 @@ SWAY_SAMPLES = 1001
 BETA_DECADES = 8.0  # from share 0 to 1
 HORIZONTAL = np.pi / 2.0
 TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the linear model implies
+MODERATE_ANGLE = np.pi / 4.0  # that a cure aims at
 SMALL_ANGLE = np.pi / 3.0  # what a rope angle may reach in the linear model before nonlinearity is blamed
 
 
@@ -108,6 +109,8 @@ def _guess(canonical: Canonical) -> Trajectory:
 
 def _with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) -> Canonical:
     beta, gamma = problem.sway_weight, problem.sway_scale
+    if beta == 0.0:
+        return quiet
     if gamma is None:
         between = quiet.quantities(solution(np.linspace(0.0, 1.0, SWAY_SAMPLES)))
         sway = between[:, 2 + quiet.system.layout.m :][:, problem.plant.end_load]
@@ -162,7 +165,7 @@ def _too_hard(problem: Problem, iterations: int, linear_angle: float) -> Solutio
     """Blame the swing where the linear model leaves the small angles, else the solver."""
     if linear_angle < SMALL_ANGLE:
         return _failure(problem, Status.DIVERGED, iterations, "Allow more time: raise move.duration.")
-    enough = problem.duration * np.sqrt(linear_angle / SMALL_ANGLE)
+    enough = problem.duration * max(1.1, np.sqrt(linear_angle / MODERATE_ANGLE))
     cure = f"Allow about {enough:.2g} s (move.duration), or shorten the move."
     return _failure(problem, Status.SWINGS_TOO_FAR, iterations, cure)
 
