@@ -18,10 +18,10 @@ def machine_of(plant: Plant, **changes: float) -> Machine:
 
 
 def motion(axes: int) -> Profile:
-    """Two pieces per axis, with a jump of the acceleration between them: 0.3 (0.15 …) in 3 s, from 0.1."""
+    """Two pieces per axis from 0.1, with a jump of the acceleration between them."""
     distance = 0.3 / np.arange(1.0, axes + 1.0)
     first = np.array([0.0, 0.0, 4.0 / 9.0])[:, None] * distance
-    rest = np.array([0.25, 2.0 / 3.0, -5.0 / 9.0, 5.0 / 27.0])[:, None] * distance
+    rest = np.array([0.25, 2.0 / 3.0, -4.0 / 9.0, 8.0 / 81.0])[:, None] * distance
     coefficients = np.zeros((2, 4, axes))
     coefficients[0, :3], coefficients[1] = first, rest
     coefficients[:, 0] += 0.1

@@ -213,7 +213,8 @@ static Status require_knowns(Instance *instance, const unsigned knowns[], size_t
     for (size_t i = 0; i < n; i++) {
         const Variable *variable = find_variable(instance, knowns[i], REAL);
         if (!variable) return FAILED;
-        if (!can_be_set(variable, ANY_MODE)) return fail(instance, "%s is not a known.", variable->name);
+        const int is_state = knowns[i] >= STATES && knowns[i] < STATES + N_STATES;
+        if (!is_state && !can_be_set(variable, ANY_MODE)) return fail(instance, "%s is not a known.", variable->name);
     }
     return OK;
 }

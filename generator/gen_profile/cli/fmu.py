@@ -1,0 +1,81 @@
+"""The command that writes FMUs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
+
+# spelled out here because --help must not wait for CasADi; a test holds them against the workflow's
+KINDS = ("plant", "profile", "system")
+INPUTS = ("setpoint", "acceleration", "velocity")
+PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86_64", "macos-arm64", "all")
+
+
+@cli.command(epilog="Example: gen-profile fmu system --preset paper --fmi 3 --out paper.fmu")
+@click.argument("kind", type=click.Choice(KINDS))
+@spec_options
+@click.option(
+    "--fmi", "version", type=click.Choice(("2", "3")), default="2", help="Version of FMI; 2 by default."
+)
+@click.option(
+    "--input",
+    "input_name",
+    type=click.Choice(INPUTS),
+    default="setpoint",
+    help="What a plant's drives are asked for; setpoint (interpolated positions) by default.",
+)
+@click.option(
+    "--platform",
+    type=click.Choice(PLATFORMS),
+    default="host",
+    help="What to compile for; this computer by default. The first time, Windows takes a minute.",
+)
+@click.option("--source-only", is_flag=True, help="Put no binary in, for TwinCAT and real-time targets.")
+@click.option(
+    "--out",
+    "path",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="FMU to write; named after the spec in this folder by default.",
+)
+@json_option
+@debug_option
+def fmu(
+    kind: str,
+    spec_path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    version: str,
+    input_name: str,
+    platform: str,
+    source_only: bool,
+    path: Path | None,
+    as_json: bool,
+) -> None:
+    """Write an FMU of a plant, of a profile, or of the system of both."""
+    from gen_profile.cli.progress import progress
+    from gen_profile.workflows.fmu import export_fmu, platform_names
+    from gen_profile_fmu.fmu_files import Version
+    from gen_profile_fmu.plant_variables import InputKind
+
+    spec = chosen_spec(spec_path, preset, overrides)
+    platforms = () if source_only else platform_names(platform)
+    with progress() as tell:
+        made = export_fmu(
+            spec,
+            kind,
+            version=Version(version),
+            input_kind=InputKind(input_name),
+            platforms=platforms,
+            path=path,
+            progress=tell,
+        )
+    document = made.to_dict()
+    names = [
+        name["name"] + ("" if name["runs_here"] else " (not run)") for name in document["platforms"]
+    ] or ["sources only"]
+    text = f"{made.path}: FMI {version}, {', '.join(names)}, {len(made.content)} bytes"
+    print_outcome(document, text, as_json)

@@ -1,0 +1,308 @@
+"""Every kind of FMU, by FMI 2 and 3, in both interfaces, against separately written equations."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from fmu import absolute_angle_crane as oracle
+from fmu.drivers import Instance, cosimulate, exchange
+from fmu.kinds import model_of, motion
+from scipy.integrate import solve_ivp
+
+from gen_profile.plants.registry import find_plant
+from gen_profile_fmu.fmu_files import Version
+from gen_profile_fmu.plant_fmu import cached_fmu
+
+CRANE = find_plant("double-pendulum-crane")
+OTHER = {"m1": 0.5, "m2": 0.1, "L1": 0.6, "L2": 0.25, "g": 9.7, "c1": 0.01, "c2": 0.02}
+TIMES = np.arange(0.0, 2.0001, 0.01)
+OUTPUTS = ("angle.hook", "angle.payload", "cart.position", "cart.velocity")
+
+
+def wave(time, order=0):
+    """Something smooth that an input does, with its derivatives."""
+    return (0.8 * np.sin(3.0 * time), 2.4 * np.cos(3.0 * time), -7.2 * np.sin(3.0 * time),
+            -21.6 * np.cos(3.0 * time))[order]  # fmt: skip
+
+
+def expected(acceleration, times=TIMES, start=(0.0,) * 4, cart=(0.0, 0.0)):
+    """Absolute angles, and the cart's position and velocity, for an acceleration (time, velocity)."""
+
+    def rates(time, x):
+        push = acceleration(time, x[5])
+        return np.concatenate((x[2:4], oracle.accelerations(x[:2], x[2:4], push, OTHER), [x[5], push]))
+
+    initial = np.array([*start, *cart])
+    result = solve_ivp(
+        rates,
+        (times[0], times[-1]),
+        initial,
+        method="DOP853",
+        rtol=1e-11,
+        atol=1e-13,
+        t_eval=times,
+        max_step=0.02,
+    )
+    return result.y[[0, 1, 4, 5]].T
+
+
+@pytest.fixture(params=Version)
+def version(request):
+    return request.param
+
+
+@pytest.fixture
+def open_instance(version):
+    opened = []
+
+    def open_(kind, *, exchange):
+        opened.append(Instance(cached_fmu(model_of(kind, CRANE), version), version, exchange=exchange))
+        return opened[-1]
+
+    yield open_
+    for instance in opened:
+        instance.close()
+
+
+class TestModelExchange:
+    @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
+    def test_of_a_plant(self, open_instance, kind):
+        instance = open_instance(kind, exchange=True)
+        lag = kind == "plant-velocity"
+        instance.begin({**OTHER, **({"tau": 0.05} if lag else {})})
+        name = "cart.setpoint_velocity" if lag else "cart.setpoint_acceleration"
+        found = exchange(instance, TIMES, lambda time: instance.write({name: wave(time)}), OUTPUTS, 2e-3)
+        follow = (lambda t, v: (wave(t) - v) / 0.05) if lag else (lambda t, v: wave(t))
+        np.testing.assert_allclose(found, expected(follow), rtol=0.0, atol=2e-8)
+
+    @pytest.mark.parametrize("tau", [0.0, 0.05])
+    def test_of_setpoints_takes_one_each_period(self, open_instance, tau):
+        instance = open_instance("plant-setpoint", exchange=True)
+        positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
+        instance.begin({**OTHER, "tau": tau, "interpolation_period": 0.02})
+
+        def next_setpoint(time):
+            k = int(time / 0.02 + 1e-9)
+            instance.write({"cart.setpoint": positions[min(k + 1, 100)]})
+
+        times = np.arange(101) * 0.02
+        found = exchange(instance, times, next_setpoint, OUTPUTS, 1e-3)
+        states, carts = oracle.swing_in_steps(positions, 0.02, tau, OTHER)
+        np.testing.assert_allclose(found[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(found[:, 2], carts, rtol=0.0, atol=1e-8)
+
+    @pytest.mark.parametrize("tau", [0.0, 0.05])
+    def test_of_a_system(self, open_instance, tau):
+        instance = open_instance("system", exchange=True)
+        instance.begin({**OTHER, "tau": tau, "start_time": 0.1})
+        times = np.arange(0.0, 4.0001, 0.01)
+        found = exchange(instance, times, lambda time: None, OUTPUTS, 2e-3)
+        np.testing.assert_allclose(found, followed(times, tau), rtol=0.0, atol=2e-8)
+
+    def test_of_a_profile(self, open_instance):
+        instance = open_instance("profile", exchange=True)
+        instance.begin({"start_time": 0.1})
+        times = np.arange(0.0, 3.0, 0.013)
+        names = [f"cart.setpoint{suffix}" for suffix in ("", "_velocity", "_acceleration", "_jerk")]
+        found = exchange(instance, times, lambda time: None, names, 1.0)
+        for order in range(4):
+            exact = motion(1).derivative(times - 0.1, order)[:, 0]
+            np.testing.assert_allclose(found[:, order], exact, rtol=0.0, atol=1e-13)
+
+
+def followed(times, tau):
+    """The system's outputs: the motion begins at 0.1 s; pieces are integrated one by one."""
+    profile = motion(1)
+
+    def acceleration(time, velocity):
+        order = 2 if tau == 0.0 else 1
+        asked = profile.derivative(np.array([time - 0.1]), order)[0, 0]
+        return asked if tau == 0.0 else (asked - velocity) / tau
+
+    edges = [0.0, 0.1, 0.1 + 0.75, 0.1 + 2.25, times[-1]]
+    rows, state = (
+        [expected(acceleration, np.array([0.0, 1e-9]), cart=(0.1, 0.0))[:1]],
+        np.array([0, 0, 0, 0, 0.1, 0.0]),
+    )
+    for low, high in pairwise(edges):
+        inside = times[(times > low) & (times <= high)]
+
+        def rates(time, x, low=low, high=high):
+            at = min(max(time, low + 1e-12), high - 1e-12)
+            push = acceleration(at, x[5])
+            return np.concatenate((x[2:4], oracle.accelerations(x[:2], x[2:4], push, OTHER), [x[5], push]))
+
+        grid = np.unique(np.append(inside, high))
+        result = solve_ivp(rates, (low, high), state, method="DOP853", rtol=1e-11, atol=1e-13, t_eval=grid)
+        rows.append(result.y[[0, 1, 4, 5]].T[: len(inside)])
+        state = result.y[:, -1]
+    return np.concatenate(rows)
+
+
+class TestCosimulation:
+    @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
+    def test_interpolates_inputs(self, kind):
+        """With derivatives up to the third order, 10 ms steps are as good as continuous inputs (FMI 2)."""
+        instance = Instance(cached_fmu(model_of(kind, CRANE), Version.FMI2), Version.FMI2, exchange=False)
+        lag = kind == "plant-velocity"
+        instance.begin({**OTHER, **({"tau": 0.05} if lag else {})})
+        name = "cart.setpoint_velocity" if lag else "cart.setpoint_acceleration"
+
+        def before(time, _):
+            instance.write({name: wave(time)})
+            instance.slopes(name, *(wave(time, order) for order in (1, 2, 3)))
+
+        found = cosimulate(instance, TIMES, before, OUTPUTS)
+        follow = (lambda t, v: (wave(t) - v) / 0.05) if lag else (lambda t, v: wave(t))
+        np.testing.assert_allclose(found, expected(follow), rtol=0.0, atol=1e-8)
+        instance.close()
+
+    @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
+    def test_holds_inputs_that_have_no_derivatives(self, open_instance, kind):
+        instance = open_instance(kind, exchange=False)
+        lag = kind == "plant-velocity"
+        instance.begin({**OTHER, **({"tau": 0.05} if lag else {})})
+        name = "cart.setpoint_velocity" if lag else "cart.setpoint_acceleration"
+        times = np.arange(0.0, 1.01, 0.1)
+        found = cosimulate(instance, times, lambda time, _: instance.write({name: wave(time)}), OUTPUTS)
+        state, rows = np.zeros(6), [np.zeros(4)]
+        for low, high in pairwise(times):
+
+            def rates(_, x, low=low):
+                push = (wave(low) - x[5]) / 0.05 if lag else wave(low)
+                return np.concatenate(
+                    (x[2:4], oracle.accelerations(x[:2], x[2:4], push, OTHER), [x[5], push])
+                )
+
+            state = solve_ivp(rates, (low, high), state, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+            rows.append(state[[0, 1, 4, 5]])
+        np.testing.assert_allclose(found, rows, rtol=0.0, atol=1e-9)
+
+    @pytest.mark.parametrize("tau", [0.0, 0.05])
+    def test_of_setpoints(self, open_instance, tau):
+        instance = open_instance("plant-setpoint", exchange=False)
+        positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
+        instance.begin({**OTHER, "tau": tau})
+        times = np.arange(101) * 0.02
+        found = cosimulate(
+            instance,
+            times,
+            lambda _, end: instance.write({"cart.setpoint": positions[round(end / 0.02)]}),
+            OUTPUTS,
+        )
+        states, carts = oracle.swing_in_steps(positions, 0.02, tau, OTHER)
+        np.testing.assert_allclose(found[:, :2], states[:, :2], rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(found[:, 2], carts, rtol=0.0, atol=1e-12)
+
+    @pytest.mark.parametrize("tau", [0.0, 0.05])
+    @pytest.mark.parametrize("step", [0.01, 0.07])
+    def test_of_a_system_is_exact_whatever_the_step(self, open_instance, tau, step):
+        instance = open_instance("system", exchange=False)
+        instance.begin({**OTHER, "tau": tau, "start_time": 0.1})
+        times = np.arange(0.0, 4.0001, step)
+        found = cosimulate(instance, times, lambda *_: None, OUTPUTS)
+        np.testing.assert_allclose(found, followed(times, tau), rtol=0.0, atol=1e-8)
+        if tau == 0.0:
+            assert found[-1, 2] == motion(1).target[0]
+
+    @pytest.mark.parametrize("step", [0.001, 0.013, 0.9])
+    def test_of_a_profile_is_exact_at_any_communication_point(self, open_instance, step):
+        instance = open_instance("profile", exchange=False)
+        instance.begin({"start_time": 0.1})
+        times = np.arange(0.0, 3.0, step)
+        names = [f"cart.setpoint{suffix}" for suffix in ("", "_velocity", "_acceleration", "_jerk")]
+        found = cosimulate(instance, times, lambda *_: None, names)
+        for order in range(4):
+            exact = motion(1).derivative(times - 0.1, order)[:, 0]
+            np.testing.assert_allclose(found[:, order], exact, rtol=0.0, atol=1e-13)
+
+    @pytest.mark.parametrize("kind", ["profile", "system"])
+    def test_waits_for_its_trigger(self, open_instance, kind):
+        instance = open_instance(kind, exchange=False)
+        instance.begin({"start_time": 0.05}, wait_for_trigger=True)
+        seen = []
+        for k in range(400):
+            instance.set_boolean("trigger", k in {2, 50, 60})  # too early; in time; once more
+            instance.fmu.doStep(k * 0.01, 0.01)
+            seen.append((instance.get_boolean("moving"), instance.get_boolean("done")))
+            time = 0.01 * (k + 1) - 0.5
+            exact = motion(1)(np.array([time])).position[0, 0]
+            assert instance.read("cart.setpoint")[0] == pytest.approx(exact, abs=1e-12)
+        began, ended = seen.index((True, False)), seen.index((False, True))
+        assert (began, ended) == (50, pytest.approx(274, abs=1))
+        assert seen == [(False, False)] * began + [(True, False)] * (ended - began) + [(False, True)] * (
+            400 - ended
+        )
+
+    def test_starts_swinging_where_asked(self, open_instance):
+        instance = open_instance("plant-acceleration", exchange=False)
+        instance.begin({**OTHER, "theta1": 0.2, "theta2": -0.1, "theta2.rate": 0.3, "cart.start": 0.5})
+        found = cosimulate(instance, TIMES, lambda *_: None, OUTPUTS)
+        exact = expected(lambda *_: 0.0, start=(0.2, 0.1, 0.0, 0.3), cart=(0.5, 0.0))
+        np.testing.assert_allclose(found, exact, rtol=0.0, atol=1e-8)
+
+
+class TestDirectionalDerivatives:
+    @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity", "plant-setpoint", "system"])
+    def test_agree_with_differences(self, open_instance, kind):
+        """In continuous-time mode, every output and derivative by every state and input."""
+        instance = open_instance(kind, exchange=True)
+        instance.begin({**OTHER, **({} if kind == "plant-acceleration" else {"tau": 0.05})})
+        instance.events()
+        instance.fmu.enterContinuousTimeMode()
+        x = np.array([0.3, -0.2, 0.5, 0.4, 0.1, -0.3])
+        instance.rates(0.4, x)
+        table = instance.references
+        unknowns = [name for name in table if name.startswith(("der(", "sway", "height", "angle"))]
+        states = ["theta1", "theta2", "theta1.rate", "theta2.rate", "cart.position", "cart.velocity"]
+        inputs = [name for name in table if kind != "system" and name.startswith("cart.setpoint_")]
+
+        def evaluate(shift, name):
+            y = x + shift * np.array([state == name for state in states])
+            if name in inputs:
+                instance.write({name: shift})
+            instance.rates(0.4, y)
+            return instance.read(*unknowns)
+
+        for known in (*states, *inputs):
+            exact = (evaluate(1e-5, known) - evaluate(-1e-5, known)) / 2e-5
+            evaluate(0.0, known)
+            found = instance.directional(unknowns, [known], [1.0])
+            np.testing.assert_allclose(found, exact, rtol=1e-7, atol=1e-7, err_msg=known)
+        twice = instance.directional(unknowns, states[:2], [2.0, 3.0])
+        one = [instance.directional(unknowns, [state], [1.0]) for state in states[:2]]
+        np.testing.assert_allclose(twice, 2.0 * one[0] + 3.0 * one[1], rtol=1e-12)
+
+    def test_reach_parameters_and_starts(self, open_instance):
+        instance = open_instance("plant-velocity", exchange=True)
+        unknowns = ["sway.payload", "der(theta1.rate)", "cart.position", "der(cart.velocity)"]
+
+        def evaluate(**changes):
+            instance.fmu.reset()
+            values = {"theta1": 0.3, "theta2": 0.1, "tau": 0.05, "cart.setpoint_velocity": 0.7, **OTHER}
+            instance.write({**values, **{name.replace("__", "."): v for name, v in changes.items()}})
+            instance.initialise()
+            return instance.read(*unknowns)
+
+        for known, value in {"L1": 0.6, "m2": 0.1, "tau": 0.05, "cart__start": 0.0, "theta1": 0.3}.items():
+            exact = (evaluate(**{known: value + 1e-6}) - evaluate(**{known: value - 1e-6})) / 2e-6
+            evaluate()
+            found = instance.directional(unknowns, [known.replace("__", ".")], [1.0])
+            np.testing.assert_allclose(found, exact, rtol=1e-6, atol=1e-7, err_msg=known)
+        instance.fmu.exitInitializationMode()
+
+    def test_of_a_profile_are_zero(self, open_instance):
+        instance = open_instance("profile", exchange=True)
+        instance.begin({})
+        assert instance.directional(["cart.setpoint"], ["start_time"], [1.0]) == [0.0]
+
+    def test_backwards_agree_with_forwards(self):
+        fmu = cached_fmu(model_of("plant-velocity", CRANE), Version.FMI3)
+        instance = Instance(fmu, Version.FMI3, exchange=True)
+        instance.begin({**OTHER, "theta1": 0.3, "theta2": 0.1})
+        unknowns, knowns = ["der(theta1.rate)", "sway.payload"], ["theta1", "cart.velocity", "L1"]
+        jacobian = np.column_stack([instance.directional(unknowns, [known], [1.0]) for known in knowns])
+        references = [[instance.references[name] for name in names] for names in (unknowns, knowns)]
+        found = instance.fmu.getAdjointDerivative(*references, [2.0, -1.0], nSensitivity=3)
+        np.testing.assert_allclose(found, [2.0, -1.0] @ jacobian, rtol=1e-13)
+        instance.close()
