@@ -13,19 +13,22 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem
 from gen_profile.profile import Array
 
+HELD = 0.01  # of the longest move
+
 
 def axis_reach(problem: Problem) -> Array:
     """Measure every axis by its move, shape (m,), in m or rad.
 
     An axis that ends where it began, but may be needed on the way, is measured by the move that would swing
-    the load as much as the others' moves do; where there is no such move, by the longest of theirs.
+    the load as much as the others' moves do. Where it cannot swing the load, as a hoist cannot, it is all but
+    held: free to move as far as the others, it would pull up the load rather than calm it.
     """
     distance = np.abs(np.array(problem.distance))
     middle = (np.array(problem.start) + np.array(problem.target)) / 2.0
     gain = np.linalg.norm(linearize(problem.plant, problem.parameters, middle).input, axis=0)
     swing = (gain * distance).max()
     equivalent = np.where(gain > 0.0, swing / np.where(gain > 0.0, gain, 1.0), 0.0)
-    equivalent = np.where(equivalent > 0.0, equivalent, distance.max())
+    equivalent = np.where(equivalent > 0.0, equivalent, HELD * distance.max())
     return np.asarray(np.where(distance > 0.0, distance, equivalent))
 
 

@@ -114,7 +114,10 @@ def _with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) ->
     if gamma is None:
         between = quiet.quantities(solution(np.linspace(0.0, 1.0, SWAY_SAMPLES)))
         sway = between[:, 2 + quiet.system.layout.m :][:, problem.plant.end_load]
-        gamma = AUTO_SWAY / float(peak(np.linalg.norm(sway, axis=1, keepdims=True))[0])
+        largest = float(peak(np.linalg.norm(sway, axis=1, keepdims=True))[0])
+        if largest == 0.0:  # a hoist alone swings nothing
+            return quiet
+        gamma = AUTO_SWAY / largest
         beta *= 2.0 * _integral(solution, quiet.quantities(solution.points)[:, 1]) / AUTO_EFFORT**2
     return attrs.evolve(quiet, data=attrs.evolve(quiet.data, beta=beta, gamma=gamma))
 
