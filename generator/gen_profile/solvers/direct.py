@@ -9,7 +9,8 @@ what any motion can do where angles are small.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import attrs
 import numpy as np
@@ -42,6 +43,8 @@ STEP_TOLERANCE = 1e-8  # of the motion's coordinates, relative
 STALLED = 1e-5  # step that is still taken for the programs' own tolerance when it ceases to shrink
 MAX_ITERATIONS = 30
 TRACE = 1e-11  # of effort, in the least worst case
+WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
+LEAST_SHARE = 0.01  # of a load's limit, of which a change is still measured
 SWAY_ROUNDS = 4  # to account for what the sway does between collocation points
 SWAY_SAMPLES = 4001
 HORIZONTAL = np.pi / 2.0
@@ -85,8 +88,18 @@ class Found:
         return len(self.solutions)
 
 
-# program, iterate, maps → P, q; adds constraints of its own to the program
-Goal = Callable[[ConicProgram, Iterate, Sequence[IntervalMaps]], tuple[Matrix, Array]]
+class Goal(Protocol):
+    """What programs shall achieve."""
+
+    def pose(
+        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
+    ) -> tuple[Matrix, Array]:
+        """Add constraints of its own to a program, and give its cost: P and q."""
+        ...
+
+    def step(self, solutions: Sequence[ConicSolution]) -> float:
+        """Measure by how much what counts changed from one program to the next."""
+        ...
 
 
 def solve(problem: Problem) -> Solution:
@@ -105,7 +118,9 @@ def solve(problem: Problem) -> Solution:
     weights, iterations = resolve_weights(problem)
     allowed = asked = problem.limits.sway
     for _ in range(SWAY_ROUNDS):
-        found = sequence(setup, setup.transcription.rest(), least_cost(setup, weights, asked, None))
+        found = sequence(
+            setup, setup.transcription.rest(), LeastCost(setup=setup, weights=weights, sway_limit=asked)
+        )
         iterations += found.iterations
         solution = conclude(setup, found, weights, iterations)
         if allowed is None or asked is None or solution.optimum is None:
@@ -202,8 +217,8 @@ def _intervals(problem: Problem) -> int:
     return int(np.clip(np.ceil(enough), INTERVALS, MAX_INTERVALS))
 
 
-def sequence(setup: Setup, start: Iterate, goal: Goal, tolerance: float = STEP_TOLERANCE) -> Found:
-    """Solve programs linearised about one another's motion until it stays."""
+def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
+    """Solve programs linearised about one another's motion until what counts stays."""
     transcription, iterate = setup.transcription, start
     extra = goals.worst_case_variables(setup.tried) if setup.tried else 0
     solutions: list[ConicSolution] = []
@@ -212,53 +227,82 @@ def sequence(setup: Setup, start: Iterate, goal: Goal, tolerance: float = STEP_T
         maps = transcription.maps(iterate)
         program = transcription.program(maps, extra)
         goals.keep_limits(program, setup.problem, transcription)
-        solutions.append(program.solve(*goal(program, iterate, maps)))
+        solutions.append(program.solve(*goal.pose(program, iterate, maps)))
         if solutions[-1].verdict is not Verdict.SOLVED:
             verdict = solutions[-1].verdict
             break
-        following = transcription.iterate(solutions[-1].x, maps)
-        before, step = step, _step(iterate, following)
-        iterate = following
-        if step < tolerance or (step < STALLED and step > 0.5 * before):
+        before, step = step, goal.step(solutions)
+        iterate = transcription.iterate(solutions[-1].x, maps)
+        if step < STEP_TOLERANCE or (step < STALLED and step > 0.5 * before):
             verdict = Verdict.SOLVED
     return Found(verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)
 
 
-def _step(before: Iterate, after: Iterate) -> float:
-    return float(np.abs(after.local - before.local).max() / np.abs(after.local).max())
+@attrs.frozen(kw_only=True, eq=False)
+class LeastCost:
+    """Minimise eq. (26), with the end load's sway and the worst case within bounds.
 
+    Attributes
+    ----------
+    setup : Setup
+    weights : Weights
+    sway_limit : float or None
+        m, on the way.
+    worst : float or None
+        Share of a load's limit, after the move.
+    """
 
-def least_cost(setup: Setup, weights: goals.Weights, sway_limit: float | None, worst: float | None) -> Goal:
-    """Minimise eq. (26), with the end load's sway and the worst case within bounds."""
+    setup: Setup
+    weights: goals.Weights
+    sway_limit: float | None
+    worst: float | None = None
 
-    def pose(program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]) -> tuple[Matrix, Array]:
-        transcription = setup.transcription
-        if sway_limit is not None:
-            goals.keep_sway(program, transcription, sway_limit, iterate, maps[0])
-        if worst is not None:
-            column = goals.bound_worst(program, transcription, setup.tried)
+    def pose(
+        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
+    ) -> tuple[Matrix, Array]:
+        """Add the bounds to a program and expand the cost: P and q."""
+        transcription = self.setup.transcription
+        if self.sway_limit is not None:
+            goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0])
+        if self.worst is not None:
+            column = goals.bound_worst(program, transcription, self.setup.tried)
             row = sparse.csc_matrix(([1.0], ([0], [column])), shape=(1, program.variables))
-            program.at_most(row, np.array([worst]))
-        scaled = attrs.evolve(weights, beta=weights.beta / setup.cost_scale)
-        quadratic, linear = goals.cost(transcription, setup.forms, scaled, iterate, maps[0])
+            program.at_most(row, np.array([self.worst]))
+        scaled = attrs.evolve(self.weights, beta=self.weights.beta / self.setup.cost_scale)
+        quadratic, linear = goals.cost(transcription, self.setup.forms, scaled, iterate, maps[0])
         return _widen(quadratic, program.variables), np.pad(linear, (0, program.variables - len(linear)))
 
-    return pose
+    def step(self, solutions: Sequence[ConicSolution]) -> float:
+        """Measure by how much the motion changed last."""
+        columns = slice(0, self.setup.transcription.intervals * self.setup.transcription.breadth)
+        after = solutions[-1].x[columns]
+        before = solutions[-2].x[columns] if len(solutions) > 1 else np.zeros_like(after)
+        return float(np.abs(after - before).max() / np.abs(after).max())
 
 
-def least_worst(setup: Setup) -> Goal:
+@attrs.frozen(kw_only=True, eq=False)
+class LeastWorst:
     """Minimise the worst share of a load's limit; a trace of effort makes the motion unique."""
 
-    def pose(program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]) -> tuple[Matrix, Array]:
-        transcription, sway_limit = setup.transcription, setup.problem.limits.sway
+    setup: Setup
+
+    def pose(
+        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
+    ) -> tuple[Matrix, Array]:
+        """Add the bounds to a program: P and q."""
+        transcription, sway_limit = self.setup.transcription, self.setup.problem.limits.sway
         if sway_limit is not None:
             goals.keep_sway(program, transcription, sway_limit, iterate, maps[0])
-        column = goals.bound_worst(program, transcription, setup.tried)
+        column = goals.bound_worst(program, transcription, self.setup.tried)
         linear = np.zeros(program.variables)
         linear[column] = 1.0
-        return TRACE * transcription.effort(setup.forms, program.variables), linear
+        return TRACE * transcription.effort(self.setup.forms, program.variables), linear
 
-    return pose
+    def step(self, solutions: Sequence[ConicSolution]) -> float:
+        """Measure by how much the worst share changed last, in units of what would be noticed."""
+        before = solutions[-2].x[-1] if len(solutions) > 1 else float("inf")
+        noticed = WORTHWHILE * max(abs(float(solutions[-1].x[-1])), LEAST_SHARE)
+        return STEP_TOLERANCE * abs(float(solutions[-1].x[-1] - before)) / noticed
 
 
 def _widen(matrix: Matrix, width: int) -> Matrix:

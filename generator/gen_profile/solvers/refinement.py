@@ -10,31 +10,35 @@ from gen_profile.solvers.canonical import Canonical
 from gen_profile.solvers.collocation import GAUSS, STAGES, Trajectory
 from gen_profile.solvers.newton import NewtonOutcome, solve_newton
 
-MAX_INTERVALS = 240
-DRIFT_TOLERANCE = 1e-6  # of the Hamiltonian over an interval, relative to its size
+MAX_INTERVALS = 480
+DRIFT_TOLERANCE = 1e-7  # of the Hamiltonian over an interval, relative to its size
 DEFECT_TOLERANCE = 3e-3  # see `defect`; what it costs in sway is of its square
 
 
 def refine(canonical: Canonical, solution: Trajectory) -> NewtonOutcome:
     """Split intervals until the Hamiltonian is constant and the equations are met.
 
-    Stops where the mesh would grow beyond `MAX_INTERVALS`.
+    Where the mesh would grow beyond `MAX_INTERVALS`, the intervals that need it least are left alone.
     """
     iterations, residual = 0, 0.0
-    while True:
-        drift, missed = _drift(canonical, solution), defect(canonical, solution)
-        parts = np.maximum(
-            (drift / DRIFT_TOLERANCE) ** (1.0 / (2 * STAGES)), (missed / DEFECT_TOLERANCE) ** (1.0 / STAGES)
-        )
-        parts = np.clip(np.ceil(parts), 1, 4).astype(int)
-        if parts.max() == 1 or parts.sum() > MAX_INTERVALS:
-            break
+    while (parts := _parts(canonical, solution)).max() > 1:
         outcome = solve_newton(canonical, solution.on(_split(solution.mesh, parts)))
         iterations += outcome.iterations
         if outcome.solution is None:
             break
         solution, residual = outcome.solution, outcome.residual
     return NewtonOutcome(solution=solution, iterations=iterations, residual=residual)
+
+
+def _parts(canonical: Canonical, solution: Trajectory) -> NDArray[np.intp]:
+    """Tell into how many parts to divide every interval."""
+    wanted = np.maximum(
+        (_drift(canonical, solution) / DRIFT_TOLERANCE) ** (1.0 / (2 * STAGES)),
+        (defect(canonical, solution) / DEFECT_TOLERANCE) ** (1.0 / STAGES),
+    )
+    while (parts := np.clip(np.ceil(wanted), 1, 4).astype(np.intp)).sum() > max(MAX_INTERVALS, len(parts)):
+        wanted *= 0.9
+    return parts
 
 
 def _drift(canonical: Canonical, solution: Trajectory) -> Array:

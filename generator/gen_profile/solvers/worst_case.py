@@ -20,24 +20,17 @@ from gen_profile.problem.problem import Problem, WorstCase
 from gen_profile.profile import Array, Profile
 from gen_profile.response import Swing
 from gen_profile.solvers.conic import Verdict
-from gen_profile.solvers.direct import (
-    conclude,
-    least_cost,
-    least_worst,
-    resolve_weights,
-    sequence,
-    set_up,
-)
+from gen_profile.solvers.direct import LeastCost, LeastWorst, conclude, resolve_weights, sequence, set_up
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
 
 SLACK = 1.003  # what the least cost may give away of the least worst case
-ROUNDS = 6
+GOOD_ENOUGH = 0.01  # share of a load's limit below which nobody need seek less
+ROUNDS = 8
 CORNERS = 6  # parameters up to which all corners are tried
 GRID = 9  # machines along each range
 DRAWS = 64  # machines within the ranges
 WORSE = 1.01  # how much worse a machine must be than those tried to be added
-ROUGHLY = 1e-3  # step at which the worst case itself no longer changes: it does not fix the motion
 WATCH_SAMPLES = 1001
 
 Parameters = Mapping[str, float]
@@ -61,14 +54,14 @@ def solve(problem: Problem) -> Solution:
 
 def solve_within_limits(problem: Problem) -> Solution:
     """Minimise the worst residual sway, and call it infeasible where that still breaks a load's limit."""
-    solution, share = _solve(problem)
-    if share <= 1.0:
+    solution, share = _solve(problem, most=1.0)
+    if share <= 1.0 or solution.optimum is None:
         return solution
     return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
 
 
-def _solve(problem: Problem) -> tuple[Solution, float]:
-    """Solve, and find the worst share of a load's limit."""
+def _solve(problem: Problem, most: float = float("inf")) -> tuple[Solution, float]:
+    """Solve, and find the worst share of a load's limit; give up where it must be more than `most`."""
     worst_case = problem.worst_case
     if worst_case is None:
         raise ValueError("the problem has no worst case")
@@ -77,22 +70,26 @@ def _solve(problem: Problem) -> tuple[Solution, float]:
     tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
-        best = sequence(setup, setup.transcription.rest(), least_worst(setup), ROUGHLY)
-        iterations += best.iterations
-        if best.verdict is not Verdict.SOLVED:
-            return conclude(setup, best, weights, iterations), float("inf")
-        share = SLACK * float(best.solutions[-1].x[-1])
-        found = sequence(setup, best.iterate, least_cost(setup, weights, problem.limits.sway, share))
+        goal = LeastCost(setup=setup, weights=weights, sway_limit=problem.limits.sway, worst=GOOD_ENOUGH)
+        bound, found = 0.0, sequence(setup, setup.transcription.rest(), goal)
+        if found.verdict is not Verdict.SOLVED:
+            best = sequence(setup, setup.transcription.rest(), LeastWorst(setup=setup))
+            iterations += best.iterations
+            bound = float(best.solutions[0].x[-1])
+            if best.verdict is not Verdict.SOLVED or bound > most:
+                return conclude(setup, best, weights, iterations), float("inf")
+            goal = attrs.evolve(goal, worst=SLACK * float(best.solutions[-1].x[-1]))
+            found = sequence(setup, best.iterate, goal)
         iterations += found.iterations
         solution = conclude(setup, found, weights, iterations)
         if solution.optimum is None:
             return solution, float("inf")
         shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
-        if shares.max() <= WORSE * share:
+        if goal.worst is not None and shares.max() <= WORSE * goal.worst:
             break
         tried = [*tried, everywhere[int(shares.argmax())]]
-    bound = float(best.solutions[0].x[-1]) * worst_case.load_limits[-1]
-    return attrs.evolve(solution, worst_case_bound=bound), float(shares.max())
+    solution = attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
+    return solution, float(shares.max())
 
 
 def ends(problem: Problem, worst_case: WorstCase) -> list[Parameters]:
