@@ -184,7 +184,7 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
         raise SpecError(f"{path} is unverified: export it with its check, or say --accept-unverified.")
     if manifest.check is not None and not manifest.check.get("passed"):
         raise SpecError(f"{path} failed its check, as {beside} tells; it is not streamed.")
-    spec = spec_from_dict(manifest.spec)
+    spec = spec_from_dict(manifest.spec, path.parent)
     return Source(spec=spec, plan=plan_of(content, target_of(spec)))
 
 
