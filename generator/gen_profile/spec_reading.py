@@ -78,7 +78,7 @@ def preset_spec(name: str, overrides: Sequence[str] = ()) -> Spec:
         There is no such preset, or the overrides have faults.
     """
     if name not in presets():
-        raise SpecError(f"--preset: unknown preset {name!r}{suggestion(name, presets())}.")
+        raise SpecError(f"--preset: unknown preset {name!r}{suggestion(name, presets())}")
     return parse_spec((files("gen_profile") / "presets" / f"{name}.toml").read_text("utf-8"), overrides, name)
 
 

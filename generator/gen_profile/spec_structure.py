@@ -37,7 +37,7 @@ class Faults:
         """Note a problem, such as ``must be positive``, of a place such as ``plant.m1``."""
         steps = place.split(".")
         if not any(".".join(steps[: depth + 1]) in self._sentences for depth in range(len(steps))):
-            self._sentences[place] = f"{place}: {problem}{'' if problem.endswith('?') else '.'}"
+            self._sentences[place] = f"{place}: {problem}{'' if problem.endswith(('?', '.')) else '.'}"
 
     def __iter__(self) -> Iterator[str]:
         """Give one sentence per place."""

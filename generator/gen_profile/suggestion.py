@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """``; did you mean 'x'?`` where something similar is known, else the list of what is."""
+    """End a sentence: ``; did you mean 'x'?`` where something similar is known, else the list of what is."""
     known = list(known)
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"; did you mean {near[0]!r}?" if near else f" (known: {', '.join(known)})"
+    return f"; did you mean {near[0]!r}?" if near else f" (known: {', '.join(known)})."

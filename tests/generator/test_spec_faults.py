@@ -102,7 +102,7 @@ FAULTS = [
     (
         "move.duration",
         "minimum",
-        r"move\.duration: \"minimum\" is not supported yet; state the duration in s\.",
+        r"move\.duration: \"minimum\" needs a limit: state limits\.acceleration, or velocity or jerk\.",
     ),
     ("limits.jerk", 0, r"limits\.jerk: must be greater than 0, found 0\.0\."),
     ("cost.sway_weight", -1, r"cost\.sway_weight: must be at least 0, found -1\.0\."),
@@ -133,7 +133,18 @@ FAULTS = [
         r"robustness\.uncertain: must be a table such as \{ L1 = 0\.2 \}, found an array\.",
     ),
     ("name", 7, r"name: must be text, found 7\."),
+    ("robustness.nominal_zero", 1, r"robustness\.nominal_zero: must be true or false, found 1\."),
+    ("limits.travel", [0.0], r"limits\.travel: must be an array of 2 numbers, found an array\."),
     # what contradicts
+    ("move.shortest", True, r"move\.shortest: unknown key; write duration = \"minimum\"\."),
+    ("limits.travel", [0.0, 0.2], r"limits\.travel: must contain the move's target, found \[0\.0, 0\.2\]\."),
+    ("robustness.nominal_zero", True, r"robustness\.nominal_zero: only with method = \"range\"; .*\."),
+    (
+        "robustness",
+        {"method": "range", "order": 2, "uncertain": {"L1": 0.2}},
+        r"robustness\.order: only with method = \"sensitivity\"\.",
+    ),
+    ("robustness", {"method": "range"}, r"robustness\.uncertain: required with method = \"range\", .*\."),
     ("actuator", {"type": "first-order"}, r"actuator\.tau: required with type = \"first-order\" .*\."),
     ("actuator.tau", 0.1, r"actuator\.tau: only with type = \"first-order\"; .*\."),
     ("cost.effort", "reference", r"cost\.effort: \"reference\" weighs the reference of a lagging drive .*\."),

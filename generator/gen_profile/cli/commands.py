@@ -106,6 +106,7 @@ def cli() -> None:
 @click.option(
     "--csv-columns", metavar="NAME,…", help="Of position, velocity, acceleration, jerk; all by default."
 )
+@click.option("--method", metavar="NAME", help="Solver: auto, indirect or direct.")
 @click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
 @json_option
@@ -120,6 +121,7 @@ def design(
     plc_layout: str | None,
     csv_dialect: str | None,
     csv_columns: str | None,
+    method: str | None,
     no_check: bool,
     keep_failed: bool,
     as_json: bool,
@@ -137,6 +139,8 @@ def design(
         overrides += (f"export.csv_dialect={csv_dialect}",)
     if csv_columns is not None:
         overrides += (f"export.csv_columns={[name.strip() for name in csv_columns.split(',')]}",)
+    if method is not None:
+        overrides += (f"solver.method={method}",)
     spec = chosen_spec(spec_path, preset, overrides)
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
@@ -156,6 +160,13 @@ def design(
     type=click.Path(path_type=Path),
     help="Draw the comparison (png, svg or pdf).",
 )
+@click.option(
+    "--base",
+    type=click.Choice(["quintic", "septic", "jerk-limited"]),
+    default="quintic",
+    show_default=True,
+    help="What the shapers are fed with; jerk-limited needs limits.jerk.",
+)
 @json_option
 @debug_option
 def compare(
@@ -163,6 +174,7 @@ def compare(
     preset: str | None,
     overrides: tuple[str, ...],
     picture: Path | None,
+    base: str,
     as_json: bool,
 ) -> None:
     """Compare optimal profiles with shapers."""
@@ -176,7 +188,7 @@ def compare(
 
         require_drawable(picture)
     with progress() as tell:
-        comparison = run(spec, tell)
+        comparison = run(spec, base, tell)
         if picture is not None:
             tell("drawing")
             draw(comparison, picture)

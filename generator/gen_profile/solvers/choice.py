@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import attrs
@@ -16,6 +17,7 @@ from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
 from gen_profile.spec import LimitsSpec
 
+COMFORT = 1.01  # of the shortest duration, in which there is but one motion
 Method = Literal["auto", "indirect", "direct"]
 
 
@@ -61,12 +63,13 @@ def _explained(solution: Solution) -> Solution:
     """Say what would make an infeasible problem feasible."""
     if solution.status is not Status.INFEASIBLE:
         return solution
-    problem = solution.problem
-    shortest = minimum_time(problem)
-    cures = (
-        [] if shortest is None else [f"With these limits it takes at least {_up(shortest)} s (move.duration)"]
-    )
-    for name in ("velocity", "acceleration", "jerk", "sway", "travel"):
+    problem = attrs.evolve(solution.problem, worst_case=None)
+    cures = []
+    # with a limit on the sway the search would take too long for an explanation
+    shortest = shortest_duration(problem, direct.solve) if problem.limits.sway is None else None
+    if shortest is not None:
+        cures.append(f"With these limits it takes at least {_up(COMFORT * shortest)} s (move.duration)")
+    for name in (field.name for field in attrs.fields(LimitsSpec)):
         if getattr(problem.limits, name) is not None:
             without = attrs.evolve(problem, limits=attrs.evolve(problem.limits, **{name: None}))
             if direct.solve(without).optimum is not None:
@@ -76,8 +79,5 @@ def _explained(solution: Solution) -> Solution:
 
 def _up(value: float) -> str:
     """Write three digits, rounded up: what is called enough must be enough."""
-    text = f"{value:.2e}"
-    mantissa, exponent = text.split("e")
-    if float(text) < value:
-        text = f"{float(mantissa) + 0.01:.2f}e{exponent}"
-    return f"{float(text):g}"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return f"{math.ceil(value / unit) * unit:.3g}"

@@ -414,7 +414,7 @@ def _cost(setup: Setup, iterate: Iterate, weights: goals.Weights) -> float:
         for axis, form in enumerate(setup.forms)
     )
     sway = transcription.end_sway_found(iterate)
-    growth = np.exp(weights.gamma**2 * (sway**2).sum(axis=1))
+    growth = np.exp(np.minimum(weights.gamma**2 * (sway**2).sum(axis=1), goals.STEEPEST))
     return duration * (setup.cost_scale * effort + weights.beta * float(transcription.quadrature() @ growth))
 
 

@@ -18,6 +18,7 @@ from gen_profile.solvers.condensing import IntervalMaps
 from gen_profile.solvers.conic import ConicProgram, Matrix, place
 from gen_profile.solvers.transcription import Iterate, Transcription
 
+STEEPEST = 50.0  # exponent beyond which the sway's cost is steep enough
 WITHIN = 1.0 - 1e-6  # share of a limit that a program may use: its own tolerance must not break the limit
 
 
@@ -69,7 +70,8 @@ def cost(
     if weights.beta > 0.0:
         sway, matrix, offset = transcription.end_sway(iterate, maps, width)
         points, directions = sway.shape
-        share = weights.beta * transcription.quadrature() * np.exp(weights.gamma**2 * (sway**2).sum(axis=1))
+        exponent = np.minimum(weights.gamma**2 * (sway**2).sum(axis=1), STEEPEST)
+        share = weights.beta * transcription.quadrature() * np.exp(exponent)
         slope = 2.0 * weights.gamma**2 * share[:, None] * sway
         curvature = (
             2.0

@@ -18,7 +18,7 @@ class Status(Enum):
     SWINGS_TOO_FAR = "The load would have to swing beyond the horizontal."
     INFEASIBLE = "No motion meets the end conditions within the limits."
     NOT_CONTROLLABLE = "Some part of the machine swings on, whatever the axes do."
-    DIVERGED = "Newton's method found no motion that meets the optimality conditions."
+    DIVERGED = "The solver found no motion that meets the optimality conditions."
 
 
 ERRORS: dict[Status, type[GenProfileError]] = {

@@ -24,6 +24,7 @@ from gen_profile.solvers.direct import LeastCost, LeastWorst, conclude, resolve_
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
 
+MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
 SLACK = 1.003  # what the least cost may give away of the least worst case
 GOOD_ENOUGH = 0.01  # share of a load's limit below which nobody need seek less
 ROUNDS = 8
@@ -78,7 +79,7 @@ def _solve(problem: Problem, most: float = float("inf")) -> tuple[Solution, floa
             bound = float(best.solutions[0].x[-1])
             if best.verdict is not Verdict.SOLVED or bound > most:
                 return conclude(setup, best, weights, iterations), float("inf")
-            goal = attrs.evolve(goal, worst=SLACK * float(best.solutions[-1].x[-1]))
+            goal = attrs.evolve(goal, worst=SLACK * float(best.solutions[-1].x[-1]) + MARGIN)
             found = sequence(setup, best.iterate, goal)
         iterations += found.iterations
         solution = conclude(setup, found, weights, iterations)

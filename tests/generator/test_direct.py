@@ -1,0 +1,126 @@
+"""The direct method against the indirect one, the limits at every instant, and linear programs."""
+
+import attrs
+import numpy as np
+import pytest
+from generator.crane_problems import CRANE, EFFORTS, crane_problem
+from generator.oracles.crane_linear_program import feasible
+
+from gen_profile.problem.actuator import lag_compensated
+from gen_profile.solvers import choice, direct, indirect
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.solution import Status
+from gen_profile.spec import LimitsSpec
+
+LIMITS = {"velocity": 0.15, "acceleration": 0.4, "jerk": 6.0}
+
+
+def limited(**limits):
+    return crane_problem(limits=LimitsSpec(**limits))
+
+
+@pytest.mark.parametrize(("effort", "tau"), EFFORTS)
+@pytest.mark.parametrize("beta", [0.0, 20.0, 50.0])
+def test_agrees_with_the_indirect_method(effort, tau, beta):
+    problem = crane_problem(effort=effort, tau=tau, sway_weight=beta)
+    one, other = direct.solve(problem).raise_for_status(), indirect.solve(problem).raise_for_status()
+    assert one.cost == pytest.approx(other.cost, rel=1e-6)
+    # Pontryagin's costates are the multipliers of the programs
+    size = np.abs(other.costates).max(axis=0)
+    for node in (0, -1):
+        assert one.costates[node] == pytest.approx(other.costates[node], abs=1e-4 * size.max())
+        assert one.costates[node] / size == pytest.approx(other.costates[node] / size, abs=1e-3)
+
+
+def test_agrees_with_automatic_weights():
+    problem = crane_problem(sway_scale=None)
+    one, other = direct.solve(problem).raise_for_status(), indirect.solve(problem).raise_for_status()
+    assert one.sway_scale == pytest.approx(other.sway_scale, rel=1e-6)
+    assert one.sway_weight == pytest.approx(other.sway_weight, rel=1e-6)
+    assert one.cost == pytest.approx(other.cost, rel=1e-6)
+
+
+def test_redundant_sensitivities_are_named():
+    solution = direct.solve(crane_problem(desensitized=("L1", "L2"), sway_weight=0.0))
+    assert solution.redundant == ("L2",)
+    assert solution.status is Status.CONVERGED
+
+
+@pytest.mark.parametrize("tau", [None, 0.05])
+@pytest.mark.parametrize(("name", "limit"), LIMITS.items())
+def test_limits_hold_for_the_command_at_every_instant(name, limit, tau):
+    loose = crane_problem(tau=tau, sway_weight=0.0)
+    order = list(LIMITS).index(name) + 1
+    free = lag_compensated(optimal_profile(direct.solve(loose)), tau)
+    found = np.abs(free.within_segments(201, order)[1]).max()
+    limit = 0.9 * found
+    solution = direct.solve(attrs.evolve(loose, limits=LimitsSpec(**{name: limit})))
+    command = lag_compensated(optimal_profile(solution), tau)
+    kept = np.abs(command.within_segments(201, order)[1]).max()
+    assert 0.98 * limit < kept <= limit
+
+
+def test_travel_and_sway_hold_between_samples():
+    # the least sway on the way to a target that the axis may not overshoot
+    problem = crane_problem(limits=LimitsSpec(travel=(0.0, 0.3), sway=0.018))
+    solution = direct.solve(problem)
+    position = optimal_profile(solution).within_segments(201, 0)[1]
+    assert position.min() >= 0.0
+    assert position.max() <= 0.3 + 1e-12
+    assert 0.0179 < direct.greatest_sway(solution) <= 0.018
+
+
+def test_a_limit_costs():
+    free, bound = (direct.solve(limited(**limits)) for limits in ({}, {"acceleration": 0.5}))
+    assert bound.raise_for_status().cost > free.raise_for_status().cost
+    assert bound.raise_for_status().hamiltonian is None
+
+
+def test_auto_takes_the_indirect_method_where_no_limit_binds():
+    assert choice.solve(limited(acceleration=1.0)).method == indirect.METHOD
+    assert choice.solve(limited(acceleration=0.5)).method == direct.METHOD
+    assert choice.solve(limited(acceleration=0.5), "indirect").method == indirect.METHOD
+    assert choice.solve(limited(), "direct").method == direct.METHOD
+
+
+def test_an_infeasible_problem_says_what_would_do():
+    solution = choice.solve(limited(acceleration=0.2, velocity=0.2))
+    assert solution.status is Status.INFEASIBLE
+    assert "at least 3.1 s" in solution.cure
+    assert "without limits.acceleration it would do in 3 s" in solution.cure
+    assert "limits.velocity" not in solution.cure
+
+
+@pytest.mark.parametrize("desensitized", [(), ("L1",)])
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"acceleration": 0.3},
+        {"velocity": 0.15, "acceleration": 0.5, "jerk": 10.0},
+        {"jerk": 5.0},
+    ],
+)
+def test_minimum_time_agrees_with_linear_programs(limits, desensitized):
+    problem = crane_problem(desensitized=desensitized, limits=LimitsSpec(**limits))
+    found = choice.minimum_time(problem)
+    low, high = 0.5 * found, 2.0 * found
+    while high - low > 1e-3 * found:
+        middle = (low + high) / 2.0
+        robust = bool(desensitized)
+        if feasible(CRANE.nominal(), 0.3, middle, desensitized=robust, **limits):
+            high = middle
+        else:
+            low = middle
+    assert found == pytest.approx(high, rel=0.02)
+    assert found > 0.999 * low
+
+
+def test_no_duration_does_where_the_target_is_out_of_reach():
+    assert choice.minimum_time(limited(acceleration=1.0, travel=(0.0, 0.2))) is None
+
+
+def test_a_wild_move_is_refused_not_returned():
+    solution = direct.solve(crane_problem(duration=0.4, sway_weight=0.0))
+    assert solution.optimum is None
+    assert solution.status in {Status.SWINGS_TOO_FAR, Status.DIVERGED}
+    assert solution.cure
