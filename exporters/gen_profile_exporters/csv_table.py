@@ -64,8 +64,8 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     motion = sampled(profile, target, target.cycle_time, "export.cycle_time", dialect.most)
     if len(motion.position) < dialect.least:
         raise ExportError(
-            f"export.csv_dialect: {target.export.csv_dialect} needs {dialect.least} points or more, the motion "
-            f"has {len(motion.position)}; lower export.cycle_time."
+            f"export.csv_dialect: {target.export.csv_dialect} needs {dialect.least} points or more, the "
+            f"motion has {len(motion.position)}; lower export.cycle_time."
         )
     table = axis_table(motion, target.axes)
     columns = [_time_texts(len(table.position), target.cycle_time)]
@@ -188,8 +188,8 @@ def _column_order(found: Sequence[str], target: Target) -> list[int]:
     axes, expected = target.axes, _header(target)
     if len(names) == 1 and len(re.split(r"[;\t]", names[0])) > 1:
         raise ExportError(
-            "line 1: columns are separated by semicolons or tabs, not commas: a spreadsheet rewrote it, or it "
-            "is of another export.csv_dialect; export it again and do not save it from the spreadsheet."
+            "line 1: columns are separated by semicolons or tabs, not commas: a spreadsheet rewrote it, or "
+            "it is of another export.csv_dialect; export it again and do not save it from the spreadsheet."
         )
     for axis in axes:
         for quantity in QUANTITIES:

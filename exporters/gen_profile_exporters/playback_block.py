@@ -60,6 +60,11 @@ def match(text: str, layout: str, axes: int) -> dict[str, Token]:
     return values
 
 
+def variable_names(layout: str, axes: int) -> list[str]:
+    """List the block's variables in the order of their declaration."""
+    return re.findall(r"^ +(\w+) : ", _program(layout, axes), re.MULTILINE)
+
+
 def layout_of(text: str) -> str:
     """Tell the layout of a block's table by what the table declares."""
     if re.search(r"\bcPower0\b", text, re.IGNORECASE):

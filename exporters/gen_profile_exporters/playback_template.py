@@ -185,19 +185,26 @@ IF nState = cMoving THEN
         fFraction := fFraction - 1.0;
         nCycle := nCycle + 1;
     END_IF;
-ELSIF (nState = cWaiting) AND bChecked THEN
-    fGain := fScale;
-    IF bMirror THEN fGain := -fScale; END_IF;
-    IF NOT bTableGood THEN nErrorId := 5; END_IF;
+ELSIF nState = cWaiting THEN
+    (* Checked in every cycle of waiting, as the start position is issued meanwhile. *)
+    IF bChecked AND NOT bTableGood THEN nErrorId := 5; END_IF;
     IF bAbort THEN nErrorId := 4; END_IF;
     IF NOT ((fScale >= 0.0) AND (fScale <= 1.0)) THEN nErrorId := 3; END_IF;
 %   FOR nAxis := 1 TO cAxes DO
-    fShift~ := fStartOffset~ + (1.0 - fGain) * cStart~;
     IF NOT (ABS(fActPosition~ - (cStart~ + fStartOffset~)) <= fStartTolerance~) THEN nErrorId := 2; END_IF;
 %   END_FOR;
     IF NOT (ABS(fCycleTime - cCycleTime) <= 1.0E-6 * cCycleTime) THEN nErrorId := 1; END_IF;
-    nState := cMoving;
-    IF nErrorId <> 0 THEN nState := cFailed; END_IF;
+    IF nErrorId <> 0 THEN
+        nState := cFailed;
+    ELSE
+        fGain := fScale;
+        IF bMirror THEN fGain := -fScale; END_IF;
+%       FOR nAxis := 1 TO cAxes DO
+        fShift~ := fStartOffset~ + (1.0 - fGain) * cStart~;
+        fPosition~ := cStart~ + fStartOffset~;
+%       END_FOR;
+        IF bChecked THEN nState := cMoving; END_IF;
+    END_IF;
     bStopping := FALSE;
     bOffNominal := FALSE;
     nCycle := 0;

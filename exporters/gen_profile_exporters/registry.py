@@ -6,6 +6,7 @@ only when its format is asked for.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import PurePath
@@ -15,14 +16,31 @@ from gen_profile.errors import SpecError
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
-    from gen_profile_exporters import csv_table, structured_text
+    from gen_profile_exporters import (
+        codesys,
+        csv_table,
+        plcopen_xml,
+        rockwell_l5x,
+        siemens_scl,
+        structured_text,
+        twincat,
+    )
     from gen_profile_exporters.can import exporter as can
     from gen_profile_exporters.exporter import Exporter
 
     # Holds the project's own formats to the protocol wherever types are checked.
-    _CONFORMING: tuple[Exporter, ...] = (csv_table, structured_text, can)
+    _CONFORMING: tuple[Exporter, ...] = (
+        can,
+        codesys,
+        csv_table,
+        plcopen_xml,
+        rockwell_l5x,
+        siemens_scl,
+        structured_text,
+        twincat,
+    )
 
-Proof = Literal["executed", "read back", "parsed", "untested"]
+Proof = Literal["executed", "read back", "schema-checked", "parsed", "untested"]
 
 
 class Format(NamedTuple):
@@ -36,7 +54,8 @@ class Format(NamedTuple):
         One line for lists.
     proof : str
         How far others confirm the artefacts: ``"executed"`` by an implementation of the target's language,
-        ``"read back"`` by other people's readers, ``"parsed"`` by other people's grammar, or ``"untested"``.
+        ``"read back"`` by other people's readers, ``"schema-checked"`` against the format's published schema,
+        ``"parsed"`` by other people's grammar, or ``"untested"``.
     suffix : str
         Of the artefact's name, such as ``".csv"``.
     """
@@ -54,6 +73,12 @@ BUILT_IN: dict[str, Format] = {
         proof="read back",
         suffix=".log",
     ),
+    "codesys": Format(
+        module="gen_profile_exporters.codesys",
+        summary="playback block, SoftMotion wrapper and XYVA cam in a PLCopen XML project for CODESYS",
+        proof="schema-checked",
+        suffix=".codesys.xml",
+    ),
     "csv": Format(
         module="gen_profile_exporters.csv_table",
         summary="table of time, position, velocity, acceleration and jerk (RFC 4180)",
@@ -65,6 +90,30 @@ BUILT_IN: dict[str, Format] = {
         summary="playback function block in portable IEC 61131-3 Structured Text",
         proof="executed",
         suffix=".st",
+    ),
+    "plcopen-xml": Format(
+        module="gen_profile_exporters.plcopen_xml",
+        summary="playback function block as PLCopen XML (TC6 v2.01)",
+        proof="schema-checked",
+        suffix=".xml",
+    ),
+    "rockwell-l5x": Format(
+        module="gen_profile_exporters.rockwell_l5x",
+        summary="CAM arrays for MCCP and MATC in an L5X import for Logix controllers",
+        proof="parsed",
+        suffix=".L5X",
+    ),
+    "siemens-scl": Format(
+        module="gen_profile_exporters.siemens_scl",
+        summary="playback block, wrapper and cam points as SCL sources for TIA Portal",
+        proof="untested",
+        suffix=".scl",
+    ),
+    "twincat": Format(
+        module="gen_profile_exporters.twincat",
+        summary="playback block, NC wrapper and motion function points for TwinCAT 3",
+        proof="parsed",
+        suffix=".TcPOU",
     ),
 }
 GROUP = "gen_profile.exporters"
@@ -86,7 +135,7 @@ def find_exporter(name: str) -> Exporter:
     """
     known = BUILT_IN if name in BUILT_IN else formats()
     if name not in known:
-        raise SpecError(f"--export: unknown format {name!r}{suggestion(name, known)}.")
+        raise SpecError(f"--export: unknown format {name!r}{suggestion(name, known)}")
     return cast("Exporter", import_module(known[name].module))
 
 
@@ -98,16 +147,25 @@ def format_of(path: PurePath | str) -> str:
     SpecError
         When no format has that suffix.
     """
-    suffix = PurePath(path).suffix.lower()
-    suffixes = {form.suffix: name for name, form in BUILT_IN.items()}
-    if suffix not in suffixes:
-        suffixes = {form.suffix: name for name, form in formats().items()} | suffixes
-    if suffix not in suffixes:
+    own = _longest_suffix(path, BUILT_IN)
+    if own is not None:
+        return own
+    known = formats()
+    found = _longest_suffix(path, known)
+    if found is None:
         raise SpecError(
-            f"{path}: no format has the suffix {suffix!r} (known: {', '.join(sorted(suffixes))}); "
+            f"{path}: no format has the suffix {PurePath(path).suffix!r} "
+            f"(known: {', '.join(sorted(form.suffix for form in known.values()))}); "
             "give the file the suffix that it was exported with."
         )
-    return suffixes[suffix]
+    return found
+
+
+def _longest_suffix(path: PurePath | str, known: Mapping[str, Format]) -> str | None:
+    """Find the format whose suffix fits best: ``.codesys.xml`` rather than ``.xml``."""
+    name = PurePath(path).name.lower()
+    fitting = [key for key, form in known.items() if name.endswith(form.suffix.lower())]
+    return max(fitting, key=lambda key: len(known[key].suffix), default=None)
 
 
 def _format_of_plugin(entry: EntryPoint) -> Format:

@@ -34,6 +34,11 @@ def test_every_format_can_be_found_and_has_its_own_suffix():
     assert {"csv", "plc", "can"} <= formats().keys()
 
 
+def test_the_longest_suffix_tells():
+    assert format_of("bay.codesys.xml") == "codesys"
+    assert format_of("bay.xml") == "plcopen-xml"
+
+
 def test_suffixes_ignore_case():
     assert format_of(PurePosixPath("MOTION.CSV")) == "csv"
 
@@ -41,13 +46,13 @@ def test_suffixes_ignore_case():
 def test_unknown_formats_are_refused_with_a_suggestion():
     with pytest.raises(SpecError, match=r"^--export: unknown format 'cvs'; did you mean 'csv'\?"):
         find_exporter("cvs")
-    with pytest.raises(SpecError, match=r"--export: unknown format 'gcode' \(known: can, csv, plc\)"):
-        find_exporter("gcode")
+    with pytest.raises(SpecError, match=r"--export: unknown format 'xyz' \(known: can, codesys, csv, "):
+        find_exporter("xyz")
 
 
 @pytest.mark.parametrize("path", ["motion.nc", "motion", "folder.csv/motion"])
 def test_unknown_suffixes_are_refused(path):
-    with pytest.raises(SpecError, match=r"no format has the suffix .* \(known: \.csv, \.log, \.st\)"):
+    with pytest.raises(SpecError, match=r"no format has the suffix .* \(known: .*\.csv, .*\.st, "):
         format_of(path)
 
 

@@ -1,0 +1,137 @@
+"""A function block taken apart: comments, variables and body, for formats that carry them one by one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+import attrs
+
+from gen_profile.errors import ExportError
+
+SECTIONS = ("VAR_IN_OUT", "VAR_INPUT", "VAR_OUTPUT", "VAR", "VAR CONSTANT")
+
+_HEADER = re.compile(r"\s*(\(\*.*?\*\)\s*)*", re.DOTALL)
+_NAME = re.compile(r"\s*FUNCTION_BLOCK\s+(\S+)\s", re.IGNORECASE)
+_SECTION = re.compile(
+    r"\s*(VAR_INPUT|VAR_OUTPUT|VAR(?:\s+CONSTANT)?)\b(.*?)\bEND_VAR\b", re.DOTALL | re.IGNORECASE
+)
+_VARIABLE = re.compile(
+    r"\s*(?:\(\*[^*]*\*\)\s*)*(\w+)\s*:\s*([^:;]*?)\s*(?::=\s*([^;]*?))?\s*;(?:[ \t]*\(\*(.*?)\*\))?",
+    re.DOTALL,
+)
+_ARRAY = re.compile(r"ARRAY\s*\[\s*(\d+)\s*\.\.\s*(\d+)\s*\]\s*OF\s+(\w+)", re.IGNORECASE)
+_END = re.compile(r"END_FUNCTION_BLOCK\s*\Z", re.IGNORECASE)
+
+
+@attrs.frozen(kw_only=True)
+class Variable:
+    """A declaration.
+
+    Attributes
+    ----------
+    section : str
+        One of `SECTIONS`.
+    name, type : str
+    initial : str
+        As Structured Text writes it; empty for none.
+    comment : str
+    """
+
+    section: str
+    name: str
+    type: str
+    initial: str = ""
+    comment: str = ""
+
+    @property
+    def array(self) -> tuple[str, str, str] | None:
+        """First and last index and type of the elements, or None."""
+        found = _ARRAY.fullmatch(self.type)
+        return (found[1], found[2], found[3]) if found else None
+
+    @property
+    def elements(self) -> list[str]:
+        """Initial values of an array."""
+        return [text.strip() for text in self.initial.strip("[] \n").split(",")] if self.initial else []
+
+
+@attrs.frozen(kw_only=True)
+class BlockSource:
+    """Parts of a function block.
+
+    Attributes
+    ----------
+    header : str
+        Comment before it.
+    name : str
+    variables : tuple of Variable
+        By section, in their order.
+    body : str
+        Statements.
+    """
+
+    header: str
+    name: str
+    variables: tuple[Variable, ...]
+    body: str
+
+    def text(self) -> str:
+        """Put it together as Structured Text."""
+        return f"{self.header}{self.declaration()}\n{self.body}END_FUNCTION_BLOCK\n"
+
+    def declaration(self) -> str:
+        """Everything before the statements, header excepted."""
+        lines = [f"FUNCTION_BLOCK {self.name}"]
+        for section in SECTIONS:
+            variables = [v for v in self.variables if v.section == section]
+            if variables:
+                lines += [section, *(f"    {_declared(v)}" for v in variables), "END_VAR"]
+        return "\n".join(lines) + "\n"
+
+
+def take_apart(text: str) -> BlockSource:
+    """Split Structured Text into a block's parts.
+
+    Raises
+    ------
+    ExportError
+        It is no function block.
+    """
+    header = _HEADER.match(text)
+    name = _NAME.match(text, header.end() if header else 0)
+    if name is None:
+        raise ExportError("There is no FUNCTION_BLOCK; export it again.")
+    variables: list[Variable] = []
+    at = name.end() - 1
+    while section := _SECTION.match(text, at):
+        variables += _variables(" ".join(section[1].upper().split()), section[2])
+        at = section.end()
+    body = text[at:].lstrip("\n")
+    if not _END.search(body):
+        raise ExportError("The function block breaks off before END_FUNCTION_BLOCK; export it again.")
+    return BlockSource(
+        header=header[0] if header else "", name=name[1], variables=tuple(variables), body=_END.sub("", body)
+    )
+
+
+def ordered(source: BlockSource, names: Iterable[str]) -> BlockSource:
+    """Put the variables into the order of their names; others stay, last."""
+    rank = {name.lower(): number for number, name in enumerate(names)}
+    variables = sorted(source.variables, key=lambda variable: rank.get(variable.name.lower(), len(rank)))
+    return attrs.evolve(source, variables=tuple(variables))
+
+
+def _variables(section: str, text: str) -> list[Variable]:
+    return [
+        Variable(
+            section=section, name=name, type=type_.strip(), initial=initial.strip(), comment=comment.strip()
+        )
+        for name, type_, initial, comment in _VARIABLE.findall(text)
+    ]
+
+
+def _declared(variable: Variable) -> str:
+    initial = f" := {variable.initial}" if variable.initial else ""
+    comment = f" (* {variable.comment} *)" if variable.comment else ""
+    return f"{variable.name} : {variable.type}{initial};{comment}"

@@ -1,0 +1,76 @@
+"""CODESYS: a PLCopen XML project with the playback block, a SoftMotion wrapper, and the motion as a cam.
+
+The wrapper streams setpoints with ``SMC_FollowSetValues`` (SM3_Basic), which checks nothing: the limits are
+the profile's. The cam is a table of ``SMC_CAMXYVA``, between whose points SoftMotion interpolates by
+quintics.
+"""
+
+from __future__ import annotations
+
+from lxml import etree
+
+from gen_profile.profile import Profile, SampledProfile
+from gen_profile_exporters import plcopen_xml
+from gen_profile_exporters.axis_wrapper import CODESYS, axis_wrapper
+from gen_profile_exporters.block_source import BlockSource, Variable, take_apart
+from gen_profile_exporters.cam_points import QuinticPoints, quintic_points
+from gen_profile_exporters.exporter import File, Target
+from gen_profile_exporters.structured_text import block_text, literal
+from gen_profile_exporters.xml_documents import write_xml
+
+MEMBERS = ("dX", "dY", "dV", "dA")
+
+
+def encode(profile: Profile, target: Target) -> tuple[File, ...]:
+    """Write the project; the playback block is its first one.
+
+    Raises
+    ------
+    ExportError
+        As for Structured Text.
+    """
+    source = take_apart(block_text(profile, target))
+    wrapper = axis_wrapper(source.name, len(target.axes), CODESYS)
+    points = quintic_points(profile, target)
+    cams = [_cam(source.name, points, axis) for axis in range(len(target.axes))]
+    pous = [plcopen_xml.pou(source), plcopen_xml.pou(wrapper), *cams]
+    return (
+        File(
+            filename=f"{target.name}.codesys.xml", content=write_xml(plcopen_xml.project(target.name, pous))
+        ),
+    )
+
+
+def replay(content: bytes, target: Target) -> SampledProfile:
+    """Work out what the project's first function block issues.
+
+    Raises
+    ------
+    ExportError
+        The document is no such project, or its block was altered.
+    """
+    return plcopen_xml.replay(content, target)
+
+
+def _cam(block: str, points: QuinticPoints, axis: int) -> etree._Element:
+    """Build a block that holds the table and makes a cam of it, as its address is known only at run time."""
+    name = f"{block}_Cam{axis + 1 if points.position.shape[1] > 1 else ''}"
+    last = len(points.time) - 1
+    source = BlockSource(
+        header=f"(* {name}: time cam over {literal(points.time[-1])} s; call it once, then give Cam to "
+        "MC_CamTableSelect. *)\n",
+        name=name,
+        variables=(
+            Variable(section="VAR_OUTPUT", name="Cam", type="MC_CAM_REF"),
+            Variable(section="VAR", name="aPoints", type=f"ARRAY [0..{last}] OF SMC_CAMXYVA"),
+        ),
+        body=f"Cam.byType := 3;\nCam.byVarType := 6;\nCam.nElements := {last + 1};\nCam.xStart := 0.0;\n"
+        f"Cam.xEnd := {literal(points.time[-1])};\nCam.pce := ADR(aPoints);\n",
+    )
+    element = plcopen_xml.pou(source)
+    columns = (points.time, *(q[:, axis] for q in (points.position, points.velocity, points.acceleration)))
+    rows = zip(*(map(literal, column.tolist()) for column in columns), strict=True)
+    plcopen_xml.initialise_structures(
+        element, "aPoints", [dict(zip(MEMBERS, row, strict=True)) for row in rows]
+    )
+    return element

@@ -1,0 +1,60 @@
+"""XML in and out: nothing fetched, no entities, one form of bytes."""
+
+from __future__ import annotations
+
+from lxml import etree
+
+from gen_profile.errors import ExportError
+
+
+def parse_xml(content: bytes) -> etree._Element:
+    """Read a document.
+
+    Raises
+    ------
+    ExportError
+        It is not well formed.
+    """
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=True)
+    try:
+        root = etree.fromstring(content, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise ExportError(f"Not well-formed XML ({reason}); export it again.") from error
+    if root is None:
+        raise ExportError("The XML document is empty; export it again.")
+    return root
+
+
+def write_xml(root: etree._Element) -> bytes:
+    """Serialise, UTF-8, indented."""
+    etree.indent(root)
+    return etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n"
+
+
+def child(parent: etree._Element, path: str, namespaces: dict[str, str] | None = None) -> etree._Element:
+    """Find an element that must be there.
+
+    Raises
+    ------
+    ExportError
+        It is not.
+    """
+    found = parent.find(path, namespaces)
+    if found is None:
+        raise ExportError(f"line {parent.sourceline}: {path.rpartition(':')[2]} is missing; export it again.")
+    return found
+
+
+def attribute(element: etree._Element, name: str) -> str:
+    """Read an attribute that must be there.
+
+    Raises
+    ------
+    ExportError
+        It is not.
+    """
+    value = element.get(name)
+    if value is None:
+        raise ExportError(f"line {element.sourceline}: {name} is missing; export it again.")
+    return str(value)

