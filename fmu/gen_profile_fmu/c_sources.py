@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -38,12 +39,15 @@ def equations_source(equations: Dynamics) -> str:
     everything, change = sym.column(list(arguments.values())), sym.column(list(seeds.values()))
     tangents = [sym.directional(expression, everything, change) for expression in (e.ddq_u, seen)]
     changes = {f"change_of_{name}": column for name, column in seeds.items()}
-    return '#include "equations.h"\n#define CASADI_SYMBOL_EXPORT static\n' + sym.c_source(
+    text = sym.c_source(
         Function("equations_acceleration", arguments, e.ddq_u),
         Function("equations_jump", arguments, e.driven @ e.ddq_a),
         Function("equations_outputs", arguments, seen),
         Function("equations_tangent", {**arguments, **changes}, *tangents),
     )
+    # CasADi's helpers have no storage class: they would clash where two FMUs are linked into one program
+    internal = re.sub(r"^(casadi_real|casadi_int|void|int) (?=casadi_\w+\()", r"static \1 ", text, flags=re.M)
+    return f'#include "equations.h"\n#define CASADI_SYMBOL_EXPORT static\n{internal}'
 
 
 def variables_header(table: VariableTable, n_a: int, n_u: int, constants: Mapping[str, str]) -> str:

@@ -179,13 +179,20 @@ static Status get_value(Instance *instance, unsigned reference, Type type, doubl
     return OK;
 }
 
-static int can_be_set(const Variable *variable, int mode) {
+static int is_state(unsigned reference) {
+    const int index = (int)reference - STATES;
+    return index >= 0 && index < N_STATES;
+}
+
+/* In continuous-time mode more than FMI asks for, states and parameters by name, as CasADi wants it. */
+static int can_be_set(unsigned reference, int mode) {
     const int starting = INSTANTIATED | INITIALIZATION;
-    switch (variable->kind) {
+    if (is_state(reference) && mode & CONTINUOUS) return 1;
+    switch (VARIABLES[reference].kind) {
         case FIXED_PARAMETER:
         case STATE: return mode & starting;
-        case TUNABLE_PARAMETER:
         case DISCRETE_INPUT: return mode & (starting | EVENT | STEP);
+        case TUNABLE_PARAMETER:
         case INPUT: return mode & (starting | EVENT | CONTINUOUS | STEP);
         default: return 0;
     }
@@ -194,9 +201,12 @@ static int can_be_set(const Variable *variable, int mode) {
 static Status set_value(Instance *instance, unsigned reference, Type type, double value) {
     const Variable *variable = find_variable(instance, reference, type);
     if (!variable) return FAILED;
-    if (!can_be_set(variable, ANY_MODE)) return fail(instance, "%s is an output, it cannot be set.", variable->name);
-    if (!can_be_set(variable, instance->state.mode)) {
-        return fail(instance, "%s cannot be set in %s.", variable->name, mode_name(instance->state.mode));
+    const int mode = instance->state.mode;
+    if (!can_be_set(reference, mode | INITIALIZATION)) {
+        return fail(instance, "%s is an output, it cannot be set.", variable->name);
+    }
+    if (!can_be_set(reference, mode)) {
+        return fail(instance, "%s cannot be set in %s.", variable->name, mode_name(mode));
     }
     if (!isfinite(value)) return fail(instance, "%s must be finite, found %g.", variable->name, value);
     if (value < variable->lower || value > variable->upper) {
@@ -213,8 +223,7 @@ static Status require_knowns(Instance *instance, const unsigned knowns[], size_t
     for (size_t i = 0; i < n; i++) {
         const Variable *variable = find_variable(instance, knowns[i], REAL);
         if (!variable) return FAILED;
-        const int is_state = knowns[i] >= STATES && knowns[i] < STATES + N_STATES;
-        if (!is_state && !can_be_set(variable, ANY_MODE)) return fail(instance, "%s is not a known.", variable->name);
+        if (!can_be_set(knowns[i], ANY_MODE)) return fail(instance, "%s is not a known.", variable->name);
     }
     return OK;
 }
