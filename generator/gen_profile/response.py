@@ -152,9 +152,10 @@ def free_swing(
         return np.concatenate([dq_u.ravel(), acceleration(q_u, dq_u, axes, machines).ravel()])
 
     start = starts.reshape(len(machines), 2, -1).swapaxes(0, 1).ravel()
-    integral = solve_ivp(
-        rate, (times[0], times[-1]), start, method="DOP853", t_eval=times, rtol=1e-8, atol=1e-11
-    )
+    with np.errstate(over="ignore", invalid="ignore"):  # a failure is told below
+        integral = solve_ivp(
+            rate, (times[0], times[-1]), start, method="DOP853", t_eval=times, rtol=1e-8, atol=1e-11
+        )
     if not integral.success:
         raise CosimulationError(f"The {plant.type}'s swing cannot be integrated: {integral.message}")
     q_u = integral.y.reshape(*shape, len(times))[0].transpose(0, 2, 1)

@@ -6,7 +6,7 @@ from command_line import run_here
 from generator.lagrangian_machines import Lagrange
 from scipy.integrate import solve_ivp
 
-from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
+from gen_profile.errors import CosimulationError, InfeasibleProblem, OutputError, SpecError
 from gen_profile.identification.estimation import Machine, estimate
 from gen_profile.identification.measurements import (
     DirectReading,
@@ -17,6 +17,7 @@ from gen_profile.identification.measurements import (
     parse_swing,
 )
 from gen_profile.plants.registry import find_plant
+from gen_profile.response import free_swing
 from gen_profile.spec_reading import preset_spec, read_spec
 from gen_profile.workflows.identify import identify, write_spec
 
@@ -292,6 +293,17 @@ def test_what_cannot_be_identified(tmp_path, monkeypatch, arguments, code, why):
     assert outcome.code == code
     assert why in outcome.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_machine_that_explodes_is_no_traceback():
+    with pytest.raises(CosimulationError, match="single-pendulum-crane's swing cannot be integrated"):
+        free_swing(
+            HOIST,
+            np.array([list((HOIST.nominal() | {"c": -1e9}).values())]),
+            q_a=[0.0, 0.0],
+            starts=np.array([[0.1, 0.0]]),
+            times=np.linspace(0.0, 10.0, 20),
+        )
 
 
 def test_an_unwritable_spec(tmp_path):

@@ -119,7 +119,11 @@ def test_other_distributions_add_machines(monkeypatch):
 
 @pytest.mark.parametrize(
     ("value", "why"),
-    [("no_such_module:PLANT", "No module named"), ("fmu.hoisting_pendulum:outputs", "is no gen_profile")],
+    [
+        ("no_such_module:PLANT", "No module named"),
+        ("fmu.hoisting_pendulum:outputs", "is no gen_profile"),
+        ("generator.unsound_plant:PLANT", "M_uu is singular at rest"),
+    ],
 )
 def test_a_broken_machine_of_another_distribution(monkeypatch, value, why):
     broken = EntryPoints([EntryPoint("winch", value, registry.GROUP)])

@@ -227,6 +227,16 @@ def test_equations_that_do_not_take_symbols():
         dynamics(branchy)
 
 
+def test_an_identified_spec_takes_its_machine_along(folder, tmp_path):
+    found = run_here(
+        "identify", folder / "own.toml", "--measured", "L=2.1±0.01", "--out", tmp_path / "new" / "spec.toml"
+    )
+    assert (found.code, found.errors) == (0, [])
+    spec = read_spec(tmp_path / "new" / "spec.toml")
+    assert spec.plant.parameters["L"] == 2.1
+    assert spec.machine() is read_spec(folder / "own.toml").machine()
+
+
 def test_a_machine_of_its_own_survives_the_manifest(folder):
     spec = read_spec(folder / "own.toml")
     assert spec_from_dict(spec.to_dict(), folder / "machines") == spec
