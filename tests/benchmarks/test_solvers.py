@@ -95,9 +95,7 @@ def test_beside_general_tools():
     solve, jerk = boundary_value_problem(problem)
     found = solve()
     peer = best(solve)
-    print(
-        f"{'scipy solve_bvp, tol 1e-6':28} {1e3 * peer:9.1f} ms   u(0) off by {jerk(found) - JERK_AT_START:+.1e}"
-    )
+    report("scipy solve_bvp, tol 1e-6", peer, jerk(found))
 
     began = time.perf_counter()
     oracle = CraneOptimalControl(problem.parameters, "jerk", None, 50.0, 50.0)
