@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
@@ -125,21 +126,98 @@ class SolverSpec:
 
 
 @attrs.frozen(kw_only=True)
+class AxisLimitsSpec:
+    """Greatest magnitudes of one axis' command in SI units, and its travel."""
+
+    velocity: Positive | None = None
+    acceleration: Positive | None = None
+    jerk: Positive | None = None
+    travel: tuple[Distance, Distance] | None = None
+
+
+@attrs.frozen(kw_only=True)
 class LimitsSpec:
-    """Greatest magnitudes of the command in SI units, its travel, and the end load's transient sway in m."""
+    """Limits of all axes' commands, and the end load's transient sway in m.
+
+    `axis` holds what is different for single axes: all axes by name in the plant's order, or none.
+    """
 
     velocity: Positive | None = None
     acceleration: Positive | None = None
     jerk: Positive | None = None
     sway: Positive | None = None
     travel: tuple[Distance, Distance] | None = None
+    axis: Mapping[str, AxisLimitsSpec] = attrs.field(factory=dict, converter=_frozen_mapping)
+
+    def own(self, column: int) -> tuple[str, AxisLimitsSpec]:
+        """Name of an axis that has limits of its own, and those."""
+        return list(self.axis.items())[column] if self.axis else ("", AxisLimitsSpec())
+
+    def of(self, column: int) -> AxisLimitsSpec:
+        """Limits of one axis: its own, and where it has none, those of all."""
+        _, own = self.own(column)
+        names = [field.name for field in attrs.fields(AxisLimitsSpec)]
+        stated = {name: getattr(own, name) for name in names if getattr(own, name) is not None}
+        return AxisLimitsSpec(**{name: getattr(self, name) for name in names} | stated)
+
+    def without(self, name: str) -> LimitsSpec:
+        """Leave one kind of limit out, such as ``"jerk"``, for all axes."""
+        if name == "sway":
+            return attrs.evolve(self, sway=None)
+        axis = {key: attrs.evolve(own, **{name: None}) for key, own in self.axis.items()}
+        return attrs.evolve(self, axis=axis, **{name: None})
+
+
+@attrs.frozen(kw_only=True)
+class ForeignFmu:
+    """Somebody else's FMU that judges in place of ours.
+
+    Attributes
+    ----------
+    name : str
+        File name as the spec has it.
+    path : Path
+        Where the file lies.
+    sha256 : str
+    input : str
+        What its inputs are: ``"acceleration"``, ``"velocity"`` or ``"setpoint"`` of the axes.
+    inputs : tuple of str
+        Its variables, one per axis.
+    sway : mapping of str to str
+        Its variables by load, of those loads that it has.
+    parameters : mapping of str to str
+        Its variables by the plant's parameters.
+    time_limit : float
+        s, for all scenarios together.
+    """
+
+    name: str
+    path: Path = attrs.field(eq=False)
+    sha256: str
+    input: str
+    inputs: tuple[str, ...]
+    sway: Mapping[str, str] = attrs.field(converter=_frozen_mapping)
+    parameters: Mapping[str, str] = attrs.field(converter=_frozen_mapping)
+    time_limit: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Write the keys of ``[check]``."""
+        return {
+            "fmu": self.name,
+            "fmu_sha256": self.sha256,
+            "input": {self.input: list(self.inputs)},
+            "output": {"sway": dict(self.sway)},
+            "parameters": dict(self.parameters),
+            "time_limit": self.time_limit,
+        }
 
 
 @attrs.frozen(kw_only=True)
 class CheckSpec:
-    """Greatest residual sway in m of each load by name, over all scenarios."""
+    """Greatest residual sway in m of each load by name, over all scenarios, and an FMU that is to judge."""
 
     residual_sway: Mapping[str, Positive] = attrs.field(converter=_frozen_mapping)
+    foreign: ForeignFmu | None = None
     default: bool = attrs.field(default=False, eq=False)  # the limit was not stated
 
 
@@ -181,8 +259,8 @@ class CanSpec:
     torque_per_acceleration : float or None
         For the torque: ‰ of the rated torque per m/s² (or rad/s²) of the axis.
     timeout : float or None
-        How long a drive waits for the next setpoint before it stops by itself, in s; None takes 20 ms or
-        three cycles, whichever is longer.
+        How long a drive waits for the next setpoint before it stops by itself, and the streamer for an
+        answer, in s; None takes 20 ms or three cycles, whichever is longer.
     start_tolerance : float
         How far the axis may stand from the first setpoint, in m (or rad).
     following_error : float or None
@@ -258,6 +336,9 @@ class Spec:
         if self.cost.sway_scale is None:
             document["cost"]["sway_scale"] = "auto"
         del document["check"]["default"]
+        if self.check.foreign is not None:
+            del document["check"]["foreign"]
+            document["check"] |= self.check.foreign.to_dict()
         if document["move"].pop("shortest"):
             document["move"]["duration"] = "minimum"
         return document

@@ -9,13 +9,16 @@ import attrs
 import can
 import canopen
 
+from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import MOVING
 from gen_profile_exporters.can.clock import NANOSECONDS, Clock
+from gen_profile_exporters.can.link import FRAMES_AT_ONCE
 from gen_profile_exporters.can.load import Load
 from gen_profile_exporters.can.simulated_drive import SimulatedDrive
 
-WAIT = 0.0005  # s, for a frame, before the drives look at their clocks
+FAREWELL = NANOSECONDS // 2  # without SYNC, after which a stream is over
+WAIT = 0.001  # s, for a frame, before the drives look at their clocks
 
 
 class DriveBank:
@@ -54,20 +57,32 @@ class DriveBank:
 
     @property
     def finished(self) -> bool:
-        """Whether every drive had been enabled, and none is any more."""
-        return all(drive.was_enabled and drive.state not in MOVING for drive in self.drives)
+        """Whether every drive had been enabled, and nothing has moved or been asked for a while."""
+        over = all(drive.was_enabled and drive.state not in MOVING for drive in self.drives)
+        return over and self._clock.now() - self._synced > FAREWELL
 
     def run(self, stop: Callable[[], bool]) -> None:
-        """Serve the bus until told to stop."""
-        while not stop():
-            self.poll(WAIT)
+        """Serve the bus until told to stop.
+
+        Raises
+        ------
+        StreamAborted
+            The bus fails.
+        """
+        try:
+            while not stop():
+                self.poll(WAIT)
+        except (can.CanError, OSError) as error:
+            raise StreamAborted(f"The bus of the simulated drives failed ({error}).") from error
 
     def poll(self, wait: float = 0.0) -> None:
-        """Take in what is waiting, then look at the clock."""
-        message = self._bus.recv(wait)
-        while message is not None:
+        """Take in what is waiting, at most so long for the first frame in s, then look at the clock."""
+        for _ in range(FRAMES_AT_ONCE):
+            message = self._bus.recv(wait)
+            if message is None:
+                break
             self._take(message)
-            message = self._bus.recv(0)
+            wait = 0.0
         now = self._clock.now()
         self._network.send_due(now)
         for drive in self.drives:

@@ -49,6 +49,7 @@ class SimulatedDrive:
         self.was_enabled = False
         self._misses, self._fresh, self._flags, self._late = 0, False, 0, 0.0
         self._controlword = 0
+        self._values: dict[tuple[int, int], int] = {}  # as `value` read them, until they are written
         self._setpoint_heard: int | None = None
         self._master_heard: int | None = None
         self.local: Any = canopen.LocalNode(node, dictionary(node, make))
@@ -67,8 +68,10 @@ class SimulatedDrive:
 
     def value(self, index: int, sub: int = 0) -> int:
         """Read an object."""
-        entry = self.local.object_dictionary.get_variable(index, sub)
-        return int(entry.decode_raw(self.local.get_data(index, sub)))
+        if (index, sub) not in self._values:
+            entry = self.local.object_dictionary.get_variable(index, sub)
+            self._values[index, sub] = int(entry.decode_raw(self.local.get_data(index, sub)))
+        return self._values[index, sub]
 
     def store(self, index: int, sub: int, value: int) -> None:
         """Set an object, as the drive itself does."""
@@ -84,6 +87,7 @@ class SimulatedDrive:
         """Drop power and settings, and boot again."""
         self.state, self.velocity = State.SWITCH_ON_DISABLED, 0.0
         self.local.data_store.clear()
+        self._values.clear()
         self.local.nmt.stop_heartbeat()
         self._setpoint_heard = self._master_heard = None
         self.boot()
@@ -148,7 +152,8 @@ class SimulatedDrive:
             self._pack_feedback()
 
     def _written(self, index: int, subindex: int, od: object, data: bytes) -> None:
-        del subindex, od
+        del od
+        self._values.pop((index, subindex), None)
         if index == 0x6040:
             self._obey(int.from_bytes(data, "little"))
         elif index == 0x6060:

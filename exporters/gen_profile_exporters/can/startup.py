@@ -8,8 +8,10 @@ Objects: CiA 301 (1000h to 1FFFh), CiA 402-2 (6000h and up), CiA 302-3 (concise 
 
 from __future__ import annotations
 
+import csv
 import struct
 from collections.abc import Iterator, Mapping, Sequence
+from io import StringIO
 from math import ceil
 
 import attrs
@@ -102,13 +104,14 @@ def startup_lists(motion: Setpoints, target: Target) -> dict[int, tuple[Entry, .
 
 def table(lists: Lists) -> bytes:
     """Render lists as a table for people and scripts (RFC 4180)."""
-    lines = ["node,object,subindex,bits,value,meaning"]
+    text = StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(["node", "object", "subindex", "bits", "value", "meaning"])
     for node, entries in lists.items():
-        lines += [
-            f"{node},{entry.index:04X}h,{entry.sub:02X}h,{entry.bits},{_number(entry)},{entry.meaning}"
-            for entry in entries
-        ]
-    return ("\n".join(lines) + "\n").encode("utf-8")
+        for entry in entries:
+            place = (f"{entry.index:04X}h", f"{entry.sub:02X}h")
+            rows.writerow([node, *place, entry.bits, _number(entry), entry.meaning])
+    return text.getvalue().encode("utf-8")
 
 
 def concise_dcf(entries: Sequence[Entry]) -> bytes:

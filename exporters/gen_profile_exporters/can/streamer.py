@@ -28,7 +28,7 @@ from gen_profile_exporters.can.lateness import Lateness
 from gen_profile_exporters.can.link import Link
 from gen_profile_exporters.can.plan import StreamPlan, message
 from gen_profile_exporters.can.scaling import magnitude_counts, quick_stop_deceleration
-from gen_profile_exporters.can.watch import Alert, Watch
+from gen_profile_exporters.can.watch import Alert, Axis, Watch
 
 ALIGN_CYCLES = 10  # of preloads before power goes on
 SETTLED_CYCLES = 10  # within the tolerance, before power goes off
@@ -104,11 +104,11 @@ class Streamer:
         self._period = frames.period_microseconds(target.can) * 1000
         timeout = startup.timeout_ms(target.can) * NANOSECONDS // 1000
         self._watch = Watch(
-            [axis.name for axis in target.axes],
-            self._nodes,
+            [Axis(axis.name, node) for axis, node in zip(target.axes, self._nodes, strict=True)],
             clock,
-            self._period,
-            startup.heartbeat_ms(target.can) * NANOSECONDS // 1000,
+            period=self._period,
+            heartbeat=startup.heartbeat_ms(target.can) * NANOSECONDS // 1000,
+            timeout=timeout,
         )
         self._link.subscribe(self._watch.take)
         self._sync = message(frames.SYNC, b"")

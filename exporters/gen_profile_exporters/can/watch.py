@@ -14,7 +14,6 @@ from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, M
 from gen_profile_exporters.can.clock import NANOSECONDS, Clock
 
 OPERATIONAL = 5
-LATE_CYCLES = 2  # without an answer, after which a drive counts as gone
 HEARTBEATS_MISSED = 3
 BUS_OFF, CONTROLLER_STATE, PASSIVE = 0x40, 0x04, 0x30  # of SocketCAN's error frames (linux/can/error.h)
 
@@ -60,20 +59,21 @@ class Watch:
 
     Parameters
     ----------
-    names, nodes : sequences
-        Of the axes.
+    axes : sequence of Axis
     clock : Clock
     period, heartbeat : int
         SYNC period, and period of the drives' heartbeats, in ns.
+    timeout : int
+        How long a drive may leave SYNC unanswered, in ns.
     """
 
     def __init__(
-        self, names: Sequence[str], nodes: Sequence[int], clock: Clock, period: int, heartbeat: int
+        self, axes: Sequence[Axis], clock: Clock, *, period: int, heartbeat: int, timeout: int
     ) -> None:
-        self.axes = tuple(Axis(name, node) for name, node in zip(names, nodes, strict=True))
+        self.axes = tuple(axes)
         self.alert = Alert.LISTENING
         self.fault: str | None = None
-        self._clock, self._period, self._heartbeat = clock, period, heartbeat
+        self._clock, self._period, self._heartbeat, self._timeout = clock, period, heartbeat, timeout
         self._feedback = frames.packing(frames.FEEDBACK)
         self._takers = {
             base + axis.node: (take, axis)
@@ -164,7 +164,7 @@ class Watch:
     def _look_for_silence(self) -> None:
         now = self._clock.now()
         for axis in self.axes:
-            if now - axis.heard > (LATE_CYCLES + 1) * self._period:
+            if now - axis.heard > self._timeout + self._period:
                 self._find(
                     f"axis {axis.name}: no feedback for {(now - axis.heard) / NANOSECONDS * 1e3:.3g} ms; "
                     "the drive, the cable or SYNC failed."

@@ -1,0 +1,236 @@
+"""What lies beside the log, read by other people's programs; and scaling, against exact arithmetic."""
+
+import csv
+import io
+import struct
+from decimal import Decimal
+from fractions import Fraction
+
+import can
+import canopen
+import cantools
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from motions import quintic, target
+
+from gen_profile.errors import ExportError
+from gen_profile.spec_reading import preset_spec
+from gen_profile_exporters.can import frames, scaling, startup
+from gen_profile_exporters.can.candump import read
+from gen_profile_exporters.can.drive_dictionary import Make, dictionary, eds
+from gen_profile_exporters.can.exporter import encode, replay
+from gen_profile_exporters.exporter import target_of
+
+MOVE = quintic((0.1, 0.4))
+TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))
+TORQUE = {"feed_forward": "torque", "torque_per_acceleration": 80.0}
+
+
+def files(profile=MOVE, *names, **options):
+    name = options.pop("name", "bay-3")
+    found = encode(profile, target(*names, name=name, **options))
+    return {file.filename.removeprefix(name): file.content for file in found}
+
+
+def messages(reader):
+    return [
+        (round(message.timestamp * 1e6), message.arbitration_id, bytes(message.data)) for message in reader
+    ]
+
+
+class TestTraces:
+    @pytest.mark.parametrize("suffix", [".asc", ".blf"])
+    def test_python_can_reads_the_same_frames(self, suffix, tmp_path):
+        written = files(TWO_MOVES, "bridge", "trolley")
+        path = tmp_path / f"bay{suffix}"
+        path.write_bytes(written[suffix])
+        with can.LogReader(path, relative_timestamp=True) as reader:
+            found = messages(reader)
+        assert [frame[1:] for frame in found] == [(f.cob_id, f.data) for f in read(written[".log"])]
+        np.testing.assert_allclose(
+            [frame[0] for frame in found], [f.stamp for f in read(written[".log"])], atol=1
+        )
+
+    def test_no_clock_in_any_file(self):
+        assert files() == files()
+        assert b"1970" in files()[".asc"]
+
+
+class TestDatabase:
+    @pytest.mark.parametrize("options", [{}, {"mode": "ip"}, {"feed_forward": "velocity"}, TORQUE])
+    @pytest.mark.parametrize("sign", [1, -1])
+    def test_cantools_decodes_the_motion(self, options, sign):
+        written = files(TWO_MOVES, "bridge", "trolley 2", sign=sign, counts_per_si=20_000.0, **options)
+        database = cantools.database.load_string(written[".dbc"].decode("ascii"))
+        signal = "InterpolationData" if options.get("mode") == "ip" else "TargetPosition"
+        found = {"bridge": [], "trolley_2": []}
+        for frame in read(written[".log"]):
+            name = database.get_message_by_frame_id(frame.cob_id).name
+            if name != "Sync":
+                found[name.removesuffix("_Setpoint")].append(database.decode_message(name, frame.data))
+        motion = replay(
+            written[".log"], target("bridge", "trolley 2", sign=sign, counts_per_si=20_000.0, **options)
+        )
+        for column, decoded in enumerate(found.values()):
+            positions = [values[signal] for values in decoded]
+            np.testing.assert_allclose(positions, motion.position[:, column], rtol=0, atol=1e-9)
+        if options.get("feed_forward") == "velocity":
+            velocity = [values["VelocityOffset"] for values in found["bridge"]]
+            np.testing.assert_allclose(velocity, MOVE(motion.times).velocity[:, 0], atol=5e-5)
+            np.testing.assert_allclose(velocity, motion.velocity[:, 0], atol=1e-9)
+        if options == TORQUE:
+            torque = [values["TorqueOffset"] for values in found["bridge"]]
+            expected = sign * 8.0 * MOVE(motion.times).acceleration[:, 0]
+            np.testing.assert_allclose(torque, expected, atol=0.051)
+
+    def test_feedback_is_decoded(self):
+        database = cantools.database.load_string(files()[".dbc"].decode("ascii"))
+        decoded = database.decode_message("cart_Feedback", struct.pack("<Hi", 0x1237, -250_000))
+        assert decoded == {"Statusword": 0x1237, "ActualPosition": -0.25}
+
+    @pytest.mark.parametrize(
+        ("name", "identifier"), [("x", "x"), ("2nd axis", "axis_2nd_axis"), ("µ", "axis__")]
+    )
+    def test_names_become_identifiers(self, name, identifier):
+        database = cantools.database.load_string(files(MOVE, name)[".dbc"].decode("ascii"))
+        assert {f"{identifier}_Command", f"{identifier}_Setpoint"} <= {m.name for m in database.messages}
+
+
+OPTIONS = {
+    "following_error": 0.01,
+    "quick_stop": 0.5,
+    "travel": {"cart": (-0.5, 0.5)},
+    "encoder": (65536, 1),
+    "gear": (3, 1),
+    "feed": (400_000, 1),
+    "timeout": 0.05,
+}
+
+
+class TestStartup:
+    def test_a_drives_own_dictionary_takes_every_entry(self):
+        # canopen's types and lengths of the standard's objects, not ours
+        node = canopen.LocalNode(1, dictionary(1, Make()))
+        for index, sub, data in concise(files(**OPTIONS)[".node1.cdcf"]):
+            if index != 0x1017:  # would start a heartbeat
+                node.set_data(index, sub, data)
+        values = {
+            (0x60C2, 1): 4, (0x60C2, 2): -3, (0x6060, 0): 8, (0x6065, 0): 10_000, (0x6085, 0): 500_000,
+            (0x607D, 1): -500_000, (0x607D, 2): 500_000, (0x608F, 1): 65536, (0x6091, 1): 3,
+            (0x6092, 1): 400_000, (0x1016, 1): 0x007F_0032, (0x1401, 5): 50, (0x6007, 0): 3, (0x605A, 0): 2,
+            (0x1601, 0): 1, (0x1601, 1): 0x607A_0020, (0x1A00, 2): 0x6064_0020, (0x1400, 1): 0x201,
+        }  # fmt: skip
+        for (index, sub), value in values.items():
+            variable = node.object_dictionary.get_variable(index, sub)
+            assert variable.decode_raw(node.get_data(index, sub)) == value, f"{index:04X}h:{sub}"
+
+    def test_table_and_concise_dcf_say_the_same(self):
+        written = files(**OPTIONS)
+        head, *rows = csv.reader(written[".startup.csv"].decode("utf-8").splitlines())
+        assert head == ["node", "object", "subindex", "bits", "value", "meaning"]
+        table = []
+        for row in rows:
+            node, index, sub, bits, value, _ = row
+            length = int(bits) // 8
+            data = (int(value, 0) & (1 << int(bits)) - 1).to_bytes(length, "little")
+            table.append((int(index.rstrip("h"), 16), int(sub.rstrip("h"), 16), data))
+            assert node == "1"
+        assert table == concise(written[".node1.cdcf"])
+
+    def test_every_axis_has_its_list(self):
+        written = files(TWO_MOVES, "bridge", "trolley", node=5)
+        assert {".node5.cdcf", ".node6.cdcf"} <= written.keys()
+
+    def test_quick_stop_brakes_twice_as_hard_as_the_motion(self):
+        entries = {(i, s): d for i, s, d in concise(files()[".node1.cdcf"])}
+        greatest = np.abs(MOVE(np.linspace(0, 1, 1001)).acceleration).max()
+        assert int.from_bytes(entries[0x6085, 0], "little") == pytest.approx(2e6 * greatest, rel=0.01)
+
+    def test_a_hasty_time_out_is_refused(self):
+        with pytest.raises(
+            ExportError, match=r"can\.timeout: 0\.005 s are less than two cycles .* set 0\.008 s"
+        ):
+            files(timeout=0.005)
+
+    def test_eds_is_read_by_canopen(self):
+        file = io.StringIO(eds(7, Make()))
+        file.name = "drive.eds"
+        found = canopen.import_od(file, 7)
+        assert found[0x60C2][2].data_type == canopen.objectdictionary.datatypes.INTEGER8
+        assert found[0x1000].default == 0x0002_0192
+        assert found[0x1018][1].default == Make().vendor
+
+
+def concise(content):
+    """Read a concise DCF as CiA 302-3 lays it out."""
+    (count,) = struct.unpack_from("<I", content)
+    entries, at = [], 4
+    for _ in range(count):
+        index, sub, size = struct.unpack_from("<HBI", content, at)
+        entries.append((index, sub, content[at + 7 : at + 7 + size]))
+        at += 7 + size
+    assert at == len(content)
+    return entries
+
+
+class TestScaling:
+    @given(
+        st.lists(st.floats(-2000, 2000), min_size=1, max_size=50),
+        st.fractions(min_value=Fraction(1, 1000), max_value=10**6),
+    )
+    def test_counts_are_exact(self, values, ratio):
+        found = scaling.exact_counts(np.array(values), ratio)
+        assert found.tolist() == [round(Fraction(value) * ratio) for value in values]
+
+    def test_ties_go_to_the_even_count(self):
+        halves = np.arange(-50_000, 50_000) + 0.5
+        found = scaling.exact_counts(halves / 1024.0, Fraction(1024))
+        assert found.tolist() == [round(Fraction(int(2 * half), 2)) for half in halves]
+
+    def test_a_hundred_thousand_setpoints(self):
+        values = np.linspace(-1.0, 1.0, 100_000)
+        found = scaling.exact_counts(values, scaling.exact(1234567.89))
+        ratio = Fraction(Decimal("1234567.89"))
+        assert found.tolist() == [round(Fraction(value) * ratio) for value in values.tolist()]
+
+    def test_far_outside_is_refused(self):
+        with pytest.raises(ExportError, match="far outside 32 bits"):
+            scaling.exact_counts(np.array([1e9]), Fraction(10**6))
+
+    def test_the_drives_increments_must_fit(self):
+        assert files(encoder=(65536, 1), gear=(3, 1), feed=(1000, 1))
+        with pytest.raises(ExportError, match=r"axis cart, in the drive's increments: .* outside 32 bits"):
+            files(encoder=(2**24, 1), gear=(3, 1), feed=(1000, 1))
+
+    def test_the_travel_is_kept(self):
+        with pytest.raises(
+            ExportError, match=r"can\.travel\.cart: the motion leaves the travel at 0\.\d+ s \(0\.3"
+        ):
+            files(travel={"cart": (0.0, 0.35)})
+
+    def test_the_torque_must_fit(self):
+        with pytest.raises(
+            ExportError, match=r"axis cart, torque: \d+ counts .* 16 bits .*; lower can\.torque_per_acc"
+        ):
+            files(feed_forward="torque", torque_per_acceleration=50_000.0)
+
+    @pytest.mark.parametrize("preset", ["paper", "gantry-crane"])
+    def test_presets_fit(self, preset):
+        found = target_of(preset_spec(preset))
+        assert frames.nodes(found) == tuple(range(1, 1 + len(found.axes)))
+        assert startup.timeout_ms(found.can) == 20
+
+
+@given(st.integers(1, 30), st.sampled_from(["none", "velocity", "torque"]), st.sampled_from([125_000, 10**6]))
+def test_bus_load_is_that_of_the_longest_frames(axes, feed_forward, bitrate):
+    bus = target(
+        *[f"axis{n}" for n in range(axes)],
+        bitrate=bitrate,
+        feed_forward=feed_forward,
+        torque_per_acceleration=1.0,
+    )
+    data = {"none": 4, "velocity": 8, "torque": 6}[feed_forward]
+    bits = 55 + axes * ((55 + 10 * data) + 115)  # (55 + 10 n) bits, and one SYNC of none
+    assert frames.cycle_bits(bus) == bits

@@ -1,0 +1,165 @@
+"""Streamer, simulated drive and candump as processes on vcan, judged by what candump saw.
+
+The kernel is this machine's or, where that has no vcan, user-mode-linux, booted once for all tests.
+"""
+
+import fcntl
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from command_line import PROGRAM
+from exporters.can import vcan_kernel
+
+HERE = Path(__file__).parent
+TIMEOUT = 0.1  # s
+PERIOD = 0.004  # s
+SLACK = 0.05  # s, for a simulated drive on a busy machine to speak up
+
+
+@pytest.fixture(scope="session")
+def scenarios(tmp_path_factory, cache):
+    """Run all scenarios, once for all of pytest-xdist's processes."""
+    if lacking := vcan_kernel.missing():
+        assert "CI" not in os.environ, f"CI must install {lacking}"
+        pytest.skip(f"{lacking} missing")
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "vcan"
+    with (folder.parent / "vcan.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not folder.exists():
+            folder.mkdir()
+            environment = {"GEN_PROFILE_CACHE": str(cache)}
+            spec = ["--preset", "paper", "--set", f"can.timeout={TIMEOUT}"]
+            subprocess.run(
+                [PROGRAM, *spec, "--export", "can", "--out", folder / "deploy"],
+                check=True,
+                capture_output=True,
+                env={**os.environ, **environment},
+            )
+            command = [sys.executable, HERE / "vcan_scenarios.py", folder]
+            code, output = vcan_kernel.run(command, folder, environment)
+            (folder / "said").write_text(output)
+            assert code == 0, output
+    return folder
+
+
+@pytest.fixture
+def scenario(scenarios, request):
+    """What one scenario left: frames as (s, COB-ID, data), JSON documents, exit codes."""
+    place = scenarios / request.param
+    frames = []
+    for line in (place / "bus.log").read_text().splitlines():
+        stamp, _, frame = line.split()
+        cob_id, _, data = frame.partition("#")
+        frames.append((float(stamp.strip("()")), int(cob_id, 16), bytes.fromhex(data)))
+    told = (place / "stream.json").read_text()
+    drive = (place / "drive.json").read_text()
+    return SimpleNamespace(
+        frames=frames,
+        stream=json.loads(told) if told else None,
+        drive=json.loads(drive[drive.index("{") : drive.rindex("}") + 1]),
+        codes=json.loads((place / "codes.json").read_text()),
+        log=(scenarios / "deploy" / "paper.log").read_text(),
+    )
+
+
+def instants(scenario, cob_id, data=None):
+    return [at for at, found, content in scenario.frames if found == cob_id and data in {None, content}]
+
+
+def on(name):
+    return pytest.mark.parametrize("scenario", [name], indirect=True)
+
+
+@on("whole")
+class TestWhole:
+    def test_every_setpoint_once_in_order_byte_for_byte(self, scenario):
+        exported = [line.split()[2] for line in scenario.log.splitlines()]
+        seen = [
+            f"{cob_id:03X}#{data.hex().upper()}"
+            for _, cob_id, data in scenario.frames
+            if cob_id in {0x301, 0x080}
+        ]
+        begins = [k for k in range(len(seen)) if seen[k : k + len(exported)] == exported]
+        assert begins
+        around = {*seen[: begins[0]], *seen[begins[0] + len(exported) :]}
+        assert around == {exported[0], exported[-2], "080#"}
+        assert seen[::2] == [frame for frame in seen if frame != "080#"]
+        assert len(exported) == 2 * 751
+
+    def test_it_ends_well(self, scenario):
+        assert scenario.codes == {"stream": 0, "drive": 0}
+        assert (scenario.stream["state"], scenario.stream["cycles_sent"]) == ("done", 751)
+        assert abs(scenario.stream["drift_s"]) < PERIOD
+        assert scenario.stream["drive"]["position_error_m"] == 0.0
+
+    def test_the_load_does_not_sway(self, scenario):
+        assert 0.0 < scenario.drive["sway_residual_peak_m"] < 1e-4
+        assert scenario.drive["position_m"] == pytest.approx([0.3], abs=1e-12)
+
+
+@on("killed")
+def test_a_killed_streamers_drive_stops_by_itself(scenario):
+    assert scenario.codes["stream"] == -9
+    assert_stopped_by_itself(scenario)
+
+
+@on("frozen")
+def test_a_frozen_streamers_drive_stops_by_itself(scenario):
+    assert scenario.codes["stream"] == 6
+    assert_stopped_by_itself(scenario)
+
+
+def assert_stopped_by_itself(scenario):
+    emergency = instants(scenario, 0x081)[0]
+    setpoints = instants(scenario, 0x301)
+    assert max(setpoints) < emergency < max(setpoints) + TIMEOUT + SLACK
+    assert scenario.drive["states"] in (["switch on disabled"], ["fault"])
+    assert 0.0 < scenario.drive["position_m"][0] < 0.25
+
+
+@on("interrupted")
+def test_ctrl_c_stops_the_axis(scenario):
+    assert scenario.codes == {"stream": 6, "drive": 0}
+    assert scenario.stream["reason"] == "Stopped by SIGINT. The axes were stopped."
+    assert_quick_stop(scenario)
+
+
+@on("second-master")
+def test_a_second_master_stops_the_axis(scenario):
+    assert scenario.codes["stream"] == 6
+    assert "second controller" in scenario.stream["reason"]
+    foreign = next(
+        at
+        for at, cob_id, data in scenario.frames
+        if cob_id == 0x301 and data == bytes(4) and at > moved(scenario)
+    )
+    stop = assert_quick_stop(scenario)
+    assert stop - foreign < 2 * PERIOD + SLACK
+
+
+def moved(scenario):
+    """When the first setpoint was sent that is not the start."""
+    return next(at for at, cob_id, data in scenario.frames if cob_id == 0x301 and data != bytes(4))
+
+
+def assert_quick_stop(scenario):
+    """Find the quick stop on the bus, no setpoint after it, and the axis at rest; return its instant."""
+    stop = instants(scenario, 0x201, b"\x02\x00")[0]
+    assert max(instants(scenario, 0x301)) < stop
+    positions = [data[2:] for at, cob_id, data in scenario.frames if cob_id == 0x181]
+    assert positions[-1] == positions[-2]
+    assert scenario.drive["states"] == ["switch on disabled"]
+    return stop
+
+
+@on("bus-down")
+def test_a_bus_that_goes_down_ends_the_stream(scenario):
+    assert scenario.codes["stream"] == 6
+    assert "own time-outs" in scenario.stream["reason"]
+    assert scenario.drive["error"]["exit_code"] == 6
