@@ -122,5 +122,5 @@ def test_no_duration_does_where_the_target_is_out_of_reach():
 def test_a_wild_move_is_refused_not_returned():
     solution = direct.solve(crane_problem(duration=0.4, sway_weight=0.0))
     assert solution.optimum is None
-    assert solution.status in {Status.SWINGS_TOO_FAR, Status.DIVERGED}
+    assert solution.status in {Status.SWINGS_TOO_FAR, Status.DIVERGED, Status.INFEASIBLE}
     assert solution.cure
