@@ -16,6 +16,8 @@ from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_mac
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.spec import RESIDUAL_SHARE, Spec
+from gen_profile.spec_foreign import KEYS as FOREIGN
+from gen_profile.spec_foreign import foreign_fmu
 from gen_profile.spec_structure import Faults, Table, finite, found, place
 from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
@@ -47,7 +49,9 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     tables["plant"] = {"file": file, **_plant(tables["plant"], plant, faults)}
     tables["move"] = _move(tables["move"], plant, faults)
     tables["robustness"] = _robustness(tables["robustness"], tables["plant"].get("parameters"), faults)
-    tables["check"] = _check(tables["check"], tables["move"], plant, faults)
+    uncertain = list(tables["robustness"]["uncertain"])
+    foreign = foreign_fmu(tables["check"], plant, uncertain, folder, faults)
+    tables["check"] = {**_check(tables["check"], tables["move"], plant, faults), "foreign": foreign}
     _limits(tables["limits"], tables["move"], faults)
     tables["axis"] = _axis(tables["axis"], plant, faults)
     _check_columns(tables["export"].get("csv_columns"), faults)
@@ -226,7 +230,7 @@ def _check(table: Table, move: Table, plant: Plant | None, faults: Faults) -> Ta
     """Give every load its limit: one number is for all; in a table, the end load's is the others' default."""
     for key in table:
         if key != "residual_sway":
-            faults.add(place("check", key), f"unknown key{suggestion(key, ['residual_sway'])}")
+            faults.add(place("check", key), f"unknown key{suggestion(key, ['residual_sway', *FOREIGN])}")
     where = "check.residual_sway"
     given = table.get("residual_sway")
     in_metres = [axis.unit == "m" for axis in plant.actuated] if plant else [True] * len(move["start"])
