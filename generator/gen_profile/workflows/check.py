@@ -15,6 +15,7 @@ from gen_profile.manifest import FILENAME, Manifest, parse_manifest, sha256
 from gen_profile.profile import SampledProfile
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import spec_from_dict
+from gen_profile.workflows.foreign_check import judge_foreign
 from gen_profile.workflows.scenarios import scenarios
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import target_of
@@ -100,11 +101,15 @@ def _verdict(spec: Spec, setpoints: SampledProfile, on_build: Callable[[], None]
     Holding velocity over a cycle errs with the cycle's square, so setpoints of twice the cycle tell how much.
     """
     machines = scenarios(spec)
+    resolution = float(setpoints.resolution.max())
+    if spec.check.foreign is not None:
+        check = judge_foreign(spec, spec.check.foreign, setpoints, machines)
+        return attrs.evolve(check, error_bound=check.error_bound + resolution)
     spacing = sample_spacing(spec, setpoints, machines)
     found = cosimulate(spec, setpoints, machines, output_step=spacing, on_build=on_build)
     expected = cosimulate(spec, _every_other(setpoints), machines, output_step=spacing)
     check = judge(spec, setpoints, machines, found, expected)
-    return attrs.evolve(check, error_bound=check.error_bound + float(setpoints.resolution.max()))
+    return attrs.evolve(check, error_bound=check.error_bound + resolution)
 
 
 def _every_other(setpoints: SampledProfile) -> SampledProfile:

@@ -15,6 +15,7 @@ from gen_profile.manifest import FILENAME, Artefact, Manifest, sha256
 from gen_profile.profile import Profile, SampledProfile
 from gen_profile.spec import Spec
 from gen_profile.workflows.delivery import Staging, staged
+from gen_profile.workflows.foreign_check import judge_foreign
 from gen_profile.workflows.planning import Plan, plan, timed
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import Exporter, target_of
@@ -165,6 +166,9 @@ def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progre
     machines = planned.trial.machines
     checks = []
     for setpoints in replayed:
+        if spec.check.foreign is not None:
+            checks.append(judge_foreign(spec, spec.check.foreign, setpoints, machines))
+            continue
         found = cosimulate(
             spec,
             setpoints,

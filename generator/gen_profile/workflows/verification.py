@@ -64,7 +64,7 @@ def cosimulate(
                     settle=STANDSTILL * tau + watch_time(spec, machines),
                     output_step=output_step,
                 ),
-                _arrival(spec, setpoints),
+                arrival(spec, setpoints),
             )
             for machine in machines
         )
@@ -90,16 +90,16 @@ def judge(
     error = max(
         float(np.abs(one.sway - other.sway).max()) for one, other in zip(found, expected, strict=True)
     )
-    between = max(_above_samples(one.sway) for one in found)
+    between = max(above_samples(one.sway) for one in found)
     return Check(
         limit=dict(spec.check.residual_sway),
         error_bound=error + between + ERROR_FLOOR,
-        arrival=_arrival(spec, setpoints),
+        arrival=arrival(spec, setpoints),
         findings=tuple(
             _finding(spec, machine, response) for machine, response in zip(machines, found, strict=True)
         ),
         directions=spec.machine().directions,
-        faults=_contradictions(setpoints),
+        faults=contradictions(setpoints),
     )
 
 
@@ -108,12 +108,12 @@ def sample_spacing(spec: Spec, setpoints: SampledProfile, machines: Sequence[Sce
     return min(setpoints.cycle_time, watch_time(spec, machines) / (RESIDUAL_SAMPLES - 1))
 
 
-def _above_samples(values: Array) -> float:
+def above_samples(values: Array) -> float:
     """Bound how far a peak between two samples rises above them: h²/8 of the curvature."""
     return float(np.abs(np.diff(values, n=2, axis=0)).max()) / 8.0
 
 
-def _arrival(spec: Spec, setpoints: SampledProfile) -> float:
+def arrival(spec: Spec, setpoints: SampledProfile) -> float:
     """Time in s from which the axes stand still, the drives' lag included."""
     return float(setpoints.times[-1]) + STANDSTILL * (spec.actuator.tau or 0.0)
 
@@ -149,7 +149,7 @@ def _finding(spec: Spec, machine: Scenario, response: Response) -> Finding:
     )
 
 
-def _contradictions(setpoints: SampledProfile) -> tuple[str, ...]:
+def contradictions(setpoints: SampledProfile) -> tuple[str, ...]:
     """Say where a velocity column does not belong to the positions beside it.
 
     A drive fed with both would follow one and not the other.

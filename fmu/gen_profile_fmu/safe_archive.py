@@ -1,0 +1,73 @@
+"""Unpacking an archive that somebody else made."""
+
+from __future__ import annotations
+
+import stat
+import zipfile
+from pathlib import Path, PurePosixPath
+
+from gen_profile.errors import CosimulationError
+
+LARGEST = 1 << 30  # bytes, of all files unpacked
+MOST_FILES = 10_000
+
+
+def unpack(path: Path, folder: Path) -> None:
+    """Unpack an FMU.
+
+    Parameters
+    ----------
+    path : Path
+        The archive.
+    folder : Path
+        Where to: nothing is written outside of it.
+
+    Raises
+    ------
+    CosimulationError
+        The archive cannot be read, is damaged or too large, or would write elsewhere.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _require_harmless(path, archive)
+            _extract(path, archive, folder)
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, RuntimeError, ValueError) as error:
+        raise CosimulationError(f"{path.name}: not an FMU, or damaged ({error}); get it again.") from error
+    except (OSError, NotImplementedError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise CosimulationError(f"{path.name}: the FMU cannot be read ({reason}).") from error
+
+
+def _require_harmless(path: Path, archive: zipfile.ZipFile) -> None:
+    members = archive.infolist()
+    if len(members) > MOST_FILES or sum(member.file_size for member in members) > LARGEST:
+        raise CosimulationError(
+            f"{path.name}: the archive is too large: at most {MOST_FILES} files of together 1 GiB are taken."
+        )
+    for member in members:
+        name = PurePosixPath(member.filename.replace("\\", "/"))
+        is_link = stat.S_ISLNK(member.external_attr >> 16)
+        if name.is_absolute() or ".." in name.parts or ":" in member.filename or is_link:
+            raise CosimulationError(
+                f"{path.name}: the archive would write outside of its folder ({member.filename[:80]!r}); "
+                "do not use it."
+            )
+
+
+def _extract(path: Path, archive: zipfile.ZipFile, folder: Path) -> None:
+    """Copy file by file, counting what really comes out: the sizes that an archive states may be lies."""
+    left = LARGEST
+    for member in archive.infolist():
+        target = folder / member.filename.replace("\\", "/")
+        if member.is_dir():
+            target.mkdir(parents=True, exist_ok=True)
+            continue
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with archive.open(member) as source, target.open("wb") as copy:
+            while block := source.read(1 << 20):
+                left -= len(block)
+                if left < 0:
+                    raise CosimulationError(
+                        f"{path.name}: the archive is too large: it holds more than 1 GiB."
+                    )
+                copy.write(block)

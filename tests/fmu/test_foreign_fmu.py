@@ -1,0 +1,303 @@
+"""Somebody else's FMU as the judge: ours in disguise, and such as crash, hang, leave, or lie."""
+
+import io
+import json
+import stat
+import zipfile
+from contextlib import suppress
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+from fmu.kinds import machine_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gen_profile.errors import CosimulationError, SpecError
+from gen_profile.manifest import FILENAME
+from gen_profile.plants.registry import find_plant
+from gen_profile.spec_reading import preset_spec, spec_from_dict
+from gen_profile.workflows.check import check_artefact
+from gen_profile.workflows.design import design
+from gen_profile_fmu import safe_archive
+from gen_profile_fmu.building import build_fmu
+from gen_profile_fmu.fmu_files import Version
+from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
+from gen_profile_fmu.model import plant_model
+from gen_profile_fmu.plant_variables import InputKind
+from gen_profile_fmu.platforms import host_platform
+
+CRANE = find_plant("double-pendulum-crane")
+NAMES = {
+    "acceleration": "cart.setpoint_acceleration",
+    "velocity": "cart.setpoint_velocity",
+    "setpoint": "cart.setpoint",
+}
+
+
+def write_fmu(path, kind="acceleration", version=Version.FMI2, **replacements):
+    """A customer's FMU; `replacements` change the text of plant_model.c."""
+    model = plant_model(machine_of(CRANE), InputKind(kind), "customer")
+    code = dict(model.code)
+    for old, new in replacements.items():
+        text = code["plant_model.c"]
+        assert old in text
+        code["plant_model.c"] = "#include <stdlib.h>\n" + text.replace(old, new)
+    path.write_bytes(build_fmu(attrs.evolve(model, code=code), version, (host_platform(),)))
+    return path
+
+
+def spec_with(folder, kind="acceleration", **check):
+    document = preset_spec("paper", ("export.cycle_time=0.004",)).to_dict()
+    document["check"] |= {
+        "fmu": "customer.fmu",
+        "input": {kind: NAMES[kind]},
+        "output": {"sway": {"hook": "sway.hook", "payload": "sway.payload"}},
+        "parameters": {"L1": "L1"},
+        **check,
+    }
+    return spec_from_dict(document, folder)
+
+
+@pytest.mark.parametrize("version", Version)
+@pytest.mark.parametrize("kind", ["acceleration", "setpoint"])
+def test_judges_as_our_own_does(tmp_path, kind, version):
+    write_fmu(tmp_path / "customer.fmu", kind, version)
+    own = design(preset_spec("paper", ("export.cycle_time=0.004",)), ["csv"], tmp_path / "own").check
+    outcome = design(spec_with(tmp_path, kind), ["csv"], tmp_path)
+    found = outcome.check
+    assert found.passed
+    assert [f.scenario.name for f in found.findings] == [f.scenario.name for f in own.findings]
+    for one, other in zip(found.findings, own.findings, strict=True):
+        for load in ("hook", "payload"):
+            apart = abs(one.residual[load] - other.residual[load])
+            assert apart < 1e-6 + found.error_bound + own.error_bound
+    again = check_artefact(tmp_path / outcome.artefacts[0].path).check  # the spec comes from the manifest
+    assert again.findings == found.findings
+    manifest = json.loads((tmp_path / FILENAME).read_text())
+    assert manifest["spec"]["check"]["fmu"] == "customer.fmu"
+    assert str(tmp_path) not in json.dumps(manifest)
+
+
+def test_an_altered_fmu_is_noticed(tmp_path):
+    path = write_fmu(tmp_path / "customer.fmu")
+    document = spec_with(tmp_path).to_dict()
+    path.write_bytes(path.read_bytes() + b" ")
+    with pytest.raises(SpecError, match=r"check.fmu: .* is not the FMU that was checked with"):
+        spec_from_dict(document, tmp_path)
+
+
+def test_a_lagging_drive_is_ours(tmp_path):
+    write_fmu(tmp_path / "customer.fmu")
+    lag = {"type": "first-order", "tau": 0.1}
+    document = {**preset_spec("paper", ("export.cycle_time=0.004",)).to_dict(), "actuator": lag}
+    own = design(spec_from_dict(document), ["csv"], tmp_path / "own").check
+    document["check"] = spec_with(tmp_path).to_dict()["check"]
+    found = design(spec_from_dict(document, tmp_path), ["csv"], tmp_path).check
+    for one, other in zip(found.findings, own.findings, strict=True):
+        assert one.residual["payload"] == pytest.approx(other.residual["payload"], abs=2e-6)
+
+
+def test_a_plant_that_takes_velocities(tmp_path):
+    """Of drives without much lag of their own; what they have is the customer's."""
+    write_fmu(tmp_path / "customer.fmu", "velocity")
+    spec = spec_with(tmp_path, "velocity", residual_sway=0.01)
+    assert design(spec, ["csv"], tmp_path).check.findings[0].residual["payload"] < 0.01
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"fmu": 3}, "check.fmu: must name an FMU"),
+        ({"fmu": "none.fmu"}, r"check.fmu: .*none.fmu cannot be read \(No such file"),
+        ({"input": {"force": "u"}}, "check.input: must name the inputs by one of acceleration, velocity"),
+        ({"input": {"setpoint": ["a", "b"]}}, r"check.input.setpoint: must name one .* per axis \(1\)"),
+        ({"output": {"angle": "a"}}, "check.output: must name the sway"),
+        ({"output": {"sway": {"boom": "a"}}}, "check.output.sway.boom: unknown load"),
+        ({"parameters": {"L3": "a", "L1": "b"}}, "check.parameters.L3: unknown parameter"),
+        ({"parameters": 1}, "check.parameters: must be a table"),
+        ({"parameters": {}}, "check.parameters.L1: required, as it is uncertain"),
+        ({"time_limit": -1}, "check.time_limit: must be a positive time"),
+        ({"fnu": 1}, r"check.fnu: unknown key"),
+    ],
+)
+def test_faults_of_the_map_are_sentences(tmp_path, change, message):
+    (tmp_path / "customer.fmu").write_bytes(b"")
+    with pytest.raises(SpecError, match=message):
+        spec_with(tmp_path, **change)
+
+
+def test_one_output_is_the_end_loads(tmp_path):
+    (tmp_path / "customer.fmu").write_bytes(b"")
+    foreign = spec_with(tmp_path, output={"sway": "load.dx"}).check.foreign
+    assert dict(foreign.sway) == {"payload": "load.dx"}
+
+
+def run_of(path, **changes):
+    given = {
+        "archive": path,
+        "times": np.linspace(0.0, 0.1, 11),
+        "inputs": np.full((10, 1), 0.1),
+        "input_names": ["cart.setpoint_acceleration"],
+        "output_names": ["sway.payload"],
+        "machines": [{"L1": 0.5}],
+        "time_limit": 60.0,
+    }
+    return ForeignRun(**{**given, **changes})
+
+
+ADVANCE = "    double reference[N_A][N_ORDERS];\n    reference_velocity(model, step, reference);"
+
+
+@pytest.mark.parametrize(
+    ("code", "changes", "message"),
+    [
+        ("*(volatile int *)16 = 1;", {}, r"customer.fmu: the FMU crashed \(SIGSEGV\)"),
+        ("abort();", {}, r"the FMU crashed \(SIGABRT\)"),
+        ("exit(0);", {}, "the FMU ended its process before"),
+        ("for (;;) model->samples++;", {"time_limit": 5.0}, "not done after 5 s; .* raise check.time_limit"),
+        ("model->values[THROWN] = 0.0 / 0.0;", {}, "refused fmi2DoStep"),
+        (
+            "model->values[SWAY] = 1.0;",
+            {"output_names": ["sway.boom"]},
+            "no real scalar variable 'sway.boom'",
+        ),
+        ("model->samples++;", {"machines": [{"L1": -1.0}]}, "refused fmi2SetReal"),
+    ],
+)
+def test_whatever_native_code_does_is_a_sentence(tmp_path, code, changes, message):
+    code = code.replace("THROWN", "Q_U")
+    path = write_fmu(tmp_path / "customer.fmu", **{ADVANCE: f"    {code}\n{ADVANCE}"})
+    with pytest.raises(CosimulationError, match=message):
+        run_foreign(run_of(path, **changes))
+
+
+def with_description(path, change):
+    """Rewrite an FMU's model description."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(packed, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, change(content) if name == "modelDescription.xml" else content)
+    path.write_bytes(packed.getvalue())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda text: text.replace(b'fmiVersion="2.0"', b'fmiVersion="1.0"'), "FMI 1.0 is not taken"),
+        (lambda text: text[: len(text) // 2], "the model description cannot be read"),
+        (lambda _: b"", "the model description cannot be read"),
+        (lambda text: text.replace(b'guid="', b'guid="x'), "the FMU cannot be run"),
+        (lambda text: b"".join([text.partition(b"<CoSimulation")[0], text.partition(b"</CoSimulation>")[2]]),
+         "for model exchange only"),
+    ],
+)  # fmt: skip
+def test_wrong_descriptions_are_refused(tmp_path, change, message):
+    path = write_fmu(tmp_path / "customer.fmu")
+    with_description(path, change)
+    with pytest.raises(CosimulationError, match=message):
+        run_foreign(run_of(path))
+
+
+def zipped(*members):
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for name, content, mode in members:
+            info = zipfile.ZipInfo(name)
+            info.external_attr = mode << 16
+            archive.writestr(info, content)
+    return packed.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "not an FMU, or damaged"),
+        (b"PK\x03\x04 nonsense", "not an FMU, or damaged"),
+        (zipped(("../evil", b"", 0o644)), "would write outside"),
+        (zipped(("a/../../evil", b"", 0o644)), "would write outside"),
+        (zipped(("/etc/evil", b"", 0o644)), "would write outside"),
+        (zipped(("c:\\evil", b"", 0o644)), "would write outside"),
+        (zipped(("..\\evil", b"", 0o644)), "would write outside"),
+        (zipped(("link", b"/etc/passwd", stat.S_IFLNK | 0o777)), "would write outside"),
+        (zipped(("empty", b"", 0o644)), "the model description cannot be read"),
+    ],
+)
+def test_archives_that_do_harm_are_refused(tmp_path, content, message):
+    path = tmp_path / "customer.fmu"
+    path.write_bytes(content)
+    with pytest.raises(CosimulationError, match=message):
+        run_foreign(run_of(path))
+    assert [p.name for p in tmp_path.rglob("*")] == ["customer.fmu"]
+
+
+def test_a_missing_archive_is_a_sentence(tmp_path):
+    with pytest.raises(CosimulationError, match=r"none.fmu: the FMU cannot be read \(No such file"):
+        run_foreign(run_of(tmp_path / "none.fmu"))
+
+
+def test_too_large_archives_are_refused(tmp_path, monkeypatch):
+    path = tmp_path / "large.fmu"
+    path.write_bytes(zipped(("a", b"x" * 1000, 0o644), ("b", b"x" * 1000, 0o644)))
+    monkeypatch.setattr(safe_archive, "LARGEST", 1999)
+    with pytest.raises(CosimulationError, match="too large"):
+        safe_archive.unpack(path, tmp_path / "out")
+    monkeypatch.setattr(safe_archive, "LARGEST", 2000)
+    safe_archive.unpack(path, tmp_path / "out")
+    monkeypatch.setattr(safe_archive, "MOST_FILES", 1)
+    with pytest.raises(CosimulationError, match="too large"):
+        safe_archive.unpack(path, tmp_path / "out")
+
+
+def test_stated_sizes_are_not_believed(tmp_path, monkeypatch):
+    content = zipped(("a", b"x" * 1000, 0o644))
+    lie = content.replace((1000).to_bytes(4, "little"), (10).to_bytes(4, "little"))
+    path = tmp_path / "lie.fmu"
+    path.write_bytes(lie)
+    monkeypatch.setattr(safe_archive, "LARGEST", 100)
+    with pytest.raises(CosimulationError):
+        safe_archive.unpack(path, tmp_path / "out")
+
+
+@settings(max_examples=150)
+@given(
+    st.lists(st.tuples(st.integers(0, 1 << 20), st.integers(0, 255)), min_size=1, max_size=8),
+    st.integers(0, 400),
+)
+def test_damaged_archives_are_read_or_refused(tmp_path_factory, changes, cut):
+    """Bytes changed at random, and the end cut off: files come out, or a sentence."""
+    content = bytearray(
+        zipped(
+            ("modelDescription.xml", b"<a/>" * 20, 0o644),
+            ("binaries/x", b"\0" * 99, 0o644),
+            ("d/", b"", 0o755),
+        )
+    )
+    for position, value in changes:
+        content[position % len(content)] = value
+    folder = tmp_path_factory.mktemp("fuzz")
+    path = folder / "a.fmu"
+    path.write_bytes(bytes(content[: len(content) - cut]))
+    with suppress(CosimulationError):
+        safe_archive.unpack(path, folder / "out")
+    outside = [p for p in folder.rglob("*") if p.is_file() and "out" not in p.relative_to(folder).parts]
+    assert outside == [path]
+
+
+TEXTS = st.text(max_size=5)
+KEYS = TEXTS | st.sampled_from(["sway", "L1"])
+VALUES = st.recursive(
+    TEXTS | st.integers() | st.floats() | st.booleans(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@settings(max_examples=150)
+@given(st.dictionaries(st.sampled_from(["fmu", "input", "output", "parameters", "time_limit"]), VALUES))
+def test_any_variable_map_is_read_or_refused(changes):
+    folder = Path(__file__).parent
+    with suppress(SpecError):
+        spec_with(folder, **{"fmu": "kinds.py", **changes})
