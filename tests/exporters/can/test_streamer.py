@@ -99,9 +99,9 @@ class TestWholeStream:
 
     def test_no_drift_in_an_hour(self):
         hour = quintic((0.0, 1.0), duration=3600.0)
-        with Bench(profile=hour, sync_period=0.1, step=25_000_000) as bench:
+        with Bench(profile=hour, sync_period=1.0, step=250_000_000) as bench:
             record = bench.run()
-        assert record.sent == 36_001
+        assert record.sent == 3601
         assert abs(record.lateness.drift) < 1e-12
         assert record.lateness.percentile(100) == 0.0
 

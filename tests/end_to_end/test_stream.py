@@ -1,0 +1,217 @@
+"""`gen-profile stream` and `drive-sim` as a user calls them, with the virtual bus of python-can."""
+
+import csv
+import json
+import os
+import shutil
+import signal
+from importlib import util
+from threading import Thread
+
+import can
+import canopen
+import pytest
+from command_line import run_here
+
+from gen_profile.workflows import stream as workflow
+from gen_profile_exporters.can.clock import SystemClock
+from gen_profile_exporters.can.streamer import Streamer
+
+BUSY = "late at cycle"  # a busy machine says so, and is no fault of the program
+
+
+@pytest.fixture(scope="module")
+def deployed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("deploy")
+    options = (
+        "--set",
+        "can.timeout=0.5",
+        "--set",
+        "can.sync_period=0.02",
+        "--export",
+        "can",
+        "--out",
+        folder,
+    )
+    assert run_here("--preset", "paper", *options).code == 0
+    return folder
+
+
+def streamed(*arguments):
+    """Stream, again where this machine was too busy."""
+    for _ in range(5):
+        outcome = run_here("stream", *arguments, "--json")
+        if BUSY not in outcome.out:
+            break
+    return outcome
+
+
+def test_simulated_drives_end_without_sway(deployed, tmp_path):
+    table = tmp_path / "driven.csv"
+    outcome = streamed(deployed / "paper.log", "--simulate-drive", "--self-test", "--log", table)
+    told = outcome.document
+    assert (outcome.code, told["state"], told["reason"]) == (0, "done", "")
+    assert told["cycles_sent"] == told["cycles_planned"] == 151
+    assert told["drive"]["position_error_m"] == 0.0
+    assert 0.0 < told["drive"]["sway_residual_peak_m"] < 3e-4
+    assert {"p50", "p99", "max"} <= told["lateness_us"].keys()
+    assert sum(told["lateness_us"]["histogram"].values()) == 151
+    head, *rows = csv.reader(table.read_text().splitlines())
+    assert head == ["time_s", "cart_planned_m", "cart_actual_m"]
+    assert len(rows) == 151
+    assert rows[-1][0] == "3"
+    assert float(rows[-1][1]) == pytest.approx(0.3, abs=1e-4)
+
+
+def test_in_words(deployed):
+    outcome = run_here("stream", deployed / "paper.log", "--simulate-drive")
+    assert "setpoints sent" in outcome.out
+    assert "lateness: half below" in outcome.out
+
+
+def test_dry_run_touches_no_bus(deployed):
+    told = run_here("stream", deployed / "paper.log", "--dry-run", "--json").document
+    assert (told["state"], told["cycles_sent"], told["cycles_planned"]) == ("planned", 0, 151)
+    assert told["axes"] == [{"name": "cart", "node": 1, "start_m": 0.0, "target_m": 0.3}]
+    assert 0.02 < told["bus_load"] < 0.04
+    assert {"node": 1, "object": "60C2h:01", "value": 2, "meaning": "interpolation period: digits"} in told[
+        "startup"
+    ]
+    words = run_here("stream", deployed / "paper.log", "--dry-run").out
+    assert "cart: node 1, from 0 to 0.3" in words
+
+
+def test_a_spec_is_designed_first(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    told = run_here(
+        "stream", "--preset", "paper", "--node", "5", "--mode", "ip", "--dry-run", "--json"
+    ).document
+    assert told["axes"][0]["node"] == 5
+    assert {entry["value"] for entry in told["startup"] if entry["object"] == "6060h:00"} == {7}
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_spec_that_fails_its_check_is_not_streamed():
+    outcome = run_here("stream", "--preset", "paper", "--set", "check.residual_sway=1e-6", "--dry-run")
+    assert outcome.code == 4
+    assert "sways by" in outcome.err
+
+
+class TestArtefact:
+    def refused(self, path, *options):
+        outcome = run_here("stream", path, "--dry-run", *options)
+        assert outcome.code == 2
+        return outcome.err
+
+    def copy(self, deployed, tmp_path):
+        shutil.copytree(deployed, tmp_path / "copy")
+        return tmp_path / "copy" / "paper.log"
+
+    def test_altered(self, deployed, tmp_path):
+        path = self.copy(deployed, tmp_path)
+        path.write_bytes(path.read_bytes().replace(b"301#E0930400", b"301#E1930400"))
+        assert "is not the file that" in self.refused(path)
+
+    def test_of_another_format_of_the_same_manifest(self, deployed):
+        assert "only the log of the format can" in self.refused(deployed / "paper.csv")
+
+    def test_unverified(self, tmp_path):
+        run_here("--preset", "paper", "--no-check", "--export", "can", "--out", tmp_path)
+        assert "is unverified" in self.refused(tmp_path / "paper.log")
+        assert run_here("stream", tmp_path / "paper.log", "--dry-run", "--accept-unverified").code == 0
+
+    def test_failed(self, deployed, tmp_path):
+        path = self.copy(deployed, tmp_path)
+        manifest = path.with_name("manifest.json")
+        document = json.loads(manifest.read_text())
+        document["check"]["passed"] = False
+        manifest.write_text(json.dumps(document))
+        assert "failed its check" in self.refused(path, "--accept-unverified")
+
+    def test_missing(self, tmp_path):
+        assert "Cannot read" in self.refused(tmp_path / "nothing.log")
+
+    def test_with_options_for_specs(self, deployed):
+        assert "streamed as it is" in self.refused(deployed / "paper.log", "--node", "3")
+
+    def test_without_a_bus(self, deployed):
+        outcome = run_here("stream", deployed / "paper.log")
+        assert (outcome.code, "name the bus" in outcome.err) == (2, True)
+
+    def test_with_a_bus_that_cannot_be_opened(self, deployed):
+        bus = ("--interface", "socketcan", "--channel", "nowhere0")
+        outcome = run_here("stream", deployed / "paper.log", *bus)
+        assert (outcome.code, "cannot be opened" in outcome.err) == (2, True)
+
+
+def test_nobody_on_the_bus(deployed):
+    outcome = run_here(
+        "stream", deployed / "paper.log", "--interface", "virtual", "--channel", "empty", "--json"
+    )
+    assert (outcome.code, outcome.document["state"], outcome.document["drive"]) == (6, "aborted", None)
+    assert "does not answer" in outcome.document["reason"]
+
+
+def test_sigterm_stops_the_axis(deployed, monkeypatch):
+    send = Streamer._send
+
+    def interrupted(self, messages):
+        if self.cycles_sent == 60:
+            os.kill(os.getpid(), signal.SIGTERM)
+        send(self, messages)
+
+    monkeypatch.setattr(Streamer, "_send", interrupted)
+    outcome = streamed(deployed / "paper.log", "--simulate-drive")
+    assert outcome.code == 6
+    assert outcome.document["reason"] == "Stopped by SIGTERM. The axes were stopped."
+    assert outcome.document["drive"]["sway_residual_peak_m"] > 0.003
+
+
+def test_a_machine_that_cannot_hold_the_cycle(deployed, monkeypatch):
+    class Slow(SystemClock):
+        def now(self):
+            return super().now() + 15_000_000 * (super().now() // 50_000_000 % 2)
+
+    monkeypatch.setattr(workflow, "SystemClock", Slow)
+    outcome = run_here("stream", deployed / "paper.log", "--simulate-drive", "--self-test")
+    assert outcome.code == 6
+    assert "cannot hold a cycle of 20 ms" in outcome.err
+
+
+def test_the_missing_extra_is_a_sentence(deployed, monkeypatch):
+    monkeypatch.setattr(
+        workflow, "find_spec", lambda name: None if name == "canopen" else util.find_spec(name)
+    )
+    outcome = run_here("stream", deployed / "paper.log", "--dry-run")
+    assert (outcome.code, "pip install 'gen-profile[can]'" in outcome.err) == (2, True)
+
+
+def test_eds_of_the_simulated_drive(tmp_path):
+    assert run_here("drive-sim", "--eds", tmp_path / "drive.eds").code == 0
+    assert canopen.import_od(str(tmp_path / "drive.eds"), 1)[0x1000].default == 0x0002_0192
+    outcome = run_here("drive-sim", "--eds", tmp_path / "no" / "drive.eds")
+    assert (outcome.code, "Cannot write" in outcome.err) == (2, True)
+
+
+def test_drives_of_their_own(deployed):
+    """drive-sim here, and a streamer in a thread: python-can's virtual bus stays within a process."""
+    source, records = workflow.verified(deployed / "paper.log"), []
+
+    def stream():
+        with can.Bus(channel="apart", interface="virtual") as bus:
+            while (message := bus.recv(60.0)) is not None and message.arbitration_id != 0x701:
+                pass
+            records.append(Streamer(bus, SystemClock(), source.plan).run())
+
+    thread = Thread(target=stream)
+    thread.start()
+    spec = ("--set", "can.timeout=0.5", "--set", "can.sync_period=0.02")
+    options = ("--interface", "virtual", "--channel", "apart", "--own-mapping", "--miss", "hold")
+    told = run_here("drive-sim", "--preset", "paper", *spec, *options, "--json").document
+    thread.join()
+    assert told["states"] == ["switch on disabled"]
+    if not records[0].reason:
+        assert told["position_m"] == pytest.approx([0.3])
+        assert told["sway_residual_peak_m"] < 3e-4
+    else:
+        assert BUSY in records[0].reason
