@@ -135,7 +135,7 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
     motion = sampled(profile, target, target.cycle_time, "export.cycle_time", MOST_SAMPLES)
     axes = counted_axes(target, target.export.plc_layout)
     if target.export.plc_layout == "segments":
-        segments = fit(motion)
+        segments = fit(_quantities(motion), motion.cycle_time)
         factor = np.array([axis.factor for axis in axes])
         coefficients = in_axis_units(np.moveaxis(segments.coefficients, 1, 0), factor)
         return PlaybackTable(
@@ -148,8 +148,7 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
             target=_literal(in_axis_units(segments.target, factor)),
         )
     table = axis_table(motion, axes)
-    quantities = (table.position, table.velocity, table.acceleration)
-    columns = np.stack([values for values in quantities if values is not None])
+    columns = _quantities(table)
     if target.export.plc_layout == "counts":
         columns = _whole(columns, axes)
     columns = _literal(columns)
@@ -162,6 +161,12 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
         last=len(table.position) - 1,
         target=columns[0, -1],
     )
+
+
+def _quantities(table: AxisTable | SampledProfile) -> Array:
+    """Stack position, velocity and acceleration."""
+    quantities = (table.position, table.velocity, table.acceleration)
+    return np.stack([values for values in quantities if values is not None])
 
 
 def counted_axes(target: Target, layout: str) -> tuple[AxisScale, ...]:

@@ -92,8 +92,7 @@ def pou(source: BlockSource) -> etree._Element:
         groups[variable.section].append(_variable(variable))
     body = etree.SubElement(etree.SubElement(element, _tag("body")), _tag("ST"))
     _formatted(body, source.body)
-    if source.header:
-        _formatted(etree.SubElement(element, _tag("documentation")), source.header.strip("(*) \n"))
+    _formatted(etree.SubElement(element, _tag("documentation")), source.header.strip("(*) \n"))
     return element
 
 

@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile.profile import Array, SampledProfile, read_only
+from gen_profile.profile import Array, read_only
 
 POSITION_ERROR = 1e-9  # m (or rad), of a segment at the cycles inside it
 ACCELERATION_ERROR = 1e-6  # m/s²
@@ -74,24 +74,29 @@ class QuinticSegments:
         return np.array([size[order].max(axis=0) for order in (1, 2, 3)])
 
 
-def fit(motion: SampledProfile) -> QuinticSegments:
-    """Cover a motion that carries velocity and acceleration with as few segments as its errors allow."""
-    if motion.velocity is None or motion.acceleration is None:
-        raise ValueError("quintic segments are fitted to velocity and acceleration, too")
-    samples = np.stack([motion.position, motion.velocity, motion.acceleration])
+def fit(samples: Array, cycle_time: float) -> QuinticSegments:
+    """Cover a motion with as few segments as the allowed errors need.
+
+    Parameters
+    ----------
+    samples : (3, cycles + 1, axes) array
+        Position, velocity and acceleration in m, m/s, m/s² (or rad …).
+    cycle_time : float
+        s.
+    """
     last = samples.shape[1] - 1
     first, pieces = [0], []
     length = 1
     while first[-1] < last:
         begin = first[-1]
-        length = _longest(samples, begin, min(length, last - begin), last - begin, motion.cycle_time)
-        pieces.append(hermite(samples[:, begin], samples[:, begin + length], length * motion.cycle_time))
+        length = _longest(samples, begin, min(length, last - begin), last - begin, cycle_time)
+        pieces.append(hermite(samples[:, begin], samples[:, begin + length], length * cycle_time))
         first.append(begin + length)
     return QuinticSegments(
-        cycle_time=motion.cycle_time,
+        cycle_time=cycle_time,
         first=np.array(first),
         coefficients=np.array(pieces),
-        target=motion.position[-1],
+        target=samples[0, -1],
     )
 
 

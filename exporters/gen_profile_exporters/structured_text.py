@@ -3,7 +3,7 @@
 The block (`gen_profile_exporters.playback_template`) holds the motion as a table, by default as quintic
 segments, and issues position, velocity and acceleration every cycle of its task. It keeps to what independent
 compilers have in common: ASCII, ``(* *)`` comments, one-dimensional arrays in ``VAR CONSTANT``, literals such
-as ``-1.5E-3`` that a REAL could hold.
+as ``-1.5E-7`` that a REAL could hold.
 Each literal reads back to the same double, and the block counts cycles instead of adding up times.
 
 - A rising edge of ``bExecute`` starts, if the task's cycle, the actual position and the table's CRC-32 are
@@ -89,8 +89,11 @@ def block_name(name: str) -> str:
 
 
 def literal(value: float) -> str:
-    """Shortest LREAL literal that reads back to the same double, such as ``-1.5E-3``."""
-    return np.format_float_scientific(value, trim="0", exp_digits=1).upper()
+    """Shortest LREAL literal that reads back to the same double, such as ``-0.25`` or ``1.5E-7``."""
+    mantissa, _, exponent = repr(float(value)).partition("e")
+    if not exponent:
+        return mantissa
+    return f"{mantissa}{'' if '.' in mantissa else '.0'}E{int(exponent):+d}"
 
 
 def plain(name: str) -> str:
@@ -240,11 +243,11 @@ def _per_axis(values: Array) -> str:
 
 
 def _literals(values: Array) -> str:
-    return _initialiser([literal(value) for value in values])
+    return _initialiser([literal(value) for value in values.tolist()])
 
 
 def _whole_numbers(values: Array) -> str:
-    return _initialiser([str(int(value)) for value in values])
+    return _initialiser([str(int(value)) for value in values.tolist()])
 
 
 def _initialiser(texts: Sequence[str]) -> str:

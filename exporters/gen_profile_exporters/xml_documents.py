@@ -17,13 +17,10 @@ def parse_xml(content: bytes) -> etree._Element:
     """
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=True)
     try:
-        root = etree.fromstring(content, parser)
+        return etree.fromstring(content, parser)
     except (etree.XMLSyntaxError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise ExportError(f"Not well-formed XML ({reason}); export it again.") from error
-    if root is None:
-        raise ExportError("The XML document is empty; export it again.")
-    return root
 
 
 def write_xml(root: etree._Element) -> bytes:

@@ -160,6 +160,18 @@ def test_any_move_comes_back(contract, start, end, duration, cycle, sign):
 
 
 @bounded
+@given(content=st.binary(max_size=200) | st.text(max_size=200).map(str.encode))
+def test_any_bytes_are_refused_or_read_never_a_crash(contract, content):
+    try:
+        found = find_exporter(contract.format).replay(content, contract.goal())
+    except ExportError as error:
+        assert str(error).endswith(".")
+        assert "\n" not in str(error)
+    else:
+        assert np.isfinite(found.position).all()
+
+
+@bounded
 @given(data=st.data())
 def test_a_mutated_file_is_refused_or_read_never_a_crash(contract, data):
     exporter = find_exporter(contract.format)

@@ -23,6 +23,33 @@ TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))
 LAYOUTS = ["segments", "samples", "counts"]
 BLOCKS = {"plcopen-xml": plcopen_xml, "codesys": codesys, "twincat": twincat, "siemens-scl": siemens_scl}
 CYCLE = 0.02
+# Each as Structured Text has it and as XML has it, in the first table of numbers.
+TABLE = r"(c(?:Power0|Position) : ARRAY [^;]*?:= \[\s*[^;]*?)"
+XML_TABLE = r'(<variable name="c(?:Power0|Position)">(?:(?!</variable>).)*?)'
+VALUE = r'<value>\s*<simpleValue value="[^"]*"/>\s*</value>'
+MUTATIONS = {
+    "wrong bounds": [
+        (r"(cPower0|cPosition) : ARRAY \[0\.\.\d+\]", r"\1 : ARRAY [0..7]"),
+        (rf'(?s){XML_TABLE}upper="\d+"', r'\1upper="7"'),
+    ],
+    "bounds from one": [
+        (r"(cPower0|cPosition) : ARRAY \[0", r"\1 : ARRAY [1"),
+        (rf'(?s){XML_TABLE}lower="0"', r'\1lower="1"'),
+    ],
+    "decimal comma": [
+        (rf"{TABLE}(\d)\.(\d)", r"\1\2,\3"),
+        (rf'(?s){XML_TABLE}(value="-?\d+)\.', r"\1\2,"),
+        (rf"{TABLE}(\d)(,)", r"\1\2,5,"),
+        (rf'(?s){XML_TABLE}(value="-?\d+)"', r'\1\2,5"'),
+    ],
+    "a value missing": [(rf"{TABLE}[-\d.E+]+,\s", r"\1"), (rf"(?s){XML_TABLE}{VALUE}", r"\1")],
+    "a value too many": [(rf"{TABLE}([-\d.E+]+,\s)", r"\1\2\2"), (rf"(?s){XML_TABLE}({VALUE})", r"\1\2\2")],
+    "an empty value": [(rf"{TABLE}[-\d.E+]+,", r"\1,"), (rf'(?s){XML_TABLE}value="[^"]+"', r'\1value=""')],
+    "not a number": [
+        (rf"{TABLE}[-\d.E+]+,", r"\1NaN,"),
+        (rf'(?s){XML_TABLE}value="[^"]+"', r'\1value="NaN"'),
+    ],
+}
 NAMES = plcopen_xml.NAMES
 
 
@@ -56,10 +83,23 @@ class TestBlocks:
     def test_an_altered_number_is_refused(self, format_):
         goal = goal_of(MOVE, "samples")
         content = format_.encode(MOVE, goal)[0].content
-        literal = structured_text.literal(sample(MOVE, CYCLE).position[20, 0]).encode()
+        literal = structured_text.literal(sample(MOVE, CYCLE).position[20, 0].item()).encode()
         assert content.count(literal) == 1
         with pytest.raises(ExportError, match="it was altered"):
-            format_.replay(content.replace(literal, b"2.5E-1"), goal)
+            format_.replay(content.replace(literal, b"0.25"), goal)
+
+    @pytest.mark.parametrize("layout", LAYOUTS)
+    @pytest.mark.parametrize("format_", [*BLOCKS.values(), structured_text], ids=[*BLOCKS, "plc"])
+    @pytest.mark.parametrize("mutation", MUTATIONS.values(), ids=MUTATIONS.keys())
+    def test_mutants_are_refused(self, mutation, format_, layout):
+        goal = goal_of(TWO_MOVES, layout)
+        text = format_.encode(TWO_MOVES, goal)[0].content.decode()
+        mutants = [re.sub(old, new, text, count=1) for old, new in mutation]
+        assert any(mutant != text for mutant in mutants)
+        for mutant in mutants:
+            if mutant != text:
+                with pytest.raises(ExportError):
+                    format_.replay(mutant.encode(), goal)
 
     @pytest.mark.parametrize("format_", BLOCKS.values(), ids=BLOCKS.keys())
     @pytest.mark.parametrize(
