@@ -13,8 +13,7 @@ from gen_profile.metrics import peak
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.response import Swing
-from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.shapers.shaped_move import shaped_profile
+from gen_profile.shapers.shaped_move import shaped_move
 from gen_profile.solvers import indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.spec_reading import preset_spec
@@ -28,10 +27,10 @@ problem = problem_of(spec)
 
 frequencies = linearize(plant, nominal).frequencies
 motions = {
-    name: shaped_profile(
-        name, start=move.start, target=move.target, duration=move.duration, frequencies=frequencies
+    name: shaped_move(name, start=move.start, target=move.target, frequencies=frequencies).profile(
+        move.duration
     )
-    for name in SHAPERS
+    for name in ("nzv", "zvd", "umzvd")
 }
 motions |= {
     f"β = {weight:g}, robust": optimal_profile(indirect.solve(attrs.evolve(problem, sway_weight=weight)))

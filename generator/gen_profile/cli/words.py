@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import StringIO
 from typing import TYPE_CHECKING
 
@@ -26,8 +26,12 @@ MANIFEST_WORDS = {
     "none": "no manifest of this spec beside the file",
 }
 
+COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
+COSTLY_OVERSHOOT = 0.1  # of the sway on the way, likewise
+
 # head → unit, figure, how many of the unit make one of the figure's
 COLUMNS = {
+    "time": ("s", "duration_s", 1.0),
     "a max": ("m/s²", "acceleration_max_m_per_s2", 1.0),
     "a rms": ("m/s²", "acceleration_rms_m_per_s2", 1.0),
     "jerk max": ("m/s³", "jerk_max_m_per_s3", 1.0),
@@ -55,6 +59,7 @@ def design(outcome: Design) -> str:
         ("sway on the way", _mm(figures["sway_transient_peak_m"])),
         ("residual sway", residual),
         ("check", _verdict(outcome.check)),
+        *_cost_of_lag(figures),
     ]
     if outcome.spec.plant.defaults:
         rows.append(("defaults used", ", ".join(f"plant.{name}" for name in outcome.spec.plant.defaults)))
@@ -83,13 +88,15 @@ def comparison(found: Comparison) -> str:
     first = found.spec.machine().actuated[0].unit
     for head, (unit, _, _) in COLUMNS.items():
         table.add_column(f"{head}\n{unit.replace('m/', f'{first}/')}", justify="right")
+    table.add_column("limit\nkept", justify="center")
+    table.add_column("Pareto\nfront", justify="center")
     for row in found.rows:
-        if row.trial:
-            cells = (_figure(factor * row.figures[key]) for _, key, factor in COLUMNS.values())
-            table.add_row(row.method, *cells)
-    left_out = [f"{row.method}: {row.reason}" for row in found.rows if not row.trial]
+        cells = (_figure(factor * row.figures[key]) for _, key, factor in COLUMNS.values())
+        marks = ("●" if mark else "" for mark in (row.safe, row.method in found.efficient))
+        table.add_row(row.method, *cells, *marks)
+    left_out = [f"{method}: {reason}" for method, reason in found.left_out.items()]
     advice = [
-        f"{kind}: {method or 'none'}. {found.reasons[kind]}" for kind, method in found.recommended.items()
+        f"{kind}: {advice.method or 'none'}. {advice.reason}" for kind, advice in found.recommended.items()
     ]
     return "\n".join([f"{found.spec.name}: {_move(found.spec)}", _text(table), *left_out, *advice])
 
@@ -126,6 +133,18 @@ def identification(found: Identification, path: Path) -> str:
     return _block(found.spec.name, rows)
 
 
+def _cost_of_lag(figures: Mapping[str, float]) -> list[tuple[str, str]]:
+    """Warn where leading the drive's lag asks much more of it than the motion itself."""
+    if "command_overshoot_m" not in figures:
+        return []
+    times = figures["command_acceleration_max_m_per_s2"] / figures["acceleration_max_m_per_s2"]
+    over = figures["command_overshoot_m"]
+    if times < COSTLY_LAG and over < COSTLY_OVERSHOOT * figures["sway_transient_peak_m"]:
+        return []
+    text = f"leading it takes {times:.1f} times the motion's acceleration and overshoots by {_mm(over)}"
+    return [("drive lag", f'{text}; a longer move, or cost.effort = "snap", takes less')]
+
+
 def _move(spec: Spec) -> str:
     units = [axis.unit for axis in spec.machine().actuated]
     distances = ", ".join(
@@ -133,9 +152,8 @@ def _move(spec: Spec) -> str:
         for name, distance, unit in zip(spec.axis, spec.move.distance, units, strict=True)
     )
     uncertain = ", ".join(f"{name} ±{100 * share:g} %" for name, share in spec.robustness.uncertain.items())
-    return f"{spec.plant.type}, {distances} in {spec.move.duration:g} s" + (
-        f", {uncertain}" if uncertain else ""
-    )
+    duration = "the shortest time" if spec.move.shortest else f"{spec.move.duration:g} s"
+    return f"{spec.plant.type}, {distances} in {duration}" + (f", {uncertain}" if uncertain else "")
 
 
 def _peaks(outcome: Design) -> list[tuple[str, str]]:

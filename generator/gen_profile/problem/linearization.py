@@ -7,6 +7,7 @@ from functools import cache
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.plants.plant import Plant
@@ -52,8 +53,16 @@ class Linearization:
     @property
     def distinct_frequencies(self) -> Array:
         """Frequencies without repetition: a spherical pendulum has one, in two directions."""
+        return np.asarray(self.frequencies[self._distinct()])
+
+    @property
+    def distinct_damping_ratios(self) -> Array:
+        """Damping ratios that go with the distinct frequencies."""
+        return np.asarray(self.damping_ratios[self._distinct()])
+
+    def _distinct(self) -> NDArray[np.bool_]:
         apart = np.diff(self.frequencies) > SAME_FREQUENCY * self.frequencies[1:]
-        return np.asarray(self.frequencies[np.concatenate([[True], apart])])
+        return np.concatenate([[True], apart])
 
 
 def linearize(

@@ -1,32 +1,106 @@
-"""A shaper applied to a quintic move, as exact polynomials."""
+"""A shaper applied to a base move, as exact polynomials."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 
+import attrs
 import numpy as np
-from numpy.polynomial import Polynomial
+from numpy.polynomial import polynomial
 
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.profile import Array, Profile
+from gen_profile.shapers.base_moves import QUINTIC, BaseMove
 from gen_profile.shapers.impulses import SHAPERS, Impulses, convolve
 
-# rest to rest from 0 to 1 in unit time, acceleration continuous; and its derivatives over their factorials
-QUINTIC = Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
-TAYLOR = [QUINTIC.deriv(k) / float(np.prod(np.arange(1, k + 1))) for k in range(6)]
 SAME_TIME = 1e-13  # knots closer than this share of the duration are one
-SHORTEST_BASE = 1e-6  # a quintic of a smaller share of the duration would drown in the knots' rounding
+SHORTEST_BASE = 1e-6  # a base move of a smaller share of the duration would drown in the knots' rounding
+LONGEST_BASE = 1e6  # a base move of more than so many times the first one tried is not looked for
+PRECISION = 1e-5  # relative, of the shortest duration
+BLOCK = 1_000_000  # polynomials evaluated at once
 
 
-def shaped_profile(
+@attrs.frozen(kw_only=True, eq=False)
+class ShapedMove:
+    """A move through a shaper, of any duration longer than the shaper's delay.
+
+    Attributes
+    ----------
+    name : str
+        Of the shaper.
+    start, target : (axes,) sequence of float
+        m (or rad).
+    shaper : Impulses
+        For all modes.
+    base : BaseMove
+        Made by every axis at once, each over its own distance.
+    """
+
+    name: str
+    start: Sequence[float]
+    target: Sequence[float]
+    shaper: Impulses
+    base: BaseMove
+
+    def profile(self, duration: float) -> Profile:
+        """Make the motion.
+
+        Parameters
+        ----------
+        duration : float
+            s, the shaper's delay included.
+
+        Raises
+        ------
+        InfeasibleProblem
+            The shaper's delay leaves no time to move in.
+        """
+        delay = self.shaper.delay
+        stretch = duration - delay
+        if stretch < duration * SHORTEST_BASE:
+            raise InfeasibleProblem(
+                f"move.duration: the {self.name} shaper's delay is {delay:.4g} s for this machine, so "
+                f"{duration:g} s leaves no time to move; state more than {delay:.4g} s, "
+                "or choose another method."
+            )
+        knots = _knots(self.shaper, self.base, stretch, duration)
+        first, last = np.asarray(self.start, dtype=np.float64), np.asarray(self.target, dtype=np.float64)
+        coefficients = _shaped(self.shaper, self.base, stretch, knots)[:, :, None] * (last - first)
+        coefficients[:, 0] += first
+        return Profile(knots=knots, coefficients=coefficients, target=last, method=self.name)
+
+    def shortest(self, keeps: Callable[[Profile], bool]) -> float | None:
+        """Find the shortest duration in s at which the motion keeps what it must; None where there is none.
+
+        Peaks of the shaped motion fall with powers of the base move's duration, though not quite evenly where
+        delayed parts overlap: the duration is bisected between one that does and one that does not.
+        """
+        delay = self.shaper.delay
+        short, enough = 0.0, delay
+        while not keeps(self.profile(delay + enough)):
+            short, enough = enough, 2.0 * enough
+            if enough > LONGEST_BASE * delay:
+                return None
+        while enough - short > PRECISION * (delay + enough):
+            middle = (enough + short) / 2.0
+            if keeps(self.profile(delay + middle)):
+                enough = middle
+            else:
+                short = middle
+        return delay + enough
+
+
+def shaped_move(
     name: str,
     *,
     start: Sequence[float],
     target: Sequence[float],
-    duration: float,
     frequencies: Sequence[float] | Array,
-) -> Profile:
-    """Move every axis by a quintic passed through one shaper per mode, within `duration` delay included.
+    damping_ratios: Sequence[float] | Array | None = None,
+    base: BaseMove = QUINTIC,
+) -> ShapedMove:
+    """Pass a base move through one shaper per mode.
 
     Parameters
     ----------
@@ -34,48 +108,49 @@ def shaped_profile(
         One of `SHAPERS`.
     start, target : (axes,) sequence of float
         m (or rad).
-    duration : float
-        s.
     frequencies : (modes,) sequence of float
-        Natural frequencies in rad/s, all positive.
+        Natural frequencies, undamped, in rad/s, all positive.
+    damping_ratios : (modes,) sequence of float, optional
+        0 by default.
+    base : BaseMove
 
     Raises
     ------
     InfeasibleProblem
-        The shaper's delay leaves no time to move in.
+        There is no such shaper for modes damped so much, or for so many.
     """
-    shaper = convolve(SHAPERS[name](float(frequency)) for frequency in frequencies)
-    base_duration = duration - shaper.delay
-    if base_duration < duration * SHORTEST_BASE:
-        raise InfeasibleProblem(
-            f"move.duration: the {name} shaper's delay is {shaper.delay:.4g} s for this machine, so "
-            f"{duration:g} s leaves no time to move; state more than {shaper.delay:.4g} s, "
-            "or choose another method."
-        )
-    knots = _knots(shaper, base_duration, duration)
-    first, last = np.asarray(start, dtype=np.float64), np.asarray(target, dtype=np.float64)
-    coefficients = _shaped_quintic(shaper, base_duration, knots)[:, :, None] * (last - first)
-    coefficients[:, 0] += first
-    return Profile(knots=knots, coefficients=coefficients, target=last, method=name)
+    ratios = np.zeros(len(frequencies)) if damping_ratios is None else damping_ratios
+    make = SHAPERS[name]
+    trains = [make(float(f), float(ratio)) for f, ratio in zip(frequencies, ratios, strict=True)]
+    return ShapedMove(name=name, start=start, target=target, shaper=convolve(trains), base=base)
 
 
-def _knots(shaper: Impulses, base_duration: float, duration: float) -> Array:
-    """List the times where some quintic begins or ends, as one where they differ by rounding only."""
-    times = np.sort(np.concatenate([shaper.times, shaper.times + base_duration]))
+def _knots(shaper: Impulses, base: BaseMove, stretch: float, duration: float) -> Array:
+    """List the times where some polynomial begins or ends, as one where they differ by rounding only."""
+    times = np.sort(np.add.outer(shaper.times, base.knots * stretch).ravel())
     apart = np.diff(times) > duration * SAME_TIME
-    knots: Array = times[np.concatenate([[True], apart])]
+    knots = np.asarray(times[np.concatenate([[True], apart])])
     knots[-1] = duration
     return knots
 
 
-def _shaped_quintic(shaper: Impulses, base_duration: float, knots: Array) -> Array:
-    """Sum of delayed, weighted unit quintics, shape (segments, 6): each shifted to the segment's own time."""
-    begin = (knots[:-1, None] - shaper.times) / base_duration
-    middle = ((knots[:-1] + knots[1:])[:, None] / 2.0 - shaper.times) / base_duration
+def _shaped(shaper: Impulses, base: BaseMove, stretch: float, knots: Array) -> Array:
+    """Sum delayed, weighted base moves, shape (segments, order): each shifted to the segment's own time."""
+    blocks = np.array_split(np.arange(len(knots) - 1), math.ceil(len(knots) * len(shaper.times) / BLOCK))
+    return np.concatenate([_block(shaper, base, stretch, knots[[*block, block[-1] + 1]]) for block in blocks])
+
+
+def _block(shaper: Impulses, base: BaseMove, stretch: float, knots: Array) -> Array:
+    begin = (knots[:-1, None] - shaper.times) / stretch
+    middle = ((knots[:-1] + knots[1:])[:, None] / 2.0 - shaper.times) / stretch
     moving = (middle > 0.0) & (middle < 1.0)
-    coefficients = [
-        np.where(moving, taylor(begin), 0.0) @ shaper.amplitudes / base_duration**k
-        for k, taylor in enumerate(TAYLOR)
-    ]
-    coefficients[0] += (middle >= 1.0) @ shaper.amplitudes
-    return np.stack(coefficients, axis=1)
+    piece = np.clip(np.searchsorted(base.knots, middle, side="right") - 1, 0, len(base.knots) - 2)
+    local = begin - base.knots[piece]
+    rows = np.asarray(base.coefficients.T)
+    taylor = []
+    for k in range(len(rows)):
+        values = polynomial.polyval(local, rows[:, piece], tensor=False)
+        taylor.append(np.where(moving, values, 0.0) @ shaper.amplitudes / stretch**k)
+        rows = np.asarray(polynomial.polyder(rows) / (k + 1.0), dtype=np.float64)
+    taylor[0] += (middle >= 1.0) @ shaper.amplitudes
+    return np.stack(taylor, axis=1)

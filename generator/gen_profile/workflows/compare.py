@@ -2,141 +2,142 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable
 from typing import Any
 
 import attrs
+import numpy as np
 
-from gen_profile.errors import GenProfileError
-from gen_profile.problem.linearization import linearize
-from gen_profile.problem.problem import problem_of
-from gen_profile.profile import Profile
-from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.shapers.shaped_move import shaped_profile
-from gen_profile.solvers import choice
-from gen_profile.solvers.motion import optimal_profile
+from gen_profile.errors import GenProfileError, InfeasibleProblem
+from gen_profile.metrics import peak
 from gen_profile.spec import Spec
-from gen_profile.workflows.planning import Trial, figures, timed, try_motion
-
-SWAY_WEIGHTS = (0.0, 20.0, 50.0)  # the paper's
+from gen_profile.workflows.contenders import Contender, contenders
+from gen_profile.workflows.planning import RESIDUAL_SAMPLES, Trial, figures, try_motion
+from gen_profile.workflows.recommendation import Recommendation, efficient, recommend
 
 Progress = Callable[[str], None]
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Row:
-    """One method.
+    """A method that has a motion for the move.
 
     Attributes
     ----------
     method : str
-    trial : Trial or None
-        None when the method has no motion for this move.
+    trial : Trial
     figures : dict of str to float
-        Empty without a motion.
-    reason : str
-        Why there is no motion.
+    safe : bool
+        Whether every load keeps its limit of residual sway on all machines.
     """
 
     method: str
-    trial: Trial | None
+    trial: Trial
     figures: dict[str, float]
-    reason: str = ""
+    safe: bool
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Comparison:
-    """All rows, and which to take.
+    """All methods, and which to take.
 
     Attributes
     ----------
     spec : Spec
+    base : str
+        Name of the base move that the shapers were fed with.
     rows : tuple of Row
-    recommended : dict of str to (str or None)
+    left_out : dict of str to str
+        Methods without a motion for the move, and why.
+    efficient : frozenset of str
+        Methods on the Pareto front.
+    recommended : dict of str to Recommendation
         ``fastest`` and ``gentlest``.
-    reasons : dict of str to str
     """
 
     spec: Spec
+    base: str
     rows: tuple[Row, ...]
-    recommended: dict[str, str | None]
-    reasons: dict[str, str]
+    left_out: dict[str, str]
+    efficient: frozenset[str]
+    recommended: dict[str, Recommendation]
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
-            "rows": [{"method": row.method, "figures": row.figures} for row in self.rows if row.trial],
-            "left_out": [{"method": row.method, "reason": row.reason} for row in self.rows if not row.trial],
-            "recommended": self.recommended,
-            "reasons": self.reasons,
+            "base": self.base,
+            "rows": [
+                {
+                    "method": row.method,
+                    "figures": row.figures,
+                    "keeps_residual_sway": row.safe,
+                    "pareto": row.method in self.efficient,
+                }
+                for row in self.rows
+            ],
+            "left_out": [{"method": method, "reason": reason} for method, reason in self.left_out.items()],
+            "recommended": {kind: advice.method for kind, advice in self.recommended.items()},
+            "reasons": {kind: advice.reason for kind, advice in self.recommended.items()},
         }
 
 
-def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
-    """Try every shaper and the optimal motion with several weights of sway on the machines of a spec."""
-    spec = timed(spec)
-    rows = []
-    for method, make in _methods(spec):
-        progress(method)
+def compare(spec: Spec, base: str = "quintic", progress: Progress = lambda _: None) -> Comparison:
+    """Try every shaper and variants of the optimal motion on the machines of a spec.
+
+    Parameters
+    ----------
+    spec : Spec
+    base : str
+        What the shapers are fed with, one of `gen_profile.shapers.base_moves.BASES`.
+    progress : callable
+        Told what is being done.
+    """
+    rows: list[Row] = []
+    left_out: dict[str, str] = {}
+    impossible: dict[str, str] = {}
+    for contender in contenders(spec, base):
+        progress(contender.method)
         try:
-            trial = try_motion(spec, make())
-            rows.append(Row(method=method, trial=trial, figures=figures(trial)))
+            if contender.requirements in impossible:
+                left_out[contender.method] = impossible[contender.requirements]
+            else:
+                rows.append(_row(spec, contender))
         except GenProfileError as error:
-            rows.append(Row(method=method, trial=None, figures={}, reason=str(error)))
-    recommended, reasons = _recommend(spec, [row for row in rows if row.trial])
-    return Comparison(spec=spec, rows=tuple(rows), recommended=recommended, reasons=reasons)
-
-
-def _methods(spec: Spec) -> Iterator[tuple[str, Callable[[], Profile]]]:
-    """Name every method, with the function that designs its motion."""
-    for name in SHAPERS:
-        yield name, partial(_shaped, spec, name)
-    for weight in sorted({*SWAY_WEIGHTS, spec.cost.sway_weight}):
-        yield f"optimal-beta{weight:g}", partial(_optimal, spec, weight)
-
-
-def _shaped(spec: Spec, name: str) -> Profile:
-    move = spec.move
-    # where the load would swing on; a shaper knows one frequency per mode, whatever the hoist does on the way
-    linear = linearize(spec.machine(), spec.plant.parameters, move.target)
-    return shaped_profile(
-        name,
-        start=move.start,
-        target=move.target,
-        duration=move.duration,
-        frequencies=linear.distinct_frequencies,
+            left_out[contender.method] = str(error)
+            if contender.requirements and isinstance(error, InfeasibleProblem):
+                impossible[contender.requirements] = str(error)
+    found = {row.method: row.figures for row in rows}
+    return Comparison(
+        spec=spec,
+        base=base,
+        rows=tuple(rows),
+        left_out=left_out,
+        efficient=efficient(found),
+        recommended=recommend(
+            {row.method: row.figures for row in rows if row.safe},
+            limit=_limit_in_words(spec),
+            unit=spec.machine().actuated[0].unit,
+            optimal=[method for method in found if method.startswith("optimal")],
+        ),
     )
 
 
-def _optimal(spec: Spec, sway_weight: float) -> Profile:
-    problem = attrs.evolve(problem_of(spec), sway_weight=sway_weight)
-    return optimal_profile(choice.solve(problem, spec.solver.method))
+def _row(spec: Spec, contender: Contender) -> Row:
+    trial = try_motion(spec, contender.design())
+    duration, limits = trial.motion.duration, np.array(list(spec.check.residual_sway.values()))
+    after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
+    return Row(
+        method=contender.method,
+        trial=trial,
+        figures=figures(trial),
+        safe=all(bool((peak(response.sway) <= limits).all()) for response in after),
+    )
 
 
-def _recommend(spec: Spec, rows: list[Row]) -> tuple[dict[str, str | None], dict[str, str]]:
-    """Choose among the methods whose worst residual sway keeps the limit.
-
-    All rows take the same time, so the fastest is the one that a given drive could shorten most.
-    """
-    limit = list(spec.check.residual_sway.values())[-1]
-    safe = [row for row in rows if row.figures["sway_residual_worst_m"] <= limit]
-    if not safe:
-        reason = f"No method keeps the residual sway below {1e3 * limit:.3g} mm on all machines."
-        return {"fastest": None, "gentlest": None}, {"fastest": reason, "gentlest": reason}
-    fastest = min(safe, key=lambda row: row.figures["acceleration_max_m_per_s2"])
-    acceleration, unit = fastest.figures["acceleration_max_m_per_s2"], spec.machine().actuated[0].unit
-    gentlest = min(safe, key=lambda row: row.figures["sway_transient_peak_m"])
-    return {"fastest": fastest.method, "gentlest": gentlest.method}, {
-        "fastest": (
-            f"Of the methods that keep the residual sway below {1e3 * limit:.3g} mm on all machines, "
-            f"it asks for the least acceleration ({acceleration:.3g} {unit}/s²): "
-            "the same drive could make the move in the shortest time with it."
-        ),
-        "gentlest": (
-            f"Of the same methods, it swings the load least on the way "
-            f"({1e3 * gentlest.figures['sway_transient_peak_m']:.3g} mm)."
-        ),
-    }
+def _limit_in_words(spec: Spec) -> str:
+    limits = spec.check.residual_sway
+    if len(set(limits.values())) == 1:
+        return f"{1e3 * next(iter(limits.values())):.3g} mm"
+    return ", ".join(f"{1e3 * limit:.3g} mm ({load})" for load, limit in limits.items())

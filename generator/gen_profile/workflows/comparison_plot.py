@@ -1,7 +1,8 @@
-"""The comparison as a picture."""
+"""The comparison as a picture: the paper's figures 2 to 5 for all methods, and their worst residuals."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -9,12 +10,21 @@ from typing import Any
 import numpy as np
 
 from gen_profile.errors import OutputError
-from gen_profile.workflows.compare import Comparison
+from gen_profile.problem.linearization import linearize
+from gen_profile.profile import Array, Profile
+from gen_profile.workflows.compare import Comparison, Row
 
 SAMPLES = 1500
 AFTERMATH = 0.5  # of the move's duration, shown after its end
+FREQUENCIES = 600
+BEYOND = 1.6  # of the fastest mode's frequency, where the spectrum ends
+DECADES = 4.0  # of the spectrum that are shown
+HEADROOM = 3.0  # bars of residuals end at so many limits, lest the worst method hide the others
+ORDERS = ("position ({})", "velocity ({}/s)", "acceleration ({}/s²)", "jerk ({}/s³)")
 # suffix → metadata that keeps the clock out of the file
 METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+
+Styles = Mapping[str, Mapping[str, Any]]
 
 
 def require_drawable(path: Path) -> None:
@@ -32,7 +42,7 @@ def require_drawable(path: Path) -> None:
 
 
 def draw(comparison: Comparison, path: Path) -> None:
-    """Draw acceleration and sway of every method over time, nominal and perturbed, and its worst residual.
+    """Draw the motion of the first axis, its spectrum, the end load's sway, and the worst residuals.
 
     Raises
     ------
@@ -44,47 +54,139 @@ def draw(comparison: Comparison, path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot  # noqa: PLC0415
 
-    figure, axes = pyplot.subplots(4, 1, figsize=(9, 11), layout="constrained", height_ratios=[2, 2, 2, 1.3])
+    figure, axes = pyplot.subplots(4, 2, figsize=(15, 16), layout="constrained")
     try:
-        _fill(axes, comparison)
+        styles = _styles(comparison)
+        _reference(axes[:, 0], comparison, styles)
+        _spectrum(axes[0, 1], comparison, styles)
+        _sway(axes[1:3, 1], comparison, styles)
+        _residuals(axes[3, 1], comparison, styles)
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=7)
         figure.suptitle(f"{comparison.spec.name}: {comparison.spec.plant.type}")
         with matplotlib.rc_context({"svg.hashsalt": comparison.spec.name}):  # else ids are random
-            figure.savefig(path, dpi=120, metadata=METADATA[path.suffix.lower()])
+            figure.savefig(path, dpi=110, metadata=METADATA[path.suffix.lower()])
     except OSError as error:
         raise OutputError(f"--plot {path}: cannot write the picture: {error.strerror or error}.") from error
     finally:
         pyplot.close(figure)
 
 
-def _fill(axes: Any, comparison: Comparison) -> None:
-    """Draw into four axes: acceleration, nominal sway, perturbed sway, and worst residuals as bars."""
-    tried = [(row.method, row.trial, row.figures) for row in comparison.rows if row.trial]
-    motion, nominal, perturbed, bars = axes
-    worst = [figures["sway_residual_worst_m"] for _, _, figures in tried]
-    for color, (method, trial, _) in enumerate(tried):
-        duration = trial.motion.duration
-        times = np.linspace(0.0, duration + min(AFTERMATH * duration, trial.watch), SAMPLES)
-        responses = trial.swing.at(times)
-        after = [np.abs(response.sway[times >= duration, -1]).max() for response in responses]
-        motion.plot(times, trial.motion.derivative(times, 2)[:, 0], color=f"C{color}", label=method)
-        nominal.plot(times, 1e3 * responses[0].sway[:, -1], color=f"C{color}")
-        perturbed.plot(times, 1e3 * responses[int(np.argmax(after))].sway[:, -1], color=f"C{color}")
-    limit = 1e3 * list(comparison.spec.check.residual_sway.values())[-1]
-    load = comparison.spec.machine().loads[-1]
-    motion.set(ylabel="acceleration (m/s²)")
-    motion.legend(loc="upper right", fontsize="small")
-    nominal.set(ylabel=f"{load} sway (mm),\nnominal machine")
-    perturbed.set(ylabel=f"{load} sway (mm),\nworst machine", xlabel="time (s)")
-    for axis in (motion, nominal, perturbed):
-        axis.axvline(comparison.spec.move.duration, color="0.7", linewidth=0.8)
-        axis.grid(alpha=0.3)
-        axis.margins(x=0.0)
-    bars.barh(
-        [method for method, _, _ in tried],
-        [1e3 * value for value in worst],
-        color=[f"C{k}" for k in range(len(tried))],
+def _styles(comparison: Comparison) -> Styles:
+    """Draw optimal motions solid, shapers dashed, and those recommended thick."""
+    import matplotlib  # noqa: PLC0415
+
+    optimal = [row.method for row in comparison.rows if row.method.startswith("optimal")]
+    shapers = [row.method for row in comparison.rows if row.method not in optimal]
+    advised = {advice.method for advice in comparison.recommended.values()}
+    styles = {}
+    for kind, dashes, palette in ((optimal, "-", "tab10"), (shapers, "--", "Dark2")):
+        colours = [*matplotlib.color_sequences[palette], "black"]
+        for index, method in enumerate(kind):
+            width = 2.4 if method in advised else 1.2
+            colour = colours[index % len(colours)]
+            styles[method] = {"color": colour, "linestyle": dashes, "linewidth": width}
+    return styles
+
+
+def _times(row: Row) -> Array:
+    duration = row.trial.motion.duration
+    return np.linspace(0.0, duration + min(AFTERMATH * duration, row.trial.watch), SAMPLES)
+
+
+def _reference(axes: Any, comparison: Comparison, styles: Styles) -> None:
+    """Draw position, velocity, acceleration and jerk of the first axis (the paper's figure 2)."""
+    first = comparison.spec.machine().actuated[0]
+    for order, (axis, label) in enumerate(zip(axes, ORDERS, strict=True)):
+        for row in comparison.rows:
+            times = np.linspace(0.0, row.trial.motion.duration, SAMPLES)
+            values = row.trial.motion.derivative(times, order)[:, 0]
+            axis.plot(times, values, label=row.method, **styles[row.method])
+        axis.set(ylabel=f"{first.name} " + label.format(first.unit), xlabel="time (s)")
+        _dress(axis)
+
+
+def _spectrum(axis: Any, comparison: Comparison, styles: Styles) -> None:
+    """Draw the spectrum of the acceleration, and where the machines' natural frequencies lie (figure 3)."""
+    spec, (nominal, *others) = comparison.spec, comparison.rows[0].trial.machines
+    plant, target = spec.machine(), spec.move.target
+    natural = linearize(plant, nominal.parameters, target).distinct_frequencies
+    everywhere = np.array([linearize(plant, m.parameters, target).frequencies for m in (nominal, *others)])
+    frequencies = np.linspace(0.0, BEYOND * everywhere.max(), FREQUENCIES)
+    highest = 0.0
+    for row in comparison.rows:
+        magnitude = spectrum(row.trial.motion, frequencies)
+        highest = max(highest, float(magnitude.max()))
+        axis.semilogy(frequencies, magnitude, **styles[row.method])
+    for low, high in zip(everywhere.min(axis=0), everywhere.max(axis=0), strict=True):
+        axis.axvspan(low, high, color="0.88", zorder=0)
+    for frequency in natural:
+        axis.axvline(frequency, color="0.4", linewidth=0.8, zorder=1)
+    first = plant.actuated[0]
+    axis.set(
+        xlabel="frequency (rad/s); natural ones marked, with their ranges",
+        ylabel=f"spectrum of the acceleration ({first.unit}/s)",
+        ylim=(highest * 10.0**-DECADES, 1.5 * highest),
     )
-    bars.axvline(limit, color="k", linestyle="--", label=f"limit {limit:.3g} mm")
-    bars.invert_yaxis()
-    bars.legend(loc="lower right")
-    bars.set(xlabel=f"worst residual sway of the {load} (mm)")
+    _dress(axis)
+
+
+def spectrum(motion: Profile, frequencies: Array) -> Array:
+    """Find |∫ ÿ exp(−jωt) dt| of the first axis, by a quadrature that is exact to rounding within segments.
+
+    Parameters
+    ----------
+    motion : Profile
+    frequencies : (k,) array
+        rad/s.
+
+    Returns
+    -------
+    (k,) array
+        m/s (or rad/s).
+    """
+    lengths = np.diff(motion.knots)
+    # Gauss points resolve the segment's polynomial, and half an oscillation with three each
+    points = motion.coefficients.shape[1] + 4 + int(3.0 * lengths.max() * frequencies.max() / np.pi)
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    times = (motion.knots[:-1, None] + lengths[:, None] * (nodes + 1.0) / 2.0).ravel()
+    weighted = motion.derivative(times, 2)[:, 0] * np.multiply.outer(lengths / 2.0, weights).ravel()
+    return np.asarray(np.abs(np.exp(-1j * np.multiply.outer(frequencies, times)) @ weighted))
+
+
+def _sway(axes: Any, comparison: Comparison, styles: Styles) -> None:
+    """Draw the end load's sway on the nominal machine and on the worst one (figures 4 and 5)."""
+    load = comparison.spec.machine().loads[-1]
+    for row in comparison.rows:
+        times = _times(row)
+        responses = row.trial.swing.at(times)
+        standing = times >= row.trial.motion.duration
+        worst = max(responses, key=lambda response: np.abs(response.sway[standing, -1]).max())
+        for axis, response in zip(axes, (responses[0], worst), strict=True):
+            axis.plot(times, 1e3 * response.sway[:, -1], **styles[row.method])
+    for axis, machine in zip(axes, ("nominal machine", "each method's worst machine"), strict=True):
+        for duration in {row.trial.motion.duration for row in comparison.rows}:
+            axis.axvline(duration, color="0.7", linewidth=0.8, zorder=0)
+        axis.set(ylabel=f"{load} sway (mm), {machine}", xlabel="time (s)")
+        _dress(axis)
+
+
+def _residuals(axis: Any, comparison: Comparison, styles: Styles) -> None:
+    """Draw worst residuals as bars, beside the limit."""
+    limit = 1e3 * list(comparison.spec.check.residual_sway.values())[-1]
+    methods = [row.method for row in comparison.rows]
+    worst = np.array([1e3 * row.figures["sway_residual_worst_m"] for row in comparison.rows])
+    end = min(1.1 * max(worst.max(), limit), HEADROOM * limit)
+    axis.barh(methods, worst, color=[styles[method]["color"] for method in methods])
+    for place, value in enumerate(worst):
+        axis.text(min(value, 0.88 * end), place, f" {value:.3g}", va="center", fontsize="small")
+    axis.axvline(limit, color="k", linestyle=":", label=f"limit {limit:.3g} mm")
+    axis.invert_yaxis()
+    axis.legend(loc="lower right")
+    load = comparison.spec.machine().loads[-1]
+    axis.set(xlabel=f"worst residual sway of the {load} (mm)", xlim=(0.0, end))
+
+
+def _dress(axis: Any) -> None:
+    axis.grid(alpha=0.3)
+    axis.margins(x=0.0)

@@ -1,0 +1,79 @@
+"""Motions that are fed to shapers: from 0 to 1 within unit time, from rest to rest, as exact polynomials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from importlib.util import find_spec
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import SpecError
+from gen_profile.profile import Array, read_only
+from gen_profile.spec import LimitsSpec
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class BaseMove:
+    """A motion of unit distance in unit time.
+
+    Attributes
+    ----------
+    knots : (segments + 1,) array
+        Rising from 0 to 1.
+    coefficients : (segments, order) array
+        Of the position, lowest power first, every segment in time of its own.
+    """
+
+    knots: Array = attrs.field(converter=read_only)
+    coefficients: Array = attrs.field(converter=read_only)
+
+
+# the lowest polynomials with continuous acceleration, and with continuous jerk
+QUINTIC = BaseMove(knots=[0.0, 1.0], coefficients=[[0.0, 0.0, 0.0, 10.0, -15.0, 6.0]])
+SEPTIC = BaseMove(knots=[0.0, 1.0], coefficients=[[0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0]])
+
+
+def jerk_limited(limits: LimitsSpec, reach: float) -> BaseMove:
+    """Move as fast as limits of velocity, acceleration and jerk permit, in up to seven cubic segments.
+
+    Parameters
+    ----------
+    limits : LimitsSpec
+        Of which the jerk must be stated.
+    reach : float
+        Distance in m (or rad) that the limits are meant for.
+
+    Raises
+    ------
+    SpecError
+        There is no limit of jerk, or Ruckig is not installed.
+    """
+    if limits.jerk is None:
+        raise SpecError(
+            "limits.jerk: a jerk-limited base move needs it; state it, or take another base move."
+        )
+    if find_spec("ruckig") is None:
+        raise SpecError("A jerk-limited base move needs Ruckig: pip install 'gen-profile[ruckig]'.")
+    from ruckig import InputParameter, Ruckig, Trajectory  # noqa: PLC0415  # an extra
+
+    demand, trajectory = InputParameter(1), Trajectory(1)
+    demand.target_position = [1.0]
+    demand.max_velocity = [(limits.velocity or math.inf) / reach]
+    demand.max_acceleration = [(limits.acceleration or math.inf) / reach]
+    demand.max_jerk = [limits.jerk / reach]
+    Ruckig(1).calculate(demand, trajectory)
+    found = trajectory.profiles[0][0]
+    kept = np.array(found.t) > 0.0
+    taylor = np.stack([found.p[:-1], found.v[:-1], np.array(found.a[:-1]) / 2.0, np.array(found.j) / 6.0])
+    duration = trajectory.duration
+    ends = np.cumsum(np.array(found.t)[kept]) / duration
+    return BaseMove(knots=[0.0, *ends[:-1], 1.0], coefficients=taylor[:, kept].T * duration ** np.arange(4.0))
+
+
+BASES: dict[str, Callable[[LimitsSpec, float], BaseMove]] = {
+    "quintic": lambda _limits, _reach: QUINTIC,
+    "septic": lambda _limits, _reach: SEPTIC,
+    "jerk-limited": jerk_limited,
+}

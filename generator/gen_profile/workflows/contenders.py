@@ -1,0 +1,177 @@
+"""Who takes part in a comparison: every shaper, and variants of the optimal motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, partial
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import GenProfileError, InfeasibleProblem
+from gen_profile.metrics import greatest, length, peak
+from gen_profile.problem.actuator import lag_compensated
+from gen_profile.problem.limits import Breach, breaches
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.problem import problem_of
+from gen_profile.profile import Profile, grid_length, grid_times
+from gen_profile.response import Swing
+from gen_profile.shapers.base_moves import BASES
+from gen_profile.shapers.impulses import SHAPERS
+from gen_profile.shapers.shaped_move import ShapedMove, shaped_move
+from gen_profile.solvers import choice, direct, worst_case
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.spec import Spec
+from gen_profile.workflows.planning import TRANSIENT_SAMPLES, timed
+
+SWAY_WEIGHTS = (0.0, 20.0, 50.0)  # the paper's
+# what a robustness method is called, and its keys in the spec
+ROBUST: dict[str, Mapping[str, Any]] = {
+    "order1": {"method": "sensitivity", "order": 1},
+    "order2": {"method": "sensitivity", "order": 2},
+    "range": {"method": "range"},
+}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Contender:
+    """A method that takes part.
+
+    Attributes
+    ----------
+    method : str
+    design : () → Profile
+        Raises a `GenProfileError` where the method has no motion for the move.
+    requirements : str
+        Contenders of the same requirements have a motion all or none; empty where that says nothing.
+    """
+
+    method: str
+    design: Callable[[], Profile]
+    requirements: str = ""
+
+
+def contenders(spec: Spec, base: str) -> Iterator[Contender]:
+    """List shapers fed with a base move by its name, then optimal motions.
+
+    Parameters
+    ----------
+    spec : Spec
+        Each method takes the spec's duration, or its own shortest one where the spec asks for that.
+    base : str
+        One of `gen_profile.shapers.base_moves.BASES`.
+    """
+    for name in SHAPERS:
+        yield Contender(method=name, design=partial(_shaped, spec, name, base))
+    own = cache(partial(_attempt, spec))
+    weight, stated = spec.cost.sway_weight, spec.cost.sway_scale is not None
+    for other in sorted({*SWAY_WEIGHTS, weight}):
+        # β means the same as in the paper only together with a γ
+        name = "optimal" if other == weight and not stated else f"optimal-beta{other:g}"
+        design = partial(_result, own) if other == weight else partial(_optimal, _weighing(spec, other))
+        yield Contender(method=name, design=design, requirements="the spec's own")
+    for kind, keys in ROBUST.items():
+        robustness = attrs.evolve(spec.robustness, **keys)
+        if robustness != spec.robustness and robustness.uncertain:
+            variant = attrs.evolve(_weighing(spec, 0.0), robustness=robustness)
+            yield Contender(method=f"optimal-{kind}", design=partial(_optimal_within, variant, own))
+
+
+def _shaped(spec: Spec, name: str, base: str) -> Profile:
+    """Design a shaped motion that keeps the limits.
+
+    Raises
+    ------
+    InfeasibleProblem
+        It would take longer than the spec allows.
+    """
+    move, reach = spec.move, max(map(abs, spec.move.distance))
+    # where the load would swing on; a shaper knows one frequency per mode, whatever the hoist does on the way
+    linear = linearize(spec.machine(), spec.plant.parameters, move.target)
+    shaped = shaped_move(
+        name,
+        start=move.start,
+        target=move.target,
+        frequencies=linear.distinct_frequencies,
+        damping_ratios=linear.distinct_damping_ratios,
+        base=BASES[base](spec.limits, reach),
+    )
+    if move.shortest:
+        return _shortest(spec, shaped)
+    motion = shaped.profile(move.duration)
+    broken = _breaches(spec, motion)
+    if broken:
+        shortest = shaped.shortest(lambda trial: not _breaches(spec, trial))
+        cure = "" if shortest is None else f" With this shaper the move takes at least {shortest:.4g} s."
+        raise InfeasibleProblem(" ".join(breach.sentence() for breach in broken) + cure)
+    return motion
+
+
+def _shortest(spec: Spec, shaped: ShapedMove) -> Profile:
+    """Make a shaped motion as short as the limits permit; it ends on a cycle of the controller."""
+    shortest = shaped.shortest(lambda trial: not _breaches(spec, trial))
+    if shortest is None:
+        raise InfeasibleProblem("move.duration: no duration keeps the limits; widen them.")
+    cycle = spec.export.cycle_time
+    count = grid_length(shortest, cycle)
+    while _breaches(spec, motion := shaped.profile(float(grid_times(count, cycle)[-1]))):
+        count += 1
+    return motion
+
+
+def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
+    """Find the limits that a motion breaks; the sway's last, for it must be integrated."""
+    command = lag_compensated(motion, spec.actuator.tau)
+    broken = breaches(attrs.evolve(spec.limits, sway=None), command, 0.0)
+    if broken or spec.limits.sway is None:
+        return broken
+    plant = spec.machine()
+    swing = Swing(plant, motion, [spec.plant.parameters], motion.duration)
+    (nominal,) = swing.at(np.linspace(0.0, motion.duration, TRANSIENT_SAMPLES))
+    return breaches(spec.limits, command, float(peak(length(nominal.sway[:, plant.end_load]))[0]))
+
+
+def _optimal(spec: Spec) -> Profile:
+    spec = timed(spec)
+    return optimal_profile(choice.solve(problem_of(spec), spec.solver.method))
+
+
+def _optimal_within(spec: Spec, own: Callable[[], Profile | GenProfileError]) -> Profile:
+    """Design an optimal motion at no more acceleration than the spec's own design takes.
+
+    Nothing else would keep the least residual of the worst machine from taking any acceleration.
+    """
+    motion = own()
+    if spec.move.shortest or isinstance(motion, GenProfileError):
+        return _optimal(spec)
+    command = lag_compensated(motion, spec.actuator.tau)
+    taken = max(greatest(command, 2, axis) for axis in range(command.axes))
+    problem = problem_of(attrs.evolve(spec, limits=attrs.evolve(spec.limits, acceleration=taken)))
+    solution = direct.solve(problem) if problem.worst_case is None else worst_case.solve(problem)
+    if solution.optimum is None:
+        unit = spec.machine().actuated[0].unit
+        raise InfeasibleProblem(
+            f"With no more acceleration than the spec's own design takes ({taken:.3g} {unit}/s²) "
+            f"there is no such motion in {spec.move.duration:g} s."
+        )
+    return optimal_profile(solution)
+
+
+def _weighing(spec: Spec, sway_weight: float) -> Spec:
+    return attrs.evolve(spec, cost=attrs.evolve(spec.cost, sway_weight=sway_weight))
+
+
+def _attempt(spec: Spec) -> Profile | GenProfileError:
+    """Design the spec's own motion, or say why there is none: it is asked for more than once."""
+    try:
+        return _optimal(spec)
+    except GenProfileError as error:
+        return error
+
+
+def _result(attempt: Callable[[], Profile | GenProfileError]) -> Profile:
+    outcome = attempt()
+    if isinstance(outcome, GenProfileError):
+        raise outcome
+    return outcome
