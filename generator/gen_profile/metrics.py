@@ -16,6 +16,13 @@ def greatest(profile: Profile, order: int, axis: int = 0) -> float:
     return float(np.abs(values[:, axis]).max())
 
 
+def overshoot(profile: Profile) -> float:
+    """Find how far the first axis leaves the way between its start and its target."""
+    _, values = profile.within_segments(POINTS_PER_SEGMENT, 0)
+    ends = (profile.start[0], profile.target[0])
+    return float(max(values[:, 0].max() - max(ends), min(ends) - values[:, 0].min(), 0.0))
+
+
 def root_mean_square(profile: Profile, order: int) -> float:
     """Root mean square of the first axis' derivative over the move, by a quadrature that is exact for it."""
     size = profile.coefficients.shape[1]

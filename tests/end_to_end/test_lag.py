@@ -56,3 +56,12 @@ def test_an_ideal_command_does_not_arrive_in_time_with_a_lagging_drive(both):
     outcome = run_here("check", both[0], "--preset", "paper", *LAGGING, "--json")
     assert outcome.document["artefact"]["manifest"] == "none"
     assert outcome.document["check"]["arrival_s"] == pytest.approx(4.0)
+
+
+def test_a_costly_lead_is_warned_of(tmp_path):
+    """The paper's β = 50 and τ = 0.1 s: 2.59 m/s² for 0.70, and 3.15 mm beyond the target."""
+    costly = run_here(*LAGGING, "--no-check", "--out", tmp_path)
+    assert "3.7 times the motion's acceleration and overshoots by 3.15" in costly.out
+    cheap = run_here(*LAGGING[:3], "actuator.tau=0.01", "--no-check", "--out", tmp_path)
+    assert "peak command" in cheap.out
+    assert "drive lag" not in cheap.out

@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_profile.check import Scenario
 from gen_profile.errors import InfeasibleProblem
-from gen_profile.metrics import greatest, length, mean_square_root, peak, root_mean_square
+from gen_profile.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import require_limits
@@ -153,6 +153,7 @@ def figures(trial: Trial) -> dict[str, float]:
             f"command_{name}_max_{unit}": greatest(command, order)
             for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1)
         }
+        table["command_overshoot_m"] = overshoot(command)
     return table
 
 
