@@ -68,7 +68,7 @@ def sources(model: Model, version: Version) -> Sources:
     code = {
         **model.code,
         **{name: (FOLDER / name).read_text(encoding="utf-8") for name in (*_COMMON, *version.own_files)},
-        **_standard_headers(version),
+        **standard_headers(version),
     }
     identity = digest(_describe(model, version, ""), *flat(code))[:32]
     return Sources(
@@ -86,8 +86,8 @@ def _describe(model: Model, version: Version, identity: str) -> bytes:
     return fmi3_description.model_description(model, identity)
 
 
-def _standard_headers(version: Version) -> dict[str, str]:
-    """Read FMI's own headers, which FMPy brings along."""
+def standard_headers(version: Version) -> dict[str, str]:
+    """Read FMI's own headers by name; FMPy brings them along."""
     folder = Path(fmpy.__file__).parent / "c-code"
     return {name: (folder / name).read_text(encoding="utf-8") for name in version.headers}
 
