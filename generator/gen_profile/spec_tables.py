@@ -52,7 +52,7 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     uncertain = list(tables["robustness"]["uncertain"])
     foreign = foreign_fmu(tables["check"], plant, uncertain, folder, faults)
     tables["check"] = {**_check(tables["check"], tables["move"], plant, faults), "foreign": foreign}
-    _limits(tables["limits"], tables["move"], faults)
+    tables["limits"] = _limits(tables["limits"], tables["move"], plant, faults)
     tables["axis"] = _axis(tables["axis"], plant, faults)
     _check_columns(tables["export"].get("csv_columns"), faults)
     tables["can"] = _can(tables["can"], plant, faults)
@@ -214,16 +214,35 @@ def _robustness(table: Table, parameters: Mapping[str, float] | None, faults: Fa
     return {"method": "sensitivity" if uncertain else "none", **table, "uncertain": ordered}
 
 
-def _limits(table: Table, move: Table, faults: Faults) -> None:
-    """Hold limits against the move."""
-    if move["shortest"] and not {"velocity", "acceleration", "jerk"} & table.keys():
+def _limits(table: Table, move: Table, plant: Plant | None, faults: Faults) -> Table:
+    """Give every axis its table where one has limits of its own, and hold limits against the move."""
+    own = table.get("axis", {})
+    if not isinstance(own, Mapping):
+        faults.add("limits.axis", f"must be a table by axis, found {found(own)}")
+        own = {}
+    names = [axis.name for axis in plant.actuated] if plant else list(own)
+    for key, value in own.items():
+        if key not in names:
+            faults.add(place("limits.axis", key), f"unknown axis{suggestion(key, names)}")
+        elif not isinstance(value, Mapping):
+            faults.add(place("limits.axis", key), f"must be a table, found {found(value)}")
+    axes = {name: value if isinstance(value := own.get(name, {}), Mapping) else {} for name in names}
+    stated = {*table, *(key for limits in axes.values() for key in limits)}
+    if move["shortest"] and stated.isdisjoint({"velocity", "acceleration", "jerk"}):
         faults.add("move.duration", '"minimum" needs a limit: state limits.acceleration, or velocity or jerk')
-    travel = table.get("travel")
-    if isinstance(travel, list) and len(travel) == 2 and None not in (edges := [finite(e) for e in travel]):
-        low, high = edges
-        for key in ("start", "target"):
-            if not all(low <= position <= high for position in move[key]):
-                faults.add("limits.travel", f"must contain the move's {key}, found {travel}")
+    for column, name in enumerate(names if plant else ()):
+        where = f"limits.axis.{name}.travel" if "travel" in axes[name] else "limits.travel"
+        travel = axes[name].get("travel", table.get("travel"))
+        if (
+            isinstance(travel, list)
+            and len(travel) == 2
+            and None not in (edges := [finite(e) for e in travel])
+        ):
+            low, high = edges
+            for key in ("start", "target"):
+                if not low <= move[key][column] <= high:
+                    faults.add(where, f"must contain the move's {key}, found {travel}")
+    return {**table, "axis": axes if own else {}}
 
 
 def _check(table: Table, move: Table, plant: Plant | None, faults: Faults) -> Table:

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from gen_profile.errors import SpecError
-from gen_profile.metrics import length
+from gen_profile.metrics import greatest, length
 from gen_profile.problem.axis_reach import axis_reach, effort_weights
+from gen_profile.problem.limits import breaches
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import indirect
-from gen_profile.spec_reading import parse_spec, preset_spec
+from gen_profile.solvers import choice, indirect
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.spec_reading import parse_spec, preset_spec, spec_from_dict
 
 
 def fault_of(preset, *overrides):
@@ -123,6 +125,68 @@ def test_a_hoist_that_is_not_asked_to_move_hardly_does():
     optimum = indirect.solve(problem_of(preset_spec("single-pendulum-crane", overrides))).raise_for_status()
     hoist = optimum.states[:, 3]
     assert np.abs(hoist - 1.0).max() < 0.01
+
+
+# ── limits of single axes ────────────────────────────────────────────────────────────────────────────────
+
+
+HOISTING = ["cost.sway_weight=0", "limits.velocity=1.3", "limits.axis.hoist.velocity=0.45"]
+
+
+@pytest.mark.parametrize(
+    ("override", "sentence"),
+    [
+        ("limits.axis=3", "limits.axis: must be a table by axis, found 3."),
+        ("limits.axis.hoist=3", "limits.axis.hoist: must be a table, found 3."),
+        ("limits.axis.hook={}", "limits.axis.hook: unknown axis (known: cart, hoist)."),
+        (
+            "limits.axis.hoist.velocity=0",
+            "limits.axis.hoist.velocity: must be greater than 0, found 0.0.",
+        ),
+        (
+            "limits.axis.hoist.travel=[0.0, 5.0]",
+            "limits.axis.hoist.travel: must contain the move's start, found [0.0, 5.0].",
+        ),
+        ("limits.travel=[0.0, 8.0]", "limits.travel: must contain the move's target, found [0.0, 8.0]."),
+    ],
+)
+def test_faults_of_limits_by_axis(override, sentence):
+    assert fault_of("single-pendulum-crane", override) == sentence
+
+
+def test_an_axis_may_have_limits_of_its_own():
+    limits = preset_spec("single-pendulum-crane", [*HOISTING, "limits.acceleration=0.5"]).limits
+    cart, hoist = limits.of(0), limits.of(1)
+    assert (cart.velocity, cart.acceleration) == (1.3, 0.5)
+    assert (hoist.velocity, hoist.acceleration) == (0.45, 0.5)
+    assert limits.without("velocity").of(1).velocity is None
+    assert limits.without("sway") == limits
+    again = preset_spec("single-pendulum-crane", [*HOISTING, "limits.acceleration=0.5"])
+    assert spec_from_dict(again.to_dict()) == again
+
+
+def test_every_axis_keeps_its_own_limits():
+    spec = preset_spec("single-pendulum-crane", HOISTING)
+    profile = optimal_profile(choice.solve(problem_of(spec)))
+    assert 0.999 * 1.3 < greatest(profile, 1, 0) <= 1.3 + 1e-9
+    assert 0.999 * 0.45 < greatest(profile, 1, 1) <= 0.45 + 1e-9
+    assert breaches(spec.limits, profile, 0.0) == ()
+
+
+def test_what_an_axis_breaks_is_named():
+    spec = preset_spec("single-pendulum-crane", [*HOISTING, "limits.axis.hoist.travel=[1.0, 7.0]"])
+    free = optimal_profile(indirect.solve(problem_of(spec)))
+    broken = {breach.limit: breach for breach in breaches(spec.limits, free, 0.0)}
+    assert broken.keys() == {"velocity", "axis.hoist.velocity"}
+    assert broken["axis.hoist.velocity"].sentence().startswith("limits.axis.hoist.velocity: 0.45 is allowed")
+
+
+def test_the_shortest_move_waits_for_the_slowest_axis():
+    """6 m of hoisting at 0.3 m/s take 20 s, whatever the cart could do."""
+    limits = ["limits.acceleration=0.5", "limits.axis.hoist.velocity=0.3"]
+    spec = preset_spec("single-pendulum-crane", ["cost.sway_weight=0", "move.duration=minimum", *limits])
+    shortest = choice.minimum_time(problem_of(spec))
+    assert 20.0 < shortest < 22.0
 
 
 # ── loads that swing in two directions ───────────────────────────────────────────────────────────────────

@@ -73,17 +73,24 @@ def require_limits(limits: LimitsSpec, command: Profile, transient_sway: float) 
 
 def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Breach]:
     """List what the motion needs of every limit there is."""
-    for order, (name, allowed) in enumerate(
-        [("velocity", limits.velocity), ("acceleration", limits.acceleration), ("jerk", limits.jerk)], start=1
-    ):
-        if allowed is not None:
-            _, values = command.within_segments(POINTS_PER_SEGMENT, order)
-            yield Breach(limit=name, found=float(np.abs(values).max()), allowed=allowed, power=order)
+    for column in range(command.axes):
+        (axis, own), allowed_here = limits.own(column), limits.of(column)
+        places = {
+            name: name if getattr(own, name) is None else f"axis.{axis}.{name}"
+            for name in ("velocity", "acceleration", "jerk", "travel")
+        }
+        for order, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
+            allowed = getattr(allowed_here, name)
+            if allowed is not None:
+                _, values = command.within_segments(POINTS_PER_SEGMENT, order)
+                found = float(np.abs(values[:, column]).max())
+                yield Breach(limit=places[name], found=found, allowed=allowed, power=order)
+        if allowed_here.travel is not None:
+            low, high = allowed_here.travel
+            _, values = command.within_segments(POINTS_PER_SEGMENT, 0)
+            rounding = 1e-12 * max(abs(low), abs(high))
+            top, bottom = float(values[:, column].max()), float(values[:, column].min())
+            yield Breach(limit=places["travel"], found=top - rounding, allowed=high, power=0)
+            yield Breach(limit=places["travel"], found=-bottom - rounding, allowed=-low, power=0)
     if limits.sway is not None:
         yield Breach(limit="sway", found=sway, allowed=limits.sway, power=2)
-    if limits.travel is not None:
-        low, high = limits.travel
-        _, values = command.within_segments(POINTS_PER_SEGMENT, 0)
-        rounding = 1e-12 * max(abs(low), abs(high))
-        yield Breach(limit="travel", found=float(values.max()) - rounding, allowed=high, power=0)
-        yield Breach(limit="travel", found=-float(values.min()) - rounding, allowed=-low, power=0)

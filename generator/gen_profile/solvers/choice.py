@@ -69,9 +69,10 @@ def _explained(solution: Solution) -> Solution:
     shortest = shortest_duration(problem, direct.solve) if problem.limits.sway is None else None
     if shortest is not None:
         cures.append(f"With these limits it takes at least {_up(COMFORT * shortest)} s (move.duration)")
-    for name in (field.name for field in attrs.fields(LimitsSpec)):
-        if getattr(problem.limits, name) is not None:
-            without = attrs.evolve(problem, limits=attrs.evolve(problem.limits, **{name: None}))
+    for name in ("velocity", "acceleration", "jerk", "sway", "travel"):
+        loosened = problem.limits.without(name)
+        if loosened != problem.limits:
+            without = attrs.evolve(problem, limits=loosened)
             if direct.solve(without).optimum is not None:
                 cures.append(f"without limits.{name} it would do in {problem.duration:g} s")
     return attrs.evolve(solution, cure="; ".join(cures) + "." if cures else solution.cure)

@@ -176,7 +176,8 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
         )
         for index, values in enumerate(parameters)
     ]
-    commands_jerk = problem.tau is not None and problem.limits.jerk is not None
+    jerks = [problem.limits.of(axis).jerk for axis in range(layout.m)]
+    commands_jerk = problem.tau is not None and any(jerk is not None for jerk in jerks)
     intervals = _intervals(problem)
     piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=1.0 / intervals)
     reach = axis_reach(problem)

@@ -87,10 +87,11 @@ def cost(
 
 def keep_limits(program: ConicProgram, problem: Problem, transcription: Transcription) -> None:
     """Bound the command of every axis, and its travel, at every instant."""
-    limits, duration = problem.limits, problem.duration
+    duration = problem.duration
     lag = (problem.tau or 0.0) / duration
-    bounds = {1: limits.velocity, 2: limits.acceleration, 3: limits.jerk}
     for axis, reach in enumerate(axis_reach(problem)):
+        limits = problem.limits.of(axis)
+        bounds = {1: limits.velocity, 2: limits.acceleration, 3: limits.jerk}
         for order, limit in bounds.items():
             if limit is not None:
                 most = WITHIN * limit * duration**order / reach
