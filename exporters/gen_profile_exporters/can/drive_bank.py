@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import attrs
@@ -49,9 +51,9 @@ class DriveBank:
         self._counts_per_si = tuple(counts_per_si)
         self._network = _Network(bus, clock)
         self._synced = clock.now()
-        self._network.subscribe(frames.NMT, self._obey_reset)
         for drive in self.drives:
             self._network.add_node(drive.local)
+        self._network.subscribe(frames.NMT, self._obey_reset)  # after canopen's own
         for drive in self.drives:
             drive.boot()
 
@@ -110,7 +112,8 @@ class DriveBank:
         for drive in self.drives:
             drive.receive(message.arbitration_id, bytes(data), self._clock.now())
         if (message.arbitration_id == frames.NMT and len(data) == 2) or self._is_request(message):
-            self._network.notify(message.arbitration_id, data, message.timestamp)
+            with suppress(struct.error):  # canopen cannot refuse a request that goes on with none
+                self._network.notify(message.arbitration_id, data, message.timestamp)
 
     def _is_request(self, message: can.Message) -> bool:
         nodes = {drive.node for drive in self.drives}

@@ -10,6 +10,7 @@ from exporters.can.bench import QUICK_STOP, Bench
 from motions import quintic
 
 from gen_profile_exporters.can.candump import read
+from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.drive_dictionary import Make
 from gen_profile_exporters.can.exporter import encode
 from gen_profile_exporters.can.load import RigidLoad
@@ -231,3 +232,88 @@ def assert_stands(bench, since):
     at_rest = {position for at, position in bench.positions() if at > since + 300}
     assert len(at_rest) <= 1
     assert abs(bench.drive.actual - 400_000) > 50_000
+
+
+class TestLateness:
+    def late(self, cycle, milliseconds):
+        """Have this machine busy for a while, just before a cycle is due."""
+        bench = Bench()
+        sleep_until, done = bench.clock.sleep_until, []
+
+        def oversleep(instant):
+            sleep_until(instant)
+            if bench.streamer.cycles_sent == cycle and not done and instant == bench.streamer._due:
+                done.append(True)
+                bench.clock.stall(int(milliseconds * 1e6))
+
+        bench.clock.sleep_until = oversleep
+        with bench:
+            return bench, bench.run()
+
+    def test_a_little_late_is_sent_and_told(self):
+        _, record = self.late(125, 1.5)
+        assert (record.phase, record.sent) == (Phase.DONE, 251)
+        assert record.lateness.percentile(100) == pytest.approx(1500)
+        assert record.lateness.histogram()["< 2000"] == 1
+
+    def test_one_setpoint_may_be_left_out_where_it_makes_no_great_step(self):
+        bench, record = self.late(20, 3)
+        assert (record.phase, record.sent) == (Phase.DONE, 250)
+        left_out = bench.plan.cycles[20][0].data
+        assert bytes(left_out) not in {frame.data for frame in bench.of(0x301)}
+        assert min(np.diff([frame.at for frame in bench.of(0x080)])) >= PERIOD - 0.3
+
+    @pytest.mark.parametrize(("cycle", "milliseconds"), [(125, 3), (20, 7)])
+    def test_a_great_step_is_an_abort(self, cycle, milliseconds):
+        bench, record = self.late(cycle, milliseconds)
+        assert record.phase is Phase.ABORTED
+        assert f"late at cycle {cycle}" in record.reason
+        assert_quick_stop_is_last(bench)
+
+    def test_a_frozen_streamer(self):
+        bench, record = self.late(125, 500)
+        assert record.phase is Phase.ABORTED
+        assert_quick_stop_is_last(bench)
+
+
+def assert_quick_stop_is_last(bench):
+    stops = [frame.at for frame in bench.of(0x201) if frame.data == QUICK_STOP]
+    assert max(frame.at for frame in bench.of(0x301)) <= stops[0]
+
+
+def test_a_drive_that_does_not_switch_on():
+    with Bench() as bench:
+        tamper_feedback(lambda word: 0x0250)(bench)
+        record = bench.run()
+    assert re.search(
+        r"do not reach 'ready to switch on' within 5 s \(cart: switch on disabled\)", record.reason
+    )
+    assert len(bench.of(0x301)) > 1000
+    assert_quick_stop_is_last(bench)
+
+
+@pytest.mark.parametrize(
+    "make", [Make(), Make(miss="hold"), Make(miss="stop")], ids=["extrapolate", "hold", "stop"]
+)
+def test_a_killed_streamers_drive_stops_by_itself(make):
+    """The streamer is gone between two frames; whatever the drive's make, it stops within the time-out."""
+
+    class Killed(BaseException):
+        pass
+
+    def die(message):
+        if bench.streamer.cycles_sent >= 120:
+            bench.fault_at = bench.fault_at or bench.now
+            raise Killed
+        return True
+
+    with Bench(make=make) as bench:
+        bench.streamer_end.sending = die
+        with pytest.raises(Killed):
+            bench.run()
+        bench.wait(300)
+        emergencies = bench.of(0x081)
+    assert bench.drive.state in {State.SWITCH_ON_DISABLED, State.FAULT}
+    assert abs(bench.drive.actual - 400_000) > 50_000
+    if make.miss != "stop":  # which needs no time-out
+        assert emergencies[0].at <= bench.fault_at + 20 + 1

@@ -1,0 +1,168 @@
+"""Drives that are not fit to be moved: nothing is commanded, and a sentence says why."""
+
+import re
+
+import pytest
+from exporters.can.bench import Bench
+from motions import quintic, target
+
+from gen_profile.errors import ExportError
+from gen_profile_exporters.can.cia402 import State
+from gen_profile_exporters.can.drive_dictionary import Make
+from gen_profile_exporters.can.exporter import encode
+from gen_profile_exporters.can.plan import plan_of
+from gen_profile_exporters.can.streamer import Phase
+
+
+def refused(bench, reason):
+    record = bench.run()
+    assert record.phase is Phase.ABORTED
+    assert re.search(reason, record.reason), record.reason
+    assert not bench.of(0x201)
+    assert not bench.of(0x301)
+    assert bench.drive.actual == bench.drive.command
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (
+            {"stand": [110_000]},
+            r"stands at 0\.11, and the motion starts at 0\.1 \(10000 counts apart, 1000 allowed",
+        ),
+        (
+            {"make": Make(following_error=0xFFFF_FFFF)},
+            r"does not watch its following error \(6065h is FFFFFFFFh",
+        ),
+        ({"make": Make(following_error=0)}, r"does not watch its following error"),
+        (
+            {"vendor": 1},
+            r"node 1 is another drive: its vendor is 000002E5h, and can\.vendor asks for 00000001h",
+        ),
+        ({"product": 1}, r"another drive: its product"),
+        ({"make": Make(modes=1)}, r"does not know the mode csp \(6502h\)"),
+        (
+            {"make": Make(fixed_period=(2, -3))},
+            r"60C2h:01 \(interpolation period: digits\) must hold 4h, .* keeps 2h",
+        ),
+    ],
+    ids=["position", "monitoring off", "monitoring none", "vendor", "product", "mode", "fixed period"],
+)
+def test_unfit_drives(options, reason):
+    with Bench(**options) as bench:
+        refused(bench, reason)
+
+
+def test_a_window_that_is_off_can_be_stated():
+    with Bench(make=Make(following_error=0xFFFF_FFFF), following_error=0.01) as bench:
+        assert bench.run().phase is Phase.DONE
+        assert bench.drive.value(0x6065) == 10_000
+
+
+def test_a_device_of_another_kind():
+    with Bench() as bench:
+        bench.drive.store(0x1000, 0, 0x0002_0191)
+        refused(bench, r"node 1 is no CiA 402 drive \(1000h is 00020191h\)")
+
+
+@pytest.mark.parametrize("state", [State.FAULT, State.ENABLED])
+def test_a_drive_in_another_state(state):
+    with Bench() as bench:
+        bench.drive.store(0x6041, 0, state.bits)
+        refused(bench, f"in the state '{state.words}'")
+
+
+@pytest.mark.parametrize(
+    ("ends", "fits"), [((0, 350_000), False), ((100_000, 400_000), True), ((5, -5), True)]
+)
+def test_the_drives_own_travel(ends, fits):
+    with Bench() as bench:
+        for sub, end in enumerate(ends, start=1):
+            bench.drive.store(0x607D, sub, end)
+        if fits:
+            assert bench.run().phase is Phase.DONE
+        else:
+            refused(bench, r"from 100000 to 400000 counts leaves the drive's travel of 0 to 350000 counts")
+
+
+def drop(bench, index):
+    del bench.drive.local.object_dictionary[index]
+
+
+def test_a_missing_object_that_safety_needs():
+    with Bench() as bench:
+        drop(bench, 0x6007)
+        refused(
+            bench, r"6007h:00 \(connection lost: quick stop\) must hold 3h, but the drive keeps nothing there"
+        )
+
+
+def test_a_missing_identity():
+    with Bench(vendor=0x2E5) as bench:
+        drop(bench, 0x1018)
+        refused(bench, r"has no object 1018h:01")
+
+
+def test_an_object_that_drives_need_not_have():
+    with Bench() as bench:
+        drop(bench, 0x1006)
+        assert bench.run().phase is Phase.DONE
+
+
+def test_an_object_that_may_not_be_read():
+    with Bench() as bench:
+        bench.drive.local.object_dictionary[0x6502].access_type = "wo"
+        refused(bench, r"refuses to tell 6502h:00")
+
+
+def test_a_mode_that_is_not_taken():
+    with Bench() as bench:
+        written = bench.drive._written
+        bench.drive.local._write_callbacks.remove(written)
+        bench.drive.local.add_write_callback(lambda **of: of["index"] != 0x6060 and written(**of))
+        refused(bench, r"shows mode 0 \(6061h\) instead of 8")
+
+
+@pytest.mark.parametrize("after", [0, 6])
+def test_a_silent_drive(after):
+    with Bench() as bench:
+        answers = bench.drive_end
+
+        def silent(message):
+            answers.left -= message.arbitration_id == 0x581
+            return message.arbitration_id != 0x581 or answers.left >= 0
+
+        answers.left, answers.sending = after, silent
+        refused(bench, r"node 1 does not answer properly")
+
+
+def test_a_drive_that_falls_silent_while_it_is_set_up():
+    with Bench() as bench:
+        written = []
+        bench.drive_end.sending = lambda message: (
+            message.data[:1] != b"\x60" or written.append(1) or len(written) < 9
+        )
+        refused(bench, r"does not answer properly")
+
+
+@pytest.mark.parametrize(
+    ("cob_id", "data", "reason"),
+    [
+        (0x080, b"", "second controller"),
+        (0x081, b"\x30\x81" + bytes(6), "emergency 8130h"),
+        (0x601, bytes(8), "second"),
+    ],
+)
+def test_others_are_heard_before_anything_is_sent(cob_id, data, reason):
+    with Bench() as bench:
+        bench.say(cob_id, data)
+        refused(bench, reason)
+    assert not bench.of(0x601) or cob_id == 0x601
+
+
+def test_another_cycle_than_the_logs():
+    log = encode(quintic((0.1, 0.4)), target())[0].content
+    with pytest.raises(
+        ExportError, match=r"can\.sync_period: the log's cycle is 0\.004 s and the spec's 0\.002 s"
+    ):
+        plan_of(log, target(sync_period=0.002, bitrate=1_000_000))

@@ -1,0 +1,190 @@
+"""The simulated drive by itself: states, faults, and what it does when nobody feeds it."""
+
+import gc
+import struct
+
+import can
+import pytest
+from exporters.can.bench import Bench
+
+from gen_profile.errors import StreamAborted
+from gen_profile_exporters.can.cia402 import Controlword, State, state_of
+from gen_profile_exporters.can.drive_dictionary import Make
+from gen_profile_exporters.can.realtime import real_time
+from gen_profile_exporters.can.simulated_drive import SimulatedDrive
+
+
+@pytest.fixture
+def bench():
+    with Bench() as found:
+        yield found
+
+
+def command(drive, *words):
+    for word in words:
+        drive.store(0x6040, 0, word)
+    return drive.state
+
+
+class TestStates:
+    # CiA 402-2: transitions by number
+    @pytest.mark.parametrize(
+        ("words", "state"),
+        [
+            ((0x06,), State.READY),
+            ((0x06, 0x07), State.SWITCHED_ON),
+            ((0x06, 0x07, 0x0F), State.ENABLED),
+            ((0x06, 0x07, 0x0F, 0x07), State.SWITCHED_ON),
+            ((0x06, 0x07, 0x0F, 0x06), State.READY),
+            ((0x06, 0x07, 0x06), State.READY),
+            ((0x06, 0x07, 0x0F, 0x00), State.SWITCH_ON_DISABLED),
+            ((0x06, 0x07, 0x0F, 0x02), State.QUICK_STOP),
+            ((0x06, 0x07, 0x0F, 0x02, 0x0F), State.QUICK_STOP),
+            ((0x06, 0x07, 0x02), State.SWITCH_ON_DISABLED),
+            ((0x0F,), State.SWITCH_ON_DISABLED),
+            ((0x07,), State.SWITCH_ON_DISABLED),
+        ],
+    )
+    def test_controlwords(self, bench, words, state):
+        assert command(bench.drive, *words) is state
+        assert state_of(bench.drive.value(0x6041)) is state
+
+    def test_a_fault_is_left_by_a_rising_edge_only(self, bench):
+        bench.drive.fault(0x3210)
+        assert bench.drive.state is State.FAULT
+        assert command(bench.drive, Controlword.SHUTDOWN) is State.FAULT
+        assert command(bench.drive, Controlword.FAULT_RESET) is State.SWITCH_ON_DISABLED
+
+    def test_a_fault_reaction_is_not_interrupted(self, bench):
+        command(bench.drive, 0x06, 0x07, 0x0F)
+        bench.drive.fault(0x3210)
+        assert command(bench.drive, 0x0F) is State.FAULT_REACTION
+        bench.drive.fault(0x3211)
+        bench.drive.next_command()
+        bench.wait(1)
+        assert bench.drive.state is State.FAULT
+        assert [frame.data[:2] for frame in bench.of(0x081)] == [b"\x10\x32"]
+
+    def test_unknown_statuswords_are_not_ready(self):
+        assert state_of(0x0001) is State.NOT_READY
+
+
+def enabled(bench, **settings):
+    drive = bench.drive
+    drive.store(0x6060, 0, 8)
+    command(drive, 0x06, 0x07, 0x0F)
+    drive.velocity = 100_000.0
+    for index, value in settings.items():
+        drive.store(int(index[1:], 16), 0, value)
+    drive.store(0x1016, 1, 127 << 16 | 20)
+    drive.local.nmt.state = "OPERATIONAL"
+    bench.say(0x77F, b"\x05")
+    return drive
+
+
+class TestConnection:
+    @pytest.mark.parametrize(
+        ("option", "state", "code"),
+        [
+            (1, State.FAULT, b"\x30\x81"),
+            (2, State.SWITCH_ON_DISABLED, b"\x30\x81"),
+            (3, State.SWITCH_ON_DISABLED, b"\x30\x81"),
+        ],
+    )
+    def test_a_lost_heartbeat(self, option, state, code):
+        with Bench(make=Make(miss="hold")) as bench:
+            drive = enabled(bench, x6007=option, x6085=10_000_000)
+            bench.wait(19)
+            assert drive.state is State.ENABLED
+            bench.wait(30)
+            assert drive.state is state
+            assert bench.of(0x081)[0].data[:2] == code
+
+    def test_no_reaction_where_none_is_asked_for(self):
+        with Bench(make=Make(miss="hold")) as bench:
+            drive = enabled(bench, x6007=0)
+            bench.wait(50)
+            assert drive.state is State.ENABLED
+
+
+class TestMotion:
+    def test_the_travel_limits_the_command(self, bench):
+        drive = enabled(bench)
+        drive.store(0x607D, 1, 0)
+        drive.store(0x607D, 2, 150_000)
+        bench.say(0x201, b"\x0f\x00")
+        for index, sub, value in ((0x1601, 0, 1), (0x1601, 1, 0x607A_0020), (0x1401, 2, 1)):
+            drive.store(index, sub, value)
+        bench.say(0x301, struct.pack("<i", 200_000))
+        bench.say(0x080)
+        bench.wait(1)
+        assert drive.actual == 150_000
+        assert drive.value(0x6041) & 1 << 11
+
+    def test_short_frames_change_nothing(self, bench):
+        drive = enabled(bench)
+        bench.say(0x201, b"\x02")
+        bench.wait(1)
+        assert drive.state is State.ENABLED
+
+    def test_positions_beyond_32_bits_are_clipped(self):
+        drive = SimulatedDrive(1, Make(), 0)
+        drive.arrive(1e12)
+        assert drive.value(0x6064) == 2**31 - 1
+
+
+class TestBus:
+    def test_nmt_resets(self, bench):
+        drive = enabled(bench)
+        bench.say(0x000, b"\x81\x01")
+        bench.wait(1)
+        assert drive.state is State.SWITCH_ON_DISABLED
+        assert drive.local.nmt.state == "PRE-OPERATIONAL"
+        assert drive.value(0x1016, 1) == 0
+        assert [frame.data for frame in bench.of(0x701)][-1] == b"\x00"
+
+    def test_resets_of_other_nodes_are_not_its_own(self, bench):
+        drive = enabled(bench)
+        bench.say(0x000, b"\x81\x05")
+        bench.say(0x000, b"\x01")
+        bench.say(0x181, b"", is_remote_frame=True)
+        bench.wait(1)
+        assert drive.state is State.ENABLED
+
+    def test_it_serves_until_the_bus_fails(self, bench):
+        def down(message):
+            raise can.CanOperationError("Network is down")
+
+        bench.drive_end.receiving = down
+        with pytest.raises(StreamAborted, match="simulated drives failed"):
+            bench.drives.run(lambda: False)
+
+
+class TestRealTime:
+    def test_what_is_refused_is_said(self, monkeypatch):
+        def refuse(*_):
+            raise PermissionError
+
+        monkeypatch.setattr("os.sched_setscheduler", refuse)
+        monkeypatch.setattr("ctypes.CDLL", lambda *_, **__: FakeLibrary())
+        with real_time() as refused:
+            assert len(refused) == 2
+        assert "ulimit -r" in refused[0]
+        assert "ulimit -l" in refused[1]
+
+    def test_collection_of_garbage_is_as_before(self):
+        gc.disable()
+        try:
+            with real_time():
+                assert not gc.isenabled()
+            assert not gc.isenabled()
+        finally:
+            gc.enable()
+
+
+class FakeLibrary:
+    def mlockall(self, flags):
+        return -1
+
+    def munlockall(self):
+        return 0
