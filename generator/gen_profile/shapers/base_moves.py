@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
 import attrs
@@ -35,22 +35,25 @@ QUINTIC = BaseMove(knots=[0.0, 1.0], coefficients=[[0.0, 0.0, 0.0, 10.0, -15.0, 
 SEPTIC = BaseMove(knots=[0.0, 1.0], coefficients=[[0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0]])
 
 
-def jerk_limited(limits: LimitsSpec, reach: float) -> BaseMove:
+def jerk_limited(limits: LimitsSpec, distance: Sequence[float]) -> BaseMove:
     """Move as fast as limits of velocity, acceleration and jerk permit, in up to seven cubic segments.
 
     Parameters
     ----------
     limits : LimitsSpec
         Of which the jerk must be stated.
-    reach : float
-        Distance in m (or rad) that the limits are meant for.
+    distance : (axes,) sequence of float
+        Of every axis in m (or rad): all make the same move, each over its own distance.
 
     Raises
     ------
     SpecError
         There is no limit of jerk, or Ruckig is not installed.
     """
-    if limits.jerk is None:
+    velocity, acceleration, jerk = (
+        _share(limits, name, distance) for name in ("velocity", "acceleration", "jerk")
+    )
+    if math.isinf(jerk):
         raise SpecError(
             "limits.jerk: a jerk-limited base move needs it; state it, or take another base move."
         )
@@ -60,9 +63,7 @@ def jerk_limited(limits: LimitsSpec, reach: float) -> BaseMove:
 
     demand, trajectory = InputParameter(1), Trajectory(1)
     demand.target_position = [1.0]
-    demand.max_velocity = [(limits.velocity or math.inf) / reach]
-    demand.max_acceleration = [(limits.acceleration or math.inf) / reach]
-    demand.max_jerk = [limits.jerk / reach]
+    demand.max_velocity, demand.max_acceleration, demand.max_jerk = [velocity], [acceleration], [jerk]
     Ruckig(1).calculate(demand, trajectory)
     found = trajectory.profiles[0][0]
     kept = np.array(found.t) > 0.0
@@ -72,8 +73,15 @@ def jerk_limited(limits: LimitsSpec, reach: float) -> BaseMove:
     return BaseMove(knots=[0.0, *ends[:-1], 1.0], coefficients=taylor[:, kept].T * duration ** np.arange(4.0))
 
 
-BASES: dict[str, Callable[[LimitsSpec, float], BaseMove]] = {
-    "quintic": lambda _limits, _reach: QUINTIC,
-    "septic": lambda _limits, _reach: SEPTIC,
+def _share(limits: LimitsSpec, name: str, distance: Sequence[float]) -> float:
+    """Limit of a derivative of a unit move; infinite where no axis that moves has one."""
+    allowed = [getattr(limits.of(axis), name) for axis in range(len(distance))]
+    pairs = zip(allowed, distance, strict=True)
+    return min((limit / abs(far) for limit, far in pairs if limit is not None and far), default=math.inf)
+
+
+BASES: dict[str, Callable[[LimitsSpec, Sequence[float]], BaseMove]] = {
+    "quintic": lambda _limits, _distance: QUINTIC,
+    "septic": lambda _limits, _distance: SEPTIC,
     "jerk-limited": jerk_limited,
 }

@@ -86,7 +86,7 @@ def _shaped(spec: Spec, name: str, base: str) -> Profile:
     InfeasibleProblem
         It would take longer than the spec allows.
     """
-    move, reach = spec.move, max(map(abs, spec.move.distance))
+    move = spec.move
     # where the load would swing on; a shaper knows one frequency per mode, whatever the hoist does on the way
     linear = linearize(spec.machine(), spec.plant.parameters, move.target)
     shaped = shaped_move(
@@ -95,7 +95,7 @@ def _shaped(spec: Spec, name: str, base: str) -> Profile:
         target=move.target,
         frequencies=linear.distinct_frequencies,
         damping_ratios=linear.distinct_damping_ratios,
-        base=BASES[base](spec.limits, reach),
+        base=BASES[base](spec.limits, move.distance),
     )
     if move.shortest:
         return _shortest(spec, shaped)
@@ -123,7 +123,7 @@ def _shortest(spec: Spec, shaped: ShapedMove) -> Profile:
 def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
     """Find the limits that a motion breaks; the sway's last, for it must be integrated."""
     command = lag_compensated(motion, spec.actuator.tau)
-    broken = breaches(attrs.evolve(spec.limits, sway=None), command, 0.0)
+    broken = breaches(spec.limits.without("sway"), command, 0.0)
     if broken or spec.limits.sway is None:
         return broken
     plant = spec.machine()
