@@ -1,0 +1,60 @@
+"""Shortest moves, worst cases and second order, from the spec to the verdict."""
+
+import json
+
+import pytest
+from command_line import run_here
+
+RANGE = ("--set", "robustness.method=range", "--set", "cost.sway_weight=0")
+BOUND = ("--set", "limits.acceleration=0.7067")
+
+
+def test_the_shortest_duration_ends_on_a_cycle_and_stands_in_the_manifest(tmp_path):
+    limits = ("--set", "limits.acceleration=0.4", "--set", 'move.duration="minimum"')
+    outcome = run_here(*limits, "--cycle-time", "0.004", "--out", tmp_path, "--json")
+    assert outcome.code == 0, outcome.err
+    duration = outcome.document["figures"]["duration_s"]
+    assert 2.7 < duration < 2.8
+    assert duration / 0.004 == pytest.approx(round(duration / 0.004), abs=1e-9)
+    assert json.loads((tmp_path / "manifest.json").read_bytes())["spec"]["move"]["duration"] == duration
+    assert outcome.document["figures"]["acceleration_max_m_per_s2"] <= 0.4
+    assert run_here("check", tmp_path / "paper.csv").code == 0
+
+
+def test_no_duration_does(tmp_path):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(
+        '[plant]\ntype = "double-pendulum-crane"\n[move]\ndistance = 0.3\nduration = "minimum"\n'
+        "[limits]\nacceleration = 1.0\nsway = 1e-6\n"
+    )
+    outcome = run_here(spec, "--out", tmp_path / "new")
+    assert outcome.code == 3
+    assert "move.duration: no duration keeps the limits" in outcome.err
+
+
+def test_a_range_leaves_less_at_worst_and_more_in_the_middle(tmp_path):
+    usual = run_here(*BOUND, "--no-check", "--out", tmp_path, "--json").document
+    ranged = run_here(*RANGE, *BOUND, "--out", tmp_path, "--json").document
+    assert ranged["check"]["passed"]
+    assert ranged["figures"]["sway_residual_worst_m"] < 0.75e-3 < usual["figures"]["sway_residual_worst_m"]
+    assert ranged["figures"]["sway_residual_peak_m"] > 1e-4
+    bound = ranged["solver"]["worst_case_bound_m"]
+    assert 0.69e-3 < bound <= ranged["figures"]["sway_residual_worst_m"]
+    assert usual["solver"]["worst_case_bound_m"] is None
+
+
+def test_second_order_is_flatter(tmp_path):
+    longer = ("--set", "move.duration=5", "--set", "cost.sway_weight=0", "--out", tmp_path, "--json")
+    first = run_here(*longer).document["figures"]
+    second = run_here(*longer, "--set", "robustness.order=2").document["figures"]
+    assert second["sway_residual_worst_m"] < 0.5 * first["sway_residual_worst_m"]
+    assert second["sway_residual_peak_m"] < 1e-6
+
+
+def test_both_methods_write_nearly_the_same(tmp_path):
+    documents = [
+        run_here("--method", name, "--out", tmp_path, "--json").document for name in ("direct", "indirect")
+    ]
+    assert [document["solver"]["method"] for document in documents] == ["direct", "indirect"]
+    assert documents[0]["solver"]["cost"] == pytest.approx(documents[1]["solver"]["cost"], rel=1e-6)
+    assert documents[0]["solver"]["defect"] is None
