@@ -14,7 +14,13 @@ from pathlib import Path
 
 UML = "linux.uml"
 TOOLS = ("candump", "cansend", "ip")
-MODULES = ("net/can/can", "net/can/can-raw", "drivers/net/can/dev/can-dev", "drivers/net/can/vcan")
+MODULES = (
+    "net/can/can",
+    "net/can/can-raw",
+    "net/can/can-bcm",
+    "drivers/net/can/dev/can-dev",
+    "drivers/net/can/vcan",
+)
 
 INIT = """#!/bin/sh
 export PATH={path}
