@@ -216,8 +216,10 @@ def test_faulty_logs(text, why):
 
 @pytest.mark.parametrize("column", ["angel", "3", "0"])
 def test_columns_that_are_not_there(column):
-    with pytest.raises(OutputError, match=f"there is no column '{column}'"):
+    with pytest.raises(OutputError, match=f"there is no column '{column}'.*angle.*[.?]$"):
         log_of("t;angle\n0;1\n", ("1", column))
+    with pytest.raises(OutputError, match=f"there is no column '{column}'; there are 2, without names[.]$"):
+        log_of("0;1\n", ("1", column))
 
 
 # ── the whole way ────────────────────────────────────────────────────────────────────────────────────────

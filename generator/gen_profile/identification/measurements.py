@@ -164,7 +164,8 @@ def _column(column: str, names: list[str], count: int, source: str) -> int:
         return names.index(column)
     if column.isdecimal() and 1 <= int(column) <= count:
         return int(column) - 1
-    raise OutputError(f"{source}: there is no column {column!r}{suggestion(column, names)}.")
+    known = suggestion(column, names) if names else f"; there are {count}, without names."
+    raise OutputError(f"{source}: there is no column {column!r}{known}")
 
 
 def _is_number(text: str) -> bool:

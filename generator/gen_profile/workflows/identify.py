@@ -100,13 +100,13 @@ def read_swing(
     load = named or loads[0]
     si_units = {"angle": "rad", "sway": "m"}
     if quantity not in si_units:
-        raise SpecError(f"--signal: unknown signal {quantity!r}{suggestion(quantity, si_units)}.")
+        raise SpecError(f"--signal: unknown signal {quantity!r}{suggestion(quantity, si_units)}")
     if load not in loads:
-        raise SpecError(f"--signal: unknown load {load!r}{suggestion(load, loads)}.")
+        raise SpecError(f"--signal: unknown load {load!r}{suggestion(load, loads)}")
     unit = unit or si_units[quantity]
     if unit not in UNITS or UNITS[unit][0] != si_units[quantity]:
         fitting = [name for name, (si, _) in UNITS.items() if si == si_units[quantity]]
-        raise SpecError(f"--unit: {unit!r} does not measure an {quantity}{suggestion(unit, fitting)}.")
+        raise SpecError(f"--unit: {unit!r} does not measure an {quantity}{suggestion(unit, fitting)}")
     try:
         text = path.read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
