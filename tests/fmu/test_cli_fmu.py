@@ -1,0 +1,112 @@
+"""`gen-profile fmu` as a user calls it."""
+
+import zipfile
+
+import pytest
+from command_line import run_here
+from fmpy import read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
+
+from gen_profile.cli import fmu as command
+from gen_profile.workflows.fmu import KINDS
+from gen_profile_fmu.plant_variables import InputKind
+from gen_profile_fmu.platforms import PLATFORMS, host_platform
+
+FAST = ("--set", "plant.L1=0.5")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("version", ["2", "3"])
+def test_writes_an_fmu_that_others_run(tmp_path, kind, version):
+    path = tmp_path / "a.fmu"
+    done = run_here("fmu", kind, "--fmi", version, *FAST, "--out", path, "--json")
+    assert (done.code, done.errors) == (0, [])
+    document = done.document
+    assert document["path"] == str(path)
+    assert document["platforms"] == [{"name": host_platform(), "runs_here": True}]
+    assert document["bytes"] == path.stat().st_size
+    assert validate_fmu(str(path)) == []
+    description = read_model_description(str(path))
+    assert description.modelName == document["model_identifier"] == f"paper_{kind}"
+    starts = {variable.name: variable.start for variable in description.modelVariables}
+    if kind != "profile":
+        assert float(starts["L1"]) == 0.5
+    result = simulate_fmu(str(path), stop_time=4.0, output_interval=0.01, fmi_type="CoSimulation")
+    if kind == "profile":
+        assert result["cart.setpoint"][-1] == pytest.approx(0.3, abs=1e-12)
+    if kind == "system":
+        assert result["cart.position"][-1] == pytest.approx(0.3, abs=1e-12)
+        assert abs(result["sway.payload"][result["time"] > 3.0]).max() < 1e-6
+
+
+def test_is_named_after_the_spec(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = run_here("fmu", "plant", "--source-only", "--input", "acceleration")
+    assert done.code == 0
+    assert done.out.startswith("paper_plant.fmu: FMI 2, sources only, ")
+    with zipfile.ZipFile("paper_plant.fmu") as archive:
+        names = archive.namelist()
+    assert "sources/fmu.c" in names
+    assert not [name for name in names if name.startswith("binaries/")]
+    names = [variable.name for variable in read_model_description("paper_plant.fmu").modelVariables]
+    assert "cart.setpoint_acceleration" in names
+
+
+def test_same_spec_same_archive(tmp_path):
+    for name in ("a.fmu", "b.fmu"):
+        assert run_here("fmu", "system", *FAST, "--out", tmp_path / name).code == 0
+    assert (tmp_path / "a.fmu").read_bytes() == (tmp_path / "b.fmu").read_bytes()
+
+
+def test_other_platforms_are_labelled(tmp_path):
+    done = run_here("fmu", "plant", "--platform", "linux-arm64", "--out", tmp_path / "a.fmu", "--json")
+    assert done.document["platforms"] == [{"name": "linux-arm64", "runs_here": False}]
+    again = run_here("fmu", "plant", "--platform", "linux-arm64", "--out", tmp_path / "a.fmu")
+    assert "linux-arm64 (not run)" in again.out
+
+
+def test_choices_are_those_of_the_workflow():
+    assert command.KINDS == KINDS
+    assert set(command.INPUTS) == {kind.value for kind in InputKind}
+    assert ("host", *PLATFORMS, "all") == command.PLATFORMS
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("fmu",), 2, "Missing argument"),
+        (("fmu", "crane"), 2, "'crane' is not one of"),
+        (("fmu", "plant", "--fmi", "1"), 2, "'1' is not one of"),
+        (("fmu", "plant", "--set", "plant.L1=-1"), 2, "plant.L1: must be a number"),
+        (("fmu", "plant", "--out", "/proc/none/a.fmu"), 2, "Cannot write to the folder /proc/none"),
+    ],
+)
+def test_bad_input_ends_in_sentences(arguments, code, words):
+    done = run_here(*arguments)
+    assert done.code == code
+    assert words in done.err
+    assert "Traceback" not in done.err
+
+
+def test_a_foreign_fmu_that_fails_ends_in_exit_code_4(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "customer.fmu").write_bytes(b"nothing")
+    (tmp_path / "crane.toml").write_text(
+        """
+        [plant]
+        type = "double-pendulum-crane"
+        [move]
+        distance = 0.3
+        duration = 3.0
+        [check]
+        fmu = "customer.fmu"
+        input.acceleration = "u"
+        output.sway = "load.dx"
+        """
+    )
+    done = run_here("crane.toml", "--out", "deploy")
+    assert done.code == 4
+    assert done.errors == [
+        "Error: customer.fmu: not an FMU, or damaged (File is not a zip file); get it again."
+    ]
+    assert not (tmp_path / "deploy").exists()
