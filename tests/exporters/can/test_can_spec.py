@@ -14,7 +14,8 @@ def test_everything_stated_comes_back():
         [
             "can.mode=csp", "can.feed_forward=torque", "can.torque_per_acceleration=40", "can.timeout=0.05",
             "can.start_tolerance=0.002", "can.following_error=0.01", "can.quick_stop=1.5", TRAVEL,
-            "can.encoder=[65536, 1]", "can.gear=[3, 1]", "can.feed=[40000, 1]", "can.vendor=0x2E5", "can.product=1",
+            "can.encoder=[65536, 1]", "can.gear=[3, 1]", "can.feed=[40000, 1]", "can.vendor=0x2E5",
+            "can.product=1",
         ],
     )  # fmt: skip
     assert spec.can.travel == {"cart": (-0.1, 0.5)}
