@@ -10,6 +10,7 @@ stop by themselves, as they were set up to.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from enum import Enum
@@ -154,6 +155,10 @@ class Streamer:
             if commanded:
                 reason = f"{reason} {self._abort()}"
             return self._record(Phase.ABORTED, reason)
+        except BaseException:  # a bug, maybe, but the axes must not run on
+            if commanded:
+                self._abort()
+            raise
         return self._record(Phase.DONE, "")
 
     def _begin(self, phase: Phase) -> None:
@@ -217,7 +222,12 @@ class Streamer:
         self._command(Controlword.SWITCH_ON, State.SWITCHED_ON, last)
         self._command(Controlword.SHUTDOWN, State.READY, last)
         self._command(Controlword.DISABLE_VOLTAGE, State.SWITCH_ON_DISABLED, last)
-        configuration.release(self._link, self._plan.target)
+        self._release()
+
+    def _release(self) -> None:
+        """Leave drives alone that are switched off; one that does not listen will report a lost heartbeat."""
+        with suppress(StreamAborted, SdoError, struct.error):
+            configuration.release(self._link, self._plan.target)
 
     def _abort(self) -> str:
         """Quick-stop all axes, and say whether they confirmed it."""
@@ -231,8 +241,7 @@ class Streamer:
             with suppress(StreamAborted):
                 self._link.wait_until(self._clock.now() + self._period)
             if self._watch.standing:
-                with suppress(StreamAborted, SdoError):
-                    configuration.release(self._link, self._plan.target)
+                self._release()
                 return "The axes were stopped."
             if self._clock.now() > deadline:
                 return (

@@ -317,3 +317,22 @@ def test_a_killed_streamers_drive_stops_by_itself(make):
     assert abs(bench.drive.actual - 400_000) > 50_000
     if make.miss != "stop":  # which needs no time-out
         assert emergencies[0].at <= bench.fault_at + 20 + 1
+
+
+def test_even_a_bug_stops_the_axis():
+    with Bench() as bench:
+        bench.at_cycle(120, lambda: setattr(bench.streamer, "_judge", None))
+        with pytest.raises(TypeError):
+            bench.run()
+        bench.wait(2)
+    assert_quick_stop_is_last(bench)
+    assert bench.drive.state is State.SWITCH_ON_DISABLED
+
+
+def test_a_drive_that_no_longer_answers_once_it_is_off_is_no_fault():
+    with Bench() as bench:
+        bench.drive_end.sending = lambda message: (
+            message.arbitration_id != 0x581 or "hold" not in bench.phases
+        )
+        record = bench.run()
+    assert (record.phase, record.reason) == (Phase.DONE, "")
