@@ -26,7 +26,7 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--interface",
             metavar="NAME",
-            help="Interface as python-can names it: socketcan, pcan, slcan, udp_multicast …",
+            help="Interface as python-can names it: socketcan, pcan, slcan …",
         ),
     ):
         command = decorate(command)
@@ -75,10 +75,8 @@ def stream(
     from gen_profile.workflows import stream as run
 
     run.require_extra()
-    if mode is not None:
-        overrides += (f"can.mode={mode}",)
-    if node is not None:
-        overrides += (f"can.node={node}",)
+    named = {"can.mode": mode, "can.node": node}
+    overrides += tuple(f"{key}={value}" for key, value in named.items() if value is not None)
     with progress() as tell:
         source = _source(spec_path, preset, overrides, accept_unverified, tell)
         if dry_run:
@@ -90,12 +88,7 @@ def stream(
             tell("measuring this machine")
             run.self_test(source)
         outcome = run.stream(source, port, simulate_drive=simulate_drive, tell=tell)
-    if table is not None:
-        _write(table, outcome.table())
-    print_outcome(outcome.to_dict(), _outcome_words(outcome), as_json)
-    if not outcome.done:
-        click.echo(f"Stream aborted: {outcome.record.reason}", err=True)
-        sys.exit(StreamAborted.exit_code)
+    _conclude(outcome, table, as_json)
 
 
 @cli.command(
@@ -154,6 +147,20 @@ def drive_sim(
         "sway_residual_peak_m": sway,
     }
     print_outcome(document, f"axes at {document['position_m']} m, residual sway {1e3 * sway:.4g} mm", as_json)
+
+
+for parameter in stream.params:
+    if parameter.name == "spec_path":
+        parameter.metavar = "[ARTEFACT|SPEC.toml]"
+
+
+def _conclude(outcome: Outcome, table: Path | None, as_json: bool) -> None:
+    if table is not None:
+        _write(table, outcome.table())
+    print_outcome(outcome.to_dict(), _outcome_words(outcome), as_json)
+    if not outcome.done:
+        click.echo(f"Stream aborted: {outcome.record.reason}", err=True)
+        sys.exit(StreamAborted.exit_code)
 
 
 def _source(
