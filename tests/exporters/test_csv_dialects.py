@@ -41,6 +41,7 @@ class TestText:
             io.StringIO(encoded("excel-de")),
             delimiter=";",
             skiprows=1,
+            encoding="utf-8",
             converters=lambda text: float(text.replace(",", ".")),
         )
         np.testing.assert_allclose(table[:, 1], 1e3 * sample(MOVE, 0.02).position[:, 0], rtol=1e-15)
