@@ -1,0 +1,200 @@
+"""The binary at the level of FMI 3.0: call order, refusals, states, and what it exports."""
+
+import re
+from ctypes import byref, c_bool, c_double, c_size_t, c_uint32, c_void_p
+from pathlib import Path
+
+import fmpy
+import lief
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
+from fmu.kinds import model_of
+
+from gen_profile.plants.registry import find_plant
+from gen_profile_fmu.fmu_files import Version
+from gen_profile_fmu.plant_fmu import cached_fmu
+
+CRANE = find_plant("double-pendulum-crane")
+ERROR = 3
+
+
+@pytest.fixture
+def fmu():
+    return cached_fmu(model_of("plant-acceleration", CRANE), Version.FMI3)
+
+
+def load(fmu, kind):
+    instance = kind(
+        guid=fmu.guid,
+        modelIdentifier=fmu.model_identifier,
+        unzipDirectory=str(fmu.folder),
+        instanceName="crane",
+    )
+    instance.messages = []
+    instance.log = lambda _, status, category, message: instance.messages.append(
+        (status, category.decode(), message.decode())
+    )
+    return instance
+
+
+@pytest.fixture
+def slave(fmu):
+    instance = load(fmu, FMU3Slave)
+    instance.instantiate(logMessage=instance.log)
+    yield instance
+    instance.freeInstance()
+
+
+@pytest.fixture
+def model(fmu):
+    instance = load(fmu, FMU3Model)
+    instance.instantiate(logMessage=instance.log)
+    instance.enterInitializationMode()
+    yield instance
+    instance.freeInstance()
+
+
+def status_of(call, *arguments):
+    try:
+        return call(*arguments) or 0
+    except FMICallException as error:
+        return error.status
+
+
+def test_exports_the_standards_functions_and_no_others(fmu):
+    header = (Path(fmpy.__file__).parent / "c-code" / "fmi3Functions.h").read_text()
+    declared = set(re.findall(r"FMI3_Export \w+TYPE\s+(fmi3\w+);", header))
+    (library,) = (fmu.folder / "binaries").rglob("*.so")
+    elf = lief.ELF.parse(str(library))  # owns its symbols
+    exported = {symbol.name for symbol in elf.exported_symbols}
+    assert exported == declared
+
+
+def test_steps_only_after_initialization(slave):
+    assert status_of(lambda: slave.doStep(0.0, 0.01)) == ERROR
+    assert slave.messages[-1] == (
+        ERROR,
+        "logStatusError",
+        "fmi3DoStep must not be called in the mode after instantiation.",
+    )
+    slave.reset()
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    slave.doStep(0.0, 0.01)
+    assert status_of(lambda: slave.doStep(0.0, 0.01)) == ERROR
+    assert slave.messages[-1][2] == "The step begins at 0 s, but the FMU has reached 0.01 s."
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_values_must_be_finite(slave, value):
+    assert status_of(slave.setFloat64, [0], [value]) == ERROR
+    assert slave.messages[-1][2].startswith("m1 must be finite, found ")
+
+
+def test_unknown_references_and_wrong_types_are_refused(slave):
+    slave.enterInitializationMode()
+    for call, message in (
+        (lambda: slave.getFloat64([999]), "There is no variable of reference 999."),
+        (lambda: slave.getBoolean([0]), "m1 is no boolean variable."),
+        (lambda: slave.getInt32([0]), "fmi3GetInt32: every variable is Float64 or Boolean."),
+        (lambda: slave.getFloat64([0], nValues=2), "fmi3GetFloat64: every variable has one value."),
+    ):
+        slave.reset()
+        slave.enterInitializationMode()
+        assert status_of(call) == ERROR
+        assert slave.messages[-1][2] == message
+
+
+def test_states_are_saved_and_restored(slave):
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    references = list(range(20))
+    slave.setFloat64([slave_reference("cart.setpoint_acceleration")], [1.0])
+    slave.doStep(0.0, 0.1)
+    state = slave.getFMUState()
+    text = slave.serializeFMUState(state)
+    slave.doStep(0.1, 0.1)
+    once = slave.getFloat64(references)
+    slave.setFMUState(state)
+    slave.doStep(0.1, 0.1)
+    assert slave.getFloat64(references) == once
+    copy = slave.deserializeFMUState(text)
+    slave.setFMUState(copy)
+    slave.doStep(0.1, 0.1)
+    assert slave.getFloat64(references) == once
+    slave.freeFMUState(state)
+    slave.freeFMUState(copy)
+    with pytest.raises(FMICallException):
+        slave.deserializeFMUState(text[:-1])
+
+
+def slave_reference(name):
+    table = cached_fmu(model_of("plant-acceleration", CRANE), Version.FMI3).variables
+    return [variable.name for variable in table.variables].index(name)
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "message"),
+    [
+        (FMU3Slave, {"eventModeUsed": True}, "Neither event mode in co-simulation nor intermediate updates"),
+        (FMU3ScheduledExecution, {}, "Scheduled execution is not provided."),
+    ],
+)
+def test_what_is_not_provided_is_not_instantiated(fmu, kind, arguments, message):
+    instance = load(fmu, kind)
+    with pytest.raises(Exception, match="nstantiate"):
+        instance.instantiate(logMessage=instance.log, **arguments)
+    assert instance.messages[0][2].startswith(message)
+    instance.freeLibrary()
+
+
+@pytest.mark.parametrize(
+    "name", ["fmi3EnterConfigurationMode", "fmi3ExitConfigurationMode", "fmi3EnterStepMode"]
+)
+def test_functions_without_a_capability_fail_in_a_sentence(slave, name):
+    assert status_of(getattr(slave, name), slave.component) == ERROR
+    assert slave.messages[-1][2] == f"{name} is not provided by this FMU."
+
+
+def test_model_exchange_counts_its_states_and_events(model):
+    model.exitInitializationMode()
+    number = c_size_t()
+    model.fmi3GetNumberOfContinuousStates(model.component, byref(number))
+    assert number.value == 6
+    model.fmi3GetNumberOfEventIndicators(model.component, byref(number))
+    assert number.value == 0
+    nominals = (c_double * 6)()
+    model.fmi3GetNominalsOfContinuousStates(model.component, nominals, 6)
+    assert list(nominals) == [1.0] * 6
+    assert status_of(model.fmi3GetContinuousStates, model.component, nominals, 5) == ERROR
+    assert model.messages[-1][2] == "There are 6 continuous states."
+
+
+def test_time_and_states_are_set_in_continuous_time_mode_only(model):
+    states = (c_double * 6)()
+    assert status_of(model.fmi3SetContinuousStates, model.component, states, 6) == ERROR
+    assert model.messages[-1][2].endswith("must not be called in initialization mode.")
+    model.reset()
+    model.enterInitializationMode()
+    model.exitInitializationMode()
+    model.enterContinuousTimeMode()
+    states[2] = float("nan")
+    assert status_of(model.fmi3SetContinuousStates, model.component, states, 6) == ERROR
+    assert model.messages[-1][2] == "theta1.rate must be finite."
+
+
+def test_null_pointers_and_no_instance_are_errors(slave):
+    slave.enterInitializationMode()
+    assert status_of(slave.fmi3GetFloat64, slave.component, None, 1, None, 1) == ERROR
+    assert slave.messages[-1][2] == "fmi3GetFloat64 was given a null pointer."
+    assert status_of(slave.fmi3GetFloat64, None, (c_uint32 * 1)(0), 1, (c_double * 1)(), 1) == ERROR
+    assert status_of(slave.fmi3GetFMUState, slave.component, None) == ERROR
+    slave.fmi3FreeInstance(None)
+
+
+def test_log_categories_are_switched(slave):
+    slave.fmi3SetDebugLogging(slave.component, c_bool(True), 0, None)
+    slave.reset()
+    assert slave.messages == [(0, "logEvents", "Reset.")]
+    assert isinstance(slave.component, c_void_p | int)
