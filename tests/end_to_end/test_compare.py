@@ -3,12 +3,12 @@
 import pytest
 from command_line import run_here
 
-from gen_profile.shapers.impulses import SHAPERS
-
 from gen_profile.cli import words
+from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.spec_reading import preset_spec
 from gen_profile.workflows.compare import compare
 
+FEW = ("--set", "robustness={}")
 FIGURES = (
     "acceleration_max_m_per_s2",
     "acceleration_rms_m_per_s2",
@@ -138,3 +138,33 @@ def test_people_get_a_table_with_the_recommendation():
     assert row[6:] == ["19.36", "12.38", "0", "1.463", "1.955", "●", "●"]
     assert any(line.startswith("fastest: optimal-beta0. ") for line in lines)
     assert outcome.errors == []
+
+
+def test_shapers_can_be_fed_with_another_move(figures):
+    document = run_here("compare", "--json", "--base", "septic", *FEW).document
+    rows = {row["method"]: row["figures"] for row in document["rows"]}
+    assert document["base"] == "septic"
+    for name in SHAPERS.keys() & figures.keys():
+        assert rows[name]["velocity_max_m_per_s"] != pytest.approx(figures[name]["velocity_max_m_per_s"])
+
+
+def test_the_range_of_ropes_is_kept_best_by_the_motion_made_for_it(figures):
+    """At no more acceleration than β = 50; the convex bound for these is 0.70 mm."""
+    row = figures["optimal-range"]
+    assert row["acceleration_max_m_per_s2"] <= figures["optimal-beta50"]["acceleration_max_m_per_s2"] * 1.0001
+    assert row["sway_residual_worst_m"] < 0.75e-3
+
+
+def test_marks_the_pareto_front(comparison):
+    rows = {row["method"]: row for row in comparison["rows"]}
+    assert not rows["zv"]["pareto"]  # nzv leaves less, swings less and asks for less
+    assert all(rows[method]["pareto"] for method in comparison["recommended"].values())
+    assert {method for method, row in rows.items() if row["keeps_residual_sway"]} == {
+        method for method, row in rows.items() if row["figures"]["sway_residual_worst_m"] <= 0.003
+    }
+
+
+def test_other_machines_compare_the_spec_s_own_motion_as_optimal():
+    document = run_here("compare", "--json", "--preset", "slosh-tank", *FEW).document
+    methods = [row["method"] for row in document["rows"]]
+    assert {"optimal", "optimal-beta0"} <= set(methods)

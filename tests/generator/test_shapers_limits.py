@@ -96,7 +96,7 @@ def test_the_shortest_move_keeps_all_limits_and_a_shorter_one_does_not(name, bas
     shortest = move.shortest(keeps)
     assert shortest > move.shaper.delay
     assert keeps(move.profile(shortest))
-    assert not keeps(move.profile(shortest * (1.0 - 2e-5)))
+    assert not keeps(move.profile(shortest * (1.0 - 2e-4)))
 
 
 def test_limits_that_no_duration_keeps():

@@ -17,7 +17,7 @@ from gen_profile.shapers.impulses import SHAPERS, Impulses, convolve
 SAME_TIME = 1e-13  # knots closer than this share of the duration are one
 SHORTEST_BASE = 1e-6  # a base move of a smaller share of the duration would drown in the knots' rounding
 LONGEST_BASE = 1e6  # a base move of more than so many times the first one tried is not looked for
-PRECISION = 1e-5  # relative, of the shortest duration
+PRECISION = 1e-4  # relative, of the shortest duration
 BLOCK = 1_000_000  # polynomials evaluated at once
 
 

@@ -64,18 +64,29 @@ def contenders(spec: Spec, base: str) -> Iterator[Contender]:
     """
     for name in SHAPERS:
         yield Contender(method=name, design=partial(_shaped, spec, name, base))
-    own = cache(partial(_attempt, spec))
+    once = cache(partial(timed, spec))  # the shortest duration does not depend on β
+    own = cache(partial(_attempt, once))
     weight, stated = spec.cost.sway_weight, spec.cost.sway_scale is not None
     for other in sorted({*SWAY_WEIGHTS, weight}):
         # β means the same as in the paper only together with a γ
         name = "optimal" if other == weight and not stated else f"optimal-beta{other:g}"
-        design = partial(_result, own) if other == weight else partial(_optimal, _weighing(spec, other))
+        design = partial(_result, own) if other == weight else partial(_weighed, once, other)
         yield Contender(method=name, design=design, requirements="the spec's own")
-    for kind, keys in ROBUST.items():
-        robustness = attrs.evolve(spec.robustness, **keys)
-        if robustness != spec.robustness and robustness.uncertain:
-            variant = attrs.evolve(_weighing(spec, 0.0), robustness=robustness)
-            yield Contender(method=f"optimal-{kind}", design=partial(_optimal_within, variant, own))
+    for kind, keys in _other_robustness(spec).items():
+        robust = attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, **keys))
+        yield Contender(method=f"optimal-{kind}", design=partial(_optimal_within, robust, own))
+
+
+def _other_robustness(spec: Spec) -> dict[str, Mapping[str, Any]]:
+    """Choose from `ROBUST` what the spec does not ask for anyway, and what does not take minutes."""
+    asked = spec.robustness
+    return {
+        kind: keys
+        for kind, keys in ROBUST.items()
+        if asked.uncertain
+        and attrs.evolve(asked, **keys) != asked
+        and not (kind == "range" and (asked.method == "range" or spec.move.shortest))
+    }
 
 
 def _shaped(spec: Spec, name: str, base: str) -> Profile:
@@ -133,18 +144,23 @@ def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
 
 
 def _optimal(spec: Spec) -> Profile:
-    spec = timed(spec)
     return optimal_profile(choice.solve(problem_of(spec), spec.solver.method))
 
 
+def _weighed(timed_spec: Callable[[], Spec], sway_weight: float) -> Profile:
+    spec = timed_spec()
+    return _optimal(attrs.evolve(spec, cost=attrs.evolve(spec.cost, sway_weight=sway_weight)))
+
+
 def _optimal_within(spec: Spec, own: Callable[[], Profile | GenProfileError]) -> Profile:
-    """Design an optimal motion at no more acceleration than the spec's own design takes.
+    """Design an optimal motion with β = 0 at no more acceleration than the spec's own design takes.
 
     Nothing else would keep the least residual of the worst machine from taking any acceleration.
     """
+    spec = attrs.evolve(spec, cost=attrs.evolve(spec.cost, sway_weight=0.0))
     motion = own()
     if spec.move.shortest or isinstance(motion, GenProfileError):
-        return _optimal(spec)
+        return _optimal(timed(spec))
     command = lag_compensated(motion, spec.actuator.tau)
     taken = max(greatest(command, 2, axis) for axis in range(command.axes))
     problem = problem_of(attrs.evolve(spec, limits=attrs.evolve(spec.limits, acceleration=taken)))
@@ -158,14 +174,10 @@ def _optimal_within(spec: Spec, own: Callable[[], Profile | GenProfileError]) ->
     return optimal_profile(solution)
 
 
-def _weighing(spec: Spec, sway_weight: float) -> Spec:
-    return attrs.evolve(spec, cost=attrs.evolve(spec.cost, sway_weight=sway_weight))
-
-
-def _attempt(spec: Spec) -> Profile | GenProfileError:
+def _attempt(timed_spec: Callable[[], Spec]) -> Profile | GenProfileError:
     """Design the spec's own motion, or say why there is none: it is asked for more than once."""
     try:
-        return _optimal(spec)
+        return _optimal(timed_spec())
     except GenProfileError as error:
         return error
 
