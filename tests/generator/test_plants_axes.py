@@ -9,7 +9,7 @@ from gen_profile.problem.axis_reach import axis_reach, effort_weights
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import choice, indirect
+from gen_profile.solvers import choice, direct, indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.spec_reading import parse_spec, preset_spec, spec_from_dict
 
@@ -114,9 +114,10 @@ def test_a_trolley_answers_the_pull_of_the_slew():
     np.testing.assert_allclose(states[-1, :4], 0.0, atol=1e-9)  # angles and rates
 
 
-def test_a_hoist_alone_swings_nothing():
+@pytest.mark.parametrize("solve", [indirect.solve, direct.solve])
+def test_a_hoist_alone_swings_nothing(solve):
     overrides = ["move.start=[12.0, 7.0]", "move.target=[12.0, 1.0]", "cost.sway_weight=5"]
-    optimum = indirect.solve(problem_of(preset_spec("single-pendulum-crane", overrides))).raise_for_status()
+    optimum = solve(problem_of(preset_spec("single-pendulum-crane", overrides))).raise_for_status()
     assert (optimum.sway == 0.0).all()
 
 

@@ -140,9 +140,11 @@ def resolve_weights(problem: Problem) -> tuple[goals.Weights, int]:
     solution = solve(quiet)
     if solution.optimum is None:
         return goals.Weights(beta=0.0, gamma=1.0), solution.iterations
-    effort = solution.optimum.cost / problem.duration
+    effort, sway = solution.optimum.cost / problem.duration, greatest_sway(solution)
+    if sway == 0.0:  # a hoist alone swings nothing
+        return goals.Weights(beta=0.0, gamma=1.0), solution.iterations
     return goals.Weights(
-        beta=problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2, gamma=AUTO_SWAY / greatest_sway(solution)
+        beta=problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2, gamma=AUTO_SWAY / sway
     ), solution.iterations
 
 
