@@ -81,7 +81,7 @@ BUILT_IN: dict[str, Format] = {
     ),
     "csv": Format(
         module="gen_profile_exporters.csv_table",
-        summary="table of time, position, velocity, acceleration and jerk (RFC 4180)",
+        summary="table of time, position, velocity, acceleration and jerk (RFC 4180, and vendors' dialects)",
         proof="read back",
         suffix=".csv",
     ),
