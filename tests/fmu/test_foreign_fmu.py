@@ -17,10 +17,12 @@ from hypothesis import strategies as st
 from gen_profile.errors import CosimulationError, SpecError
 from gen_profile.manifest import FILENAME
 from gen_profile.plants.registry import find_plant
+from gen_profile.profile import SampledProfile
 from gen_profile.spec_reading import preset_spec, spec_from_dict
 from gen_profile.workflows.check import check_artefact
 from gen_profile.workflows.design import design
-from gen_profile_fmu import safe_archive
+from gen_profile.workflows.foreign_check import _axis_inputs
+from gen_profile_fmu import foreign_child, safe_archive
 from gen_profile_fmu.building import build_fmu
 from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
@@ -301,3 +303,38 @@ def test_any_variable_map_is_read_or_refused(changes):
     folder = Path(__file__).parent
     with suppress(SpecError):
         spec_with(folder, **{"fmu": "kinds.py", **changes})
+
+
+@pytest.mark.parametrize("version", Version)
+def test_the_childs_work_in_this_process(tmp_path, version):
+    """The same as in a process of its own, where coverage does not look."""
+    path = write_fmu(tmp_path / "customer.fmu", version=version)
+    run = run_of(path)
+    expected = run_foreign(run)
+    for outputs in (["sway.payload"], ["sway.boom"]):
+        folder = tmp_path / outputs[0]
+        folder.mkdir()
+        job = {
+            "archive": str(path),
+            "machines": run.machines,
+            "input_names": run.input_names,
+            "output_names": outputs,
+        }
+        (folder / "job.json").write_text(json.dumps(job))
+        np.savez(folder / "motion.npz", times=run.times, inputs=run.inputs)
+        foreign_child.main(folder)
+    np.testing.assert_array_equal(np.load(tmp_path / "sway.payload" / "result.npy"), expected)
+    assert "no real scalar variable" in (tmp_path / "sway.boom" / "refusal.txt").read_text()
+
+
+def test_positions_alone_become_accelerations():
+    """Velocity passes through each cycle's mean at its middle, and stands at both ends."""
+    times = np.arange(101) * 0.02
+    position = (0.3 * np.sin(0.25 * np.pi * times) ** 2)[:, None]
+    setpoints = SampledProfile(cycle_time=0.02, position=position)
+    grid, inputs = _axis_inputs("acceleration", setpoints, 0.0)
+    velocity = np.cumsum(inputs[:, 0] * np.diff(grid))
+    np.testing.assert_allclose(velocity[:-1], np.diff(position[:, 0]) / 0.02, atol=1e-12)
+    assert velocity[-1] == pytest.approx(0.0, abs=1e-12)
+    middles = 0.5 * (np.append(0.0, velocity[:-1]) + velocity) * np.diff(grid)
+    assert middles.sum() == pytest.approx(0.3, abs=1e-4)
