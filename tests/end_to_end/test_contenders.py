@@ -11,7 +11,7 @@ from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.spec import LimitsSpec, RobustnessSpec
+from gen_profile.spec import CheckSpec, LimitsSpec, RobustnessSpec
 from gen_profile.spec_reading import preset_spec
 from gen_profile.workflows.compare import compare
 from gen_profile.workflows.contenders import contenders
@@ -101,7 +101,8 @@ def test_the_spec_s_own_motion_is_designed_once(monkeypatch):
         raise InfeasibleProblem("limits.velocity: too little.")
 
     monkeypatch.setattr("gen_profile.workflows.contenders.choice.solve", solve)
-    found = compare(attrs.evolve(PAPER, robustness=RobustnessSpec()))
+    loads = CheckSpec(residual_sway={"hook": 0.01, "payload": 0.003})
+    found = compare(attrs.evolve(PAPER, robustness=RobustnessSpec(), check=loads))
     assert len(calls) == 1  # what is impossible for β = 0 is so for any β
     refused = {method: reason for method, reason in found.left_out.items() if method not in SHAPERS}
     assert refused == dict.fromkeys(

@@ -8,6 +8,11 @@ import pytest
 from command_line import run_here, run_process
 from matplotlib import image
 
+from gen_profile.errors import OutputError
+from gen_profile.spec_reading import preset_spec
+from gen_profile.workflows.compare import Comparison
+from gen_profile.workflows.comparison_plot import draw
+
 FEW = ("--set", "cost.sway_weight=0", "--set", "robustness={}")
 
 
@@ -81,3 +86,12 @@ def test_where_matplotlib_is_not_installed_the_program_says_so_too(tmp_path):
     outcome = run_process(*words, cwd=tmp_path, PYTHONPATH=os.pathsep.join(paths))
     assert (outcome.code, outcome.errors) == (2, [INSTALL])
     assert not (tmp_path / "picture.png").exists()
+
+
+def test_where_no_method_has_a_motion_there_is_nothing_to_draw(tmp_path):
+    nothing = Comparison(
+        spec=preset_spec("paper"), base="quintic", rows=(), left_out={}, efficient=frozenset(), recommended={}
+    )
+    with pytest.raises(OutputError, match="no method has a motion for this move"):
+        draw(nothing, tmp_path / "picture.png")
+    assert list(tmp_path.iterdir()) == []

@@ -47,8 +47,10 @@ def draw(comparison: Comparison, path: Path) -> None:
     Raises
     ------
     OutputError
-        The file cannot be written.
+        The file cannot be written, or no method has a motion.
     """
+    if not comparison.rows:
+        raise OutputError("--plot: no method has a motion for this move; compare without --plot to see why.")
     import matplotlib  # noqa: PLC0415  # an extra
 
     matplotlib.use("Agg")
