@@ -37,7 +37,9 @@ def solve(problem: Problem, method: Method = "auto") -> Solution:
     solution = indirect.solve(problem)
     if method == "indirect" or keeps_limits(solution):
         return solution
-    return _explained(direct.solve(problem))
+    other = direct.solve(problem)
+    # where both fail, the indirect method, which knows the linear angle, has more to say
+    return solution if other.optimum is None and solution.optimum is None else _explained(other)
 
 
 def minimum_time(problem: Problem) -> float | None:

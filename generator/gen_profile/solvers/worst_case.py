@@ -14,15 +14,17 @@ from itertools import product
 import attrs
 import numpy as np
 
-from gen_profile.metrics import peak
+from gen_profile.metrics import POINTS_PER_SEGMENT, peak
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem, WorstCase
 from gen_profile.profile import Array, Profile
 from gen_profile.response import Swing
+from gen_profile.solvers import direct
 from gen_profile.solvers.conic import Verdict
 from gen_profile.solvers.direct import LeastCost, LeastWorst, conclude, resolve_weights, sequence, set_up
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
+from gen_profile.spec import LimitsSpec
 
 MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
 SLACK = 1.003  # what the least cost may give away of the least worst case
@@ -50,7 +52,24 @@ def solve(problem: Problem) -> Solution:
     Solution
         Its `worst_case_bound` is what no motion on the same intervals goes below where angles are small.
     """
-    return _solve(problem)[0]
+    solution = _solve(problem)[0]
+    if solution.optimum is not None or problem.limits != LimitsSpec():
+        return solution
+    held = _held_back(problem)
+    return solution if held is None else attrs.evolve(_solve(held)[0], problem=problem)
+
+
+def _held_back(problem: Problem) -> Problem | None:
+    """Allow no more acceleration than the motion takes that is exact and insensitive.
+
+    Without any limit, ever less sway would ask for ever more acceleration.
+    """
+    names = tuple(problem.worst_case.uncertain) if problem.worst_case is not None else ()
+    exact = direct.solve(attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0))
+    if exact.optimum is None:
+        return None
+    _, acceleration = optimal_profile(exact).within_segments(POINTS_PER_SEGMENT, 2)
+    return attrs.evolve(problem, limits=LimitsSpec(acceleration=float(np.abs(acceleration).max())))
 
 
 def solve_within_limits(problem: Problem) -> Solution:
