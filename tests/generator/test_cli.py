@@ -71,7 +71,7 @@ def test_plants_tell_parameters_with_units_and_bounds():
     [
         ([], "com", {"compare"}),
         ([], "--ex", {"--export"}),
-        (["--export"], "p", {"plc"}),
+        (["--export"], "p", {"plc", "plcopen-xml"}),
         (["compare", "--preset"], "paper-beta5", {"paper-beta50"}),
     ],
 )

@@ -29,7 +29,7 @@ BETA_DECADES = 8.0  # from share 0 to 1
 HORIZONTAL = np.pi / 2.0
 TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the linear model implies
 MODERATE_ANGLE = np.pi / 4.0  # that a cure aims at
-SMALL_ANGLE = np.pi / 3.0  # what a rope angle may reach in the linear model before nonlinearity is blamed
+SMALL_ANGLE = np.radians(50.0)  # of the linear model; from there on nonlinearity is blamed where Newton fails
 
 
 def solve(problem: Problem) -> Solution:

@@ -15,7 +15,7 @@ class Status(Enum):
     """How a solve ended, each with its sentence."""
 
     CONVERGED = "The optimality conditions are met."
-    SWINGS_TOO_FAR = "The load would have to swing beyond the horizontal."
+    SWINGS_TOO_FAR = "The load would have to swing too far."
     INFEASIBLE = "No motion meets the end conditions within the limits."
     NOT_CONTROLLABLE = "Some part of the machine swings on, whatever the axes do."
     DIVERGED = "The solver found no motion that meets the optimality conditions."
