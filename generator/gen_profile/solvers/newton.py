@@ -17,6 +17,7 @@ from gen_profile.solvers.collocation import Trajectory
 
 TOLERANCE = 1e-7  # step after which the next iterate's error is of the order of its square
 STALLED = 1e-5  # step that is taken for rounding noise when it ceases to shrink
+SLOW = 0.5  # share of the step before that is no longer Newton's convergence
 SMALLEST_DAMPING = 1.0 / 16.0
 MAX_ITERATIONS = 20
 
@@ -56,7 +57,10 @@ def solve_newton(problem: Canonical, guess: Trajectory) -> NewtonOutcome:
             return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
         trial = _iterate(problem, current.trajectory.blend(current.following, damping))
         if trial is not None and _shortens(problem, current, trial, damping):
+            stalled = trial.step < STALLED and trial.step > SLOW * current.step
             current, damping = trial, min(1.0, 2.0 * damping)
+            if stalled:
+                return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
         elif current.step < STALLED:
             return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
         else:
