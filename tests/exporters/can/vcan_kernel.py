@@ -80,6 +80,7 @@ def _run_in_uml(script, folder):
         text=True,
         errors="replace",
         check=False,
+        env={**os.environ, "HOME": str(folder)},  # where the kernel keeps its socket; it dies without
         preexec_fn=_punctual,
     )
     code = folder / "code"
