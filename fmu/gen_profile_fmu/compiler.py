@@ -10,6 +10,7 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 from platform import machine
+from tempfile import TemporaryDirectory
 
 import attrs
 
@@ -96,12 +97,14 @@ def compile_library(compiler: Compiler, folder: Path, source: str, output: str, 
     CosimulationError
         With the compiler's words.
     """
-    environment = {
-        **os.environ,
-        "ZIG_GLOBAL_CACHE_DIR": str(zig_cache),
-        "ZIG_LOCAL_CACHE_DIR": str(zig_cache),
-    }
-    _run((*compiler.command, "-I.", "-o", output, source, "-lm"), folder=folder, environment=environment)
+    # old Zigs at work side by side take each other's object files from a shared local cache
+    with TemporaryDirectory(prefix="zig-") as local_cache:
+        environment = {
+            **os.environ,
+            "ZIG_GLOBAL_CACHE_DIR": str(zig_cache),
+            "ZIG_LOCAL_CACHE_DIR": local_cache,
+        }
+        _run((*compiler.command, "-I.", "-o", output, source, "-lm"), folder=folder, environment=environment)
 
 
 def _run(command: tuple[str, ...], folder: Path | None, environment: dict[str, str] | None) -> str:
