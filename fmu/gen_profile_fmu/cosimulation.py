@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Mapping
 from ctypes import byref, c_double, c_uint, sizeof
 from types import TracebackType
@@ -10,24 +9,16 @@ from typing import Any, Self
 
 import attrs
 import numpy as np
-from fmpy import calloc, free
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-    fmi2OK,
-    fmi2True,
-)
+from fmpy.fmi2 import fmi2True
 
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Plant
 from gen_profile.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.response import Response
-from gen_profile_fmu.cache import ENVIRONMENT_VARIABLE
-from gen_profile_fmu.plant_fmu import PlantFmu, plant_fmu
+from gen_profile_fmu.fmu_files import Version
+from gen_profile_fmu.instances import slave
+from gen_profile_fmu.plant_fmu import plant_fmu
 from gen_profile_fmu.plant_variables import MAX_STEP, TAU
 
 # blocks of variables that are read after every step, and what a Response calls them
@@ -39,7 +30,6 @@ _OBSERVED = {
     "SWAY": "sway",
     "ANGLE": "angle",
 }
-_logger = logging.getLogger(__name__)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -73,8 +63,7 @@ class PlantCosimulation:
         self._plant = plant
         self._fmu = plant_fmu(plant, on_build)
         self._messages: list[str] = []
-        self._callbacks = _callbacks(self._messages)
-        self._slave = _load(self._fmu, self._callbacks, self._messages)
+        self._slave = slave(self._fmu, Version.FMI2, self._messages)
         variables = self._fmu.variables
         self._setpoints = _references(variables.references("INPUTS"))
         self._outputs = _references(variables.references(*_OBSERVED))
@@ -190,8 +179,8 @@ class PlantCosimulation:
 
     def _march(self, steps: _Steps) -> Array:
         """Take all steps, reading setpoints and writing samples in place; a step costs a few microseconds."""
-        slave, component = self._slave, self._slave.component
-        set_real, do_step, get_real = slave.fmi2SetReal, slave.fmi2DoStep, slave.fmi2GetReal
+        fmu, component = self._slave, self._slave.component
+        set_real, do_step, get_real = fmu.fmi2SetReal, fmu.fmi2DoStep, fmu.fmi2GetReal
         inputs, outputs = self._setpoints, self._outputs
         n_inputs, n_outputs = len(inputs), len(outputs)
         samples = np.empty((len(steps.times), n_outputs))
@@ -226,40 +215,3 @@ def _steps(setpoints: SampledProfile, settle: float, output_step: float | None) 
 
 def _references(references: Any) -> Any:
     return (c_uint * len(references))(*references)
-
-
-def _callbacks(messages: list[str]) -> Any:
-    """Make FMI callbacks that log the FMU's messages and keep those of failures."""
-
-    def log(environment: object, instance: bytes, status: int, category: bytes, message: bytes) -> None:
-        del environment, instance
-        text = message.decode("utf-8", errors="replace")
-        if status == fmi2OK:
-            _logger.debug("%s: %s", category.decode("utf-8"), text)
-        else:
-            _logger.warning("%s: %s", category.decode("utf-8"), text)
-            messages.append(text)
-
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(log)
-    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-    return callbacks
-
-
-def _load(fmu: PlantFmu, callbacks: Any, messages: list[str]) -> Any:
-    try:
-        slave = FMU2Slave(
-            guid=fmu.guid,
-            modelIdentifier=fmu.model_identifier,
-            unzipDirectory=str(fmu.folder),
-            instanceName=fmu.model_identifier,
-        )
-        slave.instantiate(callbacks=callbacks, loggingOn=_logger.isEnabledFor(logging.DEBUG))
-    except Exception as error:  # FMPy raises nothing more special
-        reason = " ".join(messages) or str(error)
-        raise CosimulationError(
-            f"The plant's FMU in {fmu.folder} cannot be loaded: {reason} "
-            f"If programs must not be loaded from there, name another folder in {ENVIRONMENT_VARIABLE}."
-        ) from error
-    return slave

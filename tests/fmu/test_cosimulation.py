@@ -151,7 +151,7 @@ def test_errors_of_the_fmu_are_logged(cosimulation, crane, setpoints, caplog):
     with pytest.raises(CosimulationError):
         cosimulation.run(setpoints, {**crane.nominal(), "g": 0.0}, max_step=1e-3, settle=0.0)
     (record,) = caplog.records
-    assert (record.name, record.levelno) == ("gen_profile_fmu.cosimulation", logging.WARNING)
+    assert (record.name, record.levelno) == ("gen_profile_fmu.instances", logging.WARNING)
     assert record.getMessage() == "logStatusError: g must lie between 0.1 and 30, found 0."
 
 

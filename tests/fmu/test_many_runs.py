@@ -30,21 +30,56 @@ def many(version):
         yield runs
 
 
+def one_by_one(version, times, values, parameters, since):
+    """Greatest magnitudes in one run, without the loop."""
+    instance = Instance(cached_fmu(model_of("plant-acceleration", CRANE), version), version, exchange=False)
+    instance.begin(parameters, start=times[0])
+    held = dict(zip(times[:-1].tolist(), values, strict=True))
+    seen = cosimulate(
+        instance, times, lambda time, _: instance.write({"cart.setpoint_acceleration": held[time]}), OUTPUTS
+    )
+    instance.close()
+    return np.abs(seen[times >= since]).max(axis=0)
+
+
 def test_gives_the_peaks_of_every_run(many, version):
     parameters = {"L1": np.array([0.4, 0.5, 0.6]), "m2": np.array([0.1, 0.2, 0.3])}
     found = many.peaks(TIMES, INPUTS, parameters, OUTPUTS, since=1.0)
     for row, length, mass in zip(found, *parameters.values(), strict=True):
-        fmu = cached_fmu(model_of("plant-acceleration", CRANE), version)
-        instance = Instance(fmu, version, exchange=False)
-        instance.begin({"L1": length, "m2": mass})
         values = INPUTS["cart.setpoint_acceleration"]
+        expected = one_by_one(version, TIMES, values, {"L1": length, "m2": mass}, since=1.0)
+        np.testing.assert_array_equal(row, expected)
 
-        def before(time, _, instance=instance, values=values):
-            instance.write({"cart.setpoint_acceleration": values[round(time / 0.01)]})
 
-        seen = cosimulate(instance, TIMES, before, OUTPUTS)
-        np.testing.assert_array_equal(row, np.abs(seen[100:]).max(axis=0))
-        instance.close()
+def test_runs_may_have_their_own_inputs_and_times(many, version):
+    """As for jitter and latency; a parameter of their own they need not have."""
+    random = np.random.default_rng(5)
+    times = TIMES + 0.002 * random.random((3, len(TIMES)))
+    inputs = random.normal(size=(3, len(TIMES) - 1))
+    found = many.peaks(times, {"cart.setpoint_acceleration": inputs}, {}, OUTPUTS)
+    for row, points, values in zip(found, times, inputs, strict=True):
+        np.testing.assert_array_equal(row, one_by_one(version, points, values, {}, since=0.0))
+    shared = many.peaks(TIMES, {"cart.setpoint_acceleration": inputs}, {"L1": np.array([0.5])}, OUTPUTS)
+    assert shared.shape == (3, 2)
+
+
+def test_one_run_needs_nothing_of_its_own(many, version):
+    (found,) = many.peaks(TIMES, INPUTS, {}, OUTPUTS)
+    values = INPUTS["cart.setpoint_acceleration"]
+    np.testing.assert_array_equal(found, one_by_one(version, TIMES, values, {}, since=0.0))
+
+
+@pytest.mark.parametrize("workers", [2, 5])
+def test_workers_find_the_same_whatever_their_number(many, version, workers):
+    parameters = {"L1": np.linspace(0.4, 0.6, 23)}
+    alone = many.peaks(TIMES, INPUTS, parameters, OUTPUTS)
+    fmu = cached_fmu(model_of("plant-acceleration", CRANE), version)
+    with ManyRuns(fmu, version, workers=workers) as together:
+        np.testing.assert_array_equal(together.peaks(TIMES, INPUTS, parameters, OUTPUTS), alone)
+        lengths = np.full(23, 0.5)
+        lengths[[7, 20]] = [-1.0, -2.0]
+        with pytest.raises(CosimulationError, match=r"in run 7, counted from 0: L1 must .* found -1\."):
+            together.peaks(TIMES, INPUTS, {"L1": lengths}, OUTPUTS)
 
 
 def test_runs_do_not_depend_on_those_before(many):
@@ -64,10 +99,15 @@ def test_a_system_needs_no_inputs(version):
     ("changes", "message"),
     [
         ({"parameters": {"L3": np.ones(1)}}, "no variable 'L3'"),
-        ({"parameters": {"L1": np.array([0.5, -1.0])}}, r"could not go on in run 1, with {'L1': -1.0}"),
+        ({"parameters": {"L1": np.array([0.5, -1.0])}}, r"go on in run 1, .*: L1 must lie .*, found -1\."),
         ({"parameters": {"L1": np.ones(2), "L2": np.ones(3)}}, "parameters of many runs differ in length"),
         ({"inputs": {"cart.setpoint_acceleration": np.ones(3)}}, "inputs of many runs differ in length"),
-        ({"times": np.array([0.0, 0.0, 0.1]), "inputs": {}}, "could not go on in run 0"),
+        (
+            {"inputs": {"cart.setpoint_acceleration": np.ones((2, 200)), "theta1": np.ones((3, 200))}},
+            "inputs of many runs differ",
+        ),
+        ({"times": np.tile(TIMES, (3, 1)), "parameters": {"L1": np.ones(2)}}, r"are of \[2, 3\] runs"),
+        ({"times": np.array([0.0, 0.0, 0.1]), "inputs": {}}, "run 0, .*: The step size must be positive"),
     ],
 )
 def test_refusals_are_sentences(many, changes, message):
@@ -78,8 +118,9 @@ def test_refusals_are_sentences(many, changes, message):
 
 def test_memory_stays_flat(many):
     parameters = {"L1": np.linspace(0.4, 0.6, 200)}
-    many.peaks(TIMES, INPUTS, parameters, OUTPUTS)
+    inputs = {name: np.tile(values, (200, 1)) for name, values in INPUTS.items()}
+    many.peaks(TIMES, inputs, parameters, OUTPUTS)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for _ in range(20):
-        many.peaks(TIMES, INPUTS, parameters, OUTPUTS)
+        many.peaks(TIMES, inputs, parameters, OUTPUTS)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2000  # KiB, of 4000 runs

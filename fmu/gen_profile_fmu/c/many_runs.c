@@ -34,14 +34,22 @@ typedef struct {
     void *instance;
 } Fmu;
 
+/* Numbers of every run, one run behind the other; those that all runs share are there once, and `size` is 0. */
 typedef struct {
-    size_t runs, steps, inputs, parameters, outputs;
-    const double *times;                 /* steps + 1 */
-    const double *input_values;          /* steps x inputs */
-    const double *parameter_values;      /* runs x parameters */
+    const double *values;
+    size_t size;
+} PerRun;
+
+typedef struct {
+    PerRun times;                        /* steps + 1 */
+    PerRun inputs;                       /* steps x n_inputs */
+    PerRun parameters;                   /* n_parameters */
+    size_t steps, n_inputs, n_parameters, n_outputs;
     const unsigned *input_references, *parameter_references, *output_references;
-    size_t first;                        /* communication point from which peaks count */
+    double since;                        /* time from which peaks count */
 } Plan;
+
+static const double *of_run(const PerRun *numbers, size_t run) { return numbers->values + run * numbers->size; }
 
 static int set(const Fmu *fmu, const unsigned *references, size_t n, const double *values) {
     if (n == 0) return GOOD;
@@ -62,32 +70,36 @@ static int step(const Fmu *fmu, double time, double size) {
 }
 
 static int begin(const Fmu *fmu, const Plan *plan, size_t run) {
-    const double *values = plan->parameter_values + run * plan->parameters;
-    const double start = plan->times[0];
+    const double *values = of_run(&plan->parameters, run);
+    const double start = *of_run(&plan->times, run);
     if (fmu->reset2) {
         return fmu->reset2(fmu->instance) || fmu->setup2(fmu->instance, fmi2False, 0.0, start, fmi2False, 0.0) ||
-               set(fmu, plan->parameter_references, plan->parameters, values) || fmu->enter2(fmu->instance) ||
+               set(fmu, plan->parameter_references, plan->n_parameters, values) || fmu->enter2(fmu->instance) ||
                fmu->exit2(fmu->instance);
     }
-    return fmu->reset3(fmu->instance) || set(fmu, plan->parameter_references, plan->parameters, values) ||
+    return fmu->reset3(fmu->instance) || set(fmu, plan->parameter_references, plan->n_parameters, values) ||
            fmu->enter3(fmu->instance, false, 0.0, start, false, 0.0) || fmu->exit3(fmu->instance);
 }
 
-/* Greatest magnitudes of the outputs, runs x outputs; `values` is room for the outputs. The number of good runs. */
-EXPORT size_t many_runs(const Fmu *fmu, const Plan *plan, double *values, double *peaks) {
-    for (size_t run = 0; run < plan->runs; run++) {
-        double *peak = peaks + run * plan->outputs;
-        for (size_t i = 0; i < plan->outputs; i++) peak[i] = 0.0;
-        if (begin(fmu, plan, run) != GOOD) return run;
-        for (size_t k = 0; k < plan->steps; k++) {
-            const double *input = plan->input_values + k * plan->inputs;
-            const double size = plan->times[k + 1] - plan->times[k];
-            if (set(fmu, plan->input_references, plan->inputs, input) != GOOD) return run;
-            if (step(fmu, plan->times[k], size) != GOOD) return run;
-            if (k + 1 < plan->first) continue;
-            if (get(fmu, plan->output_references, plan->outputs, values) != GOOD) return run;
-            for (size_t i = 0; i < plan->outputs; i++) peak[i] = fmax(peak[i], fabs(values[i]));
-        }
+/* One run; `values` is room for the outputs. */
+static int simulate(const Fmu *fmu, const Plan *plan, size_t run, double *values, double *peaks) {
+    const double *times = of_run(&plan->times, run), *input = of_run(&plan->inputs, run);
+    for (size_t i = 0; i < plan->n_outputs; i++) peaks[i] = 0.0;
+    int status = begin(fmu, plan, run);
+    for (size_t k = 0; k < plan->steps && status == GOOD; k++, input += plan->n_inputs) {
+        status = set(fmu, plan->input_references, plan->n_inputs, input);
+        if (status == GOOD) status = step(fmu, times[k], times[k + 1] - times[k]);
+        if (status != GOOD || times[k + 1] < plan->since) continue;
+        status = get(fmu, plan->output_references, plan->n_outputs, values);
+        for (size_t i = 0; i < plan->n_outputs; i++) peaks[i] = fmax(peaks[i], fabs(values[i]));
     }
-    return plan->runs;
+    return status;
+}
+
+/* Greatest magnitudes of the outputs in runs [first, end), runs x outputs. The first bad run, or `end`. */
+EXPORT size_t many_runs(const Fmu *fmu, const Plan *plan, size_t first, size_t end, double *values, double *peaks) {
+    for (size_t run = first; run < end; run++) {
+        if (simulate(fmu, plan, run, values, peaks + run * plan->n_outputs) != GOOD) return run;
+    }
+    return end;
 }
