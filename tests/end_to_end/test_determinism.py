@@ -5,6 +5,7 @@ import os
 
 import pytest
 from command_line import run_process
+from system_parts import missing
 
 FORMATS = ("--export", "csv", "--export", "plc", "--export", "can")
 GERMAN = "de_DE.UTF-8"
@@ -46,10 +47,7 @@ def test_a_german_locale_with_its_decimal_comma(first, tmp_path):
         locale.setlocale(locale.LC_ALL, GERMAN)
         assert locale.localeconv()["decimal_point"] == ","
     except locale.Error:
-        missing = f"the locale {GERMAN} is not installed: localedef -i de_DE -f UTF-8 {GERMAN}"
-        if os.environ.get("CI"):
-            pytest.fail(missing)
-        pytest.skip(missing)
+        missing(f"the locale {GERMAN} (localedef -i de_DE -f UTF-8 {GERMAN})")
     finally:
         locale.setlocale(locale.LC_ALL, before)
     assert outputs(tmp_path / "run", LC_ALL=GERMAN, LANG=GERMAN, LANGUAGE="de") == first

@@ -1,13 +1,13 @@
 """The compiler that is chosen, what it says, and that the hand-written C is clean."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from fmu.kinds import KINDS, model_of
+from system_parts import program
 
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.registry import find_plant
@@ -66,8 +66,7 @@ def test_hand_written_c_has_no_warning(written, zig_cc, kind, version):
 def test_plain_c_compilers_take_the_sources(written, kind, version):
     """As an importer of a source FMU would, with GNU's compiler and its own idea of warnings."""
     folder = written(kind, version)
-    system = shutil.which("cc")
-    assert system, "This test needs a system C compiler; install gcc."
+    system = program("cc", "gcc")
     command = [system, *STRICT, "-c", SOURCE_FILE, "-o", "object.o"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -81,8 +80,7 @@ def test_zig_is_the_default():
 
 
 def test_a_system_compiler_can_be_named(crane, quintic, monkeypatch, tmp_path):
-    system = shutil.which("cc")
-    assert system, "This test needs a system C compiler; install gcc."
+    system = program("cc", "gcc")
     with PlantCosimulation(crane) as zig:
         expected = zig.run(sample(quintic, 0.01), crane.nominal(), max_step=1e-3, settle=1.0)
         folder = plant_fmu(crane).folder

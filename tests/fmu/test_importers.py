@@ -1,8 +1,8 @@
 """Other people's importers: CasADi's DaeBuilder, Ecos, and a plain C compiler for the sources."""
 
 import html
+import importlib
 import io
-import shutil
 import subprocess
 import zipfile
 from pathlib import Path
@@ -11,10 +11,10 @@ import casadi
 import fmpy
 import numpy as np
 import pytest
-from ecospy import EcosSimulation, EcosSimulationStructure
 from fmpy import simulate_fmu
 from fmu.drivers import Instance, cosimulate
 from fmu.kinds import KINDS, model_of, motion
+from system_parts import missing, program
 
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem import symbolic as sym
@@ -29,6 +29,15 @@ CRANE = find_plant("double-pendulum-crane")
 @pytest.fixture(params=Version)
 def version(request):
     return request.param
+
+
+@pytest.fixture(scope="module")
+def ecos():
+    """Give Ecos, whose wheel takes Threading Building Blocks from the system."""
+    try:
+        return importlib.import_module("ecospy")
+    except OSError as error:
+        missing(f"Threading Building Blocks (Debian package libtbb12): {error}")
 
 
 def _own_jacobian(kind, x, u):
@@ -77,17 +86,17 @@ if tuple(map(int, casadi.__version__.split(".")[:2])) >= (3, 8):  # older ones r
         assert len(builder.y()) >= 4
 
 
-def test_ecos_runs_a_profile_into_a_plant(version):
+def test_ecos_runs_a_profile_into_a_plant(ecos, version):
     """Connected by name: what a co-simulation master does with the two FMUs."""
     profile = cached_fmu(model_of("profile", CRANE), version)
     plant = cached_fmu(model_of("plant-acceleration", CRANE), version)
-    with EcosSimulationStructure() as structure:
+    with ecos.EcosSimulationStructure() as structure:
         structure.add_model("motion", str(profile.archive))
         structure.add_model("crane", str(plant.archive))
         structure.make_real_connection(
             "motion::cart.setpoint_acceleration", "crane::cart.setpoint_acceleration"
         )
-        with EcosSimulation(structure=structure, step_size=1e-3) as simulation:
+        with ecos.EcosSimulation(structure=structure, step_size=1e-3) as simulation:
             simulation.init()
             simulation.step_until(2.5)
             found = [simulation.get_real(f"crane::{name}") for name in ("cart.position", "sway.payload")]
@@ -103,11 +112,11 @@ def test_ecos_runs_a_profile_into_a_plant(version):
 
 
 @pytest.mark.parametrize("kind", ["plant-setpoint", "system"])
-def test_ecos_runs_every_version(kind, version):
+def test_ecos_runs_every_version(ecos, kind, version):
     fmu = cached_fmu(model_of(kind, CRANE), version)
-    with EcosSimulationStructure() as structure:
+    with ecos.EcosSimulationStructure() as structure:
         structure.add_model("crane", str(fmu.archive))
-        with EcosSimulation(structure=structure, step_size=0.01) as simulation:
+        with ecos.EcosSimulation(structure=structure, step_size=0.01) as simulation:
             simulation.init()
             if kind == "plant-setpoint":
                 simulation.set_real("crane::cart.setpoint", 0.01)
@@ -129,8 +138,7 @@ def test_source_fmus_compile_with_a_plain_compiler_and_run(kind, version, tmp_pa
     folder = {Version.FMI2: fmpy.platform, Version.FMI3: fmpy.platform_tuple}[version]
     library = tmp_path / "binaries" / folder / f"{model.identifier}.so"
     library.parent.mkdir(parents=True)
-    system = shutil.which("cc")
-    assert system, "This test needs a system C compiler; install gcc."
+    system = program("cc", "gcc")
     override = f"-DFMI{version.value}_OVERRIDE_FUNCTION_PREFIX"
     command = [system, "-std=c99", "-O1", "-shared", "-fPIC", override, "-o", str(library), "fmu.c", "-lm"]
     done = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True, check=False)
@@ -151,7 +159,7 @@ def test_two_source_fmus_link_into_one_program(version, tmp_path):
         folder.mkdir()
         for name, text in sources(model, version).code.items():
             (folder / name).write_text(text)
-        subprocess.run(["cc", "-std=c99", "-c", "fmu.c"], cwd=folder, check=True)
+        subprocess.run([program("cc", "gcc"), "-std=c99", "-c", "fmu.c"], cwd=folder, check=True)
         objects.append(folder / "fmu.o")
     names = [{line.split()[-1] for line in _symbols(path) if line.split()[-2] == "T"} for path in objects]
     assert names[0]
@@ -162,7 +170,7 @@ def test_two_source_fmus_link_into_one_program(version, tmp_path):
 
 
 def _symbols(path):
-    done = subprocess.run(["nm", str(path)], capture_output=True, text=True, check=True)
+    done = subprocess.run([program("nm", "binutils"), str(path)], capture_output=True, text=True, check=True)
     return done.stdout.splitlines()
 
 

@@ -14,6 +14,7 @@ import pytest
 from fmu.drivers import Instance
 from fmu.kinds import model_of
 from fmu.test_fmi2_calls import functions_of_the_standard
+from system_parts import program
 
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.registry import find_plant
@@ -25,7 +26,7 @@ from gen_profile_fmu.plant_fmu import cached_fmu
 from gen_profile_fmu.platforms import PLATFORMS, host_platform
 
 SYSTEM = model_of("system", find_plant("double-pendulum-crane"))
-WINE = Path("/usr/lib/wine/wine64")
+WINE = "/usr/lib/wine/wine64"
 
 
 def binaries(version, *names):
@@ -88,7 +89,7 @@ def test_one_processor_of_macos_needs_no_universal_binary():
 
 def test_windows_runs_under_wine(cache, tmp_path):
     """The same values to 12 digits as this computer's binary computes."""
-    assert WINE.exists(), "This test needs Wine; install wine64."
+    wine = program(WINE, "wine64")
     (library,) = binaries(Version.FMI2, "windows-x86_64").values()
     parsed = lief.PE.parse(list(library))
     assert {entry.name for entry in parsed.get_export().entries} == functions_of_the_standard()
@@ -104,7 +105,7 @@ def test_windows_runs_under_wine(cache, tmp_path):
     names = [variable.name for variable in SYSTEM.variables.variables[first:]]
     arguments = ["system.dll", fmu.guid, "200", str(first), str(len(names)), "result.txt"]
     environment = {**os.environ, "WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"}
-    command = [str(WINE), "rundll32", "runner.dll,run", *arguments]
+    command = [wine, "rundll32", "runner.dll,run", *arguments]
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert (tmp_path / "result.txt").exists(), done.stderr
     found = np.loadtxt(tmp_path / "result.txt")

@@ -1,11 +1,10 @@
-import os
-import shutil
 import subprocess
 
 import can
 import numpy as np
 import pytest
 from motions import quintic, target
+from system_parts import program
 
 from gen_profile.errors import ExportError
 from gen_profile.profile import sample
@@ -69,13 +68,11 @@ class TestEncode:
             assert not any(frame.is_extended_id or frame.is_remote_frame or frame.is_fd for frame in frames)
 
     def test_can_utils_read_the_same(self, tmp_path):
-        if shutil.which("log2asc") is None:
-            assert "CI" not in os.environ, "CI must install can-utils"
-            pytest.skip("log2asc is missing; install the package can-utils")
+        log2asc = program("log2asc", "can-utils")
         path = tmp_path / "bay-3.log"
         path.write_bytes(encoded(TWO_MOVES, "bridge", "trolley"))
         output = subprocess.run(
-            ["log2asc", "-I", str(path), "can0"], check=True, capture_output=True, text=True
+            [log2asc, "-I", str(path), "can0"], check=True, capture_output=True, text=True
         )
         found = [line.split()[2:] for line in output.stdout.splitlines() if " Rx " in line]
         expected = []

@@ -101,5 +101,7 @@ def _which(tool):
 
 def _own_vcan():
     """Whether this machine's kernel makes vcan interfaces, in a network namespace of their own."""
+    if _which("unshare") is None or _which("ip") is None:
+        return False
     probe = ["unshare", "-n", "ip", "link", "add", "vcan0", "type", "vcan"]
     return subprocess.run(probe, capture_output=True, check=False).returncode == 0
