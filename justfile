@@ -10,7 +10,7 @@ lint:
 
 # The whole suite with branch coverage; pyproject.toml holds the least share.
 coverage:
-    pytest -n 2 --cov --cov-report=term
+    pytest -n auto --cov --cov-report=term
 
 # Some tests: just test tests/generator -k shaper
 test *arguments:
