@@ -1,4 +1,4 @@
-"""``manifest.json``, the record beside the artefacts: spec, versions, hashes and the check."""
+"""``manifest.json``, the record beside the artefacts: spec, versions, hashes and check of every export."""
 
 from __future__ import annotations
 
@@ -58,6 +58,8 @@ class Manifest:
     artefacts : tuple of Artefact
     check : mapping or None
         `gen_profile.check.Check.to_dict` of the artefact that came off worst; None when none was checked.
+    earlier : tuple of Manifest
+        Of exports into the same folder before, with those of their artefacts that were not replaced since.
     """
 
     name: str
@@ -67,11 +69,37 @@ class Manifest:
     versions: Mapping[str, str]
     artefacts: tuple[Artefact, ...]
     check: Mapping[str, Any] | None
+    earlier: tuple[Manifest, ...] = ()
+
+    def after(self, previous: Manifest) -> Manifest:
+        """Keep what a previous manifest says of artefacts that this export does not replace."""
+        replaced = {artefact.path for artefact in self.artefacts}
+        remaining = (
+            attrs.evolve(
+                one, artefacts=tuple(kept for kept in one.artefacts if kept.path not in replaced), earlier=()
+            )
+            for one in (previous, *previous.earlier)
+        )
+        return attrs.evolve(self, earlier=tuple(one for one in remaining if one.artefacts))
+
+    def covering(self, name: str, digest: str) -> Manifest:
+        """Find the export that a file comes from: by its SHA-256, else by its name, else the latest."""
+        every = (self, *self.earlier)
+        by_content = [one for one in every if any(known.sha256 == digest for known in one.artefacts)]
+        by_name = [one for one in every if any(known.path == name for known in one.artefacts)]
+        return (by_content or by_name or [self])[0]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            **attrs.asdict(self),
+            "check": self.check or UNVERIFIED,
+            "earlier": [one.to_dict() for one in self.earlier],
+        }
 
     def to_json(self) -> bytes:
         """Render, UTF-8."""
-        document = {"format": FORMAT, "format_version": FORMAT_VERSION, **attrs.asdict(self)}
-        document["check"] = self.check or UNVERIFIED
+        document = {"format": FORMAT, "format_version": FORMAT_VERSION, **self.to_dict()}
         return (json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")
 
 
@@ -93,13 +121,20 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
         document = json.loads(content.decode("utf-8"))
         if (document.pop("format"), document.pop("format_version")) != (FORMAT, FORMAT_VERSION):
             raise ValueError("another format")
-        artefacts = tuple(Artefact(**artefact) for artefact in document.pop("artefacts"))
-        check = document.pop("check")
-        return Manifest(artefacts=artefacts, check=None if check == UNVERIFIED else check, **document)
+        return _from_dict(document)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise OutputError(
             f"{source}: not a manifest of this version of gen-profile; export again, or give the spec."
         ) from error
+
+
+def _from_dict(document: dict[str, Any]) -> Manifest:
+    artefacts = tuple(Artefact(**artefact) for artefact in document.pop("artefacts"))
+    earlier = tuple(map(_from_dict, document.pop("earlier", ())))
+    check = document.pop("check")
+    return Manifest(
+        artefacts=artefacts, earlier=earlier, check=None if check == UNVERIFIED else check, **document
+    )
 
 
 def sha256(content: bytes) -> str:

@@ -291,3 +291,19 @@ def test_a_suffix_that_no_format_has_is_a_sentence(folder):
 def test_the_folder_itself_is_no_artefact(folder):
     outcome = run_here("check", folder)
     assert (outcome.code, outcome.errors) == (2, [f"Error: Cannot read {folder}: Is a directory."])
+
+
+def test_two_specs_may_share_a_folder(tmp_path):
+    """Each artefact keeps its own spec and verdict; a second export of one format keeps the first's."""
+    short = ("--set", "name=short", "--set", "move.distance=0.1")
+    assert run_here("--export", "csv", "--out", tmp_path).code == 0
+    assert run_here(*short, "--export", "csv", "--out", tmp_path).code == 0
+    assert run_here(*short, "--export", "plc", "--out", tmp_path).code == 0
+    for file, name in (("paper.csv", "paper"), ("short.csv", "short"), ("short.st", "short")):
+        outcome = run_here("check", tmp_path / file, "--json")
+        found = (outcome.code, outcome.document["name"], outcome.document["artefact"]["manifest"])
+        assert found == (0, name, "matches")
+    (tmp_path / "paper.csv").write_text(altered_row((tmp_path / "paper.csv").read_text(), 1000, 1.02))
+    outcome = run_here("check", tmp_path / "paper.csv", "--json")
+    assert (outcome.code, outcome.document["name"]) == (4, "paper")
+    assert outcome.document["artefact"]["manifest"] == "differs"

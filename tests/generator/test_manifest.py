@@ -74,5 +74,35 @@ def test_refuses_what_is_no_manifest(content):
         parse_manifest(content, "out/manifest.json")
 
 
+def exported(name, *paths):
+    artefacts = tuple(
+        attrs.evolve(ARTEFACT, path=path, sha256=sha256(f"{name} {path}".encode())) for path in paths
+    )
+    return attrs.evolve(MANIFEST, name=name, artefacts=artefacts)
+
+
+class TestSeveralExportsIntoOneFolder:
+    def test_what_is_not_replaced_is_kept(self):
+        first, second = exported("a", "a.csv", "a.st"), exported("b", "b.csv")
+        third = exported("a", "a.st").after(second.after(first))
+        assert third.artefacts == exported("a", "a.st").artefacts
+        assert [(one.name, [kept.path for kept in one.artefacts]) for one in third.earlier] == [
+            ("b", ["b.csv"]),
+            ("a", ["a.csv"]),
+        ]
+        assert parse_manifest(third.to_json(), "manifest.json") == third
+
+    def test_an_export_that_replaces_everything_is_alone(self):
+        assert exported("a", "a.csv").after(exported("a", "a.csv")) == exported("a", "a.csv")
+
+    def test_a_file_is_found_by_content_then_by_name(self):
+        both = exported("b", "b.csv").after(exported("a", "a.csv"))
+        (own,) = exported("a", "a.csv").artefacts
+        assert both.covering("renamed.csv", own.sha256).name == "a"
+        assert both.covering("a.csv", "altered").name == "a"
+        assert both.covering("b.csv", "altered").name == "b"
+        assert both.covering("renamed.csv", "altered").name == "b"
+
+
 def test_hashes_as_others_do():
     assert sha256(b"load") == hashlib.sha256(b"load").hexdigest()

@@ -78,7 +78,7 @@ def check_artefact(
     """
     content = _read(path)
     format_ = format_of(path)
-    manifest = _manifest_beside(path)
+    manifest = _manifest_beside(path, content)
     if spec is None:
         spec = _spec_of(manifest, path)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
@@ -87,8 +87,8 @@ def check_artefact(
     faults = (*_missed_ends(spec, setpoints), *check.faults)
     if standing == "differs":
         faults += (
-            f"{path.name} is none of the files that {FILENAME} beside it lists: it was altered after its "
-            "export, or a later export replaced the manifest; export it again.",
+            f"{path.name} is none of the files that {FILENAME} beside it lists: "
+            "it was altered after its export; export it again.",
         )
     return Judgement(
         path=path, format=format_, spec=spec, check=attrs.evolve(check, faults=faults), manifest=standing
@@ -129,9 +129,11 @@ def _read(path: Path) -> bytes:
         raise OutputError(f"Cannot read {path}: {error.strerror or error}.") from error
 
 
-def _manifest_beside(path: Path) -> Manifest | None:
+def _manifest_beside(path: Path, content: bytes) -> Manifest | None:
     beside = path.parent / FILENAME
-    return parse_manifest(_read(beside), str(beside)) if beside.is_file() else None
+    if not beside.is_file():
+        return None
+    return parse_manifest(_read(beside), str(beside)).covering(path.name, sha256(content))
 
 
 def _spec_of(manifest: Manifest | None, path: Path) -> Spec:

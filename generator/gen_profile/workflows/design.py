@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,8 @@ from typing import Any
 import attrs
 
 from gen_profile.check import Check
-from gen_profile.manifest import FILENAME, Artefact, Manifest, sha256
+from gen_profile.errors import OutputError
+from gen_profile.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256
 from gen_profile.profile import Profile, SampledProfile
 from gen_profile.spec import Spec
 from gen_profile.workflows.delivery import Staging, staged
@@ -53,25 +55,10 @@ class Design:
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
-        solution, optimum = self.plan.solution, self.plan.solution.raise_for_status()
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
-            "solver": {
-                "status": solution.status.name.lower(),
-                "method": solution.method,
-                "iterations": solution.iterations,
-                "residual": solution.residual,
-                "time_s": self.plan.solver_time,
-                "cost": optimum.cost,
-                "sway_weight": optimum.sway_weight,
-                "sway_scale_per_m": optimum.sway_scale,
-                "intervals": len(optimum.knots) - 1,
-                "defect": optimum.defect,
-                "hamiltonian_variation": optimum.hamiltonian_variation,
-                "redundant": list(solution.redundant),
-                "worst_case_bound_m": solution.worst_case_bound,
-            },
+            "solver": self._solver(),
             "figures": self.plan.figures,
             "check": None if self.check is None else self.check.to_dict(),
             "artefacts": [
@@ -83,6 +70,36 @@ class Design:
                 }
                 for artefact in self.artefacts
             ],
+        }
+
+    def _solver(self) -> dict[str, Any]:
+        """Tell how the motion was found; what a shaper has not is null."""
+        solution, seconds = self.plan.solution, self.plan.solver_time
+        if solution is None:
+            return {
+                "status": "shaped",
+                "method": self.spec.solver.method,
+                "base": self.spec.solver.base,
+                "iterations": 0,
+                "residual": None,
+                "time_s": seconds,
+                "cost": None,
+            }
+        optimum = solution.raise_for_status()
+        return {
+            "status": solution.status.name.lower(),
+            "method": solution.method,
+            "iterations": solution.iterations,
+            "residual": solution.residual,
+            "time_s": seconds,
+            "cost": optimum.cost,
+            "sway_weight": optimum.sway_weight,
+            "sway_scale_per_m": optimum.sway_scale,
+            "intervals": len(optimum.knots) - 1,
+            "defect": optimum.defect,
+            "hamiltonian_variation": optimum.hamiltonian_variation,
+            "redundant": list(solution.redundant),
+            "worst_case_bound_m": solution.worst_case_bound,
         }
 
 
@@ -126,7 +143,8 @@ def design(
         worst = _check(spec, planned, replayed, progress) if check else None
         if spec.plant.file is not None:  # the spec in the manifest is nothing without it
             staging.write(spec.plant.file.name, spec.plant.file.content)
-        staging.write(FILENAME, _manifest(spec, planned, artefacts, worst).to_json())
+        manifest = _manifest(spec, planned, artefacts, worst)
+        staging.write(FILENAME, _after_earlier_ones(manifest, folder / FILENAME).to_json())
         delivered = worst is None or worst.passed or keep_failed
         if delivered:
             staging.deliver()
@@ -191,3 +209,12 @@ def _manifest(spec: Spec, planned: Plan, artefacts: tuple[Artefact, ...], check:
         artefacts=artefacts,
         check=None if check is None else check.to_dict(),
     )
+
+
+def _after_earlier_ones(manifest: Manifest, path: Path) -> Manifest:
+    """Keep what the manifest in the output folder says of files that stay; replace a damaged one."""
+    if not path.is_file():
+        return manifest
+    with suppress(OutputError):
+        return manifest.after(parse_manifest(path.read_bytes(), str(path)))
+    return manifest

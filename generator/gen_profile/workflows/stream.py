@@ -177,7 +177,7 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
         raise SpecError(f"{path}: only the log of the format can is streamed; export with --export can.")
     beside = path.parent / FILENAME
     content = _read(path)
-    manifest = parse_manifest(_read(beside), str(beside))
+    manifest = parse_manifest(_read(beside), str(beside)).covering(path.name, sha256(content))
     if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == "can"}:
         raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
     if manifest.check is None and not accept_unverified:
