@@ -11,6 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from gen_profile.errors import CosimulationError
+from gen_profile.metrics import length, peak
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_column
@@ -19,6 +20,7 @@ from gen_profile.profile import Array, Profile
 
 RELATIVE_TOLERANCE = 1e-10
 ABSOLUTE_TOLERANCE = 1e-13
+TRANSIENT_SAMPLES = 4001
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -114,6 +116,13 @@ class Swing:
                 )
             )
         return tuple(responses)
+
+
+def greatest_sway(plant: Plant, motion: Profile, parameters: Mapping[str, float]) -> float:
+    """Find the greatest sway of the end load during a motion, in m."""
+    swing = Swing(plant, motion, [parameters], motion.duration)
+    (response,) = swing.at(np.linspace(0.0, motion.duration, TRANSIENT_SAMPLES))
+    return float(peak(length(response.sway[:, plant.end_load]))[0])
 
 
 def free_swing(

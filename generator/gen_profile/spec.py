@@ -53,6 +53,8 @@ CycleTime = Annotated[float, Bounds(least=1e-5, most=10.0)]
 Duration = Annotated[float, Bounds(least=1e-3, most=1e5)]
 Column = Literal["position", "velocity", "acceleration", "jerk"]
 Distance = Annotated[float, Bounds(least=-1e5, most=1e5)]
+SolverName = Literal["auto", "indirect", "direct"]
+ShaperName = Literal["nzv", "zv", "zvd", "zvdd", "umzvd", "ei", "2hump-ei", "3hump-ei", "mzv"]
 Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]
 
 DEFAULT_COUNTS_PER_SI = 1e6
@@ -120,9 +122,23 @@ class CostSpec:
 
 @attrs.frozen(kw_only=True)
 class SolverSpec:
-    """Which solver: "auto" takes the indirect one where no limit binds."""
+    """Which solver, or which shaper and the move that it is fed with.
 
-    method: Literal["auto", "indirect", "direct"] = "auto"
+    "auto" takes the indirect solver where no limit binds.
+    """
+
+    method: Literal[SolverName, ShaperName] = "auto"
+    base: Literal["quintic", "septic", "jerk-limited"] = "quintic"
+
+    @property
+    def solver(self) -> SolverName:
+        """What finds optimal motions, also where a shaper is to make the motion."""
+        return self.method if self.method in ("auto", "indirect", "direct") else "auto"
+
+    @property
+    def shaper(self) -> str | None:
+        """What makes the motion, where it is no optimal one."""
+        return None if self.method in ("auto", "indirect", "direct") else self.method
 
 
 @attrs.frozen(kw_only=True)

@@ -25,8 +25,8 @@ def limited(limits, **move):
     return attrs.evolve(PAPER, limits=limits, move=attrs.evolve(PAPER.move, **move))
 
 
-def designs(spec, base="quintic"):
-    return {contender.method: contender.design for contender in contenders(spec, base)}
+def designs(spec):
+    return {contender.method: contender.design for contender in contenders(spec)}
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -34,7 +34,7 @@ def designs(spec, base="quintic"):
 def test_every_shaper_takes_its_own_shortest_time(base, tau):
     spec = limited(TIGHT, shortest=True)
     spec = attrs.evolve(spec, actuator=attrs.evolve(spec.actuator, tau=tau))
-    methods = designs(spec, base)
+    methods = designs(attrs.evolve(spec, solver=attrs.evolve(spec.solver, base=base)))
     durations = set()
     for name in SHAPERS:
         motion = methods[name]()

@@ -67,7 +67,7 @@ def test_travel_and_sway_hold_between_samples():
     position = optimal_profile(solution).within_segments(201, 0)[1]
     assert position.min() >= 0.0
     assert position.max() <= 0.3 + 1e-12
-    assert 0.0179 < direct.greatest_sway(solution) <= 0.018
+    assert 0.0179 < direct.sway_on_the_way(solution) <= 0.018
 
 
 def test_a_limit_costs():

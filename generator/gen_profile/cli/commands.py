@@ -106,7 +106,7 @@ def cli() -> None:
 @click.option(
     "--csv-columns", metavar="NAME,…", help="Of position, velocity, acceleration, jerk; all by default."
 )
-@click.option("--method", metavar="NAME", help="Solver: auto, indirect or direct.")
+@click.option("--method", metavar="NAME", help="Solver (auto, indirect or direct), or a shaper such as zvd.")
 @click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
 @json_option
@@ -163,9 +163,7 @@ def design(
 @click.option(
     "--base",
     type=click.Choice(["quintic", "septic", "jerk-limited"]),
-    default="quintic",
-    show_default=True,
-    help="What the shapers are fed with; jerk-limited needs limits.jerk.",
+    help="What the shapers are fed with, in place of solver.base; jerk-limited needs limits.jerk.",
 )
 @json_option
 @debug_option
@@ -174,7 +172,7 @@ def compare(
     preset: str | None,
     overrides: tuple[str, ...],
     picture: Path | None,
-    base: str,
+    base: str | None,
     as_json: bool,
 ) -> None:
     """Compare optimal profiles with shapers."""
@@ -182,13 +180,15 @@ def compare(
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.compare import compare as run
 
+    if base is not None:
+        overrides += (f"solver.base={base}",)
     spec = chosen_spec(spec_path, preset, overrides)
     if picture is not None:
         from gen_profile.workflows.comparison_plot import draw, require_drawable
 
         require_drawable(picture)
     with progress() as tell:
-        comparison = run(spec, base, tell)
+        comparison = run(spec, tell)
         if picture is not None:
             tell("drawing")
             draw(comparison, picture)

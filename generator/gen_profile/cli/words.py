@@ -47,8 +47,10 @@ COLUMNS = {
 def design(outcome: Design) -> str:
     """Tell what was designed, how it was judged and where it lies."""
     solution, figures = outcome.plan.solution, outcome.plan.figures
-    status, seconds = solution.status.name.lower(), outcome.plan.solver_time
-    found = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
+    found = f"{outcome.spec.solver.method} shaper, fed with a {outcome.spec.solver.base} move"
+    if solution is not None:
+        status, seconds = solution.status.name.lower(), outcome.plan.solver_time
+        found = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
     residual = (
         f"{_mm(figures['sway_residual_peak_m'])} nominal, {_mm(figures['sway_residual_worst_m'])} at worst"
     )
@@ -63,7 +65,7 @@ def design(outcome: Design) -> str:
     ]
     if outcome.spec.plant.defaults:
         rows.append(("defaults used", ", ".join(f"plant.{name}" for name in outcome.spec.plant.defaults)))
-    if solution.redundant:
+    if solution is not None and solution.redundant:
         names = ", ".join(solution.redundant)
         rows.append(("left out", f"sensitivity to {names}: zero with that to the others, to first order"))
     rows += [("wrote", str(outcome.folder / artefact.path)) for artefact in outcome.artefacts]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 import attrs
 
@@ -11,17 +10,16 @@ from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers import direct, indirect, worst_case
-from gen_profile.solvers.direct import greatest_sway
+from gen_profile.solvers.direct import sway_on_the_way
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
-from gen_profile.spec import LimitsSpec
+from gen_profile.spec import LimitsSpec, SolverName
 
 COMFORT = 1.01  # of the shortest duration, in which there is but one motion
-Method = Literal["auto", "indirect", "direct"]
 
 
-def solve(problem: Problem, method: Method = "auto") -> Solution:
+def solve(problem: Problem, method: SolverName = "auto") -> Solution:
     """Solve a problem by the method that suits it.
 
     Parameters
@@ -56,7 +54,7 @@ def keeps_limits(solution: Solution) -> bool:
     problem = solution.problem
     if problem.limits == LimitsSpec():
         return True
-    sway = greatest_sway(solution) if problem.limits.sway is not None else 0.0
+    sway = sway_on_the_way(solution) if problem.limits.sway is not None else 0.0
     command = lag_compensated(optimal_profile(solution), problem.tau)
     return not breaches(problem.limits, command, sway)
 

@@ -16,7 +16,6 @@ import attrs
 import numpy as np
 from scipy import sparse
 
-from gen_profile.metrics import peak
 from gen_profile.problem.axis_reach import axis_reach
 from gen_profile.problem.dynamics import parameter_column
 from gen_profile.problem.linearization import linearize
@@ -24,7 +23,7 @@ from gen_profile.problem.motion_equations import motion_equations
 from gen_profile.problem.pontryagin import SNAP_TIME, optimality_system
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.profile import Array
-from gen_profile.response import Swing
+from gen_profile.response import greatest_sway
 from gen_profile.solvers import goals
 from gen_profile.solvers.bezier import Piece, power_basis
 from gen_profile.solvers.canonical import canonical_problem, independence
@@ -46,7 +45,6 @@ TRACE = 1e-11  # of effort, in the least worst case
 WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
 LEAST_SHARE = 0.01  # of a load's limit, of which a change is still measured
 SWAY_ROUNDS = 4  # to account for what the sway does between collocation points
-SWAY_SAMPLES = 4001
 HORIZONTAL = np.pi / 2.0
 
 
@@ -125,7 +123,7 @@ def solve(problem: Problem) -> Solution:
         solution = conclude(setup, found, weights, iterations)
         if allowed is None or asked is None or solution.optimum is None:
             break
-        sway = greatest_sway(solution)
+        sway = sway_on_the_way(solution)
         if sway <= allowed:
             break
         asked *= goals.WITHIN * allowed / sway
@@ -140,7 +138,7 @@ def resolve_weights(problem: Problem) -> tuple[goals.Weights, int]:
     solution = solve(quiet)
     if solution.optimum is None:
         return goals.Weights(beta=0.0, gamma=1.0), solution.iterations
-    effort, sway = solution.optimum.cost / problem.duration, greatest_sway(solution)
+    effort, sway = solution.optimum.cost / problem.duration, sway_on_the_way(solution)
     if sway == 0.0:  # a hoist alone swings nothing
         return goals.Weights(beta=0.0, gamma=1.0), solution.iterations
     return goals.Weights(
@@ -421,10 +419,7 @@ def _cost(setup: Setup, iterate: Iterate, weights: goals.Weights) -> float:
     return duration * (setup.cost_scale * effort + weights.beta * float(transcription.quadrature() @ growth))
 
 
-def greatest_sway(solution: Solution) -> float:
+def sway_on_the_way(solution: Solution) -> float:
     """Greatest sway of the nominal machine's end load during the motion of a solution, in m."""
-    problem, motion = solution.problem, optimal_profile(solution)
-    swing = Swing(problem.plant, motion, [problem.parameters], motion.duration)
-    response = swing.at(np.linspace(0.0, motion.duration, SWAY_SAMPLES))[0]
-    sway = np.linalg.norm(response.sway[:, problem.plant.end_load], axis=1, keepdims=True)
-    return float(peak(sway)[0])
+    problem = solution.problem
+    return greatest_sway(problem.plant, optimal_profile(solution), problem.parameters)

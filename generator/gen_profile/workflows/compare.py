@@ -44,8 +44,6 @@ class Comparison:
     Attributes
     ----------
     spec : Spec
-    base : str
-        Name of the base move that the shapers were fed with.
     rows : tuple of Row
     left_out : dict of str to str
         Methods without a motion for the move, and why.
@@ -56,7 +54,6 @@ class Comparison:
     """
 
     spec: Spec
-    base: str
     rows: tuple[Row, ...]
     left_out: dict[str, str]
     efficient: frozenset[str]
@@ -67,7 +64,7 @@ class Comparison:
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
-            "base": self.base,
+            "base": self.spec.solver.base,
             "rows": [
                 {
                     "method": row.method,
@@ -83,21 +80,19 @@ class Comparison:
         }
 
 
-def compare(spec: Spec, base: str = "quintic", progress: Progress = lambda _: None) -> Comparison:
+def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
     """Try every shaper and variants of the optimal motion on the machines of a spec.
 
     Parameters
     ----------
     spec : Spec
-    base : str
-        What the shapers are fed with, one of `gen_profile.shapers.base_moves.BASES`.
     progress : callable
         Told what is being done.
     """
     rows: list[Row] = []
     left_out: dict[str, str] = {}
     impossible: dict[str, str] = {}
-    for contender in contenders(spec, base):
+    for contender in contenders(spec):
         progress(contender.method)
         try:
             if contender.requirements in impossible:
@@ -111,7 +106,6 @@ def compare(spec: Spec, base: str = "quintic", progress: Progress = lambda _: No
     found = {row.method: row.figures for row in rows}
     return Comparison(
         spec=spec,
-        base=base,
         rows=tuple(rows),
         left_out=left_out,
         efficient=efficient(found),

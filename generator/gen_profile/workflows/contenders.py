@@ -7,23 +7,18 @@ from functools import cache, partial
 from typing import Any
 
 import attrs
-import numpy as np
 
 from gen_profile.errors import GenProfileError, InfeasibleProblem
-from gen_profile.metrics import greatest, length, peak
+from gen_profile.metrics import greatest
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.problem.limits import Breach, breaches
-from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
-from gen_profile.profile import Profile, grid_length, grid_times
-from gen_profile.response import Swing
-from gen_profile.shapers.base_moves import BASES
+from gen_profile.profile import Profile
 from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.shapers.shaped_move import ShapedMove, shaped_move
 from gen_profile.solvers import choice, direct, worst_case
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.spec import Spec
-from gen_profile.workflows.planning import TRANSIENT_SAMPLES, timed
+from gen_profile.workflows.planning import timed
+from gen_profile.workflows.shaping import shaped_motion
 
 SWAY_WEIGHTS = (0.0, 20.0, 50.0)  # the paper's
 # what a robustness method is called, and its keys in the spec
@@ -52,18 +47,19 @@ class Contender:
     requirements: str = ""
 
 
-def contenders(spec: Spec, base: str) -> Iterator[Contender]:
-    """List shapers fed with a base move by its name, then optimal motions.
+def contenders(spec: Spec) -> Iterator[Contender]:
+    """List shapers, then optimal motions.
 
     Parameters
     ----------
     spec : Spec
-        Each method takes the spec's duration, or its own shortest one where the spec asks for that.
-    base : str
-        One of `gen_profile.shapers.base_moves.BASES`.
+        Each method takes the spec's duration, or its own shortest one where the spec asks for that; every
+        shaper is fed with the spec's base move.
     """
     for name in SHAPERS:
-        yield Contender(method=name, design=partial(_shaped, spec, name, base))
+        yield Contender(method=name, design=partial(shaped_motion, spec, name))
+    if spec.solver.shaper is not None:
+        spec = attrs.evolve(spec, solver=attrs.evolve(spec.solver, method="auto"))
     once = cache(partial(timed, spec))  # the shortest duration does not depend on β
     own = cache(partial(_attempt, once))
     weight, stated = spec.cost.sway_weight, spec.cost.sway_scale is not None
@@ -89,62 +85,8 @@ def _other_robustness(spec: Spec) -> dict[str, Mapping[str, Any]]:
     }
 
 
-def _shaped(spec: Spec, name: str, base: str) -> Profile:
-    """Design a shaped motion that keeps the limits.
-
-    Raises
-    ------
-    InfeasibleProblem
-        It would take longer than the spec allows.
-    """
-    move = spec.move
-    # where the load would swing on; a shaper knows one frequency per mode, whatever the hoist does on the way
-    linear = linearize(spec.machine(), spec.plant.parameters, move.target)
-    shaped = shaped_move(
-        name,
-        start=move.start,
-        target=move.target,
-        frequencies=linear.distinct_frequencies,
-        damping_ratios=linear.distinct_damping_ratios,
-        base=BASES[base](spec.limits, move.distance),
-    )
-    if move.shortest:
-        return _shortest(spec, shaped)
-    motion = shaped.profile(move.duration)
-    broken = _breaches(spec, motion)
-    if broken:
-        shortest = shaped.shortest(lambda trial: not _breaches(spec, trial))
-        cure = "" if shortest is None else f" With this shaper the move takes at least {shortest:.4g} s."
-        raise InfeasibleProblem(" ".join(breach.sentence() for breach in broken) + cure)
-    return motion
-
-
-def _shortest(spec: Spec, shaped: ShapedMove) -> Profile:
-    """Make a shaped motion as short as the limits permit; it ends on a cycle of the controller."""
-    shortest = shaped.shortest(lambda trial: not _breaches(spec, trial))
-    if shortest is None:
-        raise InfeasibleProblem("move.duration: no duration keeps the limits; widen them.")
-    cycle = spec.export.cycle_time
-    count = grid_length(shortest, cycle)
-    while _breaches(spec, motion := shaped.profile(float(grid_times(count, cycle)[-1]))):
-        count += 1
-    return motion
-
-
-def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
-    """Find the limits that a motion breaks; the sway's last, for it must be integrated."""
-    command = lag_compensated(motion, spec.actuator.tau)
-    broken = breaches(spec.limits.without("sway"), command, 0.0)
-    if broken or spec.limits.sway is None:
-        return broken
-    plant = spec.machine()
-    swing = Swing(plant, motion, [spec.plant.parameters], motion.duration)
-    (nominal,) = swing.at(np.linspace(0.0, motion.duration, TRANSIENT_SAMPLES))
-    return breaches(spec.limits, command, float(peak(length(nominal.sway[:, plant.end_load]))[0]))
-
-
 def _optimal(spec: Spec) -> Profile:
-    return optimal_profile(choice.solve(problem_of(spec), spec.solver.method))
+    return optimal_profile(choice.solve(problem_of(spec), spec.solver.solver))
 
 
 def _weighed(timed_spec: Callable[[], Spec], sway_weight: float) -> Profile:

@@ -17,16 +17,16 @@ from gen_profile.problem.limits import require_limits
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.profile import Array, Profile, grid_length, grid_times
-from gen_profile.response import Response, Swing
+from gen_profile.response import TRANSIENT_SAMPLES, Response, Swing
 from gen_profile.solvers import choice
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec import Spec
 from gen_profile.workflows.scenarios import scenarios
+from gen_profile.workflows.shaping import shaped_motion
 
 SHORTEST_WATCH = 4.0  # s; a residual is watched for this long, or for two of the slowest periods
 STANDSTILL = 10.0  # time constants after which a lagging drive counts as standing: its speed is down to e⁻¹⁰
-TRANSIENT_SAMPLES = 2001
 RESIDUAL_SAMPLES = 4001
 
 
@@ -57,9 +57,20 @@ class Trial:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Plan:
-    """A design that is not yet written: the solver's outcome, the trial of its motion, and its figures."""
+    """A design that is not yet written.
 
-    solution: Solution
+    Attributes
+    ----------
+    solution : Solution or None
+        What the solver found; None where a shaper made the motion.
+    solver_time : float
+        s.
+    trial : Trial
+        Of the motion.
+    figures : dict of str to float
+    """
+
+    solution: Solution | None
     solver_time: float
     trial: Trial
     figures: dict[str, float]
@@ -75,26 +86,34 @@ def timed(spec: Spec) -> Spec:
     """
     if not spec.move.shortest:
         return spec
+    if spec.solver.shaper is not None:
+        return _lasting(spec, shaped_motion(spec, spec.solver.shaper).duration)
     shortest = choice.minimum_time(problem_of(spec))
     if shortest is None:
         raise InfeasibleProblem(
             "move.duration: no duration keeps the limits and brings the load to rest; widen the limits."
         )
     cycle = spec.export.cycle_time
-    duration = float(grid_times(grid_length(shortest, cycle), cycle)[-1])
+    return _lasting(spec, float(grid_times(grid_length(shortest, cycle), cycle)[-1]))
+
+
+def _lasting(spec: Spec, duration: float) -> Spec:
     return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=duration, shortest=False))
 
 
 def plan(spec: Spec) -> Plan:
-    """Solve a spec and try the motion on all machines.
+    """Solve a spec, or shape a move for it, and try the motion on all machines.
 
     Raises
     ------
     InfeasibleProblem, SolverDiverged, LimitViolation
     """
     began = time.perf_counter()
-    solution = choice.solve(problem_of(spec), spec.solver.method)
-    motion = optimal_profile(solution)
+    if spec.solver.shaper is not None:
+        solution, motion = None, shaped_motion(spec, spec.solver.shaper)
+    else:
+        solution = choice.solve(problem_of(spec), spec.solver.solver)
+        motion = optimal_profile(solution)
     solver_time = time.perf_counter() - began
     trial = try_motion(spec, motion)
     found = figures(trial)
