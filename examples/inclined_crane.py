@@ -7,7 +7,7 @@ With the track rising by the angle s, Lagrange's equation of the load, divided b
 
 import numpy as np
 
-from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant
 
 
 def equations(q_u, dq_u, q_a, dq_a, p):
@@ -25,6 +25,12 @@ def outputs(q_u, q_a, p):
     return Outputs(sway=[p.L * np.sin(phi)], height=[-p.L * np.cos(phi)], angle=[phi])
 
 
+def mechanics(q_u, q_a, p):  # may be left out: it gives FMUs places and energy, and proves the equations
+    (phi,), (way,) = q_u, q_a
+    place = (way * np.cos(p.s) - p.L * np.sin(phi), 0.0, way * np.sin(p.s) - p.L * np.cos(phi))
+    return Mechanics(mass=[p.m], place=[place], gravity=p.g)
+
+
 PLANT = Plant(
     type="inclined-crane",
     summary="a load below a trolley on an inclined track",
@@ -40,4 +46,6 @@ PLANT = Plant(
     loads=("load",),
     equations=equations,
     outputs=outputs,
+    bodies=("load",),
+    mechanics=mechanics,
 )

@@ -34,15 +34,14 @@ def equations_source(equations: Dynamics) -> str:
         "input": e.ddq_a,
         "parameters": e.p,
     }
-    seen = sym.column([e.sway, e.height, e.angle])
     seeds = {name: sym.symbols(f"change_of_{name}", column.shape[0]) for name, column in arguments.items()}
     everything, change = sym.column(list(arguments.values())), sym.column(list(seeds.values()))
-    tangents = [sym.directional(expression, everything, change) for expression in (e.ddq_u, seen)]
+    tangents = [sym.directional(expression, everything, change) for expression in (e.ddq_u, e.seen)]
     changes = {f"change_of_{name}": column for name, column in seeds.items()}
     text = sym.c_source(
         Function("equations_acceleration", arguments, e.ddq_u),
         Function("equations_jump", arguments, e.driven @ e.ddq_a),
-        Function("equations_outputs", arguments, seen),
+        Function("equations_outputs", arguments, e.seen),
         Function("equations_tangent", {**arguments, **changes}, *tangents),
     )
     # CasADi's helpers have no storage class: they would clash where two FMUs are linked into one program

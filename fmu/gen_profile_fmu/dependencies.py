@@ -12,7 +12,7 @@ import attrs
 
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import Dynamics
-from gen_profile_fmu.variables import Kind, VariableTable
+from gen_profile_fmu.variables import OBSERVED, Kind, VariableTable
 
 Dependencies = dict[int, list[int]]
 
@@ -76,8 +76,7 @@ def _motion(table: VariableTable) -> dict[int, set[int]]:
 def _observed(
     equations: Dynamics, table: VariableTable, drives: Mapping[int, set[int]]
 ) -> dict[int, set[int]]:
-    seen = sym.column([equations.sway, equations.height, equations.angle])
-    return _rows(equations, seen, table.references("SWAY", "HEIGHT", "ANGLE"), table, drives)
+    return _rows(equations, equations.seen, table.references(*OBSERVED), table, drives)
 
 
 def _derivatives(

@@ -205,6 +205,7 @@ def _states_and_outputs(plant: Plant) -> Blocks:
         "SWAY": _of_loads(plant, "sway", "m", "horizontal distance from the place at rest"),
         "HEIGHT": _of_loads(plant, "height", "m", "height above the suspension point"),
         "ANGLE": _of_loads(plant, "angle", "rad", "angle of the rope from the vertical"),
+        **_of_bodies(plant),
     }
 
 
@@ -225,6 +226,21 @@ def _of_loads(plant: Plant, quantity: str, unit: str, description: str) -> tuple
         Variable(name=f"{quantity}.{load}", description=description, unit=unit, kind=Kind.OUTPUT)
         for load in plant.loads
     )
+
+
+def _of_bodies(plant: Plant) -> Blocks:
+    places = tuple(
+        Variable(name=f"position.{body}.{direction}", description=words, unit="m", kind=Kind.OUTPUT)
+        for body in plant.bodies
+        for direction, words in (
+            ("x", "where the load is, horizontally"),
+            ("y", "where the load is, horizontally across"),
+            ("z", "where the load is, above the suspension point"),
+        )
+    )
+    words = "mechanical energy of all loads: kinetic, of springs, and of weight, from the suspension point on"
+    energy = Variable(name="energy", description=words, unit="J", kind=Kind.OUTPUT)
+    return {"PLACE": places, "ENERGY": (energy,) if plant.bodies else ()}
 
 
 def _trigger() -> Blocks:
@@ -263,5 +279,5 @@ def _time() -> Variable:
 
 def _check_names(plant: Plant, table: VariableTable) -> None:
     coordinates = (q.name for q in (*plant.actuated, *plant.unactuated))
-    names = [*(p.name for p in plant.parameters), *coordinates, *plant.loads]
+    names = [*(p.name for p in plant.parameters), *coordinates, *plant.loads, *plant.bodies]
     require_good_names(f"Plant {plant.type}", names, table)

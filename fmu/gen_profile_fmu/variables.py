@@ -18,6 +18,8 @@ from gen_profile.errors import CosimulationError
 DERIVATIVES = "DERIVATIVES"
 # blocks of the continuous states, in the order of their derivatives
 STATES = ("Q_U", "DQ_U", "Q_A", "DQ_A")
+# blocks of what is seen of a plant, in the order in which the equations give it
+OBSERVED = ("SWAY", "HEIGHT", "ANGLE", "PLACE", "ENERGY")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 
 

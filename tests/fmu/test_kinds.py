@@ -253,7 +253,11 @@ class TestDirectionalDerivatives:
         x = np.array([0.3, -0.2, 0.5, 0.4, 0.1, -0.3])
         instance.rates(0.4, x)
         table = instance.references
-        unknowns = [name for name in table if name.startswith(("der(", "sway", "height", "angle"))]
+        unknowns = [
+            name
+            for name in table
+            if name.startswith(("der(", "sway", "height", "angle", "position", "energy"))
+        ]
         states = ["theta1", "theta2", "theta1.rate", "theta2.rate", "cart.position", "cart.velocity"]
         inputs = [name for name in table if kind != "system" and name.startswith("cart.setpoint_")]
 

@@ -1,10 +1,13 @@
 """FMUs of every machine against our own tight integration of its equations."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from fmu.drivers import Instance, cosimulate
 from fmu.hoisting_pendulum import PLANT as WINCH
 from fmu.kinds import model_of, motion
+from generator.lagrangian_machines import MACHINES, Lagrange
 
 from gen_profile.plants.registry import BUILT_IN, find_plant
 from gen_profile.response import Swing
@@ -35,6 +38,67 @@ def test_a_system_moves_as_its_equations_say(plant, version):
     # limits of Swing's dense output where the acceleration jumps
     np.testing.assert_allclose(found[:, :-axes], exact.sway, rtol=0.0, atol=2e-5 * size)
     np.testing.assert_allclose(found[:, -axes:], exact.position, rtol=0.0, atol=1e-12)
+
+
+def swinging(plant):
+    """Start values for an undamped machine: mild for every mode."""
+    undamped = dict.fromkeys(MACHINES[plant.type][2], 0.0)
+    return {
+        **undamped,
+        **{f"{axis.name}.start": 1.5 for axis in plant.actuated},
+        **{q.name: 0.3 / (1 + i) for i, q in enumerate(plant.unactuated)},
+        **{f"{q.name}.rate": 0.2 for q in plant.unactuated},
+    }
+
+
+@pytest.mark.parametrize("version", Version)
+@pytest.mark.parametrize("type_", MACHINES)
+def test_free_swing_keeps_the_energy(type_, version):
+    plant = find_plant(type_)
+    instance = Instance(cached_fmu(model_of("plant-acceleration", plant), version), version, exchange=False)
+    values = swinging(plant)
+    instance.begin(values)
+    energy = cosimulate(instance, np.linspace(0.0, 10.0, 201), lambda *_: None, ["energy"])
+    still = Instance(cached_fmu(model_of("plant-acceleration", plant), version), version, exchange=False)
+    still.begin({name: value for name, value in values.items() if name.endswith("start")})
+    swing = energy[0] - still.read("energy")
+    for opened in (instance, still):
+        opened.close()
+    assert swing > 0.0
+    assert np.ptp(energy) < 1e-7 * swing
+
+
+@pytest.mark.parametrize("type_", MACHINES)
+def test_places_and_energy_are_those_of_the_moving_masses(type_):
+    """Along a motion, from the states that the FMU tells."""
+    lagrange = Lagrange(type_)
+    plant = lagrange.plant
+    q = [*(q.name for q in plant.unactuated), *(f"{axis.name}.position" for axis in plant.actuated)]
+    dq = [
+        *(f"{q.name}.rate" for q in plant.unactuated),
+        *(f"{axis.name}.velocity" for axis in plant.actuated),
+    ]
+    seen = [f"position.{body}.{direction}" for body in plant.bodies for direction in "xyz"]
+    fmu = cached_fmu(model_of("system", plant), Version.FMI2)
+    instance = Instance(fmu, Version.FMI2, exchange=False)
+    instance.begin({})
+    rows = cosimulate(instance, np.linspace(0.0, 2.0, 41), lambda *_: None, [*q, *dq, *seen, "energy"])
+    instance.close()
+    p = SimpleNamespace(**plant.nominal())
+    for row in rows:
+        angles, rates, places, energy = np.split(row, np.cumsum([len(q), len(dq), len(seen)]))
+        masses = MACHINES[type_][0](angles, p)[0][: len(plant.bodies)]
+        radius = p.R if type_ == "flexible-joint" else 1.0  # there on the unit circle
+        expected = radius * np.concatenate([place for _, place in masses])
+        np.testing.assert_allclose(places, expected, rtol=0.0, atol=1e-13 * (1.0 + np.abs(expected).max()))
+        if type_ != "slosh-tank":  # whose masses are 1 there
+            assert energy[0] == pytest.approx(lagrange.energy(angles, rates, plant.nominal()), rel=1e-12)
+
+
+def test_a_machine_without_bodies_has_neither_places_nor_energy():
+    names = {variable.name for variable in model_of("system", WINCH).variables.variables}
+    assert "energy" not in names
+    assert not [name for name in names if name.startswith("position.")]
 
 
 def test_setpoints_that_stand_still_leave_every_machine_at_rest(plant):

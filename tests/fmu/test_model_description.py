@@ -99,6 +99,9 @@ def test_says_what_the_plant_says(plant, kind, version):
     for load in plant.loads:
         units = [variables[f"{quantity}.{load}"].unit for quantity in ("sway", "height", "angle")]
         assert units == ["m", "m", "rad"]
+    for body in plant.bodies:
+        assert [variables[f"position.{body}.{direction}"].unit for direction in "xyz"] == ["m"] * 3
+        assert variables["energy"].unit == "J"
 
 
 def test_claims_the_capabilities_importers_look_for(kind, version):
@@ -180,6 +183,16 @@ def test_dependencies_are_those_of_the_equations(plant, kind, version):
     for quantity in ("sway", "height", "angle"):
         for load, value in zip(plant.loads, getattr(seen, quantity), strict=True):
             assert found[f"{quantity}.{load}"] == sources_of(value)
+    told = plant.mechanics(each[0], each[2], named)
+    places = [casadi.vertcat(*place) for place in told.place]
+    for body, place in zip(plant.bodies, places, strict=True):
+        for direction, value in zip("xyz", casadi.vertsplit(place), strict=True):
+            assert found[f"position.{body}.{direction}"] == sources_of(value)
+    if plant.bodies:
+        q, dq = casadi.vertcat(q_u, q_a), casadi.vertcat(dq_u, dq_a)
+        speeds = [casadi.jacobian(place, q) @ dq for place in places]
+        kinetic = sum(m * casadi.sumsqr(speed) for m, speed in zip(told.mass, speeds, strict=True))
+        assert found["energy"] == sources_of(kinetic) | sources_of(told.potential)
     for state in states:
         assert found[state] == {state}
 
@@ -232,7 +245,7 @@ def test_units_have_the_right_exponents(plant, version):
 def test_base_units_follow_from_the_units_name(unit):
     """Read "N m s/rad" as arithmetic with the base units as powers of primes."""
     primes = {"kg": 2, "m": 3, "s": 5, "rad": 7}
-    values = {**primes, "N": 2 * 3 / 5**2, "Pa": 2 / 3 / 5**2, "1": 1}
+    values = {**primes, "N": 2 * 3 / 5**2, "J": 2 * 3**2 / 5**2, "Pa": 2 / 3 / 5**2, "1": 1}
     above, *below = unit.split("/")
     expected = 1.0
     for part, sign in [(factor, 1) for factor in above.split()] + [(divisor, -1) for divisor in below]:

@@ -5,10 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from generator.lagrangian_machines import MACHINES, Lagrange
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad, simpson, solve_ivp
 
 from gen_profile.plants.registry import BUILT_IN, FAMILIES, find_plant
+from gen_profile.problem import symbolic as sym
+from gen_profile.problem.dynamics import dynamics
 from gen_profile.problem.linearization import linearize
+from gen_profile.problem.symbolic import Function
 
 
 def own_accelerations(plant, q, dq, ddq_a, parameters):
@@ -99,6 +102,44 @@ def test_sway_is_the_distance_by_which_masses_trail_their_place_at_rest(type_):
         return
     expected = trailing[0, :2] if plant.directions == 2 else trailing[:, 0]
     np.testing.assert_allclose(outputs.sway, expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("type_", MACHINES)
+def test_bodies_are_where_and_of_what_mass_the_mechanics_say(type_, seed):
+    """Places and energy, against those of the other text; the sloshing masses are measured below."""
+    lagrange = Lagrange(type_)
+    plant = lagrange.plant
+    parameters, q, dq, _ = some_machine(plant, seed)
+    n_u, p = len(plant.unactuated), SimpleNamespace(**parameters)
+    told = plant.mechanics(q[:n_u], q[n_u:], p)
+    assert len(told.place) == len(told.mass) == len(plant.bodies)
+    masses = MACHINES[type_][0](q, p)[0]
+    places = [place for _, place in masses][: len(plant.bodies)]
+    if type_ == "flexible-joint":  # there on the unit circle
+        places = [np.multiply(place, p.R) for place in places]
+    np.testing.assert_allclose(told.place, places, rtol=1e-12, atol=1e-12)
+    if type_ != "slosh-tank":
+        e = dynamics(plant)
+        energy = Function("energy", {"q": sym.column([e.q_u, e.q_a]), "dq": sym.column([e.dq_u, e.dq_a]),
+                                     "p": e.p}, e.energy)  # fmt: skip
+        (found,) = energy(q[None], dq[None], np.array([list(parameters.values())])).ravel()
+        assert found == pytest.approx(lagrange.energy(q, dq, parameters), rel=1e-12)
+
+
+@pytest.mark.parametrize("parameters", [{}, {"a": 2.0, "b": 1.2, "h": 0.2, "rho": 900.0}])
+def test_sloshing_masses_have_the_energy_of_the_liquids_surface(parameters):
+    """½ ρ g b ∫ η² dx for the rise at the wall that the sway tells."""
+    plant = find_plant("slosh-tank")
+    values = plant.nominal() | parameters
+    a, b, _, rho, _, g = values.values()
+    x, p = np.linspace(0.0, a, 20_001), SimpleNamespace(**values)
+    for mode in range(2):
+        q = [1e-3 * (mode == other) for other in range(2)]
+        wave = plant.outputs(q, [0.0], p).sway[0] * np.cos((2 * mode + 1) * np.pi * x / a)
+        surface = 0.5 * rho * g * b * simpson(wave**2, x=x)
+        raised = plant.mechanics(q, [0.0], p).potential - plant.mechanics([0.0, 0.0], [0.0], p).potential
+        assert raised == pytest.approx(surface, rel=1e-5)
 
 
 @pytest.mark.parametrize("type_", MACHINES)

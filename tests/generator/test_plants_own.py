@@ -4,6 +4,7 @@ import json
 import pickle
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import attrs
 import numpy as np
@@ -13,7 +14,7 @@ from fmu.hoisting_pendulum import PLANT as WINCH
 
 from gen_profile.errors import SpecError
 from gen_profile.plants.machine_file import plant_of_file, read_machine_file
-from gen_profile.plants.plant import Coordinate, Equations
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics
 from gen_profile.plants.registry import BUILT_IN, find_plant
 from gen_profile.plants.soundness import faults_of
 from gen_profile.problem.dynamics import dynamics
@@ -214,6 +215,63 @@ def test_equations_that_make_no_machine():
 
     (crooked,) = faults_of(attrs.evolve(WINCH, outputs=leaning))
     assert "its sway at rest is not zero" in crooked
+
+
+def place(q_u, q_a, p):
+    (phi,), (trolley, length) = q_u, q_a
+    return [(trolley - length * np.sin(phi), 0.0, -length * np.cos(phi))]
+
+
+def with_bodies(plant, **changes):
+    def mechanics(q_u, q_a, p):
+        told = {"mass": [p.m], "place": place(q_u, q_a, p), "gravity": p.g} | changes
+        return Mechanics(**{name: term(q_u, p) if callable(term) else term for name, term in told.items()})
+
+    return attrs.evolve(plant, bodies=("load",), mechanics=mechanics)
+
+
+def test_equations_must_agree_with_the_bodies_they_are_of():
+    assert faults_of(with_bodies(WINCH)) == ()
+    gravity_twice = with_bodies(WINCH, springs=lambda q_u, p: -p.m * p.g * np.cos(q_u[0]))
+    for wrong in (
+        gravity_twice,
+        with_bodies(WINCH, place=[(0.0, 0.0, 0.0)]),
+        with_bodies(changed(M_au=[[1.0], [0.0]])),
+        with_bodies(changed(M_uu=[[1.01]])),
+        with_bodies(attrs.evolve(WINCH, equations=without_the_hoists_push)),
+    ):
+        (fault,) = faults_of(wrong)
+        assert fault.startswith("its equations contradict its mechanics")
+
+
+def without_the_hoists_push(q_u, dq_u, q_a, dq_a, p):
+    return WINCH.equations(q_u, dq_u, q_a, [0.0, 0.0], p)
+
+
+def test_equations_must_not_gain_energy():
+    def pushed(q_u, dq_u, q_a, dq_a, p):
+        return WINCH.equations(q_u, dq_u, q_a, dq_a, SimpleNamespace(**{**vars(p), "c": -p.c}))
+
+    (fault,) = faults_of(with_bodies(attrs.evolve(WINCH, equations=pushed)))
+    assert fault == "its equations gain energy from nothing: the sign of a damping term is wrong"
+
+
+def test_bodies_must_be_whole():
+    (fault,) = faults_of(with_bodies(WINCH, place=[(0.0, 0.0)]))
+    assert fault == "place must be 1 × 3 finite numbers, found the shape 1 × 2"
+    nameless = attrs.evolve(with_bodies(WINCH), bodies=())
+    assert len(faults_of(nameless)) == 2
+    with pytest.raises(SpecError, match="do not take symbols"):
+        dynamics(nameless)
+    assert any("2 moving parts are named" in fault for fault in faults_of(attrs.evolve(WINCH, bodies=("a", "a"))))
+
+    def breaking(q_u, dq_u, q_a, dq_a, p):
+        if q_u[0] != 0.0:
+            raise ZeroDivisionError("no such angle")
+        return WINCH.equations(q_u, dq_u, q_a, dq_a, p)
+
+    (fault,) = faults_of(with_bodies(attrs.evolve(WINCH, equations=breaking)))
+    assert fault == "its equations fail where it swings: ZeroDivisionError: no such angle"
 
 
 def test_equations_that_do_not_take_symbols():

@@ -7,7 +7,7 @@ typedef int Equation(const double **arguments, double **results, long long int *
 
 static Equation equations_acceleration;  /* of the unactuated coordinates; the input is the axes' acceleration */
 static Equation equations_jump;          /* of the unactuated rates; the input is the jump of the axes' velocity */
-static Equation equations_outputs;       /* of every load; no input is used */
+static Equation equations_outputs;       /* of all loads; no input is used */
 /* Changes of accelerations, and of outputs, for changes of all arguments, which follow the arguments. */
 static Equation equations_tangent;
 

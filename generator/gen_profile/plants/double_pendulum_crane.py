@@ -20,7 +20,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
 
 
 def equations(
@@ -63,6 +63,13 @@ def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) ->
     )
 
 
+def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+    """Place hook and payload below the cart."""
+    seen, (cart,) = outputs(q_u, q_a, p), q_a
+    places = [(cart - sway, 0.0, height) for sway, height in zip(seen.sway, seen.height, strict=True)]
+    return Mechanics(mass=[p.m1, p.m2], place=places, gravity=p.g)
+
+
 PLANT = Plant(
     type="double-pendulum-crane",
     summary="cart, hook and payload on two ropes",
@@ -93,4 +100,6 @@ PLANT = Plant(
     loads=("hook", "payload"),
     equations=equations,
     outputs=outputs,
+    bodies=("hook", "payload"),
+    mechanics=mechanics,
 )

@@ -15,7 +15,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from types import SimpleNamespace
 
-from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+import numpy as np
+
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
 
 
 def equations(
@@ -36,6 +38,13 @@ def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) ->
     del q_a
     (alpha,) = q_u
     return Outputs(sway=[p.R * alpha], height=[0.0], angle=[alpha])
+
+
+def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+    """Place a mass at the tip that has the arm's moment of inertia."""
+    (alpha,), (hub,) = q_u, q_a
+    place = (p.R * np.cos(hub - alpha), p.R * np.sin(hub - alpha), 0.0)
+    return Mechanics(mass=[p.J / p.R**2], place=[place], springs=0.5 * p.k * alpha**2)
 
 
 PLANT = Plant(
@@ -63,4 +72,6 @@ PLANT = Plant(
     loads=("tip",),
     equations=equations,
     outputs=outputs,
+    bodies=("tip",),
+    mechanics=mechanics,
 )

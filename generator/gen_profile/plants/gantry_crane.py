@@ -17,7 +17,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
 
 
 def equations(
@@ -55,6 +55,12 @@ def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) ->
     )
 
 
+def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+    """Place the payload below the trolley."""
+    seen, (x, y) = outputs(q_u, q_a, p), q_a
+    return Mechanics(mass=[p.m], place=[(x - seen.sway[0], y - seen.sway[1], seen.height[0])], gravity=p.g)
+
+
 PLANT = Plant(
     type="gantry-crane",
     summary="bridge and trolley, and a payload that swings in both directions",
@@ -77,4 +83,6 @@ PLANT = Plant(
     directions=2,
     equations=equations,
     outputs=outputs,
+    bodies=("payload",),
+    mechanics=mechanics,
 )

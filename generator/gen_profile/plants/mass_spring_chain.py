@@ -17,7 +17,7 @@ from functools import cache
 from itertools import pairwise
 from types import SimpleNamespace
 
-from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
 
 LARGEST = 24
 
@@ -45,6 +45,8 @@ def member(masses: int) -> Plant:
         loads=tuple(f"mass{number}" for number in numbers),
         equations=_equations(masses),
         outputs=_outputs,
+        bodies=tuple(f"mass{number}" for number in numbers),
+        mechanics=_mechanics,
     )
 
 
@@ -102,8 +104,12 @@ def _equations(masses: int) -> Callable[..., Equations]:
 
 def _forces(gains: Sequence[Scalar], values: Sequence[Scalar]) -> list[Scalar]:
     """List the forces of all links, and of the missing one behind the last mass."""
-    steps = [after - before for before, after in zip([0.0, *values[:-1]], values, strict=True)]
-    return [gain * step for gain, step in zip(gains, steps, strict=True)] + [0.0]
+    return [gain * step for gain, step in zip(gains, _steps(values), strict=True)] + [0.0]
+
+
+def _steps(values: Sequence[Scalar]) -> list[Scalar]:
+    """Difference of each link's ends."""
+    return [after - before for before, after in zip([0.0, *values[:-1]], values, strict=True)]
 
 
 def _outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
@@ -111,3 +117,14 @@ def _outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -
     del q_a, p
     nothing = [0.0 for _ in q_u]
     return Outputs(sway=list(q_u), height=nothing, angle=nothing)
+
+
+def _mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+    """Place the masses along the axis."""
+    numbers, (axis,) = range(1, len(q_u) + 1), q_a
+    links = zip(numbers, _steps(q_u), strict=True)
+    return Mechanics(
+        mass=[getattr(p, f"m{number}") for number in numbers],
+        place=[(axis - distance, 0.0, 0.0) for distance in q_u],
+        springs=sum(0.5 * getattr(p, f"k{number}") * step**2 for number, step in links),
+    )

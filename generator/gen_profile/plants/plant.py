@@ -102,6 +102,37 @@ class Outputs:
 
 
 @attrs.frozen(kw_only=True)
+class Mechanics:
+    """What moves, as point masses, one entry per body.
+
+    Attributes
+    ----------
+    mass : kg
+    place : three each, m
+        x, y and z in a frame that stands still, z upwards; z = 0 where a load is suspended.
+    gravity : m/s²
+    springs : J
+        What all springs together have stored.
+    """
+
+    mass: Sequence[Scalar]
+    place: Sequence[tuple[Scalar, Scalar, Scalar]]
+    gravity: Scalar = 0.0
+    springs: Scalar = 0.0
+
+    @property
+    def potential(self) -> Scalar:
+        """Potential energy in J."""
+        weights = (mass * self.gravity * z for mass, (_, _, z) in zip(self.mass, self.place, strict=True))
+        return sum(weights, self.springs)
+
+
+def _no_bodies(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+    del q_u, q_a, p
+    return Mechanics(mass=[], place=[])
+
+
+@attrs.frozen(kw_only=True)
 class Plant:
     """A machine: names, parameters, equations of motion and outputs. Nothing else.
 
@@ -121,6 +152,10 @@ class Plant:
     equations : (q_u, dq_u, q_a, dq_a, p) → Equations
         Sequences of scalars, and the parameters as attributes of `p`.
     outputs : (q_u, q_a, p) → Outputs
+    bodies : tuple of str
+        Names of the bodies that `mechanics` tells of.
+    mechanics : (q_u, q_a, p) → Mechanics
+        For the loads' places and energy, and as a proof of the equations. A motion can be planned without.
     """
 
     type: str
@@ -134,6 +169,8 @@ class Plant:
         [Sequence[Scalar], Sequence[Scalar], Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Equations
     ]
     outputs: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Outputs]
+    bodies: tuple[str, ...] = ()
+    mechanics: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Mechanics] = _no_bodies
 
     @property
     def end_load(self) -> slice:

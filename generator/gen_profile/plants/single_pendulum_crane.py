@@ -18,7 +18,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
 
 
 def equations(
@@ -47,6 +47,12 @@ def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) ->
     return Outputs(sway=[rope * np.sin(phi)], height=[-rope * np.cos(phi)], angle=[phi])
 
 
+def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+    """Place the payload below the cart."""
+    seen, (cart, _) = outputs(q_u, q_a, p), q_a
+    return Mechanics(mass=[p.m], place=[(cart - seen.sway[0], 0.0, seen.height[0])], gravity=p.g)
+
+
 PLANT = Plant(
     type="single-pendulum-crane",
     summary="cart with a hoist, and a payload on the rope",
@@ -70,4 +76,6 @@ PLANT = Plant(
     loads=("payload",),
     equations=equations,
     outputs=outputs,
+    bodies=("payload",),
+    mechanics=mechanics,
 )

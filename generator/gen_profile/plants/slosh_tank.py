@@ -14,7 +14,8 @@ films and wetting: measure where it matters.
 
 The sway is the rise of the liquid at the trailing wall. A steady acceleration ÿ tilts the surface by ÿ/g, of
 whose Fourier series along the tank mode n holds 4 a / ((2n − 1) π)² at the wall; so mode n raises the liquid
-there by 4 a / ((2n − 1) π)² sin θ.
+there by 4 a / ((2n − 1) π)² sin θ. The same rise has the pendulum's potential energy if its mass is
+m = 8 ρ a³ b / (((2n − 1) π)⁴ L), which is Dodge's, too; the rest of the liquid moves with the tank.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
 
 ODD = (1, 3)  # 2n − 1 of the modes
 
@@ -65,6 +66,17 @@ def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) ->
     return Outputs(sway=[rise], height=[rise], angle=[q_u[0]])
 
 
+def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+    """Place the modes' pendulums below their pivots: the part of the liquid that sloshes."""
+    (tank,) = q_a
+    mass, place = [], []
+    for odd, theta in zip(ODD, q_u, strict=True):
+        length, _ = _pendulum(odd, p)
+        mass.append(8.0 * p.rho * p.a**3 * p.b / ((odd * np.pi) ** 4 * length))
+        place.append((tank - length * np.sin(theta), 0.0, -length * np.cos(theta)))
+    return Mechanics(mass=mass, place=place, gravity=p.g)
+
+
 PLANT = Plant(
     type="slosh-tank",
     summary="liquid in a rectangular tank that is moved along its length",
@@ -85,4 +97,6 @@ PLANT = Plant(
     loads=("surface",),
     equations=equations,
     outputs=outputs,
+    bodies=("mode1", "mode2"),
+    mechanics=mechanics,
 )

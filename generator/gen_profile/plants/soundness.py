@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from gen_profile.plants.plant import Plant
+from gen_profile.plants.virtual_work import contradictions
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 TYPE = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]*")
@@ -31,6 +32,7 @@ def _form(plant: Plant) -> Iterator[str]:
         ("parameter", [q.name for q in plant.parameters], IDENTIFIER),
         ("coordinate", coordinates, NAME),
         ("load", list(plant.loads), NAME),
+        ("moving part", list(plant.bodies), NAME),
     ):
         for name, count in Counter(names).items():
             if not pattern.fullmatch(name) or name in RESERVED:
@@ -58,6 +60,7 @@ def _values(plant: Plant) -> Iterator[str]:
         with np.errstate(all="ignore"):
             terms = plant.equations([0.0] * n_u, [0.0] * n_u, standing, [0.0] * m, p)
             outputs = plant.outputs([0.0] * n_u, standing, p)
+            mechanics = plant.mechanics([0.0] * n_u, standing, p)
         found = {
             "M_uu": (terms.M_uu, (n_u, n_u)),
             "M_au": (terms.M_au, (m, n_u)),
@@ -66,6 +69,10 @@ def _values(plant: Plant) -> Iterator[str]:
             "sway": (outputs.sway, (loads,)),
             "height": (outputs.height, (loads,)),
             "angle": (outputs.angle, (loads,)),
+            "mass": (mechanics.mass, (len(plant.bodies),)),
+            "place": (mechanics.place, (len(plant.bodies), 3) if plant.bodies else (0,)),
+            "gravity": (mechanics.gravity, ()),
+            "springs": (mechanics.springs, ()),
         }
         arrays = {name: (np.array(value, dtype=np.float64), shape) for name, (value, shape) in found.items()}
     except Exception as error:
@@ -87,3 +94,9 @@ def _values(plant: Plant) -> Iterator[str]:
         yield "it does not rest at q_u = 0: count the unactuated coordinates from the place at rest"
     elif np.abs(arrays["sway"][0]).max() > STILL:
         yield "its sway at rest is not zero: count it from the loads' places at rest"
+    elif plant.bodies:
+        try:
+            with np.errstate(all="ignore"):
+                yield from contradictions(plant)
+        except Exception as error:
+            yield f"its equations fail where it swings: {type(error).__name__}: {error}"

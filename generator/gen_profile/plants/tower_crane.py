@@ -27,7 +27,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
 
 
 def equations(
@@ -70,6 +70,15 @@ def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) ->
     )
 
 
+def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+    """Place the payload below the trolley; at a slew angle of 0 the jib points along x."""
+    seen, (slew, radius) = outputs(q_u, q_a, p), q_a
+    along, across = radius - seen.sway[0], -seen.sway[1]
+    x = along * np.cos(slew) - across * np.sin(slew)
+    y = along * np.sin(slew) + across * np.cos(slew)
+    return Mechanics(mass=[p.m], place=[(x, y, seen.height[0])], gravity=p.g)
+
+
 PLANT = Plant(
     type="tower-crane",
     summary="slewing jib with a trolley, and a payload that swings along and across it",
@@ -92,4 +101,6 @@ PLANT = Plant(
     directions=2,
     equations=equations,
     outputs=outputs,
+    bodies=("payload",),
+    mechanics=mechanics,
 )

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.plants.plant import Plant
+from gen_profile.plants.plant import Mechanics, Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.symbolic import Array, Symbol
 
@@ -31,6 +31,10 @@ class Dynamics:
         −M_uu⁻¹ M_auᵀ; also the jump of q̇_u per unit step of axis velocity.
     ddq_u : (n_u,) column
     sway, height, angle : (loads,) columns
+    place : (3 bodies,) column
+        x, y and z of every body, where the plant tells of bodies.
+    energy : (1,) column, or (0,)
+        Of all bodies, kinetic and potential, likewise.
     """
 
     q_u: Symbol
@@ -45,6 +49,13 @@ class Dynamics:
     sway: Symbol
     height: Symbol
     angle: Symbol
+    place: Symbol
+    energy: Symbol
+
+    @property
+    def seen(self) -> Symbol:
+        """All outputs as one column: of the loads first, then of the bodies."""
+        return sym.column([self.sway, self.height, self.angle, self.place, self.energy])
 
 
 def dynamics(plant: Plant) -> Dynamics:
@@ -59,10 +70,14 @@ def dynamics(plant: Plant) -> Dynamics:
     q_u, dq_u = sym.symbols("q_u", n_u), sym.symbols("dq_u", n_u)
     q_a, dq_a, ddq_a = sym.symbols("q_a", m), sym.symbols("dq_a", m), sym.symbols("ddq_a", m)
     p = sym.symbols("p", len(plant.parameters))
+    q, dq = sym.column([q_u, q_a]), sym.column([dq_u, dq_a])
     named = SimpleNamespace(**dict(zip((q.name for q in plant.parameters), sym.split(p), strict=True)))
     try:
         terms = plant.equations(sym.split(q_u), sym.split(dq_u), sym.split(q_a), sym.split(dq_a), named)
         outputs = plant.outputs(sym.split(q_u), sym.split(q_a), named)
+        bodies = plant.mechanics(sym.split(q_u), sym.split(q_a), named)
+        place = [x for _, place in zip(plant.bodies, bodies.place, strict=True) for x in place]
+        energy = [_energy(bodies, q, dq)] if plant.bodies else []
     except Exception as error:  # of whoever wrote the machine
         raise SpecError(
             f"plant.type: the equations of {plant.type!r} do not take symbols "
@@ -85,7 +100,16 @@ def dynamics(plant: Plant) -> Dynamics:
         sway=sym.column(outputs.sway),
         height=sym.column(outputs.height),
         angle=sym.column(outputs.angle),
+        place=sym.column(place),
+        energy=sym.column(energy),
     )
+
+
+def _energy(bodies: Mechanics, q: Symbol, dq: Symbol) -> Symbol:
+    """½ Σ m ṙ² and what gravity and springs have stored."""
+    velocities = (sym.directional(sym.column(place), q, dq) for place in bodies.place)
+    kinetic = (0.5 * m * sym.dot(v, v) for m, v in zip(bodies.mass, velocities, strict=True))
+    return sum(kinetic, bodies.potential)
 
 
 def parameter_column(plant: Plant, values: dict[str, float]) -> Array:
