@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
 
 import attrs
 import can
@@ -29,6 +30,9 @@ PDO_COB_IDS = range(0x1400, 0x1C00)
 COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it was set
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
+PERIOD_DIGITS, PERIOD_EXPONENT = (0x60C2, 1), (0x60C2, 2)
+
+Place = tuple[int, int]  # index and subindex
 
 
 @attrs.frozen(kw_only=True)
@@ -140,20 +144,29 @@ def _set(link: Link, node: Node, entries: Sequence[Entry]) -> None:
         )
 
 
-def _differing(
-    link: Link, node: Node, final: Mapping[tuple[int, int], Entry]
-) -> list[tuple[Entry, bytes | None]]:
-    found = [(entry, _upload(link, node, entry.index, entry.sub)) for entry in final.values()]
-    return [
-        (entry, data) for entry, data in found if not (entry.optional if data is None else _same(entry, data))
-    ]
+def _differing(link: Link, node: Node, final: Mapping[Place, Entry]) -> list[tuple[Entry, bytes | None]]:
+    wanted = {place: entry.data for place, entry in final.items()}
+    held = {place: _upload(link, node, *place) for place in final}
+    same = {place for place, entry in final.items() if _same(entry, held[place])}
+    if _interpolation_period(held) == _interpolation_period(wanted):  # 40 × 0.1 ms are 4 × 1 ms, too
+        same |= {PERIOD_DIGITS, PERIOD_EXPONENT}
+    return [(entry, held[place]) for place, entry in final.items() if place not in same]
 
 
-def _same(entry: Entry, data: bytes) -> bool:
+def _same(entry: Entry, data: bytes | None) -> bool:
+    if data is None:
+        return entry.optional
     if entry.index in PDO_COB_IDS and entry.sub == 1 and entry.index & 0x0200 == 0:
         apart = int.from_bytes(data, "little") ^ int.from_bytes(entry.data, "little")
         return not apart & COB_ID_BITS
     return data == entry.data
+
+
+def _interpolation_period(objects: Mapping[Place, bytes | None]) -> Decimal | None:
+    digits, exponent = objects[PERIOD_DIGITS], objects[PERIOD_EXPONENT]
+    if digits is None or exponent is None:
+        return None
+    return Decimal(int.from_bytes(digits, "little")).scaleb(int.from_bytes(exponent, "little", signed=True))
 
 
 def _require_window(link: Link, node: Node) -> None:

@@ -110,7 +110,7 @@ class Watch:
         self.alert = alert
 
     def require_well(self) -> None:
-        """Raise the first fault found, or what is overdue or out of order now.
+        """Raise the first fault found, or what is overdue now.
 
         Raises
         ------
@@ -118,8 +118,6 @@ class Watch:
         """
         if self.alert >= Alert.CYCLIC:
             self._look_for_silence()
-        for axis in self.axes:
-            self._look_at(axis)
         if self.fault is not None:
             raise StreamAborted(self.fault)
 
@@ -135,6 +133,7 @@ class Watch:
         if len(data) == self._feedback.size:
             axis.statusword, axis.position = self._feedback.unpack(data)
             axis.heard = self._clock.now()
+            self._look_at(axis)
         elif self.alert >= Alert.CYCLIC:
             self._find(
                 f"axis {axis.name}: feedback of {len(data)} bytes instead of {self._feedback.size}; "

@@ -4,6 +4,7 @@ What the tests judge is the bus alone: a third party on it takes down every fram
 """
 
 import itertools
+import struct
 
 import attrs
 import can
@@ -12,7 +13,6 @@ from motions import quintic, target
 from gen_profile_exporters.can import exporter
 from gen_profile_exporters.can.drive_bank import DriveBank
 from gen_profile_exporters.can.drive_dictionary import Make
-from gen_profile_exporters.can.load import RigidLoad
 from gen_profile_exporters.can.plan import plan_of
 from gen_profile_exporters.can.simulated_drive import SimulatedDrive
 from gen_profile_exporters.can.streamer import Streamer
@@ -20,7 +20,31 @@ from gen_profile_exporters.can.streamer import Streamer
 MS = 1_000_000
 BEGINNING = 1_000 * MS
 QUICK_STOP = b"\x02\x00"
+OTHER_MAKE = Make(own_mapping=True, fixed_period=(40, -4), miss="hold")  # 4 ms, said in another way
 _channels = itertools.count()
+
+
+@attrs.define
+class RigidLoad:
+    """Axes that follow at once, or with a first-order lag, whatever hangs on them.
+
+    Attributes
+    ----------
+    position : list of float
+        Where the axes are, in m (or rad).
+    lag : float
+        Share of the distance that is left after one step; 0 follows at once.
+    """
+
+    position: list[float]
+    lag: float = 0.0
+
+    def advance(self, position, duration):
+        del duration
+        self.position = [
+            goal + self.lag * (at - goal) for at, goal in zip(self.position, position, strict=True)
+        ]
+        return self.position
 
 
 class FakeClock:
@@ -138,6 +162,14 @@ class Bench:
         """What the first drive told: instants, and positions in counts."""
         told = self.of(0x180 + self.target.can.node)
         return [(frame.at, int.from_bytes(frame.data[2:6], "little", signed=True)) for frame in told]
+
+    def asked(self, index):
+        """Ask the first drive by SDO for an object, as anybody on the bus may; None without an answer."""
+        node, before = self.target.can.node, len(self.heard)
+        self.say(0x600 + node, struct.pack("<BHB4x", 0x40, index, 0))
+        self.wait(2)
+        answers = [frame for frame in self.heard[before:] if frame.cob_id == 0x580 + node]
+        return int.from_bytes(answers[0].data[4:], "little", signed=True) if answers else None
 
     def _listen(self):
         while (message := self.witness.recv(0)) is not None:

@@ -2,8 +2,9 @@
 
 import re
 
+import attrs
 import pytest
-from exporters.can.bench import Bench
+from exporters.can.bench import OTHER_MAKE, Bench
 from motions import quintic, target
 
 from gen_profile.errors import ExportError
@@ -48,8 +49,13 @@ def refused(bench, reason):
     ],
     ids=["position", "monitoring off", "monitoring none", "vendor", "product", "mode", "fixed period"],
 )
-def test_unfit_drives(options, reason):
-    with Bench(**options) as bench:
+@pytest.mark.parametrize("other", [False, True], ids=["usual", "other"])
+def test_unfit_drives(options, reason, other):
+    make = options.get("make", Make())
+    if other:
+        period = make.fixed_period or OTHER_MAKE.fixed_period
+        make = attrs.evolve(make, own_mapping=True, miss="hold", fixed_period=period)
+    with Bench(**{**options, "make": make}) as bench:
         refused(bench, reason)
 
 
