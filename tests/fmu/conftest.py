@@ -2,7 +2,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from fmu.slave import FMU2LoggedSlave, open_slave
+from fmu.slave import FMU2LoggedModel, FMU2LoggedSlave, open_slave
 
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
@@ -24,6 +24,12 @@ def fmu(crane: Plant) -> PlantFmu:
 @pytest.fixture
 def slave(fmu: PlantFmu) -> Iterator[FMU2LoggedSlave]:
     with open_slave(fmu) as started:
+        yield started
+
+
+@pytest.fixture
+def exchange(fmu: PlantFmu) -> Iterator[FMU2LoggedModel]:
+    with open_slave(fmu, FMU2LoggedModel) as started:
         yield started
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Self
 
 import fmpy
 from fmpy import fmi2
@@ -15,11 +16,8 @@ from gen_profile_fmu.plant_fmu import PlantFmu
 MOVE = [0.001 * k**2 for k in range(1, 30)]
 
 
-class FMU2LoggedSlave(fmi2.FMU2Slave):
-    """FMPy's slave, by variable names, with messages as (status, category, text).
-
-    FMPy reads the version of FMI off the beginning of the class's name.
-    """
+class _Logged:
+    """FMPy's instances, by variable names, with messages as (status, category, text)."""
 
     def __init__(self, fmu: PlantFmu) -> None:
         super().__init__(
@@ -57,12 +55,12 @@ class FMU2LoggedSlave(fmi2.FMU2Slave):
     def last_message(self) -> str:
         return self.messages[-1][2]
 
-    def start(self, **values: float) -> FMU2LoggedSlave:
+    def start(self, **values: float) -> Self:
         """Instantiate and initialise."""
         self.instantiate(callbacks=self.own_callbacks)
         return self.initialise(**values)
 
-    def initialise(self, **values: float) -> FMU2LoggedSlave:
+    def initialise(self, **values: float) -> Self:
         self.setupExperiment(startTime=0.0)
         self.write(**values)
         self.enterInitializationMode()
@@ -87,10 +85,19 @@ class FMU2LoggedSlave(fmi2.FMU2Slave):
         return rows
 
 
+# FMPy reads the version of FMI off the beginning of a class's name
+class FMU2LoggedSlave(_Logged, fmi2.FMU2Slave):
+    """For co-simulation."""
+
+
+class FMU2LoggedModel(_Logged, fmi2.FMU2Model):
+    """For model exchange."""
+
+
 @contextmanager
-def open_slave(fmu: PlantFmu) -> Iterator[FMU2LoggedSlave]:
+def open_slave(fmu: PlantFmu, kind: type = FMU2LoggedSlave) -> Iterator[FMU2LoggedSlave | FMU2LoggedModel]:
     """A started instance, and proof that it frees what it took."""
-    slave = FMU2LoggedSlave(fmu).start()
+    slave = kind(fmu).start()
     yield slave
     slave.fmi2FreeInstance(slave.component)
     assert not slave.allocated

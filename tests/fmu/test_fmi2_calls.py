@@ -12,20 +12,67 @@ from elftools.elf.elffile import ELFFile
 from fmpy import fmi2, read_model_description
 from fmu.slave import MOVE, status_of
 
-# in which of the fixture `modes` the standard (2.0.4, section 4.2.4) allows a call
-ALLOWED = {
-    "fmi2SetupExperiment": "100000",
-    "fmi2EnterInitializationMode": "100000",
-    "fmi2ExitInitializationMode": "010000",
-    "fmi2DoStep": "001000",
-    "fmi2Terminate": "001100",
-    "fmi2SetReal": "111000",
-    "fmi2GetReal": "011111",
-    "fmi2GetRealStatus": "001110",
-    "fmi2GetBooleanStatus": "001110",
-    "fmi2Reset": "111111",
-    "fmi2CancelStep": "000000",
+# in which of the fixtures' modes the standard (2.0.4, sections 3.2.3 and 4.2.4) allows a call
+COSIMULATION = {
+    "fmi2SetupExperiment": "1100000",
+    "fmi2EnterInitializationMode": "0100000",
+    "fmi2ExitInitializationMode": "0010000",
+    "fmi2DoStep": "0001000",
+    "fmi2Terminate": "0001100",
+    "fmi2SetReal": "1111000",
+    "fmi2GetReal": "0011111",
+    "fmi2GetRealStatus": "0001110",
+    "fmi2GetBooleanStatus": "0001110",
+    "fmi2Reset": "1111111",
+    "fmi2CancelStep": "0000000",
 }
+EXCHANGE = {
+    "fmi2SetupExperiment": "1100000",
+    "fmi2EnterInitializationMode": "0100000",
+    "fmi2ExitInitializationMode": "0010000",
+    "fmi2NewDiscreteStates": "0001000",
+    "fmi2EnterContinuousTimeMode": "0001000",
+    "fmi2EnterEventMode": "0001100",
+    "fmi2CompletedIntegratorStep": "0000100",
+    "fmi2SetContinuousStates": "0000100",
+    "fmi2SetTime": "0001100",
+    "fmi2SetReal": "1111000",  # of a tunable parameter
+    "fmi2GetReal": "0011111",
+    "fmi2GetDerivatives": "0011111",
+    "fmi2Terminate": "0001100",
+    "fmi2Reset": "1111111",
+}
+
+
+def arguments_of(function):
+    six, reference = (c_double * 6)(), (c_uint * 1)(0)
+    return {
+        "fmi2SetupExperiment": (0, 0.0, 0.0, 0, 0.0),
+        "fmi2DoStep": (0.0, 1e-3, 1),
+        "fmi2SetReal": (reference, 1, (c_double * 1)(0.5)),
+        "fmi2GetReal": (reference, 1, (c_double * 1)()),
+        "fmi2GetRealStatus": (fmi2.fmi2LastSuccessfulTime, byref(c_double())),
+        "fmi2GetBooleanStatus": (fmi2.fmi2Terminated, byref(c_int())),
+        "fmi2NewDiscreteStates": (byref(fmi2.fmi2EventInfo()),),
+        "fmi2CompletedIntegratorStep": (1, byref(c_int()), byref(c_int())),
+        "fmi2SetContinuousStates": (six, 6),
+        "fmi2GetDerivatives": (six, 6),
+        "fmi2SetTime": (0.0,),
+    }.get(function, ())
+
+
+def allowed(instance, modes, function):
+    """In which modes a call is taken, as a row of ones and zeros; refusals must be about the order."""
+    found = ""
+    for enter in modes:
+        enter()
+        status = status_of(getattr(instance, function), instance.component, *arguments_of(function))
+        found += "1" if status == fmi2.fmi2OK else "0"
+        if status != fmi2.fmi2OK:
+            assert re.search(
+                "must not be called in|must be set up before|cannot be set in", instance.last_message
+            )
+    return found
 
 
 class TestCallOrder:
@@ -36,8 +83,12 @@ class TestCallOrder:
         def instantiated():
             slave.reset()
 
-        def initialization():
+        def set_up():
             slave.reset()
+            slave.setupExperiment()
+
+        def initialization():
+            set_up()
             slave.enterInitializationMode()
 
         def step_complete():
@@ -57,27 +108,64 @@ class TestCallOrder:
             step_complete()
             assert status_of(slave.doStep, 0.0, -1.0) == fmi2.fmi2Error
 
-        return [instantiated, initialization, step_complete, step_failed, terminated, erroneous]
+        return [instantiated, set_up, initialization, step_complete, step_failed, terminated, erroneous]
 
-    @pytest.mark.parametrize("function", ALLOWED)
+    @pytest.mark.parametrize("function", COSIMULATION)
     def test_is_enforced(self, slave, modes, function):
-        real, boolean = c_double(), c_int()
-        arguments = {
-            "fmi2SetupExperiment": (0, 0.0, 0.0, 0, 0.0),
-            "fmi2DoStep": (0.0, 1e-3, 1),
-            "fmi2SetReal": ((c_uint * 1)(0), 1, (c_double * 1)(0.5)),
-            "fmi2GetReal": ((c_uint * 1)(0), 1, (c_double * 1)()),
-            "fmi2GetRealStatus": (fmi2.fmi2LastSuccessfulTime, byref(real)),
-            "fmi2GetBooleanStatus": (fmi2.fmi2Terminated, byref(boolean)),
-        }.get(function, ())
-        found = ""
-        for enter in modes:
-            enter()
-            status = status_of(getattr(slave, function), slave.component, *arguments)
-            found += "1" if status == fmi2.fmi2OK else "0"
-            if status != fmi2.fmi2OK:
-                assert f"{function} must not be called in" in slave.last_message
-        assert found == ALLOWED[function]
+        assert allowed(slave, modes, function) == COSIMULATION[function]
+
+    @pytest.mark.parametrize("function", EXCHANGE)
+    def test_is_enforced_in_model_exchange(self, exchange, function):
+        def instantiated():
+            exchange.reset()
+
+        def set_up():
+            exchange.reset()
+            exchange.setupExperiment()
+
+        def initialization():
+            set_up()
+            exchange.enterInitializationMode()
+
+        def event():
+            initialization()
+            exchange.exitInitializationMode()
+
+        def continuous():
+            event()
+            exchange.enterContinuousTimeMode()
+            exchange.completedIntegratorStep()
+
+        def terminated():
+            event()
+            exchange.terminate()
+
+        def erroneous():
+            event()
+            assert status_of(exchange.setTime, float("nan")) == fmi2.fmi2Error
+
+        modes = [instantiated, set_up, initialization, event, continuous, terminated, erroneous]
+        assert allowed(exchange, modes, function) == EXCHANGE[function]
+
+    @pytest.mark.parametrize("name", ["theta1", "cart.velocity", "L1"])
+    def test_states_and_parameters_are_set_by_name_until_somebody_integrates(self, exchange, name):
+        """What CasADi's DaeBuilder does, which evaluates only."""
+        exchange.enterContinuousTimeMode()
+        exchange.setReal([exchange.references[name]], [0.25])
+        assert exchange.read(name) == [0.25]
+        exchange.completedIntegratorStep()
+        assert status_of(exchange.setReal, [exchange.references[name]], [0.5]) == fmi2.fmi2Error
+        words = (
+            "is an output, it cannot be set"
+            if name == "cart.velocity"
+            else "cannot be set in continuous-time mode"
+        )
+        assert exchange.last_message == f"{name} {words}."
+
+    @pytest.mark.parametrize("name", ["tau", "cart.start", "sway.hook"])
+    def test_nothing_else_is_set_by_name_while_time_runs(self, exchange, name):
+        exchange.enterContinuousTimeMode()
+        assert status_of(exchange.setReal, [exchange.references[name]], [0.5]) == fmi2.fmi2Error
 
     def test_after_an_error_nothing_goes_on_but_a_reset_helps(self, slave):
         assert status_of(slave.doStep, 0.0, 0.0) == fmi2.fmi2Error
@@ -94,6 +182,7 @@ class TestCallOrder:
 class TestValues:
     def test_start_values_are_those_of_the_model_description(self, fmu, slave):
         slave.reset()
+        slave.setupExperiment()
         slave.enterInitializationMode()
         found = dict(zip(slave.references, slave.read(), strict=True))
         described = read_model_description(str(fmu.archive), validate=True).modelVariables
@@ -131,6 +220,7 @@ class TestValues:
     def test_fixed_parameters_are_set_before_the_first_step_only(self, slave, name):
         assert status_of(slave.setReal, [slave.references[name]], [0.0]) == fmi2.fmi2Error
         slave.reset()
+        slave.setupExperiment()
         slave.enterInitializationMode()
         slave.setReal([slave.references[name]], [0.5])
         slave.exitInitializationMode()
@@ -145,6 +235,7 @@ class TestValues:
 
     def test_the_start_position_shows_in_initialization_mode(self, slave):
         slave.reset()
+        slave.setupExperiment()
         slave.enterInitializationMode()
         slave.write(cart__start=0.25)
         assert slave.read("cart.position") == [0.25]

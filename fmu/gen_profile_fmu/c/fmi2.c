@@ -158,7 +158,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_state_set
     REQUIRE_POINTER(enter_event_mode && terminate_simulation, 1, "fmi2CompletedIntegratorStep");
     (void)no_state_set_before;
     *enter_event_mode = *terminate_simulation = fmi2False;
-    return fmi2OK;
+    return FMI(complete_step(instance));
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {

@@ -252,7 +252,7 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_state_set_
     REQUIRE_POINTER(enter_event_mode && terminate_simulation, 1, "fmi3CompletedIntegratorStep");
     (void)no_state_set_before;
     *enter_event_mode = *terminate_simulation = false;
-    return fmi3OK;
+    return FMI(complete_step(instance));
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {

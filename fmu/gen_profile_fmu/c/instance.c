@@ -127,10 +127,12 @@ static Status set_up(Instance *instance, double start, int has_stop, double stop
     }
     instance->state.model.time = instance->state.model.start_time = start;
     instance->state.stop_time = has_stop ? stop : HUGE_VAL;
+    instance->state.has_experiment = 1;
     return OK;
 }
 
 static Status begin_initialization(Instance *instance) {
+    if (!instance->state.has_experiment) return fail(instance, "The experiment must be set up before initialization.");
     instance->state.mode = INITIALIZATION;
     return OK;
 }
@@ -184,29 +186,37 @@ static int is_state(unsigned reference) {
     return index >= 0 && index < N_STATES;
 }
 
-/* In continuous-time mode more than FMI asks for, states and parameters by name, as CasADi wants it. */
 static int can_be_set(unsigned reference, int mode) {
     const int starting = INSTANTIATED | INITIALIZATION;
-    if (is_state(reference) && mode & CONTINUOUS) return 1;
     switch (VARIABLES[reference].kind) {
         case FIXED_PARAMETER:
         case STATE: return mode & starting;
-        case DISCRETE_INPUT: return mode & (starting | EVENT | STEP);
         case TUNABLE_PARAMETER:
+        case DISCRETE_INPUT: return mode & (starting | EVENT | STEP);
         case INPUT: return mode & (starting | EVENT | CONTINUOUS | STEP);
         default: return 0;
     }
+}
+
+/*
+ * Whether a state or parameter may be set by name in continuous-time mode, where FMI takes states as a whole and no
+ * parameters: CasADi's DaeBuilder does it. Nobody else may: it evaluates only, and so leaves the functions alone that
+ * an integrator calls.
+ */
+static int is_explored(const State *state, unsigned reference) {
+    const int known = is_state(reference) || VARIABLES[reference].kind == TUNABLE_PARAMETER;
+    return known && state->mode == CONTINUOUS && !state->is_integrated;
 }
 
 static Status set_value(Instance *instance, unsigned reference, Type type, double value) {
     const Variable *variable = find_variable(instance, reference, type);
     if (!variable) return FAILED;
     const int mode = instance->state.mode;
-    if (!can_be_set(reference, mode | INITIALIZATION)) {
+    if (!can_be_set(reference, mode) && !is_explored(&instance->state, reference)) {
+        if (can_be_set(reference, ANY_MODE)) {
+            return fail(instance, "%s cannot be set in %s.", variable->name, mode_name(mode));
+        }
         return fail(instance, "%s is an output, it cannot be set.", variable->name);
-    }
-    if (!can_be_set(reference, mode)) {
-        return fail(instance, "%s cannot be set in %s.", variable->name, mode_name(mode));
     }
     if (!isfinite(value)) return fail(instance, "%s must be finite, found %g.", variable->name, value);
     if (value < variable->lower || value > variable->upper) {
@@ -223,7 +233,7 @@ static Status require_knowns(Instance *instance, const unsigned knowns[], size_t
     for (size_t i = 0; i < n; i++) {
         const Variable *variable = find_variable(instance, knowns[i], REAL);
         if (!variable) return FAILED;
-        if (!can_be_set(knowns[i], ANY_MODE)) return fail(instance, "%s is not a known.", variable->name);
+        if (!is_state(knowns[i]) && !can_be_set(knowns[i], ANY_MODE)) return fail(instance, "%s is not a known.", variable->name);
     }
     return OK;
 }
@@ -263,6 +273,7 @@ static Status set_states(Instance *instance, const double states[], size_t n) {
         if (!isfinite(states[i])) return fail(instance, "%s must be finite.", VARIABLES[STATES + i].name);
     }
     memcpy(instance->state.model.values + STATES, states, n * sizeof *states);
+    instance->state.is_integrated = 1;
     mark_stale(&instance->state);
     return OK;
 }
@@ -285,6 +296,11 @@ static Status get_derivatives(Instance *instance, double derivatives[], size_t n
 static Status get_nominals(Instance *instance, double nominals[], size_t n) {
     if (n != N_STATES) return fail(instance, "There are %u continuous states.", (unsigned)N_STATES);
     for (size_t i = 0; i < n; i++) nominals[i] = 1.0;
+    return OK;
+}
+
+static Status complete_step(Instance *instance) {
+    instance->state.is_integrated = 1;
     return OK;
 }
 

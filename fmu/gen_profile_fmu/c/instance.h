@@ -32,6 +32,8 @@ typedef struct {
     double stop_time;        /* infinite where none was set */
     int mode;
     int outputs_are_stale, derivatives_are_stale;
+    int has_experiment;      /* a start time was given */
+    int is_integrated;       /* an integrator has set states or completed a step */
 } State;
 
 typedef struct {
