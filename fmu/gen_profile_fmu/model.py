@@ -92,36 +92,20 @@ def plant_model(machine: Machine, kind: InputKind, name: str | None = None) -> M
     """
     plant, table = machine.plant, plant_variables(machine, kind)
     equations = dynamics(plant)
-    tau, velocity, inputs = (table.references(block) for block in ("TAU", "DQ_A", "INPUTS"))
-    sloped = kind is not InputKind.SETPOINT
-    lagging = kind is not InputKind.ACCELERATION
-    drives = {
-        axis: {*inputs[axis : axis + sloped], *velocity[axis : axis + lagging], *tau}
-        for axis in range(len(inputs))
-    }
     origins = {axis: {reference} for axis, reference in enumerate(table.references("START"))}
-    orders = {
-        InputKind.ACCELERATION: INPUT_ORDER + 2,
-        InputKind.VELOCITY: INPUT_ORDER + 1,
-        InputKind.SETPOINT: 1,
-    }[kind]
-    constants = {
-        "INPUT_KIND": f"{kind.name}_INPUT",
-        "N_ORDERS": str(orders),
-        "N_SLOPED_INPUTS": str(len(inputs) if sloped else 0),
-        "SLOPED_INPUTS": "INPUTS",
-    }
     name = name or plant.type
     return Model(
         name=name,
         identifier=identifier_of(name),
         summary=plant.summary,
         variables=table,
-        structure=plant_structure(equations, table, drives, origins),
-        interpolates_inputs=sloped,
+        structure=plant_structure(equations, table, _drives(table, kind), origins),
+        interpolates_inputs=kind is not InputKind.SETPOINT,
         code={
             **hand_written(*PLANT_FILES, "plant_model.c"),
-            "variables.h": variables_header(table, len(plant.actuated), len(plant.unactuated), constants),
+            "variables.h": variables_header(
+                table, len(plant.actuated), len(plant.unactuated), _constants(kind, len(plant.actuated))
+            ),
             "equations.c": equations_source(equations),
         },
         order=("equations.c", "driven_plant.c", "plant_model.c"),
@@ -129,6 +113,31 @@ def plant_model(machine: Machine, kind: InputKind, name: str | None = None) -> M
         stop_time=10.0,
         step=0.001,
     )
+
+
+def _drives(table: VariableTable, kind: InputKind) -> dict[int, set[int]]:
+    """Find what each axis' acceleration follows from, during the simulation."""
+    tau, velocity, inputs = (table.references(block) for block in ("TAU", "DQ_A", "INPUTS"))
+    sloped, lagging = kind is not InputKind.SETPOINT, kind is not InputKind.ACCELERATION
+    return {
+        axis: {*inputs[axis : axis + sloped], *velocity[axis : axis + lagging], *tau}
+        for axis in range(len(inputs))
+    }
+
+
+def _constants(kind: InputKind, axes: int) -> dict[str, str]:
+    """List the macros of plant_model.c."""
+    orders = {
+        InputKind.ACCELERATION: INPUT_ORDER + 2,
+        InputKind.VELOCITY: INPUT_ORDER + 1,
+        InputKind.SETPOINT: 1,
+    }[kind]
+    return {
+        "INPUT_KIND": f"{kind.name}_INPUT",
+        "N_ORDERS": str(orders),
+        "N_SLOPED_INPUTS": str(axes if kind is not InputKind.SETPOINT else 0),
+        "SLOPED_INPUTS": "INPUTS",
+    }
 
 
 def profile_model(name: str, axes: Sequence[Coordinate], profile: Profile) -> Model:
