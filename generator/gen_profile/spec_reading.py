@@ -28,13 +28,25 @@ def read_spec(path: Path, overrides: Sequence[str] = ()) -> Spec:
     SpecError
         The text is no TOML, or its content has faults: all of them are listed.
     """
+    return parse_spec(read_text(path), overrides, str(path), path.parent)
+
+
+def read_text(path: Path) -> str:
+    """Read a TOML file's text, unparsed.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read.
+    SpecError
+        It is no UTF-8 text.
+    """
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
         raise OutputError(f"Cannot read the spec {path}: {error.strerror}.") from error
     except UnicodeDecodeError as error:
         raise SpecError(f"{path}: not UTF-8 text (byte {error.start}); save the spec as UTF-8.") from error
-    return parse_spec(text, overrides, str(path), path.parent)
 
 
 def parse_spec(text: str, overrides: Sequence[str] = (), source: str = "spec", folder: Path = HERE) -> Spec:
@@ -77,9 +89,20 @@ def preset_spec(name: str, overrides: Sequence[str] = ()) -> Spec:
     SpecError
         There is no such preset, or the overrides have faults.
     """
+    return parse_spec(preset_text(name), overrides, name)
+
+
+def preset_text(name: str) -> str:
+    """Read a preset's TOML text.
+
+    Raises
+    ------
+    SpecError
+        There is no such preset.
+    """
     if name not in presets():
         raise SpecError(f"--preset: unknown preset {name!r}{suggestion(name, presets())}")
-    return parse_spec((files("gen_profile") / "presets" / f"{name}.toml").read_text("utf-8"), overrides, name)
+    return (files("gen_profile") / "presets" / f"{name}.toml").read_text("utf-8")
 
 
 def spec_from_dict(document: Mapping[str, Any], folder: Path = HERE) -> Spec:

@@ -66,6 +66,15 @@ def spec_options(command: Command) -> Command:
     return command
 
 
+export_option = click.option(
+    "--export",
+    "formats",
+    metavar="FORMAT",
+    multiple=True,
+    default=("csv",),
+    shell_complete=_complete_formats,
+    help="Format to write (see gen-profile formats). Repeatable; csv by default.",
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
 debug_option = click.option(
     "--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."
@@ -83,15 +92,7 @@ def cli() -> None:
 
 @cli.command(epilog="Example: gen-profile --preset paper --export plc --export can --out deploy")
 @spec_options
-@click.option(
-    "--export",
-    "formats",
-    metavar="FORMAT",
-    multiple=True,
-    default=("csv",),
-    shell_complete=_complete_formats,
-    help="Format to write (see gen-profile formats). Repeatable; csv by default.",
-)
+@export_option
 @click.option(
     "--out",
     "folder",
@@ -291,14 +292,23 @@ def main() -> None:
 
 def chosen_spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
     """Read the spec that the command line names, or the default preset."""
-    from gen_profile.spec_reading import preset_spec, read_spec
+    from gen_profile.spec_reading import parse_spec
+
+    text, source, folder = chosen_text(path, preset)
+    return parse_spec(text, overrides, source, folder)
+
+
+def chosen_text(path: Path | None, preset: str | None) -> tuple[str, str, Path]:
+    """Read the text of that spec; also give its source, and the folder that its files are relative to."""
+    from gen_profile.spec_reading import HERE, preset_text, read_text
 
     if path is not None and preset is not None:
         raise SpecError("--preset: name either a spec file or a preset, not both.")
     if path is None:
-        return preset_spec(preset or DEFAULT_PRESET, overrides)
+        name = preset or DEFAULT_PRESET
+        return preset_text(name), name, HERE
     try:
-        return read_spec(path, overrides)
+        return read_text(path), str(path), path.parent
     except OutputError as error:
         raise OutputError(f"{str(error).rstrip('.')}{_command_meant(str(path))}") from error
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gen_profile.workflows.compare import Comparison
     from gen_profile.workflows.design import Design
     from gen_profile.workflows.identify import Identification
+    from gen_profile.workflows.sweep import Sweep
 
 MANIFEST_WORDS = {
     "matches": "the file is the one that was exported",
@@ -133,6 +134,22 @@ def identification(found: Identification, path: Path) -> str:
         rows.append(("BEWARE", widened))
     rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]
     return _block(found.spec.name, rows)
+
+
+def sweep(done: Sweep) -> str:
+    """Tell how many cases ended how, with an example of each failure."""
+    rows = [("varied", ", ".join(f"{axis.key} ({len(axis.values)})" for axis in done.store.grid.axes))]
+    rows += [
+        (status, f"{count} of {len(done.store.grid)}" + _example(done.reasons.get(status)))
+        for status, count in done.statuses.items()
+    ]
+    if done.kept:
+        rows.append(("kept", f"{done.kept} that had been finished before"))
+    return _block(done.store.name, [*rows, ("wrote", str(done.table))])
+
+
+def _example(reason: str | None) -> str:
+    return "" if reason is None else f"; {reason}"
 
 
 def _cost_of_lag(figures: Mapping[str, float]) -> list[tuple[str, str]]:

@@ -1,0 +1,91 @@
+"""The commands around profile libraries: sweep, and look one up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gen_profile.cli.commands import (
+    chosen_text,
+    cli,
+    debug_option,
+    export_option,
+    json_option,
+    print_outcome,
+    spec_options,
+)
+
+
+@cli.command(
+    epilog="Example: gen-profile sweep crane.toml --vary move.distance=0.5:10:20 --vary plant.L1=2:8:25 "
+    "--export plc --out library"
+)
+@spec_options
+@click.option(
+    "--vary",
+    "axes",
+    metavar="KEY=LO:HI:N",
+    multiple=True,
+    required=True,
+    help="A key of the spec and its values: N from LO to HI, or KEY=VALUE,VALUE,… Repeatable: all "
+    "combinations; the last one is solved along.",
+)
+@export_option
+@click.option(
+    "--out",
+    "folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    default=Path("gen-profile-sweep"),
+    help="Folder to write to; ./gen-profile-sweep by default. A sweep begun there goes on.",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Dask scheduler whose workers do it, such as tcp://10.0.0.1:8786, in place of this computer.",
+)
+@click.option(
+    "--workers",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Processes of this computer; one per processor by default.",
+)
+@json_option
+@debug_option
+def sweep(
+    spec_path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    *,
+    axes: tuple[str, ...],
+    formats: tuple[str, ...],
+    folder: Path,
+    scheduler: str | None,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Design, check and export every combination of some values.
+
+    Cases that fail are rows of the table with their reason; the exit code is 0 once all are done.
+    """
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import counting
+    from gen_profile.workflows.sweep_grid import parse_grid
+    from gen_profile.workflows.sweep_plan import prepare, require_libraries
+
+    if scheduler is not None and workers is not None:
+        raise click.UsageError("--workers is for processes of this computer; a scheduler has its own.")
+    require_libraries()
+    from gen_profile.workflows.sweep import sweep as run
+
+    text = chosen_text(spec_path, preset)
+    store = prepare(text, overrides, parse_grid(axes), formats, folder)
+    with counting("cases") as tell:
+        done = run(
+            store,
+            scheduler=scheduler,
+            workers=workers,
+            progress=lambda at: tell(at.done, at.total, f"{at.failed} failed" if at.failed else ""),
+        )
+    print_outcome(done.to_dict(), words.sweep(done), as_json)

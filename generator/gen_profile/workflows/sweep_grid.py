@@ -1,0 +1,137 @@
+"""What a sweep varies: axes of values, all their combinations, and the chains in which these are solved."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import SpecError
+
+CHAIN = 10  # cases, at most, that are solved one after another, each from its neighbour's solution
+MOST_CASES = 10_000_000
+DIGITS = 12  # of a value between the ends of an axis: 0.3, not 0.30000000000000004
+
+
+@attrs.frozen(kw_only=True)
+class Axis:
+    """A key of the spec and the values that it takes.
+
+    Attributes
+    ----------
+    key : str
+        Such as ``"plant.L1"``.
+    values : tuple
+        Numbers, texts or arrays, as TOML has them; all different.
+    """
+
+    key: str
+    values: tuple[Any, ...]
+
+    @property
+    def numeric(self) -> bool:
+        """Whether all values are numbers, so that one may be nearer than another."""
+        return all(isinstance(value, int | float) and not isinstance(value, bool) for value in self.values)
+
+    @property
+    def step(self) -> float:
+        """Mean spacing of a numeric axis; 1 where there is but one value."""
+        return (max(self.values) - min(self.values)) / max(1, len(self.values) - 1) or 1.0
+
+
+@attrs.frozen(kw_only=True)
+class Grid:
+    """All combinations of the axes' values, numbered; the last axis changes fastest."""
+
+    axes: tuple[Axis, ...]
+
+    def __len__(self) -> int:
+        return math.prod(self._shape)
+
+    def __getitem__(self, case: int) -> dict[str, Any]:
+        """Value of every key in a case."""
+        places = np.unravel_index(case, self._shape)
+        return {axis.key: axis.values[int(at)] for axis, at in zip(self.axes, places, strict=True)}
+
+    def chains(self) -> list[range]:
+        """Cut the cases into runs of neighbours along the last axis.
+
+        Where a chain begins depends on the grid alone: whoever solves it, the results are the same.
+        """
+        inner = self._shape[-1]
+        pieces = np.array_split(np.arange(inner), -(-inner // CHAIN))
+        return [
+            range(first + int(piece[0]), first + int(piece[-1]) + 1)
+            for first in range(0, len(self), inner)
+            for piece in pieces
+        ]
+
+    @cached_property
+    def _shape(self) -> tuple[int, ...]:
+        return tuple(len(axis.values) for axis in self.axes)
+
+
+def parse_grid(texts: Sequence[str]) -> Grid:
+    """Read axes such as ``move.distance=0.1:2:20`` and ``robustness.method=none,sensitivity``.
+
+    Raises
+    ------
+    SpecError
+        An axis makes no sense, there is none, a key comes twice, or there are too many cases.
+    """
+    axes = tuple(_axis(text) for text in texts)
+    if not axes:
+        raise SpecError("--vary: name what to vary, such as --vary move.distance=0.1:2:20.")
+    keys = [axis.key for axis in axes]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise SpecError(f"--vary {key}: a key is varied once.")
+    grid = Grid(axes=axes)
+    if math.prod(len(axis.values) for axis in axes) > MOST_CASES:
+        raise SpecError(f"--vary: more than {MOST_CASES} combinations; vary less, or in several sweeps.")
+    return grid
+
+
+def overrides(values: Mapping[str, Any]) -> tuple[str, ...]:
+    """Write a case as overrides of its spec, ``KEY=VALUE`` with a TOML value."""
+    return tuple(f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in values.items())
+
+
+def _axis(text: str) -> Axis:
+    key, equals, stated = (part.strip() for part in text.partition("="))
+    if not equals or not stated or not all(step.strip() for step in key.split(".")):
+        raise SpecError(f"--vary {text!r}: write KEY=LO:HI:N or KEY=VALUE,VALUE,…")
+    values = _range(text, stated.split(":")) if stated.count(":") == 2 else _listed(stated)
+    try:
+        different = {json.dumps(value, allow_nan=False) for value in values}
+    except (TypeError, ValueError) as error:
+        raise SpecError(f"--vary {text!r}: values are finite numbers, texts or arrays of these.") from error
+    if len(different) < len(values):
+        raise SpecError(f"--vary {text!r}: a value comes twice.")
+    return Axis(key=key, values=tuple(values))
+
+
+def _range(text: str, parts: Sequence[str]) -> list[float]:
+    try:
+        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+    except ValueError as error:
+        raise SpecError(f"--vary {text!r}: LO:HI:N are two numbers and how many values to take.") from error
+    if not 2 <= count <= MOST_CASES or not (math.isfinite(low) and math.isfinite(high)):
+        raise SpecError(f"--vary {text!r}: take two values or more, from one finite number to another.")
+    inner = [float(f"{value:.{DIGITS}g}") for value in np.linspace(low, high, count)[1:-1]]
+    return [low, *inner, high]
+
+
+def _listed(stated: str) -> list[Any]:
+    """Read the values as TOML, and where they are none, as texts."""
+    try:
+        values = tomllib.loads(f"values = [{stated}]")
+    except (ValueError, RecursionError):
+        return [part.strip() for part in stated.split(",")]
+    return values["values"] if values.keys() == {"values"} else [stated]

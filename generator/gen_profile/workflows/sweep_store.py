@@ -1,0 +1,173 @@
+"""The folder of a sweep: what was asked for, what is finished, and the artefacts.
+
+::
+
+    sweep.json               what is varied, from which spec, with which versions
+    sweep.parquet            one row per case, once all are finished
+    cases/0000/017/          case 17: its artefacts with their manifest, and case.json, its row
+    .lock                    held by the one who sweeps
+
+A case is finished when its ``case.json`` is there, which is the last of its files to appear, whole.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from gen_profile.errors import OutputError
+from gen_profile.workflows.delivery import staged
+from gen_profile.workflows.sweep_case import Outcome, Recipe
+from gen_profile.workflows.sweep_grid import Axis, Grid
+
+FORMAT, FORMAT_VERSION = "gen-profile sweep", 1
+DESCRIPTION, RECORD, TABLE, CASES, LOCK = "sweep.json", "case.json", "sweep.parquet", "cases", ".lock"
+PER_FOLDER = 1000
+
+
+@attrs.frozen(kw_only=True)
+class Store:
+    """A sweep's folder, and what is swept in it.
+
+    Attributes
+    ----------
+    folder : Path
+    name : str
+        Of the spec.
+    grid : Grid
+    recipe : Recipe
+    spec_sha256 : str
+        Of the spec before anything is varied, the files that it names included.
+    """
+
+    folder: Path
+    name: str
+    grid: Grid
+    recipe: Recipe
+    spec_sha256: str
+
+    def case_folder(self, case: int) -> Path:
+        """Tell where a case's files lie."""
+        return self.folder / case_path(case)
+
+    def is_finished(self, case: int) -> bool:
+        """Whether a case's record is there."""
+        return (self.case_folder(case) / RECORD).is_file()
+
+    def keep(self, case: int, outcome: Outcome) -> None:
+        """Write a finished case.
+
+        Raises
+        ------
+        OutputError
+        """
+        with staged(self.case_folder(case)) as staging:
+            for name, content in outcome.files.items():
+                staging.write(name, content)
+            staging.write(RECORD, _json(outcome.record))
+            staging.deliver()
+
+    def records(self) -> Iterator[dict[str, Any]]:
+        """Read the records of all cases, which must be finished, in their order."""
+        for case in range(len(self.grid)):
+            yield json.loads((self.case_folder(case) / RECORD).read_bytes())
+
+    def describe(self) -> dict[str, Any]:
+        """Nest plain values for ``sweep.json``: equal sweeps have equal ones, wherever their spec lies."""
+        recipe = attrs.asdict(self.recipe)
+        del recipe["source"], recipe["folder"]
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "name": self.name,
+            "vary": {axis.key: list(axis.values) for axis in self.grid.axes},
+            "spec_sha256": self.spec_sha256,
+            **recipe,
+            "formats": list(recipe["formats"]),
+            "overrides": list(recipe["overrides"]),
+            "versions": dict(recipe["versions"]),
+        }
+
+
+def case_path(case: int) -> Path:
+    """Place a case's folder within that of its sweep."""
+    return Path(CASES) / f"{case // PER_FOLDER:04d}" / f"{case % PER_FOLDER:03d}"
+
+
+@contextmanager
+def opened(store: Store) -> Iterator[None]:
+    """Begin a sweep, or go on with it; nobody else may work in its folder meanwhile.
+
+    Raises
+    ------
+    OutputError
+        The folder holds another sweep, or is in use, or cannot be written.
+    """
+    with _locked(store.folder):
+        asked = store.describe()
+        if not (store.folder / DESCRIPTION).exists():
+            with staged(store.folder) as staging:
+                staging.write(DESCRIPTION, _json(asked))
+                staging.deliver()
+        found = _description(store.folder)
+        if found != asked:
+            other = ", ".join(key for key in asked if found.get(key) != asked[key])
+            raise OutputError(
+                f"{store.folder} holds another sweep (its {other} differ); choose another folder with --out."
+            )
+        yield
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold a lock that ends with the process, however that ends."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / LOCK).open("w")
+    except OSError as error:
+        raise OutputError(
+            f"Cannot write to the folder {folder}: {error.strerror or error}; choose another one with --out."
+        ) from error
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise OutputError(f"Another sweep is at work in {folder}; wait for its end.") from error
+        yield
+
+
+def grid_of(folder: Path) -> Grid:
+    """Read what a folder's sweep varies.
+
+    Raises
+    ------
+    OutputError
+        There is no sweep in it.
+    """
+    vary = _description(folder)["vary"]
+    return Grid(axes=tuple(Axis(key=key, values=tuple(values)) for key, values in vary.items()))
+
+
+def _description(folder: Path) -> dict[str, Any]:
+    path = folder / DESCRIPTION
+    try:
+        document = json.loads(path.read_bytes())
+        if (document["format"], document["format_version"]) != (FORMAT, FORMAT_VERSION):
+            raise ValueError("another format")
+    except OSError as error:
+        raise OutputError(f"There is no sweep in {folder}: cannot read {path} ({error.strerror}).") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise OutputError(f"{path}: not a sweep of this version of gen-profile.") from error
+    if not isinstance(document.get("vary"), dict):
+        raise OutputError(f"{path}: damaged; sweep again.")
+    return dict(document)
+
+
+def _json(document: dict[str, Any]) -> bytes:
+    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")

@@ -1,0 +1,211 @@
+"""Sweeps: what is in the table, whatever becomes of the processes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, contextmanager
+
+import pyarrow.parquet as pq
+import pytest
+from command_line import PROGRAM, run_here
+from distributed import Client
+
+from gen_profile.spec_reading import preset_spec, preset_text
+from gen_profile.workflows import sweep as workflow
+from gen_profile.workflows.check import check_artefact
+from gen_profile.workflows.design import design
+from gen_profile.workflows.sweep_grid import parse_grid
+from gen_profile.workflows.sweep_plan import prepare
+
+AXES = ("--vary", "move.distance=0.1,0.3,1e6", "--vary", "plant.L1=0.4:0.5:4")
+QUICK = ("--preset", "paper-beta0", "--set", "export.cycle_time=0.01")
+
+
+def prepared(folder, *axes, overrides=(), formats=("csv",)):
+    text = (preset_text("paper-beta0"), "paper-beta0", folder)
+    return prepare(text, ("export.cycle_time=0.01", *overrides), parse_grid(axes), formats, folder)
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """A sweep of two processes, of which some cases fail; its folder and its outcome."""
+    folder = tmp_path_factory.mktemp("swept")
+    outcome = run_here("sweep", *QUICK, *AXES, "--out", folder, "--workers", "2", "--json")
+    assert outcome.code == 0, outcome.err
+    return folder, outcome
+
+
+@pytest.fixture
+def table(swept):
+    return pq.read_table(swept[0] / "sweep.parquet").to_pylist()
+
+
+def test_has_a_row_for_every_combination(table):
+    assert [(row["case"], row["move.distance"], row["plant.L1"]) for row in table] == [
+        (n, d, length)
+        for n, (d, length) in enumerate(
+            (d, length) for d in (0.1, 0.3, 1e6) for length in (0.4, 0.433333333333, 0.466666666667, 0.5)
+        )
+    ]
+
+
+def test_a_row_is_what_a_design_of_its_own_finds(table, tmp_path):
+    row = table[6]
+    overrides = ("export.cycle_time=0.01", "move.distance=0.3", f"plant.L1={row['plant.L1']}")
+    own = design(preset_spec("paper-beta0", overrides), ["csv"], tmp_path)
+    assert own.passed and row["status"] == "passed"
+    assert row["spec_sha256"] == own.spec.sha256()
+    for name, value in own.plan.figures.items():
+        assert row[name] == pytest.approx(value, rel=1e-6, abs=1e-9)
+    load, finding = own.check.worst
+    assert row["check_worst_load"] == load
+    assert row["check_worst_sway_m"] == pytest.approx(finding.residual[load], rel=1e-6)
+
+
+def test_the_artefacts_of_passed_cases_lie_beside_it_and_pass_again(swept, table):
+    for row in table:
+        if row["status"] != "passed":
+            assert row["artefacts"] == []
+            continue
+        (artefact,) = row["artefacts"]
+        judged = check_artefact(swept[0] / row["folder"] / artefact["path"])
+        assert judged.check.passed and judged.manifest == "matches"
+        assert judged.spec.move.distance == (row["move.distance"],)
+        assert (swept[0] / row["folder"] / artefact["path"]).stat().st_size == artefact["bytes"]
+
+
+def test_cases_that_fail_are_rows_with_their_reason(swept, table):
+    assert [row["status"] for row in table] == 8 * ["passed"] + 4 * ["faulty spec"]
+    assert all(row["reason"].startswith("move.target") for row in table[8:])
+    document = swept[1].document
+    assert document["statuses"] == {"passed": 8, "faulty spec": 4}
+    assert document["reasons"]["faulty spec"].startswith("case 8: move.target")
+    assert document["cases"] == 12 and document["finished_before"] == 0
+
+
+def test_tells_how_far_it_is(swept):
+    lines = swept[1].err.splitlines()
+    assert lines[0] == "0 of 12 cases …"
+    assert lines[-1] == "12 of 12 cases, 4 failed …"
+    assert any("s left …" in line for line in lines)
+
+
+def test_goes_on_in_its_folder_and_repeats_nothing(swept):
+    folder, _ = swept
+    before = stamps(folder)
+    again = run_here("sweep", *QUICK, *AXES, "--out", folder)
+    assert again.code == 0
+    lines = [line.strip() for line in again.out.splitlines()]
+    assert "kept         12 that had been finished before" in lines
+    assert any(line.startswith("faulty spec  4 of 12; case 8: move.target") for line in lines)
+    assert stamps(folder) == before
+
+
+def test_any_number_of_processes_finds_the_same_table(swept, tmp_path):
+    alone = run_here("sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "1")
+    assert alone.code == 0
+    assert (tmp_path / "sweep.parquet").read_bytes() == (swept[0] / "sweep.parquet").read_bytes()
+
+
+def test_nothing_tells_of_a_clock_or_a_folder(swept):
+    folder, _ = swept
+    for path in folder.rglob("*.json"):
+        assert str(folder) not in path.read_text("utf-8") and "time_s" not in path.read_text("utf-8")
+
+
+# Processes that end
+
+
+def stamps(folder):
+    """Which file on the disk each record is, and when it was written."""
+    found = {}
+    for path in folder.glob("cases/*/*/case.json"):
+        status = path.stat()
+        found[path.parent.name] = (status.st_ino, status.st_mtime_ns)
+    return found
+
+
+def wait_for(condition):
+    while not condition():
+        time.sleep(0.02)
+
+
+def test_a_sweep_that_is_killed_goes_on_where_it_was(swept, tmp_path):
+    process = subprocess.Popen(
+        [PROGRAM, "sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "2"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    wait_for(lambda: len(stamps(tmp_path)) >= 2)
+    process.kill()
+    process.wait()
+    finished = stamps(tmp_path)
+    assert 2 <= len(finished) < 12
+    assert not (tmp_path / "sweep.parquet").exists()
+    resumed = run_here("sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "2", "--json")
+    assert resumed.document["finished_before"] == len(finished)
+    assert finished.items() <= stamps(tmp_path).items()
+    assert (tmp_path / "sweep.parquet").read_bytes() == (swept[0] / "sweep.parquet").read_bytes()
+
+
+def test_ctrl_c_ends_it_quietly(tmp_path):
+    process = subprocess.Popen(
+        [PROGRAM, "sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "1"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    wait_for(lambda: stamps(tmp_path))
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all of them
+    out, err = process.communicate()
+    assert process.returncode == 130
+    assert out == ""
+    assert [line for line in err.splitlines() if line and not line.endswith(" …")] == ["Error: Interrupted."]
+
+
+@contextmanager
+def cluster(folder, workers):
+    """A Dask scheduler and workers, each a process of its own; the scheduler's address."""
+    address = folder / "scheduler.json"
+    loopback = ["--host", "127.0.0.1", "--no-dashboard"]
+    with ExitStack() as stack:
+
+        def start(name, *arguments):
+            process = subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.dask_{name}", *arguments],
+                stderr=subprocess.DEVNULL,
+                cwd=folder,
+            )
+            stack.callback(process.wait)
+            stack.callback(process.terminate)
+
+        start("scheduler", *loopback, "--port", "0", "--scheduler-file", str(address))
+        wait_for(address.exists)
+        for _ in range(workers):
+            start("worker", *loopback, "--nthreads", "1", "--scheduler-file", str(address))
+        yield json.loads(address.read_text("utf-8"))["address"]
+
+
+def test_a_worker_of_a_cluster_that_is_killed_costs_nothing_that_is_finished(swept, tmp_path):
+    with cluster(tmp_path, workers=2) as address:
+        store = prepared(tmp_path / "out", *AXES[1::2])
+        seen, victims = {}, []
+
+        def progress(at):
+            now = stamps(store.folder)
+            assert seen.items() <= now.items()
+            seen.update(now)
+            if at.done == 3:
+                with Client(address, set_as_default=False) as client:
+                    victims.append(next(iter(client.run(os.getpid).values())))
+                os.kill(victims[0], signal.SIGKILL)
+
+        done = workflow.sweep(store, scheduler=address, progress=progress)
+    assert len(victims) == 1
+    assert seen == stamps(store.folder) and len(seen) == 12
+    assert done.statuses == {"passed": 8, "faulty spec": 4}
+    assert done.table.read_bytes() == (swept[0] / "sweep.parquet").read_bytes()

@@ -1,0 +1,252 @@
+"""Sweeps that cannot be, cases that fail, and what is said of them."""
+
+import json
+import multiprocessing
+from importlib.util import find_spec
+
+import attrs
+import dask
+import pyarrow.parquet as pq
+import pytest
+from command_line import run_here
+from distributed import LocalCluster
+
+from gen_profile.cli.progress import counting
+from gen_profile.errors import OutputError, SpecError
+from gen_profile.spec_reading import preset_text
+from gen_profile.workflows import sweep as workflow
+from gen_profile.workflows import sweep_case, sweep_plan
+from gen_profile.workflows.sweep_case import run_case
+from gen_profile.workflows.sweep_grid import parse_grid
+from gen_profile.workflows.sweep_plan import prepare
+from gen_profile.workflows.sweep_store import opened
+from gen_profile.workflows.sweep_table import read_rows, write_table
+
+LOOPBACK = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
+QUICK = ("--preset", "paper-beta0", "--set", "export.cycle_time=0.01")
+
+
+def prepared(folder, *axes, overrides=(), formats=("csv",)):
+    text = (preset_text("paper-beta0"), "paper-beta0", folder)
+    return prepare(text, ("export.cycle_time=0.01", *overrides), parse_grid(axes), formats, folder)
+
+
+# Cases
+
+
+@pytest.mark.parametrize(
+    ("values", "status", "reason"),
+    [
+        ({}, "passed", ""),
+        ({"check.residual_sway": 1e-6}, "check failed", "The payload sways by"),
+        ({"limits.velocity": 0.05}, "infeasible", "No motion meets the end conditions"),
+        ({"solver.method": "indirect", "limits.jerk": 0.1}, "limit broken", "limits.jerk"),
+        ({"plant.L1": -1.0}, "faulty spec", "plant.L1: must be"),
+        ({"axis.cart.unit": "counts", "axis.cart.counts_per_metre": 1e12}, "not exportable", "32 bits"),
+    ],
+)
+def test_a_case_ends_in_a_record(tmp_path, values, status, reason):
+    store = prepared(tmp_path, "move.duration=3,4")
+    outcome = run_case(store.recipe, 5, values)
+    assert (outcome.record["case"], outcome.record["values"]) == (5, values)
+    assert (outcome.record["status"], outcome.passed) == (status, status == "passed")
+    assert reason in outcome.record["reason"]
+    assert outcome.record["reason"] or outcome.passed
+    assert set(outcome.files) == ({"paper-beta0.csv", "manifest.json"} if outcome.passed else set())
+    assert json.loads(json.dumps(outcome.record, allow_nan=False)) == outcome.record
+
+
+def test_a_bug_stops_one_case_only(tmp_path, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("0/0")
+
+    monkeypatch.setattr(sweep_case, "design", broken)
+    record = run_case(prepared(tmp_path, "move.duration=3,4").recipe, 0, {}).record
+    assert (record["status"], record["reason"]) == ("crashed", "Internal error (ZeroDivisionError: 0/0).")
+
+
+def test_a_full_disk_is_no_fault_of_the_case(tmp_path, monkeypatch):
+    def full(*_):
+        raise OutputError("No space left.")
+
+    monkeypatch.setattr(sweep_case, "design", full)
+    with pytest.raises(OutputError, match="No space left"):
+        run_case(prepared(tmp_path, "move.duration=3,4").recipe, 0, {})
+
+
+def test_a_worker_with_other_libraries_refuses(tmp_path):
+    recipe = attrs.evolve(prepared(tmp_path, "move.duration=3,4").recipe, versions=(("numpy", "0.9"),))
+    with pytest.raises(SpecError, match=r"a worker has gen-profile .*, and this sweep needs numpy 0\.9"):
+        run_case(recipe, 0, {})
+
+
+# Sweeps
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--vary", "plant.L9=1,2"], "plant.L9: unknown key"),
+        (["--vary", "plant.L1=-1:-2:3"], "plant.L1: must be a number from"),
+        (["--vary", "plant.L1"], "write KEY=LO:HI:N or"),
+        (["--vary", "plant.L1=1:2:3", "--export", "pdf"], "unknown format 'pdf'"),
+        (["--vary", "plant.L1=1:2:3", "--set", "plant.m1=-3"], "plant.m1: must be"),
+        (["--vary", "plant.L1=1:2:3", "--scheduler", "tcp://x:1", "--workers", "2"], "--workers is for"),
+        (["--vary", "plant.L1=1:2:3", "--workers", "0"], "0 is not in the range"),
+        ([], "Missing option '--vary'"),
+    ],
+)
+def test_a_senseless_sweep_is_refused_before_any_work(tmp_path, arguments, sentence):
+    outcome = run_here("sweep", *QUICK, *arguments, "--out", tmp_path / "out")
+    assert outcome.code == 2
+    assert sentence in outcome.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_names_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        sweep_plan, "find_spec", lambda name: None if name == "distributed" else find_spec(name)
+    )
+    outcome = run_here("sweep", *QUICK, "--vary", "plant.L1=1,2", "--out", tmp_path)
+    assert (outcome.code, outcome.errors) == (
+        2,
+        ["Error: Sweeps need Dask and PyArrow: pip install 'gen-profile[sweep]'."],
+    )
+
+
+def test_a_folder_holds_one_sweep(tmp_path):
+    store = prepared(tmp_path, "move.duration=3,4")
+    with opened(store), pytest.raises(OutputError, match="Another sweep is at work"), opened(store):
+        raise AssertionError
+    with opened(store):
+        pass
+    other = prepared(tmp_path, "move.duration=3,5", overrides=["plant.m1=0.3"])
+    difference = r"another sweep \(its vary, spec_sha256, overrides differ\)"
+    with pytest.raises(OutputError, match=difference), opened(other):
+        raise AssertionError
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b'{"format": "gen-profile sweep", "format_version": 99}'])
+def test_a_damaged_description_is_named(tmp_path, content):
+    store = prepared(tmp_path, "move.duration=3,4")
+    (tmp_path / "sweep.json").write_bytes(content)
+    with pytest.raises(OutputError, match=r"sweep.json: not a sweep of this version"), opened(store):
+        raise AssertionError
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "file").write_bytes(b"")
+    store = prepared(tmp_path / "file" / "out", "move.duration=3,4")
+    with pytest.raises(OutputError, match=r"Cannot write to the folder .*choose another"), opened(store):
+        raise AssertionError
+
+
+def test_a_scheduler_that_nobody_runs_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(workflow, "ANSWER_TIME", "200ms")
+    with pytest.raises(SpecError, match=r"--scheduler tcp://127.0.0.1:9: no worker answers"):
+        workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler="tcp://127.0.0.1:9")
+
+
+def test_a_scheduler_without_workers_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(workflow, "ANSWER_TIME", "1s")
+    with (
+        LocalCluster(n_workers=0, **LOOPBACK) as cluster,
+        pytest.raises(SpecError, match="no worker"),
+    ):
+        workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler=cluster.scheduler_address)
+
+
+DEADLY = """
+import multiprocessing, os
+from gen_profile.plants.registry import find_plant
+PLANT = find_plant("double-pendulum-crane")
+if multiprocessing.parent_process() is not None:
+    os._exit(1)
+"""
+
+
+def test_a_case_that_kills_its_process_is_a_row(tmp_path):
+    (tmp_path / "deadly.py").write_text(DEADLY, "utf-8")
+    text = preset_text("paper-beta0").replace('type = "double-pendulum-crane"', 'file = "deadly.py"')
+    (tmp_path / "spec.toml").write_text(text, "utf-8")
+    assert multiprocessing.parent_process() is None
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
+        outcome = run_here(
+            "sweep",
+            tmp_path / "spec.toml",
+            "--vary",
+            "move.duration=3",
+            "--workers",
+            "1",
+            "--out",
+            tmp_path / "out",
+        )
+    assert outcome.code == 0
+    (row,) = pq.read_table(tmp_path / "out" / "sweep.parquet").to_pylist()
+    assert row["status"] == "crashed"
+    assert row["reason"] == "Every process that worked at it ended: it lacks memory, or a library crashes."
+
+
+def test_workers_without_the_program_are_named(tmp_path, monkeypatch):
+    def gone(*_):
+        raise ModuleNotFoundError("No module named 'gen_profile'")
+
+    monkeypatch.setattr(workflow, "run_case", gone)
+    with (
+        LocalCluster(n_workers=1, processes=False, **LOOPBACK) as cluster,
+        pytest.raises(SpecError, match=r"No module named 'gen_profile'.*What is finished is kept"),
+    ):
+        workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler=cluster.scheduler_address)
+
+
+def test_counts_on_a_terminal(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with counting("cases") as tell:
+        tell(3, 10, "")
+        tell(10, 10, "2 failed")
+    shown = capsys.readouterr().err
+    assert "cases" in shown and "10/10" in shown and "2 failed" in shown
+
+
+# Its table
+
+
+RECORD = {"case": 0, "values": {"a": 1, "b": [1, 2]}, "status": "passed", "reason": ""}
+
+
+def test_cells_are_numbers_or_texts_and_may_be_missing(tmp_path):
+    grid = parse_grid(["a=1,2", "b=[1, 2],x"])
+    other = {
+        **RECORD,
+        "case": 1,
+        "values": {"a": 1, "b": "x"},
+        "figures": {"duration_s": 3.0},
+        "solver": {"defect": None},
+        "check": {"limit_m": 0.1},
+    }
+    write_table(tmp_path, grid, [RECORD, other])
+    none, some = read_rows(tmp_path)
+    assert (none["a"], none["b"], some["b"]) == (1.0, "[1, 2]", "x")
+    assert (none["duration_s"], some["duration_s"], some["check_limit_m"]) == (None, 3.0, 0.1)
+    assert none["artefacts"] == [] and none["spec_sha256"] is None and some["solver_defect"] is None
+
+
+def test_batches_of_rows_make_one_table(tmp_path, monkeypatch):
+    grid = parse_grid(["a=1,2", "b=3,4"])
+    records = [{**RECORD, "case": n, "values": grid[n]} for n in range(4)]
+    records[3]["figures"] = {"duration_s": 3.0}
+    write_table(tmp_path, grid, records)
+    whole = read_rows(tmp_path)
+    monkeypatch.setattr("gen_profile.workflows.sweep_table.BATCH", 1)
+    write_table(tmp_path, grid, records)
+    assert read_rows(tmp_path) == whole
+
+
+def test_a_table_that_is_missing_or_damaged_is_named(tmp_path):
+    with pytest.raises(OutputError, match="finish the sweep first"):
+        read_rows(tmp_path)
+    (tmp_path / "sweep.parquet").write_bytes(b"PAR1")
+    with pytest.raises(OutputError, match="damaged"):
+        read_rows(tmp_path)
+    with pytest.raises(OutputError, match="Cannot write"):
+        write_table(tmp_path / "nowhere", parse_grid(["a=1", "b=[1, 2],[3, 4]"]), [RECORD])

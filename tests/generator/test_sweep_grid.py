@@ -1,0 +1,91 @@
+"""What a sweep varies, as the command line states it."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gen_profile.errors import SpecError
+from gen_profile.spec_reading import preset_spec
+from gen_profile.workflows.sweep_grid import CHAIN, overrides, parse_grid
+
+
+def test_the_last_axis_changes_fastest():
+    grid = parse_grid(["move.distance=0.1:0.3:3", "plant.L1=0.4,0.5", "robustness.method=none,sensitivity"])
+    assert [grid[case] for case in range(len(grid))] == [
+        {"move.distance": d, "plant.L1": length, "robustness.method": method}
+        for d, length, method in itertools.product((0.1, 0.2, 0.3), (0.4, 0.5), ("none", "sensitivity"))
+    ]
+
+
+@pytest.mark.parametrize(("low", "high", "count"), [(0.1, 2.0, 20), (0.3, 0.6, 10), (-1e-7, 3e5, 7)])
+def test_a_range_is_that_of_numpy_without_its_rounding(low, high, count):
+    values = parse_grid([f"a={low}:{high}:{count}"]).axes[0].values
+    np.testing.assert_allclose(values, np.linspace(low, high, count), rtol=1e-11)
+    assert (values[0], values[-1]) == (low, high)
+
+
+def test_a_range_has_short_numbers():
+    assert parse_grid(["a=0.1:2:20"]).axes[0].values[2] == 0.3
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("a=1,2", (1, 2)),
+        ("a=0.5", (0.5,)),
+        ('a="x, y",z', ('"x', 'y"', "z")),
+        ('a="x, y","z"', ("x, y", "z")),
+        ("a=[0,1],[2,3]", ([0, 1], [2, 3])),
+        ("a=true,false", (True, False)),
+        ("a=1]\nb=[2", ("1]\nb=[2",)),
+    ],
+)
+def test_lists_are_toml_or_else_texts(text, values):
+    axis = parse_grid([text]).axes[0]
+    assert axis.values == values
+    assert axis.numeric == all(type(value) in (int, float) for value in values)
+
+
+@given(st.lists(st.integers(1, 23), min_size=1, max_size=3))
+def test_chains_cover_every_case_once_along_the_last_axis(lengths):
+    grid = parse_grid([f"k{n}={','.join(map(str, range(length)))}" for n, length in enumerate(lengths)])
+    chains = grid.chains()
+    assert list(itertools.chain(*chains)) == list(range(len(grid)))
+    for chain in chains:
+        assert len(chain) <= CHAIN
+        assert len({tuple(grid[case].values())[:-1] for case in chain}) == 1
+
+
+def test_overrides_say_what_the_values_are():
+    values = {"move.distance": 1e-07, "robustness.order": 2, "name": 'a"b', "move.target": [0.5], "x.y": True}
+    read = preset_spec("paper", [text for text in overrides(values) if not text.startswith(("x", "name"))])
+    assert read.move.target == (0.5,)
+    assert read.robustness.order == 2
+    assert overrides(values)[0] == "move.distance=1e-07"
+
+
+@pytest.mark.parametrize(
+    ("axes", "sentence"),
+    [
+        ([], "name what to vary"),
+        (["move.distance"], "write KEY=LO:HI:N"),
+        (["=1,2"], "write KEY=LO:HI:N"),
+        (["a="], "write KEY=LO:HI:N"),
+        (["a..b=1,2"], "write KEY=LO:HI:N"),
+        (["a=0:x:3"], "LO:HI:N are two numbers"),
+        (["a=0:1:2.5"], "LO:HI:N are two numbers"),
+        (["a=0:1:1"], "two values or more"),
+        (["a=0:inf:3"], "finite"),
+        (["a=1,nan"], "finite"),
+        (["a=1979-05-27"], "finite numbers, texts or arrays"),
+        (["a=1:1:2"], "a value comes twice"),
+        (["a=1,2", "a=3,4"], "a key is varied once"),
+        (["a=0:1:9999", "b=0:1:9999"], "more than 10000000 combinations"),
+    ],
+)
+def test_tells_what_makes_no_sense(axes, sentence):
+    with pytest.raises(SpecError, match=sentence):
+        parse_grid(axes)
