@@ -37,19 +37,15 @@ _BEGINNING = (
 )
 
 
-def plant_page(name: str, plant: Plant, table: VariableTable, kind: InputKind) -> str:
+def plant_page(name: str, machine: Machine, table: VariableTable, kind: InputKind) -> str:
     """Describe a plant with inputs, in HTML; its picture is the swing after a quick push."""
-    push = Profile(
-        knots=[0.0, 1.0], coefficients=_smooth_step(len(plant.actuated)), target=_shares(plant), method="push"
-    )
-    machine = Machine(plant=plant, parameters=plant.nominal())
     parts = (
-        f"<p>{escape(plant.summary)}.</p>",
-        _equations(plant),
+        f"<p>{escape(machine.plant.summary)}.</p>",
+        _equations(machine.plant),
         f"<h2>Drives</h2><p>{_INPUTS[kind]}</p>",
         _ERROR,
         "<h2>Sway after a move of one second</h2>",
-        _sway_plot(machine, push, 6.0),
+        _sway_plot(machine, _push(machine), 6.0),
         _variables(table),
     )
     return _page(name, parts)
@@ -115,14 +111,13 @@ def _variables(table: VariableTable) -> str:
     return f"<h2>Variables</h2>\n<table>\n<tr>{head}</tr>\n{rows}\n</table>"
 
 
-def _shares(plant: Plant) -> Array:
-    """How far each axis moves for the picture: a tenth of its unit, from 0."""
-    return np.full(len(plant.actuated), 0.1)
-
-
-def _smooth_step(axes: int) -> Array:
-    """0.1 in 1 s, at rest at both ends."""
-    return np.repeat(0.1 * np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])[None, :, None], axes, axis=2)
+def _push(machine: Machine) -> Profile:
+    """Move each axis by a tenth of its unit in 1 s, from rest to rest, from where it starts."""
+    start = np.array(machine.position)
+    smooth = 0.1 * np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+    coefficients = np.repeat(smooth[None, :, None], len(start), axis=2)
+    coefficients[0, 0] = start
+    return Profile(knots=[0.0, 1.0], coefficients=coefficients, target=start + 0.1, method="push")
 
 
 def _sway_plot(machine: Machine, profile: Profile, until: float) -> str:

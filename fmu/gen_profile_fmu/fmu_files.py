@@ -16,6 +16,7 @@ import fmpy
 from gen_profile_fmu import fmi2_description, fmi3_description
 from gen_profile_fmu.c_sources import FOLDER
 from gen_profile_fmu.model import Model
+from gen_profile_fmu.terminals import terminals_and_icons
 
 SOURCE_FILE = "fmu.c"  # includes all others
 _COMMON = ("instance.h", "message.c", "instance.c")
@@ -131,7 +132,11 @@ def fmu_files(made: Sources, binaries: Mapping[str, bytes], *, with_extras: bool
     if made.version is Version.FMI2:
         return laid | {"model.png": icon}
     build = fmi3_description.build_description(made.model, SOURCE_FILE)
-    return laid | {"sources/buildDescription.xml": build, "terminalsAndIcons/icon.png": icon}
+    return laid | {
+        "sources/buildDescription.xml": build,
+        "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(made.model.variables),
+        "terminalsAndIcons/icon.png": icon,
+    }
 
 
 def archive(contents: Mapping[str, bytes]) -> bytes:

@@ -109,7 +109,7 @@ def plant_model(machine: Machine, kind: InputKind, name: str | None = None) -> M
             "equations.c": equations_source(equations),
         },
         order=("equations.c", "driven_plant.c", "plant_model.c"),
-        page=partial(plant_page, name, plant, table, kind),
+        page=partial(plant_page, name, machine, table, kind),
         stop_time=10.0,
         step=0.001,
     )
