@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gen_profile.workflows.compare import Comparison
     from gen_profile.workflows.design import Design
     from gen_profile.workflows.identify import Identification
+    from gen_profile.workflows.report import Report
     from gen_profile.workflows.sweep import Sweep
 
 MANIFEST_WORDS = {
@@ -150,6 +151,12 @@ def sweep(done: Sweep) -> str:
 
 def _example(reason: str | None) -> str:
     return "" if reason is None else f"; {reason}"
+
+
+def report(made: Report, path: Path) -> str:
+    """Tell how the design was judged, and where the page lies."""
+    rows = [("move", _move(made.design.spec)), ("check", _verdict(made.check)), ("wrote", str(path))]
+    return _block(made.design.spec.name, rows)
 
 
 def _cost_of_lag(figures: Mapping[str, float]) -> list[tuple[str, str]]:

@@ -1,0 +1,169 @@
+// Plays the machines' moves: every machine in a picture of its own, all at the same time of the move.
+"use strict";
+(() => {
+  const SVG = "http://www.w3.org/2000/svg";
+  const animations = JSON.parse(document.getElementById("data").textContent).animations;
+  const LOOKS = {
+    rail: { stroke: "#8a949d", "stroke-width": 2 },
+    plumb: { stroke: "#9aa4ad", "stroke-width": 1, "stroke-dasharray": "4 3" },
+    rope: { stroke: "#17212b", "stroke-width": 1.6 },
+    spring: { stroke: "#17212b", "stroke-width": 1.6 },
+    frame: { stroke: "#17212b", "stroke-width": 3 },
+    liquid: { fill: "#7fb6de", stroke: "none" },
+    body: { fill: "#5a6672" },
+    hook: { fill: "#17212b" },
+  };
+  const COILS = 6;
+
+  function element(parent, name, attributes) {
+    const made = parent.appendChild(document.createElementNS(SVG, name));
+    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    return made;
+  }
+
+  function zigzag([[x0, y0], [x1, y1]], width) {
+    const points = [[x0, y0]];
+    for (let coil = 0; coil <= 2 * COILS; coil += 1) {
+      const share = 0.2 + (0.6 * coil) / (2 * COILS);
+      const side = coil === 0 || coil === 2 * COILS ? 0 : (coil % 2 ? 1 : -1) * width;
+      points.push([x0 + share * (x1 - x0), y0 + share * (y1 - y0) + side]);
+    }
+    points.push([x1, y1]);
+    return points;
+  }
+
+  /** One machine from one side: an SVG and the function that sets its time. */
+  function picture(host, view, moving, colour) {
+    const [left, bottom, width, height] = view.bounds;
+    const [place, swing] = view.units;
+    const scale = 1000 / width;
+    const toScreen = ([x, y]) => [(x - left) * scale, (bottom + height - y) * scale];
+    const svg = element(host, "svg", { viewBox: `0 0 1000 ${height * scale}`, role: "img", "aria-label": view.title });
+    const shapes = moving.shapes.map((shape) => {
+      const line = ["rail", "plumb", "rope", "spring", "frame", "liquid"].includes(shape.kind);
+      const look = { fill: "none", "vector-effect": "non-scaling-stroke", "stroke-linejoin": "round", ...LOOKS[shape.kind] };
+      if (shape.kind === "load") look.fill = colour;
+      const round = shape.kind === "hook";
+      return { ...shape, line, node: element(svg, line ? "polyline" : round ? "ellipse" : "rect", look) };
+    });
+
+    return function show(frame, factor) {
+      const before = Math.min(Math.floor(frame), moving.rest.length - 2);
+      const share = frame - before;
+      const mix = (rows, at) => rows[before][at] * (1 - share) + rows[before + 1][at] * share;
+      const point = (index, swung) =>
+        [0, 1].map((c) => mix(moving.rest, 2 * index + c) * place + swung * mix(moving.swing, 2 * index + c) * swing);
+      for (const { kind, line, node, points, size } of shapes) {
+        let found = points.map((index) => toScreen(point(index, kind === "plumb" ? 0 : factor)));
+        if (line) {
+          if (kind === "spring") found = zigzag(found, 9);
+          node.setAttribute("points", found.map((p) => p.map((v) => v.toFixed(2)).join()).join(" "));
+        } else {
+          const [[x, y]] = found;
+          const [rx, ry] = size.map((half) => half * scale);
+          if (node.tagName === "ellipse") {
+            for (const [key, value] of Object.entries({ cx: x, cy: y, rx, ry })) node.setAttribute(key, value);
+          } else {
+            const box = { x: x - rx, y: y - ry, width: 2 * rx, height: 2 * ry, rx: 0.25 * ry };
+            for (const [key, value] of Object.entries(box)) node.setAttribute(key, value);
+          }
+        }
+      }
+    };
+  }
+
+  /** The sway of all machines over time, with the limit after the arrival, and a cursor. */
+  function strip(svg, animation) {
+    const duration = animation.step * (animation.frames - 1);
+    const greatest = Math.max(animation.limit_mm, ...animation.actors.flatMap((actor) => actor.sway_mm.map(Math.abs)));
+    const x = (time) => (1000 * time) / duration;
+    const y = (sway) => 50 - (46 * sway) / greatest;
+    svg.setAttribute("viewBox", "0 0 1000 100");
+    const limit = animation.limit_mm;
+    element(svg, "rect", { x: x(animation.arrival), width: 1000, y: y(limit), height: y(-limit) - y(limit), fill: "#1b6e3c", opacity: 0.16 });
+    const fine = { fill: "none", "vector-effect": "non-scaling-stroke" };
+    element(svg, "path", { ...fine, d: `M${x(animation.arrival)} 0V100`, stroke: "#6b7680", "stroke-dasharray": "2 3" });
+    for (const actor of animation.actors) {
+      const points = actor.sway_mm.map((sway, frame) => `${x(frame * animation.step).toFixed(2)},${y(sway).toFixed(2)}`);
+      element(svg, "polyline", { ...fine, points: points.join(" "), stroke: actor.colour, "stroke-width": 1.5 });
+    }
+    const cursor = element(svg, "path", { ...fine, stroke: "#17212b", "stroke-width": 1.5 });
+    return (time) => cursor.setAttribute("d", `M${x(time)} 0V100`);
+  }
+
+  function cast(stage, animation) {
+    const columns = Math.min(animation.actors.length, 3);
+    stage.style.gridTemplateColumns = `repeat(auto-fit, minmax(min(100%, max(9.5rem, ${92 / columns}% - 1.6rem)), 1fr))`;
+    return animation.actors.map((actor) => {
+      const host = stage.appendChild(document.createElement("div"));
+      host.className = "actor";
+      host.style.borderTopColor = actor.colour;
+      const title = host.appendChild(document.createElement("h4"));
+      title.append(actor.name);
+      const value = title.appendChild(document.createElement("span"));
+      const pictures = animation.views.map((view, index) => picture(host, view, actor.views[index], actor.colour));
+      return (frame, factor) => {
+        const sway = actor.sway_mm[Math.round(frame)];
+        value.textContent = `${animation.load} ${sway < 0 ? "−" : "+"}${Math.abs(sway).toFixed(2)} mm`;
+        for (const show of pictures) show(frame, factor);
+      };
+    });
+  }
+
+  function stage(host, animation) {
+    const duration = animation.step * (animation.frames - 1);
+    const find = (name) => host.querySelector(`.${name}`);
+    const [slider, play, clock, speed, scale] = ["time", "play", "clock", "speed", "scale"].map(find);
+    const actors = cast(find("stage"), animation);
+    const moveCursor = strip(find("strip"), animation);
+    let time = 0;
+    let last = null; // when the latest frame was shown; null while nothing plays
+    let request = 0;
+
+    function show() {
+      const frame = Math.min(time / animation.step, animation.frames - 1);
+      for (const actor of actors) actor(frame, Number(scale.value));
+      moveCursor(time);
+      slider.value = time;
+      clock.textContent = `${time.toFixed(2)} s of ${duration.toFixed(1)} s${time >= animation.arrival ? ", arrived" : ""}`;
+      play.textContent = last === null ? "Play" : "Pause";
+    }
+    function tick(now) {
+      time = Math.min(time + (Number(speed.value) * (now - last)) / 1000, duration);
+      last = now;
+      if (time >= duration) pause();
+      else request = requestAnimationFrame(tick);
+      show();
+    }
+    function pause() {
+      cancelAnimationFrame(request);
+      last = null;
+    }
+    play.addEventListener("click", () => {
+      if (last !== null) {
+        pause();
+      } else {
+        if (time >= duration) time = 0;
+        last = performance.now();
+        request = requestAnimationFrame(tick);
+      }
+      show();
+    });
+    slider.max = duration;
+    slider.addEventListener("input", () => {
+      pause();
+      time = Number(slider.value);
+      show();
+    });
+    scale.addEventListener("change", show);
+    // paper shows one moment: that of the greatest sway of the first machine
+    const sways = animation.actors[0].sway_mm.map(Math.abs);
+    const telling = animation.step * sways.indexOf(Math.max(...sways));
+    let before = 0;
+    addEventListener("beforeprint", () => { pause(); before = time; time = telling; show(); });
+    addEventListener("afterprint", () => { time = before; show(); });
+    show();
+  }
+
+  document.querySelectorAll(".animation").forEach((host, index) => stage(host, animations[index]));
+})();

@@ -1,0 +1,154 @@
+"""What stands on a page, in the order of reading: values only, no markup.
+
+Every text here may come from a stranger (a machine's file, a log's header): the page escapes all of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+
+from gen_profile.report.animation import Animation
+from gen_profile.report.figures import Figure
+
+LEAST_SHARE = 1e-3
+
+
+@attrs.frozen(kw_only=True)
+class Verdict:
+    """An answer that a reader must not miss.
+
+    Attributes
+    ----------
+    word : str
+        Such as ``"Passed"``: colour alone does not print.
+    passed : bool or None
+        None where nothing was judged.
+    sentences : sequence of str
+        The first one is the answer, the others are reasons.
+    """
+
+    word: str
+    passed: bool | None
+    sentences: Sequence[str]
+
+    @property
+    def kind(self) -> str:
+        """What the style sheet calls it."""
+        return {True: "passed", False: "failed", None: "open"}[self.passed]
+
+
+@attrs.frozen(kw_only=True)
+class Terms:
+    """Names with a value each, as a list of facts."""
+
+    rows: Sequence[tuple[str, str]]
+    kind = "terms"
+
+
+@attrs.frozen
+class Share:
+    """A cell of a table that shows how much of something allowed is taken up: 1 is all of it."""
+
+    value: float
+
+    @property
+    def percent(self) -> str:
+        """The share in words."""
+        return f"{100.0 * self.value:.3g} %" if abs(self.value) >= LEAST_SHARE else "< 0.1 %"
+
+    @property
+    def width(self) -> str:
+        """The share as the width of a bar."""
+        return f"{100.0 * min(max(self.value, 0.0), 1.0):.1f}%"
+
+
+@attrs.frozen(kw_only=True)
+class Row:
+    """A line of a table; `mark` is ``"passed"``, ``"failed"``, ``"own"`` or nothing."""
+
+    cells: Sequence[str | Share]
+    mark: str = ""
+
+
+@attrs.frozen(kw_only=True)
+class Table:
+    """Rows under heads.
+
+    Attributes
+    ----------
+    head : sequence of str
+    rows : sequence of Row
+    words : int
+        So many columns at the left hold words, the others numbers.
+    code : bool
+        Whether the last column holds hashes and the like.
+    """
+
+    head: Sequence[str]
+    rows: Sequence[Row]
+    words: int = 1
+    code: bool = False
+    kind = "table"
+
+
+@attrs.frozen(kw_only=True)
+class Listing:
+    """A text that is folded away until somebody wants it."""
+
+    title: str
+    text: str
+    kind = "listing"
+
+
+Block = Terms | Table | Figure | Animation | Listing
+
+
+@attrs.frozen(kw_only=True)
+class Section:
+    """Blocks under a title, and what they say in words.
+
+    Attributes
+    ----------
+    title : str
+    blocks : sequence of Block
+    words : sequence of str
+        A paragraph each.
+    """
+
+    title: str
+    blocks: Sequence[Block]
+    words: Sequence[str] = ()
+
+    @property
+    def anchor(self) -> str:
+        """What links call it."""
+        return "".join(letter if letter.isalnum() else "-" for letter in self.title.lower())
+
+
+@attrs.frozen(kw_only=True)
+class Page:
+    """A whole report.
+
+    Attributes
+    ----------
+    title, subtitle : str
+    verdicts : sequence of Verdict
+    facts : sequence of (str, str)
+        The few numbers that say what the motion is.
+    sections : sequence of Section
+    colophon : str
+        What made the page.
+    """
+
+    title: str
+    subtitle: str
+    verdicts: Sequence[Verdict]
+    facts: Sequence[tuple[str, str]]
+    sections: Sequence[Section]
+    colophon: str
+
+    def all(self, kind: type[Figure] | type[Animation]) -> list[Figure | Animation]:
+        """List the blocks of one kind, in their order."""
+        return [block for section in self.sections for block in section.blocks if isinstance(block, kind)]

@@ -1,0 +1,124 @@
+"""A design as one page that an engineer can read, send and file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import attrs
+
+from gen_profile.check import Check
+from gen_profile.errors import GenProfileError
+from gen_profile.manifest import sha256
+from gen_profile.report.content import Page
+from gen_profile.report.page import render, require_pages
+from gen_profile.spec import Spec
+from gen_profile.workflows.compare import Comparison, compare
+from gen_profile.workflows.delivery import staged
+from gen_profile.workflows.design import LIBRARIES, Design, design
+from gen_profile.workflows.report_sections import facts, sections, verdict
+from gen_profile.workflows.report_words import move, uncertain
+
+Progress = Callable[[str], None]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Report:
+    """A page, and what it says.
+
+    Attributes
+    ----------
+    design : Design
+        Its artefacts were written and checked, and are gone; their hashes are what stays.
+    comparison : Comparison or None
+    content : bytes
+        The page.
+    """
+
+    design: Design
+    comparison: Comparison | None
+    content: bytes
+
+    @property
+    def check(self) -> Check:
+        """The verdict."""
+        return _checked(self.design)
+
+    def to_dict(self, path: Path) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "name": self.design.spec.name,
+            "spec_sha256": self.design.spec.sha256(),
+            "figures": self.design.plan.figures,
+            "check": self.check.to_dict(),
+            "report": {"path": str(path), "sha256": sha256(self.content), "bytes": len(self.content)},
+        }
+
+
+def report(
+    spec: Spec,
+    formats: Sequence[str],
+    *,
+    compared: bool = True,
+    progress: Progress = lambda _: None,
+) -> Report:
+    """Design, check and compare, and put what was found on one page.
+
+    Parameters
+    ----------
+    spec : Spec
+    formats : sequence of str
+        Whose artefacts are checked and told by their hashes.
+    compared : bool
+        Whether other methods are tried as well.
+    progress : callable
+        Told what is being done.
+
+    Raises
+    ------
+    GenProfileError
+    """
+    require_pages()
+    with TemporaryDirectory(prefix="gen-profile-") as folder:
+        outcome = design(spec, formats, Path(folder), keep_failed=True, progress=progress)
+    comparison = None
+    if compared:
+        progress("comparing")
+        comparison = compare(spec, progress)
+    progress("writing the report")
+    page = _page(outcome, comparison)
+    return Report(design=outcome, comparison=comparison, content=render(page))
+
+
+def write_report(content: bytes, path: Path) -> None:
+    """Write a page, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+    """
+    with staged(path.parent) as staging:
+        staging.write(path.name, content)
+        staging.deliver()
+
+
+def _page(outcome: Design, comparison: Comparison | None) -> Page:
+    spec, check = outcome.spec, _checked(outcome)
+    libraries = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
+    return Page(
+        title=spec.name,
+        subtitle=f"{spec.machine().summary}: {move(spec)}; uncertain: {uncertain(spec)}",
+        verdicts=[verdict(check)],
+        facts=facts(spec, outcome.plan.trial, outcome.plan.figures, check),
+        sections=list(sections(outcome, check, comparison)),
+        colophon=f"Made by {libraries}.",
+    )
+
+
+def _checked(outcome: Design) -> Check:
+    if outcome.check is None:
+        raise GenProfileError("A report needs a checked design.")
+    return outcome.check

@@ -1,0 +1,45 @@
+"""The machines of a trial as actors of an animation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gen_profile.report.animation import Actor, Animation
+from gen_profile.report.machines import Pose, body_size, drawings
+from gen_profile.spec import Spec
+from gen_profile.workflows.planning import Trial
+from gen_profile.workflows.report_figures import cast, end_load_sway
+
+TWINS = 2
+FRAME_RATE = 30.0  # 1/s; the page draws between frames
+MOST_FRAMES = 600
+
+
+def animation(spec: Spec, trial: Trial, arrival: float) -> Animation:
+    """Let the nominal machine and those that sway the most play the move, and swing on.
+
+    Parameters
+    ----------
+    spec : Spec
+    trial : Trial
+    arrival : float
+        When the axes stand still, in s.
+    """
+    until = trial.motion.duration + trial.watch
+    times = np.linspace(0.0, until, min(MOST_FRAMES, int(np.ceil(FRAME_RATE * until)) + 1))
+    responses = trial.swing.at(times)
+    plant = spec.machine()
+    size = body_size(plant, trial.machines[0].parameters, responses[0].position)
+    actors = []
+    for one in cast(trial, TWINS):
+        response, parameters = responses[one.index], trial.machines[one.index].parameters
+        pose = Pose(plant=plant, parameters=parameters, q_a=response.position, q_u=response.q_u, size=size)
+        sway = end_load_sway(spec, response)
+        actors.append(Actor(name=one.name, colour=one.style.colour, sway=sway, drawings=drawings(pose)))
+    return Animation(
+        times=times,
+        arrival=arrival,
+        limit=spec.check.residual_sway[plant.loads[-1]],
+        load=plant.loads[-1] if plant.directions == 1 else "load",
+        actors=actors,
+    )

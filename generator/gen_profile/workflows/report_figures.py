@@ -1,0 +1,271 @@
+"""The curves of a report: the motion, the loads, and other methods beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import attrs
+import numpy as np
+
+from gen_profile.metrics import length, peak
+from gen_profile.problem.linearization import linearize
+from gen_profile.profile import Array, Profile
+from gen_profile.report.figures import PALETTE, PLAIN, Band, Dash, Figure, Level, Line, Panel, Style
+from gen_profile.response import Response
+from gen_profile.spec import Spec
+from gen_profile.workflows.compare import Comparison, Row
+from gen_profile.workflows.comparison_plot import AFTERMATH, BEYOND, DECADES, spectrum
+from gen_profile.workflows.planning import RESIDUAL_SAMPLES, Trial
+from gen_profile.workflows.report_words import machine
+
+SAMPLES = 800
+COMPARED = 400  # samples of each curve where there are many methods
+FREQUENCIES = 500
+TWINS = 7  # machines beside the nominal one whose sway is drawn
+NEAR = 2.5  # times a curve's peak within which a limit is drawn; beyond, it would flatten the curve
+ORDERS = (("Position", "{}"), ("Velocity", "{}/s"), ("Acceleration", "{}/s²"), ("Jerk", "{}/s³"))
+LIMITED = ("travel", "velocity", "acceleration", "jerk")
+PAPERS = ("nzv", "zvd")  # the shapers that the paper compares with
+TIME = "time (s)"
+FOLLOWED = Style(colour=PALETTE[1], dash="dash")
+
+
+@attrs.frozen(kw_only=True)
+class Shown:
+    """One of the trial's machines, as it is drawn."""
+
+    index: int
+    name: str
+    style: Style
+
+
+def cast(trial: Trial, most: int = TWINS) -> list[Shown]:
+    """Choose the nominal machine, then those that leave the most sway, in the check's order.
+
+    Each has its colour, however many are shown.
+    """
+    duration = trial.motion.duration
+    after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
+    end_load = trial.swing.plant.end_load
+    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in after]
+    worst = sorted(range(1, len(residuals)), key=lambda index: -residuals[index])
+    colours = dict(zip([0, *sorted(worst[:TWINS])], PALETTE, strict=False))
+    return [
+        Shown(
+            index=index,
+            name=machine(trial.machines[index].name),
+            style=Style(colour=colours[index], width=1.3 if index else 2.2),
+        )
+        for index in [0, *sorted(worst[:most])]
+    ]
+
+
+def motion_figure(spec: Spec, trial: Trial) -> Figure:
+    """Draw what the drives are asked for, and its derivatives, with limits that are near."""
+    lagging = trial.command is not trial.motion
+    panels = []
+    for column, axis in enumerate(spec.machine().actuated):
+        for order, (quantity, unit) in enumerate(ORDERS):
+            lines = [_derivative("command", trial.command, order, column)]
+            if lagging:
+                lines.append(_derivative("motion of the axis", trial.motion, order, column, FOLLOWED))
+            greatest = max(float(np.abs(line.y).max()) for line in lines)
+            panels.append(
+                Panel(
+                    title=f"{quantity} of {axis.name}",
+                    x_label=TIME,
+                    y_label=f"{quantity.lower()} ({unit.format(axis.unit)})",
+                    lines=lines,
+                    levels=tuple(_limits(spec, column, order, NEAR * greatest)),
+                )
+            )
+    drawn = "The command of each drive leads its lag" if lagging else "The drives follow it as it is"
+    return Figure(
+        caption=f"The reference and its derivatives. {drawn}. Dashed in red: limits of the spec.",
+        panels=panels,
+    )
+
+
+def spectrum_figure(spec: Spec, trial: Trial) -> Figure:
+    """Draw the spectrum of the acceleration over the natural frequencies of all machines."""
+    return Figure(
+        caption=(
+            "Dotted: natural frequencies of the nominal machine; shaded: those of the others. The less the "
+            "motion holds there, the less the loads swing on."
+        ),
+        panels=[_spectrum(spec, trial, {"motion": trial.motion}, {"motion": PLAIN})],
+    )
+
+
+def sway_figure(spec: Spec, trial: Trial, arrival: float) -> Figure:
+    """Draw the sway of every load on the nominal machine and on perturbed ones."""
+    chosen = cast(trial)
+    times = np.linspace(0.0, trial.motion.duration + trial.watch, SAMPLES)
+    responses = trial.swing.at(times)
+    left_out = len(trial.machines) - len(chosen)
+    more = f" {left_out} machines that sway less after the move are not drawn." if left_out else ""
+    return Figure(
+        caption=f"Dotted: the arrival. Dashed in red: what is allowed from then on.{more}",
+        panels=[
+            Panel(
+                title=f"Sway of the {load}",
+                x_label=TIME,
+                y_label="sway (mm)",
+                lines=[
+                    Line(
+                        name=one.name, x=times, y=1e3 * responses[one.index].sway[:, number], style=one.style
+                    )
+                    for one in chosen
+                ],
+                levels=sway_levels(spec, load, arrival, float(times[-1])),
+                bands=[Band(low=arrival, high=arrival)],
+            )
+            for number, load in enumerate(spec.machine().loads)
+        ],
+    )
+
+
+def other_methods(comparison: Comparison) -> Figure:
+    """Draw all methods: the motion, its spectrum, and the end load's sway (the paper's figures 2 to 5)."""
+    spec, rows = comparison.spec, comparison.rows
+    styles = _styles(comparison)
+    first = spec.machine().actuated[0]
+    panels = [
+        Panel(
+            title=f"{quantity} of {first.name}",
+            x_label=TIME,
+            y_label=f"{quantity.lower()} ({unit.format(first.unit)})",
+            lines=[
+                _derivative(row.method, row.trial.motion, order, 0, styles[row.method], COMPARED)
+                for row in rows
+            ],
+        )
+        for order, (quantity, unit) in enumerate(ORDERS)
+    ]
+    motions = {row.method: row.trial.motion for row in rows}
+    panels.append(_spectrum(spec, rows[0].trial, motions, styles))
+    return Figure(
+        caption="Optimal motions solid, shapers dashed. Click on a method's name to show or hide its curves.",
+        panels=[*panels, *_sways(comparison, styles)],
+    )
+
+
+def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Panel]:
+    """Draw the end load under every method, on the nominal machine and on that with all parameters up."""
+    spec, rows = comparison.spec, comparison.rows
+    load, last = spec.machine().loads[-1], max(row.trial.motion.duration for row in rows)
+    seen = {row.method: row.trial.swing.at(_until(row)) for row in rows}
+    for index, scenario in enumerate(rows[0].trial.machines[:2]):
+        lines = [
+            Line(
+                name=method,
+                x=responses[index].times,
+                y=1e3 * responses[index].sway[:, -1],
+                style=styles[method],
+            )
+            for method, responses in seen.items()
+        ]
+        end = max(float(line.x[-1]) for line in lines)
+        yield Panel(
+            title=f"Sway of the {load}, {machine(scenario.name)}",
+            x_label=TIME,
+            y_label="sway (mm)",
+            lines=lines,
+            levels=[level for level in sway_levels(spec, load, last, end) if level.between == (last, end)],
+            bands=[Band(low=last, high=last)],
+        )
+
+
+def hamiltonian_figure(times: Array, hamiltonian: Array) -> Figure:
+    """Draw how far the Hamiltonian is from constant.
+
+    It does not depend on time explicitly, so along the exact optimum it is constant.
+    """
+    change = (hamiltonian - hamiltonian.mean()) / np.abs(hamiltonian).max()
+    return Figure(
+        caption="Change of the Hamiltonian at the mesh's nodes, relative: the exact optimum has none.",
+        panels=[
+            Panel(
+                title="Hamiltonian",
+                x_label=TIME,
+                y_label="relative change",
+                lines=[Line(name="change", x=times, y=change)],
+            )
+        ],
+    )
+
+
+def sway_levels(spec: Spec, load: str, arrival: float, end: float) -> list[Level]:
+    """List the limits of a load's sway in mm: after the arrival, and the end load's on the way."""
+    residual = 1e3 * spec.check.residual_sway[load]
+    levels = [Level(value=sign * residual, between=(arrival, end)) for sign in (1.0, -1.0)]
+    plant = spec.machine()
+    if spec.limits.sway is not None and load in plant.loads[plant.end_load]:
+        transient = 1e3 * spec.limits.sway
+        levels += [Level(value=sign * transient, between=(0.0, arrival)) for sign in (1.0, -1.0)]
+    return levels
+
+
+def end_load_sway(spec: Spec, response: Response) -> Array:
+    """Sway of the end load in m, shape (samples,): its length where it has two directions."""
+    return length(response.sway[:, spec.machine().end_load])[:, 0]
+
+
+def _derivative(  # noqa: PLR0917  # name, then what, then how
+    name: str, profile: Profile, order: int, column: int, style: Style = PLAIN, samples: int = SAMPLES
+) -> Line:
+    points = max(2, samples // (len(profile.knots) - 1))
+    times, values = profile.within_segments(points, order)
+    return Line(name=name, x=times, y=values[:, column], style=style)
+
+
+def _limits(spec: Spec, column: int, order: int, near: float) -> Iterator[Level]:
+    """List the limits of one quantity of one axis that are not too far away to be drawn."""
+    allowed = getattr(spec.limits.of(column), LIMITED[order])
+    if allowed is None:
+        return
+    for value in allowed if order == 0 else (allowed, -allowed):
+        if abs(value) <= near:
+            yield Level(value=value)
+
+
+def _spectrum(spec: Spec, trial: Trial, motions: Mapping[str, Profile], styles: Mapping[str, Style]) -> Panel:
+    plant, target = spec.machine(), spec.move.target
+    natural = linearize(plant, trial.machines[0].parameters, target).distinct_frequencies
+    everywhere = np.array([linearize(plant, m.parameters, target).frequencies for m in trial.machines])
+    frequencies = np.linspace(0.0, BEYOND * everywhere.max(), FREQUENCIES)
+    ranges = zip(everywhere.min(axis=0).tolist(), everywhere.max(axis=0).tolist(), strict=True)
+    return Panel(
+        title=f"Spectrum of the acceleration of {plant.actuated[0].name}",
+        x_label="frequency (rad/s)",
+        y_label=f"magnitude ({plant.actuated[0].unit}/s)",
+        lines=[
+            Line(name=name, x=frequencies, y=spectrum(motion, frequencies), style=styles[name])
+            for name, motion in motions.items()
+        ],
+        bands=[
+            *(Band(low=low, high=high) for low, high in ranges if high > low),
+            *(Band(low=frequency, high=frequency) for frequency in natural.tolist()),
+        ],
+        decades=DECADES,
+    )
+
+
+def _styles(comparison: Comparison) -> dict[str, Style]:
+    """Draw optimal motions solid and shapers dashed; show the paper's methods and the recommended ones."""
+    advised = {advice.method for advice in comparison.recommended.values()}
+    methods = [row.method for row in comparison.rows]
+    optimal = [method for method in methods if method.startswith("optimal")]
+    shapers = [method for method in methods if method not in optimal]
+    shown = {*advised, *PAPERS, *(method for method in optimal if method == "optimal" or "beta" in method)}
+    groups: list[tuple[list[str], int, Dash]] = [(optimal, 0, "solid"), (shapers, 3, "dash")]
+    return {
+        method: Style(colour=PALETTE[(first + place) % len(PALETTE)], dash=dash, shown=method in shown)
+        for group, first, dash in groups
+        for place, method in enumerate(group)
+    }
+
+
+def _until(row: Row) -> Array:
+    duration = row.trial.motion.duration
+    return np.linspace(0.0, duration + min(AFTERMATH * duration, row.trial.watch), COMPARED)

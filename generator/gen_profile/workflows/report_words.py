@@ -1,0 +1,43 @@
+"""Figures and moves in words, as a report says them."""
+
+from __future__ import annotations
+
+import re
+
+from gen_profile.spec import Spec
+
+
+def number(value: float) -> str:
+    """Write four digits, and none below a hundred-thousandth: of a millimetre, that is numerical error."""
+    return f"{round(value, 5) + 0.0:.4g}".replace("-", "−")
+
+
+def mm(metres: float) -> str:
+    """Write a length in mm."""
+    return f"{number(1e3 * metres)} mm"
+
+
+def bound(metres: float) -> str:
+    """Write a numerical error in µm, two digits."""
+    return f"{1e6 * metres:.2g} µm"
+
+
+def machine(name: str) -> str:
+    """Write a scenario's name with signs and units that stay together."""
+    return re.sub(r"-(?=[0-9.])", "−", name).replace(" %", "\N{NO-BREAK SPACE}%")
+
+
+def move(spec: Spec) -> str:
+    """Say what moves, how far, and in what time."""
+    axes = spec.machine().actuated
+    distances = " and ".join(
+        f"{axis.name} {number(distance)} {axis.unit}"
+        for axis, distance in zip(axes, spec.move.distance, strict=True)
+    )
+    return f"{distances} in {number(spec.move.duration)} s"
+
+
+def uncertain(spec: Spec) -> str:
+    """Say which parameters may be off, and by how much."""
+    ranges = spec.robustness.uncertain
+    return ", ".join(f"{name} ±{number(100.0 * share)} %" for name, share in ranges.items()) or "none stated"

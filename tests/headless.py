@@ -1,0 +1,86 @@
+"""A headless Chromium that opens pages, as a reader's browser would, and tells what happened in it."""
+
+from __future__ import annotations
+
+import base64
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+from selenium.webdriver.remote.webelement import WebElement
+from selenium.webdriver.support.wait import WebDriverWait
+from system_parts import program
+
+ARGUMENTS = (
+    "--headless=new",
+    "--no-sandbox",  # root has none
+    "--disable-dev-shm-usage",
+    "--disable-gpu",
+    "--hide-scrollbars",
+    "--force-device-scale-factor=1",
+    "--host-resolver-rules=MAP * ~NOTFOUND",  # offline, whatever a page asks for
+)
+PATIENCE = 300.0  # s until a page that does not answer counts as broken
+
+
+class Browser:
+    """One window."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self._driver = driver
+        self.errors: list[str] = []
+
+    def open(self, page: Path, *, width: int = 1280, mobile: bool = False) -> None:
+        """Load a page in a window of a width, and wait until it has drawn everything."""
+        size = {"width": width, "height": 844, "deviceScaleFactor": 1, "mobile": mobile}
+        self._driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        self._driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": mobile})
+        self._driver.get(page.as_uri())
+        self.wait("return document.documentElement.dataset.drawn === 'true'")
+
+    def run(self, script: str, *arguments: object) -> Any:
+        """Run a function's body in the page."""
+        return self._driver.execute_script(script, *arguments)
+
+    def run_async(self, script: str, *arguments: object) -> Any:
+        """Run a function's body whose last argument takes the result."""
+        return self._driver.execute_async_script(script, *arguments)
+
+    def wait(self, script: str) -> None:
+        """Wait until a function's body gives something true."""
+        WebDriverWait(self._driver, PATIENCE, poll_frequency=0.05).until(lambda _: self.run(script))
+
+    def find(self, selector: str) -> WebElement:
+        """Find the first element of a CSS selector."""
+        return self._driver.find_element(By.CSS_SELECTOR, selector)
+
+    def complaints(self) -> list[str]:
+        """What the console said since the last call: errors, warnings, what the page's policy refused."""
+        return [entry["message"] for entry in self._driver.get_log("browser")]
+
+    def pdf(self) -> bytes:
+        """Print the page."""
+        return base64.b64decode(self._driver.print_page())
+
+
+@contextmanager
+def browser() -> Iterator[Browser]:
+    """Start Chromium, and end it."""
+    chromium, driver = program("chromium", "chromium"), program("chromedriver", "chromium-driver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in ARGUMENTS:
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    service = Service(driver, env={**os.environ, "HOME": os.environ.get("HOME", "/tmp")})
+    started = webdriver.Chrome(options=options, service=service)
+    started.set_script_timeout(PATIENCE)
+    try:
+        yield Browser(started)
+    finally:
+        started.quit()
