@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -69,9 +70,21 @@ def parse_spec(text: str, overrides: Sequence[str] = (), source: str = "spec", f
     document = _document(text, source)
     if not document and not overrides:
         raise SpecError(f"{source}: the spec is empty; it must state at least [plant] type and [move].")
+    return spec_from_dict(overridden(document, overrides), folder)
+
+
+def overridden(document: Mapping[str, Any], overrides: Sequence[str]) -> Table:
+    """Copy nested plain values and set keys such as ``plant.L1=0.5`` in them.
+
+    Raises
+    ------
+    SpecError
+        An override makes no sense.
+    """
+    changed = copy.deepcopy(dict(document))
     for override in overrides:
-        _override(document, override)
-    return spec_from_dict(document, folder)
+        _override(changed, override)
+    return changed
 
 
 def presets() -> dict[str, str]:

@@ -20,7 +20,7 @@ from gen_profile.workflows.sweep_case import run_case
 from gen_profile.workflows.sweep_grid import parse_grid
 from gen_profile.workflows.sweep_plan import prepare
 from gen_profile.workflows.sweep_store import opened
-from gen_profile.workflows.sweep_table import read_rows, write_table
+from gen_profile.workflows.sweep_table import read_table, write_table
 
 LOOPBACK = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
 QUICK = ("--preset", "paper-beta0", "--set", "export.cycle_time=0.01")
@@ -38,6 +38,7 @@ def prepared(folder, *axes, overrides=(), formats=("csv",)):
     ("values", "status", "reason"),
     [
         ({}, "passed", ""),
+        ({"solver.method": "zvd"}, "passed", ""),
         ({"check.residual_sway": 1e-6}, "check failed", "The payload sways by"),
         ({"limits.velocity": 0.05}, "infeasible", "No motion meets the end conditions"),
         ({"solver.method": "indirect", "limits.jerk": 0.1}, "limit broken", "limits.jerk"),
@@ -225,7 +226,7 @@ def test_cells_are_numbers_or_texts_and_may_be_missing(tmp_path):
         "check": {"limit_m": 0.1},
     }
     write_table(tmp_path, grid, [RECORD, other])
-    none, some = read_rows(tmp_path)
+    none, some = read_table(tmp_path).to_pylist()
     assert (none["a"], none["b"], some["b"]) == (1.0, "[1, 2]", "x")
     assert (none["duration_s"], some["duration_s"], some["check_limit_m"]) == (None, 3.0, 0.1)
     assert none["artefacts"] == [] and none["spec_sha256"] is None and some["solver_defect"] is None
@@ -236,17 +237,17 @@ def test_batches_of_rows_make_one_table(tmp_path, monkeypatch):
     records = [{**RECORD, "case": n, "values": grid[n]} for n in range(4)]
     records[3]["figures"] = {"duration_s": 3.0}
     write_table(tmp_path, grid, records)
-    whole = read_rows(tmp_path)
+    whole = read_table(tmp_path).to_pylist()
     monkeypatch.setattr("gen_profile.workflows.sweep_table.BATCH", 1)
     write_table(tmp_path, grid, records)
-    assert read_rows(tmp_path) == whole
+    assert read_table(tmp_path).to_pylist() == whole
 
 
 def test_a_table_that_is_missing_or_damaged_is_named(tmp_path):
     with pytest.raises(OutputError, match="finish the sweep first"):
-        read_rows(tmp_path)
+        read_table(tmp_path)
     (tmp_path / "sweep.parquet").write_bytes(b"PAR1")
     with pytest.raises(OutputError, match="damaged"):
-        read_rows(tmp_path)
+        read_table(tmp_path)
     with pytest.raises(OutputError, match="Cannot write"):
         write_table(tmp_path / "nowhere", parse_grid(["a=1", "b=[1, 2],[3, 4]"]), [RECORD])

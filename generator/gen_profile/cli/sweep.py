@@ -89,3 +89,48 @@ def sweep(
             progress=lambda at: tell(at.done, at.total, f"{at.failed} failed" if at.failed else ""),
         )
     print_outcome(done.to_dict(), words.sweep(done), as_json)
+
+
+@cli.command(
+    epilog="Example: gen-profile lookup library --move.distance 0.73 --plant.L1 5.2",
+    context_settings={"ignore_unknown_options": True},
+)
+@click.argument("words", metavar="DIR --KEY VALUE …", nargs=-1, type=click.UNPROCESSED)
+@json_option
+@debug_option
+def lookup(words: tuple[str, ...], as_json: bool) -> None:
+    """Find the nearest safe profile of a sweep.
+
+    Every key that was varied is an option here. Nearness counts in steps of the grid; safe is what, played on
+    the machine asked for, keeps the limits of the check.
+    """
+    from gen_profile.cli import words as tables
+    from gen_profile.cli.progress import progress
+    from gen_profile.workflows.sweep_plan import require_libraries
+
+    require_libraries()
+    from gen_profile.workflows.lookup import lookup as run
+
+    folder, asked = _folder_and_values(words)
+    with progress() as tell:
+        tell("checking by co-simulation")
+        found = run(folder, asked, lambda: tell("compiling the plant's FMU, once"))
+    print_outcome(found.to_dict(), tables.found_profile(found), as_json)
+
+
+def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:
+    """Tell the folder from options whose names only the sweep in it knows."""
+    folders, asked = [], {}
+    rest = iter(words)
+    for word in rest:
+        if not word.startswith("--"):
+            folders.append(word)
+            continue
+        key, equals, value = word.removeprefix("--").partition("=")
+        value = value if equals else next(rest, "")
+        if not value:
+            raise click.UsageError(f"--{key} needs a value.")
+        asked[key] = value
+    if len(folders) != 1:
+        raise click.UsageError("name one folder that was swept to, and a value for every key varied there.")
+    return Path(folders[0]), asked

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from io import StringIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from gen_profile.workflows.design import Design
     from gen_profile.workflows.identify import Identification
     from gen_profile.workflows.report import Report
+    from gen_profile.workflows.lookup import Found
     from gen_profile.workflows.sweep import Sweep
 
 MANIFEST_WORDS = {
@@ -147,6 +148,28 @@ def sweep(done: Sweep) -> str:
     if done.kept:
         rows.append(("kept", f"{done.kept} that had been finished before"))
     return _block(done.store.name, [*rows, ("wrote", str(done.table))])
+
+
+def found_profile(found: Found) -> str:
+    """Tell which profile is nearest, and what it costs to use it."""
+    expected, designed = found.sway
+    costs = [f"{key} {value:+g}" for key, value in found.costs.items() if value]
+    costs.append(f"worst residual sway {_mm(expected)}, {_mm(designed)} where it was designed for")
+    rows = [
+        ("asked for", _values(found.asked)),
+        ("nearest", f"{_values(found.used)} (case {found.row['case']})"),
+        ("costs", "; ".join(costs)),
+        ("check", _verdict(found.judgement.check)),
+        *(("passed over", f"case {case}: {reason}") for case, reason in found.passed_over.items()),
+        *(("file", str(found.judgement.path.parent / one["path"])) for one in found.row["artefacts"]),
+    ]
+    return _block(found.judgement.spec.name, rows)
+
+
+def _values(values: Mapping[str, Any]) -> str:
+    return ", ".join(
+        f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in values.items()
+    )
 
 
 def _example(reason: str | None) -> str:

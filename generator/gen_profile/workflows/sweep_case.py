@@ -148,7 +148,11 @@ def _record(case: int, values: Mapping[str, Any], outcome: Design) -> dict[str, 
     if check is None:
         raise ValueError("a case is checked")
     load, finding = check.worst
-    solver = {key: value for key, value in document["solver"].items() if key not in {"status", "time_s"}}
+    solver = {
+        key: ", ".join(value) if isinstance(value, list) else value
+        for key, value in document["solver"].items()
+        if key not in {"status", "time_s"}  # of which one is told before, and the other differs every time
+    }
     return {
         "case": case,
         "values": dict(values),
@@ -156,7 +160,7 @@ def _record(case: int, values: Mapping[str, Any], outcome: Design) -> dict[str, 
         "reason": " ".join(check.reasons()),
         "spec_sha256": document["spec_sha256"],
         "profile_sha256": outcome.plan.trial.command.payload_hash(),
-        "solver": solver | {"redundant": ", ".join(solver["redundant"])},
+        "solver": solver,
         "figures": document["figures"],
         "check": {
             "worst_load": load,

@@ -15,6 +15,7 @@ from gen_profile.errors import OutputError
 from gen_profile.workflows.sweep_grid import Axis, Grid
 from gen_profile.workflows.sweep_store import TABLE, case_path
 
+Table = Any  # pyarrow.Table, which has no types
 BATCH = 10_000  # rows that are Python objects at a time
 ARTEFACTS = pa.list_(
     pa.struct(
@@ -60,8 +61,8 @@ def write_table(folder: Path, grid: Grid, records: Iterable[Mapping[str, Any]]) 
     return path
 
 
-def read_rows(folder: Path) -> list[dict[str, Any]]:
-    """Read the rows as plain values, artefacts as dicts.
+def read_table(folder: Path) -> Table:
+    """Read the table.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def read_rows(folder: Path) -> list[dict[str, Any]]:
     """
     path = folder / TABLE
     try:
-        return list(pq.read_table(path).to_pylist())
+        return pq.read_table(path)
     except FileNotFoundError as error:
         raise OutputError(
             f"There is no {TABLE} in {folder}: finish the sweep first (the same gen-profile sweep goes on)."
@@ -103,7 +104,7 @@ def _row(grid: Grid, record: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _columns(rows: Sequence[Mapping[str, Any]]) -> pa.Table:
+def _columns(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Turn rows, of which some lack cells, into columns; their order is that of their first appearance."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     types = {"artefacts": ARTEFACTS, "spec_sha256": pa.string(), "profile_sha256": pa.string()}

@@ -1,0 +1,136 @@
+"""The nearest safe profile of a sweep, held against checks of one's own."""
+
+import shutil
+
+import pytest
+from command_line import run_here
+
+from gen_profile.spec_reading import preset_spec
+from gen_profile.workflows.check import check_artefact
+from gen_profile.workflows.sweep_table import read_table
+
+CYCLE = "export.cycle_time=0.01"
+AXES = ("--vary", "solver.method=auto,zv", "--vary", "move.distance=0.3,0.4", "--vary", "plant.L1=0.3,0.35")
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("library")
+    arguments = ("--preset", "paper", "--set", CYCLE, *AXES, "--export", "csv", "--out", folder)
+    assert run_here("sweep", *arguments).code == 0
+    return folder
+
+
+def looked_up(library, *words):
+    outcome = run_here("lookup", library, *words, "--json")
+    assert outcome.code == 0, outcome.err
+    return outcome.document
+
+
+def residual(library, case, asked_for, distance):
+    """Worst sway that a case's file leaves on another machine, and whether that is allowed."""
+    row = read_table(library).to_pylist()[case]
+    overrides = (CYCLE, f"plant.L1={asked_for}", f"move.distance={distance}", "check.residual_sway=0.003")
+    check = check_artefact(library / row["folder"] / "paper.csv", preset_spec("paper", overrides)).check
+    load, finding = check.worst
+    return finding.residual[load], check.passed
+
+
+def test_what_was_swept_is_found_itself(library):
+    found = looked_up(library, "--move.distance", "0.3", "--plant.L1", "0.35", "--solver.method", "auto")
+    row = read_table(library).to_pylist()[found["case"]]
+    assert (row["move.distance"], row["plant.L1"], row["solver.method"]) == (0.3, 0.35, "auto")
+    assert found["differences"] == {"move.distance": 0.0, "plant.L1": 0.0}
+    assert found["artefact"]["manifest"] == "matches"
+    assert found["sway_residual_worst_m"] == pytest.approx(row["check_worst_sway_m"], rel=1e-3)
+    assert found["artefacts"][0]["path"] == str(library / row["folder"] / "paper.csv")
+
+
+@pytest.mark.parametrize("length", [0.29, 0.31])
+def test_between_the_values_the_nearest_is_judged_on_the_machine_asked_for(library, length):
+    found = looked_up(library, f"--plant.L1={length}", "--move.distance=0.31", "--solver.method=auto")
+    assert found["used"] == {"solver.method": "auto", "move.distance": 0.3, "plant.L1": 0.3}
+    assert found["differences"] == pytest.approx({"move.distance": -0.01, "plant.L1": 0.3 - length})
+    sway, passed = residual(library, found["case"], length, 0.3)
+    assert passed and found["sway_residual_worst_m"] == sway
+    assert sway != pytest.approx(found["sway_residual_worst_designed_m"], rel=1e-3)
+
+
+def test_a_nearer_profile_that_is_not_safe_there_is_passed_over(library):
+    words = ("--move.distance", "0.39", "--plant.L1", "0.33", "--solver.method", "auto")
+    found = looked_up(library, *words)
+    assert found["used"]["move.distance"] == 0.3
+    passed_over = [entry["case"] for entry in found["passed_over"]]
+    assert passed_over
+    for case in passed_over:
+        assert not residual(library, case, 0.33, 0.4)[1]
+    text = run_here("lookup", library, *words).out
+    assert "move.distance -0.09; worst residual sway" in text
+    assert "plant.L1 +" not in text.partition("costs")[2].partition("\n")[0]
+    assert f"passed over  case {passed_over[0]}: The " in text
+
+
+@pytest.mark.parametrize(("distance", "length"), [(0.39, 0.33), (0.36, 0.3), (0.25, 0.29)])
+def test_nearness_counts_in_steps_of_the_grid(library, distance, length):
+    found = looked_up(library, f"--move.distance={distance}", f"--plant.L1={length}", "--solver.method=auto")
+    tried = [*(entry["case"] for entry in found["passed_over"]), found["case"]]
+    rows = [row for row in read_table(library).to_pylist() if row["status"] == "passed"]
+    rows = [row for row in rows if row["solver.method"] == "auto"]
+    steps = {
+        row["case"]: ((row["move.distance"] - distance) / 0.1) ** 2 + ((row["plant.L1"] - length) / 0.05) ** 2
+        for row in rows
+    }
+    assert tried == sorted(steps, key=steps.__getitem__)[: len(tried)]
+
+
+def test_nothing_safe_is_said(library):
+    outcome = run_here("lookup", library, "--move.distance=0.3", "--plant.L1=1.5", "--solver.method=auto")
+    assert outcome.code == 4
+    assert "nearest profiles is safe there. Of the nearest, case" in outcome.err
+    assert "Sweep a finer grid" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--move.distance=0.3", "--plant.L1=0.3"], "--solver.method: state it, auto, zv were swept."),
+        (["--solver.method=auto", "--plant.L1=0.3"], "--move.distance: state it, 0.3 to 0.4 were swept."),
+        (["--solver.method=aut", "--move.distance=0.3", "--plant.L1=0.3"], "did you mean 'auto'?"),
+        (["--solver.method=auto", "--move.distance=far", "--plant.L1=0.3"], "must be a finite number"),
+        (["--solver.method=auto", "--move.distance=nan", "--plant.L1=0.3"], "must be a finite number"),
+        (["--plant.L2=0.3"], "--plant.L2: the sweep did not vary this; did you mean 'plant.L1'?"),
+        (["--solver.method=auto", "--move.distance=0.3", "--plant.L1=-7"], "plant.L1: must be a number from"),
+        (["--plant.L1"], "--plant.L1 needs a value"),
+        (["other"], "name one folder"),
+    ],
+)
+def test_faults_are_named(library, words, sentence):
+    outcome = run_here("lookup", library, *words)
+    assert outcome.code == 2
+    assert sentence in outcome.err
+
+
+def test_files_that_were_altered_or_lost_are_not_used(library, tmp_path):
+    shutil.copytree(library, tmp_path / "copy")
+    words = ("--move.distance=0.3", "--plant.L1=0.3", "--solver.method=auto")
+    case = tmp_path / "copy" / "cases" / "0000" / "000" / "paper.csv"
+    case.write_bytes(case.read_bytes().replace(b"0.1", b"0.2", 1))
+    outcome = run_here("lookup", tmp_path / "copy", *words)
+    assert outcome.code == 2 and "was altered; sweep again" in outcome.err
+    case.unlink()
+    outcome = run_here("lookup", tmp_path / "copy", *words)
+    assert outcome.code == 2 and "Cannot read" in outcome.err
+
+
+def test_a_folder_without_a_sweep_is_named(tmp_path):
+    outcome = run_here("lookup", tmp_path, "--plant.L1=0.3")
+    assert outcome.code == 2
+    assert "There is no sweep in" in outcome.err
+
+
+def test_a_sweep_of_which_nothing_passed_is_named(tmp_path):
+    arguments = ("--preset", "paper", "--vary", "check.residual_sway=1e-9", "--out", tmp_path)
+    assert run_here("sweep", *arguments).code == 0
+    outcome = run_here("lookup", tmp_path, "--check.residual_sway=1")
+    assert outcome.code == 4
+    assert "has no profile that passed" in outcome.err
