@@ -6,13 +6,13 @@ only when its format is asked for.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
-from gen_profile.errors import SpecError
+from gen_profile.errors import ExportError, SpecError
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
@@ -58,12 +58,15 @@ class Format(NamedTuple):
         ``"parsed"`` by other people's grammar, or ``"untested"``.
     suffix : str
         Of the artefact's name, such as ``".csv"``.
+    may_end_at_speed : bool
+        What plays it does not hold the last setpoint: what comes next is somebody else's.
     """
 
     module: str
     summary: str
     proof: Proof
     suffix: str
+    may_end_at_speed: bool = False
 
 
 BUILT_IN: dict[str, Format] = {
@@ -84,6 +87,7 @@ BUILT_IN: dict[str, Format] = {
         summary="table of time, position, velocity, acceleration and jerk (RFC 4180, and vendors' dialects)",
         proof="read back",
         suffix=".csv",
+        may_end_at_speed=True,
     ),
     "plc": Format(
         module="gen_profile_exporters.structured_text",
@@ -137,6 +141,25 @@ def find_exporter(name: str) -> Exporter:
     if name not in known:
         raise SpecError(f"--export: unknown format {name!r}{suggestion(name, known)}")
     return cast("Exporter", import_module(known[name].module))
+
+
+def require_end(names: Iterable[str], *, stops: bool) -> None:
+    """Refuse formats for a motion that ends at speed where their players would hold its last setpoint.
+
+    Raises
+    ------
+    ExportError
+    """
+    if stops:
+        return
+    known = formats()
+    holding = [name for name in names if not known[name].may_end_at_speed]
+    if holding:
+        able = ", ".join(name for name, form in known.items() if form.may_end_at_speed)
+        raise ExportError(
+            f"move.final_velocity: what plays {', '.join(holding)} holds the last setpoint, which would stop "
+            f"the axis at once; export {able}, or end at rest."
+        )
 
 
 def format_of(path: PurePath | str) -> str:

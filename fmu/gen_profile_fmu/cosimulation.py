@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import byref, c_double, c_uint, sizeof
 from types import TracebackType
 from typing import Any, Self
@@ -15,7 +15,7 @@ from fmpy.fmi2 import fmi2True
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Plant
 from gen_profile.profile import Array, SampledProfile, grid_length, grid_times
-from gen_profile.response import Response
+from gen_profile.response import AT_REST, Response
 from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.instances import slave
 from gen_profile_fmu.plant_fmu import plant_fmu
@@ -92,8 +92,10 @@ class PlantCosimulation:
         max_step: float,
         settle: float,
         output_step: float | None = None,
+        initial: Mapping[str, float] = AT_REST,
+        final_velocity: Sequence[float] = (),
     ) -> Response:
-        """Let drives follow the setpoints, then hold the last one.
+        """Let drives follow the setpoints, then hold the last one, or go on from it.
 
         Parameters
         ----------
@@ -106,14 +108,18 @@ class PlantCosimulation:
         max_step : float
             Longest integration step in s.
         settle : float
-            How long the last setpoint is held, in s.
+            How long to go on after the last setpoint, in s.
         output_step : float, optional
-            Spacing of samples while it is held, in s; the cycle time if it is longer or not given.
+            Spacing of samples after the last setpoint, in s; the cycle time if it is longer or not given.
+        initial : mapping of str to float, optional
+            What swings at time 0: unactuated coordinates by name, their rates as ``NAME.rate``.
+        final_velocity : (axes,) sequence of float, optional
+            With which setpoints go on after the last one, in m/s (or rad/s); by default it is held.
 
         Returns
         -------
         Response
-            At time 0, after every cycle, and every `output_step` while the last setpoint is held.
+            At time 0, after every cycle, and every `output_step` after the last setpoint.
 
         Raises
         ------
@@ -123,10 +129,11 @@ class PlantCosimulation:
         values = {
             **self._plant_values(parameters),
             **self._start_values(setpoints),
+            **initial,
             TAU: tau,
             MAX_STEP: max_step,
         }
-        steps = _steps(setpoints, settle, output_step)
+        steps = _steps(setpoints, settle, output_step, final_velocity)
         samples = np.split(self._simulate(values, steps), self._output_blocks, axis=1)
         return Response(times=steps.times, **dict(zip(_OBSERVED.values(), samples, strict=True)))
 
@@ -196,7 +203,9 @@ class PlantCosimulation:
         return samples
 
 
-def _steps(setpoints: SampledProfile, settle: float, output_step: float | None) -> _Steps:
+def _steps(
+    setpoints: SampledProfile, settle: float, output_step: float | None, final_velocity: Sequence[float]
+) -> _Steps:
     cycle = setpoints.cycle_time
     hold = cycle if output_step is None else min(output_step, cycle)
     if not (np.isfinite(hold) and hold > 0.0 and np.isfinite(settle) and settle >= 0.0):
@@ -205,7 +214,8 @@ def _steps(setpoints: SampledProfile, settle: float, output_step: float | None) 
         )
     moving = setpoints.times
     held = grid_times(grid_length(settle, hold), hold)[1:]
-    last = np.repeat(setpoints.position[-1:], len(held), axis=0)
+    onward = np.array(final_velocity) if len(final_velocity) else np.zeros(setpoints.position.shape[1])
+    last = setpoints.position[-1] + held[:, None] * onward
     return _Steps(
         times=np.concatenate((moving, moving[-1] + held)),
         sizes=np.concatenate((np.full(len(moving) - 1, cycle), np.full(len(held), hold))),

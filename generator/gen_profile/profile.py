@@ -48,7 +48,8 @@ class Profile:
     """Piecewise polynomial motion of every actuated axis, from rest at time 0.
 
     Segment k covers ``knots[k] <= t < knots[k + 1]``; its polynomial counts time from ``knots[k]``. Before
-    the first knot the motion stands at its start, from the last knot on it holds `target`.
+    the first knot the motion stands at its start, from the last knot on it holds `target`, or goes on from it
+    with its final velocity.
 
     Attributes
     ----------
@@ -57,19 +58,27 @@ class Profile:
     coefficients : (segments, order, axes) array
         Position coefficients, lowest power first, in m s⁻ᵏ (or rad s⁻ᵏ).
     target : (axes,) array
-        Position held after the end.
+        Position at the end.
     method : str
         What designed it, such as ``"optimal"`` or ``"zvd"``.
+    final_velocity : (axes,) array
+        m/s (or rad/s) at the end and after it; 0 by default.
     """
 
     knots: Array = attrs.field(converter=read_only, validator=_finite)
     coefficients: Array = attrs.field(converter=read_only, validator=_finite)
     target: Array = attrs.field(converter=read_only, validator=_finite)
     method: str
+    final_velocity: Array = attrs.field(converter=read_only, validator=_finite)
+
+    @final_velocity.default
+    def _standstill(self) -> Array:
+        return np.zeros_like(self.target)
 
     def __attrs_post_init__(self) -> None:
         segments, _, axes = self.coefficients.shape
-        if self.knots.shape != (segments + 1,) or self.target.shape != (axes,):
+        ends = (self.target.shape, self.final_velocity.shape)
+        if self.knots.shape != (segments + 1,) or ends != ((axes,), (axes,)):
             raise GenProfileError("A profile's knots, coefficients and target do not fit together.")
         if self.knots[0] != 0.0 or not (np.diff(self.knots) > 0.0).all():
             raise GenProfileError("A profile's knots must rise from 0.")
@@ -97,9 +106,11 @@ class Profile:
         coefficients = polynomial.polyder(np.moveaxis(self.coefficients, 1, 0), order)
         local = times - self.knots[segment]
         values = np.asarray(polynomial.polyval(local[:, None], coefficients[:, segment], tensor=False))
-        held = self.target if order == 0 else np.zeros(self.axes)
+        beyond = (times - self.duration)[:, None]
+        ahead = (self.target + beyond * self.final_velocity, self.final_velocity)
+        after = ahead[order] if order < len(ahead) else np.zeros(self.axes)
         rest = self.start if order == 0 else np.zeros(self.axes)
-        values = np.where((times >= self.duration)[:, None], held, values)
+        values = np.where(beyond >= 0.0, after, values)
         return np.where((times < 0.0)[:, None], rest, values)
 
     def __call__(self, times: Array) -> Motion:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from types import MappingProxyType
 
 import attrs
 import numpy as np
@@ -15,12 +16,14 @@ from gen_profile.metrics import length, peak
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_column
+from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.symbolic import Function
 from gen_profile.profile import Array, Profile
 
 RELATIVE_TOLERANCE = 1e-10
 ABSOLUTE_TOLERANCE = 1e-13
 TRANSIENT_SAMPLES = 4001
+AT_REST: Mapping[str, float] = MappingProxyType({})
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -56,9 +59,12 @@ class Swing:
     plant : Plant
     profile : Profile
     machines : sequence of mapping of str to float
-        The parameters of each machine. All hang at rest at time 0.
+        The parameters of each machine.
     until : float
         Last time that can be asked for, in s.
+    initial : mapping of str to float, optional
+        What swings at time 0, on all machines; see `gen_profile.problem.initial_state`. All hang at rest by
+        default.
 
     Raises
     ------
@@ -67,7 +73,12 @@ class Swing:
     """
 
     def __init__(
-        self, plant: Plant, profile: Profile, machines: Sequence[Mapping[str, float]], until: float
+        self,
+        plant: Plant,
+        profile: Profile,
+        machines: Sequence[Mapping[str, float]],
+        until: float,
+        initial: Mapping[str, float] = AT_REST,
     ) -> None:
         acceleration, self._outputs = _functions(plant)
         self.plant, self._profile = plant, profile
@@ -85,7 +96,7 @@ class Swing:
         integral = solve_ivp(
             rate,
             (0.0, until),
-            np.zeros(int(np.prod(shape))),
+            np.repeat(initial_state(plant, initial).reshape(2, 1, -1), len(machines), axis=1).ravel(),
             method="DOP853",
             dense_output=True,
             rtol=RELATIVE_TOLERANCE,
@@ -118,9 +129,11 @@ class Swing:
         return tuple(responses)
 
 
-def greatest_sway(plant: Plant, motion: Profile, parameters: Mapping[str, float]) -> float:
+def greatest_sway(
+    plant: Plant, motion: Profile, parameters: Mapping[str, float], initial: Mapping[str, float] = AT_REST
+) -> float:
     """Find the greatest sway of the end load during a motion, in m."""
-    swing = Swing(plant, motion, [parameters], motion.duration)
+    swing = Swing(plant, motion, [parameters], motion.duration, initial)
     (response,) = swing.at(np.linspace(0.0, motion.duration, TRANSIENT_SAMPLES))
     return float(peak(length(response.sway[:, plant.end_load]))[0])
 
@@ -191,8 +204,9 @@ def _functions(plant: Plant) -> tuple[Function, Function]:
 def _motion(profile: Profile) -> Callable[[float], Array]:
     """Evaluate position, velocity and acceleration of all axes at one time, as one row, without overhead."""
     order = profile.coefficients.shape[1]
-    stacked = np.zeros((len(profile.knots), order, 3, profile.axes))  # one segment more: the hold
-    stacked[-1, 0, 0] = profile.target
+    stacked = np.zeros((len(profile.knots), order, 3, profile.axes))  # one segment more: what follows
+    stacked[-1, 0, 0], stacked[-1, 0, 1] = profile.target, profile.final_velocity
+    stacked[-1, 1, 0] = profile.final_velocity
     falling = np.ones(order)
     for derivative in range(3):
         kept = order - derivative

@@ -77,20 +77,38 @@ class PlantSpec:
 
 @attrs.frozen(kw_only=True)
 class MoveSpec:
-    """From standstill to standstill: start and target of every axis in m (or rad), duration in s.
+    """Start and target of every axis in m (or rad), duration in s; from standstill, to standstill or a speed.
 
-    Where `shortest` is set the duration is to be found, and the one given here means nothing.
+    Attributes
+    ----------
+    shortest : bool
+        The duration is to be found, and the one given here means nothing.
+    initial : mapping of str to float
+        What swings at the start: unactuated coordinates by name in m (or rad), their rates as ``NAME.rate``.
+    final_velocity : tuple of float
+        Of every axis at the target, in m/s (or rad/s).
     """
 
     start: tuple[Distance, ...]
     target: tuple[Distance, ...]
     duration: Duration
     shortest: bool = False
+    initial: Mapping[str, float] = attrs.field(factory=dict, converter=_frozen_mapping)
+    final_velocity: tuple[Distance, ...] = attrs.field()
+
+    @final_velocity.default
+    def _standstill(self) -> tuple[float, ...]:
+        return (0.0,) * len(self.target)
 
     @property
     def distance(self) -> tuple[float, ...]:
         """Signed distance of every axis."""
         return tuple(b - a for a, b in zip(self.start, self.target, strict=True))
+
+    @property
+    def stops(self) -> bool:
+        """Whether the axes stand still at the end."""
+        return not any(self.final_velocity)
 
 
 @attrs.frozen(kw_only=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import attrs
@@ -27,6 +28,8 @@ REQUIRED = ("plant", "move")
 FILE_KEYS = ("file", "file_sha256")
 DEFAULT_NAME = "profile"
 PLACEHOLDER_DURATION = 1.0  # s, until the shortest duration is found
+LARGEST_ANGLE = 1.4  # rad, of a load at the start
+SMALL_SWING = 1e-3  # m (or rad), to compare forces with
 
 
 def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table:
@@ -48,9 +51,12 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     )
     tables["plant"] = {"file": file, **_plant(tables["plant"], plant, faults)}
     tables["move"] = _move(tables["move"], plant, faults)
+    _still_at_speed(tables["move"], tables, plant, faults)
     tables["robustness"] = _robustness(tables["robustness"], tables["plant"].get("parameters"), faults)
     uncertain = list(tables["robustness"]["uncertain"])
     foreign = foreign_fmu(tables["check"], plant, uncertain, folder, faults)
+    if foreign is not None and (tables["move"]["initial"] or any(tables["move"]["final_velocity"])):
+        faults.add("check.fmu", "judges moves from rest to rest only; remove move.initial and final_velocity")
     tables["check"] = {**_check(tables["check"], tables["move"], plant, faults), "foreign": foreign}
     tables["limits"] = _limits(tables["limits"], tables["move"], plant, faults)
     tables["axis"] = _axis(tables["axis"], plant, faults)
@@ -140,8 +146,12 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
     else:
         faults.add("move.distance", "required, but missing; state distance, or start and target")
         target = [1.0] * (axes or 1)
-    start = _per_axis([0.0] * len(target) if start is None else start, len(target), "move.start", faults)
-    if start == target:
+    count = len(target)
+    start = _per_axis([0.0] * count if start is None else start, count, "move.start", faults)
+    speed = table.pop("final_velocity", [0.0] * count)
+    speed = _per_axis(speed, count, "move.final_velocity", faults)
+    initial = _initial(table.pop("initial", {}), plant, faults)
+    if start == target and not any(speed) and not any(initial.values()):
         faults.add("move.distance", "must not be zero on every axis")
     for key, values in (("start", start), ("target", target)):
         for axis, value in zip(plant.actuated if plant else (), values, strict=False):
@@ -155,7 +165,46 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
     shortest = table.get("duration") == "minimum"
     if shortest:
         table = {**table, "duration": PLACEHOLDER_DURATION}
-    return {**table, "start": start, "target": target, "shortest": shortest}
+    ends = {"start": start, "target": target, "initial": initial, "final_velocity": speed}
+    return {**table, **ends, "shortest": shortest}
+
+
+def _initial(table: Any, plant: Plant | None, faults: Faults) -> Table:
+    """Hold what swings at the start to the machine's coordinates, and to angles that a taut rope can have."""
+    where = "move.initial"
+    if not isinstance(table, Mapping):
+        faults.add(where, f"must be a table such as {{ theta1 = 0.05 }}, found {found(table)}")
+        return {}
+    units = {q.name: q.unit for q in plant.unactuated} if plant else {}
+    names = [*units, *(f"{name}.rate" for name in units)]
+    values: dict[str, float] = {}
+    for key, value in table.items():
+        number = finite(value)
+        if plant and key not in names:
+            faults.add(place(where, key), f"unknown coordinate{suggestion(key, names)}")
+        elif number is None:
+            faults.add(place(where, key), f"must be a finite number, found {found(value)}")
+        elif units.get(key) == "rad" and abs(number) > LARGEST_ANGLE:
+            faults.add(place(where, key), f"must be from -{LARGEST_ANGLE:g} to {LARGEST_ANGLE:g} rad")
+        else:
+            values[key] = number
+    return {name: values[name] for name in names if name in values} if plant else values
+
+
+def _still_at_speed(move: Table, tables: Table, plant: Plant | None, faults: Faults) -> None:
+    """Refuse to end at a speed at which the loads do not hang still, as on a turning jib."""
+    if plant is None or not any(move["final_velocity"]):
+        return
+    named = SimpleNamespace(**tables["plant"]["parameters"])
+    still = [0.0] * len(plant.unactuated)
+
+    def pull(q_u: list[float], dq_a: list[float]) -> float:
+        terms = plant.equations(q_u, still, move["target"], dq_a, named)
+        return max(abs(float(k + g)) for k, g in zip(terms.K_u, terms.G_u, strict=True))
+
+    swung = [SMALL_SWING for _ in still]
+    if pull(still, move["final_velocity"]) > 1e-9 * pull(swung, [0.0] * len(plant.actuated)):
+        faults.add("move.final_velocity", "the load does not hang still while the axes move so; end at rest")
 
 
 def _per_axis(value: Any, axes: int | None, where: str, faults: Faults) -> list[float]:
@@ -231,6 +280,9 @@ def _limits(table: Table, move: Table, plant: Plant | None, faults: Faults) -> T
     if move["shortest"] and stated.isdisjoint({"velocity", "acceleration", "jerk"}):
         faults.add("move.duration", '"minimum" needs a limit: state limits.acceleration, or velocity or jerk')
     for column, name in enumerate(names if plant else ()):
+        most = finite(axes[name].get("velocity", table.get("velocity")))
+        if most is not None and abs(move["final_velocity"][column]) > most:
+            faults.add("move.final_velocity", f"must keep limits.velocity, found {move['final_velocity']}")
         where = f"limits.axis.{name}.travel" if "travel" in axes[name] else "limits.travel"
         travel = axes[name].get("travel", table.get("travel"))
         if (
@@ -255,7 +307,8 @@ def _check(table: Table, move: Table, plant: Plant | None, faults: Faults) -> Ta
     in_metres = [axis.unit == "m" for axis in plant.actuated] if plant else [True] * len(move["start"])
     moves = zip(move["start"], move["target"], in_metres, strict=False)
     longest = max((abs(b - a) for a, b, linear in moves if linear), default=0.0)
-    if given is None and longest == 0.0 and move["start"] != move["target"]:
+    idle = move["start"] == move["target"] and not any(move["final_velocity"]) and not move["initial"]
+    if given is None and longest == 0.0 and not idle:
         faults.add(where, "required where no axis moves in m; state what may remain, in m")
     usual = RESIDUAL_SHARE * (longest or 1.0)
     stated = given if isinstance(given, Mapping) else {} if given is None else {"": given}

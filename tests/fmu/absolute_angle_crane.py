@@ -61,6 +61,11 @@ def swing(push: Callable[[float], float], times: Array, p: Parameters) -> Array:
     return _integrate(np.zeros(4), push, times, p)[:, :2]
 
 
+def swing_from(phi: Array, rate: Array, push: Callable[[float], float], times: Array, p: Parameters) -> Array:
+    """Angles and their rates from any state under a smooth cart acceleration, shape (times, 4)."""
+    return _integrate(np.concatenate((phi, rate)), push, times, p)
+
+
 def swing_freely(phi: Array, rate: Array, times: Array, p: Parameters) -> Array:
     """Angles from any state under a cart at rest, shape (times, 2)."""
     return _integrate(np.concatenate((phi, rate)), lambda _: 0.0, times, p)[:, :2]

@@ -124,3 +124,12 @@ def test_a_wild_move_is_refused_not_returned():
     assert solution.optimum is None
     assert solution.status in {Status.SWINGS_TOO_FAR, Status.DIVERGED, Status.INFEASIBLE}
     assert solution.cure
+
+
+@pytest.mark.parametrize("weight", [0.0, 50.0])
+def test_programs_that_overshoot_back_and_forth_settle(weight):
+    """Long ropes and little time: linearised about one another's motions, the programs swap two of them."""
+    machine = {"m1": 1.79, "m2": 1.0, "L1": np.exp(0.5), "L2": np.exp(1.5)}
+    problem = crane_problem(machine, target=(1.0,), duration=5.5, sway_scale=None, sway_weight=weight)
+    one, other = direct.solve(problem).raise_for_status(), indirect.solve(problem).raise_for_status()
+    assert one.cost == pytest.approx(other.cost, rel=1e-6 if weight == 0.0 else 3e-5)

@@ -24,4 +24,5 @@ def lag_compensated(profile: Profile, tau: float | None) -> Profile:
     velocity = np.moveaxis(polynomial.polyder(np.moveaxis(profile.coefficients, 1, 0)), 0, 1)
     coefficients = profile.coefficients.copy()
     coefficients[:, :-1] += tau * velocity
-    return attrs.evolve(profile, coefficients=coefficients)
+    ahead = profile.target + tau * profile.final_velocity
+    return attrs.evolve(profile, coefficients=coefficients, target=ahead)

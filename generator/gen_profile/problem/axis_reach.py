@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem
 from gen_profile.profile import Array
@@ -20,16 +21,20 @@ def axis_reach(problem: Problem) -> Array:
     """Measure every axis by its move, shape (m,), in m or rad.
 
     An axis that ends where it began, but may be needed on the way, is measured by the move that would swing
-    the load as much as the others' moves do. Where it cannot swing the load, as a hoist cannot, it is all but
-    held: free to move as far as the others, it would pull up the load rather than calm it.
+    the load as much as the others' moves do, or as it swings at the start. Where it cannot swing the load, as
+    a hoist cannot, it is all but held: free to move as far as the others, it would pull up the load rather
+    than calm it.
     """
-    distance = np.abs(np.array(problem.distance))
+    speed = np.abs(np.array(problem.final_velocity))
+    way = np.maximum(np.abs(np.array(problem.distance)), problem.duration * speed)
     middle = (np.array(problem.start) + np.array(problem.target)) / 2.0
-    gain = np.linalg.norm(linearize(problem.plant, problem.parameters, middle).input, axis=0)
-    swing = (gain * distance).max()
+    linear = linearize(problem.plant, problem.parameters, middle)
+    gain = np.linalg.norm(linear.input, axis=0)
+    q_u, dq_u = np.split(initial_state(problem.plant, problem.initial), 2)
+    swing = max((gain * way).max(), np.linalg.norm(np.hypot(q_u, dq_u / linear.frequencies[0])))
     equivalent = np.where(gain > 0.0, swing / np.where(gain > 0.0, gain, 1.0), 0.0)
-    equivalent = np.where(equivalent > 0.0, equivalent, HELD * distance.max())
-    return np.asarray(np.where(distance > 0.0, distance, equivalent))
+    equivalent = np.where(equivalent > 0.0, equivalent, HELD * (way.max() or equivalent.max()))
+    return np.asarray(np.where(way > 0.0, way, equivalent))
 
 
 def effort_weights(reach: Array) -> Array:

@@ -42,7 +42,7 @@ class Problem:
     parameters : mapping of str to float
         Value of every plant parameter.
     start, target : tuple of float
-        Rest positions of every axis in m (or rad).
+        Positions of every axis in m (or rad) at both ends.
     duration : float
         s.
     tau : float or None
@@ -60,6 +60,11 @@ class Problem:
     limits : LimitsSpec
         Of the command and of the sway on the way.
     worst_case : WorstCase or None
+    initial : mapping of str to float
+        What swings at the start: unactuated coordinates by name, and their rates as ``NAME.rate``. It is what
+        was measured, so no parameter changes it, and its sensitivities are zero.
+    final_velocity : tuple of float
+        Of every axis at the target, in m/s (or rad/s), with no acceleration; the loads hang still then.
     """
 
     plant: Plant
@@ -75,6 +80,12 @@ class Problem:
     order: int = 1
     limits: LimitsSpec = attrs.field(factory=LimitsSpec)
     worst_case: WorstCase | None = None
+    initial: Mapping[str, float] = attrs.field(factory=dict)
+    final_velocity: tuple[float, ...] = attrs.field()
+
+    @final_velocity.default
+    def _standstill(self) -> tuple[float, ...]:
+        return (0.0,) * len(self.target)
 
     @property
     def distance(self) -> tuple[float, ...]:
@@ -112,4 +123,6 @@ def problem_of(spec: Spec) -> Problem:
         effort=spec.cost.effort,
         sway_weight=spec.cost.sway_weight,
         sway_scale=spec.cost.sway_scale,
+        initial=spec.move.initial,
+        final_velocity=spec.move.final_velocity,
     )

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.problem.axis_reach import axis_reach, effort_weights
+from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import Linearization, linearize
 from gen_profile.problem.pontryagin import Data, OptimalitySystem, StateLayout
 from gen_profile.problem.problem import Problem
@@ -35,8 +36,8 @@ class Canonical:
     data : Data
     basis : (n, n) array
         The states of `system` are ``basis @ ξ``.
-    final : (n,) array
-        ξ at the end; NaN where no end condition is asked for. At the start ξ is zero.
+    initial, final : (n,) arrays
+        ξ at the start and at the end; NaN where no end condition is asked for.
     shown : (n,) array
         Sway in m, of the load that sways most, per unit of each state of `system` that is a mode's; 0 where
         the mode is too fast to be excited, and for the axes.
@@ -45,6 +46,7 @@ class Canonical:
     system: OptimalitySystem
     data: Data
     basis: Array
+    initial: Array
     final: Array
     shown: Array
 
@@ -78,7 +80,7 @@ class Canonical:
         numpy.linalg.LinAlgError
             When they have no solution.
         """
-        return newton_iterate(flow, trajectory, np.zeros_like(self.final), self.final)
+        return newton_iterate(flow, trajectory, self.initial, self.final)
 
     def quantities(self, points: Array) -> Array:
         """H, g, highest derivatives, sways and angles; see `OptimalitySystem`."""
@@ -89,10 +91,18 @@ class Canonical:
         largest = self._greatest(solution)
         return (
             attrs.evolve(
-                self, basis=self.basis * largest, final=self.final / largest, shown=self.shown * largest
+                self,
+                basis=self.basis * largest,
+                initial=self.initial / largest,
+                final=self.final / largest,
+                shown=self.shown * largest,
             ),
             solution.scaled(np.concatenate([1.0 / largest, largest])),
         )
+
+    def towards(self, share: float) -> Canonical:
+        """Pose the problem for a share of the move and of the initial swing."""
+        return attrs.evolve(self, initial=share * self.initial, final=share * self.final)
 
     def weights(self, solution: Trajectory) -> Array:
         """Tell how much each coordinate counts, shape (n,).
@@ -167,6 +177,9 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     offset, final = np.zeros(layout.size), np.zeros(layout.size)
     offset[layout.axis(0)] = problem.start
     final[layout.axis(0)] = distance / reach
+    final[layout.axis(1)] = np.array(problem.final_velocity) * duration / reach
+    swung = np.zeros(layout.size)
+    swung[: 2 * layout.n_u] = initial_state(problem.plant, problem.initial)
     data = Data(
         parameters=np.array([problem.parameters[q.name] for q in problem.plant.parameters]),
         beta=0.0,
@@ -178,9 +191,10 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
         offset=offset,
         scale=scale,
     )
-    basis, shown = _modal(layout, linear, _shown(linear, reach, duration))
+    basis, shown = _modal(layout, linear, _shown(linear, swung[: 2 * layout.n_u], reach, duration))
     final[[state for states, _ in layout.kinds for state in states if shown[state] == 0.0]] = np.nan
-    return Canonical(system=system, data=data, basis=basis, final=final, shown=shown)
+    initial = np.asarray(np.linalg.solve(basis, swung / scale), dtype=np.float64)
+    return Canonical(system=system, data=data, basis=basis, initial=initial, final=final, shown=shown)
 
 
 def independence(canonical: Canonical) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
@@ -215,16 +229,18 @@ def _modal(layout: StateLayout, linear: Linearization, shown: Array) -> tuple[Ar
     return basis, sway
 
 
-def _shown(linear: Linearization, reach: Array, duration: float) -> Array:
+def _shown(linear: Linearization, swung: Array, reach: Array, duration: float) -> Array:
     """Sway in m per unit of each mode, shape (n_u,); 0 for modes that are too fast to be excited noticeably.
 
     The jerk with which a move of distance D in time T begins leaves such a mode swinging by its gain times
-    60 D / (ω T)³; it otherwise follows the axes statically. Asking it to rest would only spoil the equations'
-    condition.
+    60 D / (ω T)³; it otherwise follows the axes statically, and swings as at the start. Asking it to rest
+    would only spoil the equations' condition.
     """
     drive = np.abs(np.linalg.solve(linear.modes, linear.input)) @ reach
     shown = np.abs(linear.sway_gain @ linear.modes).max(axis=0)
-    excited = QUINTIC_JERK * shown * drive / (linear.frequencies * duration) ** 3
+    z, dz = np.linalg.solve(linear.modes, swung.reshape(2, -1).T).T
+    begun = shown * np.hypot(z, dz / linear.frequencies)
+    excited = QUINTIC_JERK * shown * drive / (linear.frequencies * duration) ** 3 + begun
     # a mode that no axis drives is not too fast: whether it rests must be seen
     return np.where((drive > 0.0) & (excited < NEGLIGIBLE * reach.max()), 0.0, shown)
 

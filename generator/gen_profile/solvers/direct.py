@@ -14,10 +14,12 @@ from typing import Protocol
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from gen_profile.problem.axis_reach import axis_reach
 from gen_profile.problem.dynamics import parameter_column
+from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.motion_equations import motion_equations
 from gen_profile.problem.pontryagin import SNAP_TIME, optimality_system
@@ -25,8 +27,9 @@ from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.profile import Array
 from gen_profile.response import greatest_sway
 from gen_profile.solvers import goals
+from gen_profile.solvers.acceleration import accelerate
 from gen_profile.solvers.bezier import Piece, power_basis
-from gen_profile.solvers.canonical import canonical_problem, independence
+from gen_profile.solvers.canonical import Canonical, canonical_problem, independence
 from gen_profile.solvers.condensing import IntervalMaps, axes_map
 from gen_profile.solvers.conic import ConicProgram, ConicSolution, Matrix, Verdict
 from gen_profile.solvers.motion import optimal_profile
@@ -40,7 +43,8 @@ MAX_INTERVALS = 480
 RADIANS_PER_INTERVAL = 3.0  # of the fastest mode, which Gauss collocation still follows closely
 STEP_TOLERANCE = 1e-8  # of the motion's coordinates, relative
 STALLED = 1e-5  # step that is still taken for the programs' own tolerance when it ceases to shrink
-MAX_ITERATIONS = 30
+SLOW = 0.3  # share of the step before from which on steps are combined
+MAX_ITERATIONS = 50
 TRACE = 1e-11  # of effort, in the least worst case
 WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
 LEAST_SHARE = 0.01  # of a load's limit, of which a change is still measured
@@ -158,25 +162,11 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     canonical = canonical_problem(problem, system)
     asked, redundant = independence(canonical)
-    layout = system.layout
-    states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
-    worst_case = problem.worst_case
-    exact = worst_case is None or worst_case.nominal_zero
-    modal = np.asarray(np.linalg.inv(canonical.basis), dtype=np.float64)
-    end = modal[np.ix_(states[asked[states] & exact], states)]
-    parameters = [problem.parameters, *others]
-    machines = [
-        Machine(
-            equations=motion_equations(
-                problem.plant, problem.desensitized if index == 0 else (), problem.order
-            ),
-            parameters=parameter_column(problem.plant, dict(values)),
-            scale=canonical.data.scale[states] if index == 0 else canonical.data.scale[: 2 * layout.n_u],
-            end=end if index == 0 else np.zeros((0, 2 * layout.n_u)),
-        )
-        for index, values in enumerate(parameters)
-    ]
-    jerks = [problem.limits.of(axis).jerk for axis in range(layout.m)]
+    machines = (
+        _nominal(problem, canonical, asked),
+        *(_other(problem, canonical, parameters) for parameters in others),
+    )
+    jerks = [problem.limits.of(axis).jerk for axis in range(system.layout.m)]
     commands_jerk = problem.tau is not None and any(jerk is not None for jerk in jerks)
     intervals = _intervals(problem)
     piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=1.0 / intervals)
@@ -187,26 +177,60 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
         axes=axes_map(piece, np.array(problem.start), reach, problem.duration),
         duration=problem.duration,
         target=np.array(problem.distance) / reach,
-        machines=tuple(machines),
+        final_velocity=np.array(problem.final_velocity) * problem.duration / reach,
+        machines=machines,
     )
     form, cost_scale = goals.effort_form(problem, piece), canonical.data.cost_scale
     unit = canonical.data.effort_weights * reach**2 / problem.duration**6 / cost_scale
-    tried = (
-        ()
-        if worst_case is None
-        else tuple(
-            goals.amplitudes(problem, dict(values), worst_case.load_limits, machine.scale)
-            for values, machine in zip(parameters, machines, strict=True)
-        )
-    )
     setup = Setup(
         problem=problem,
         transcription=transcription,
         forms=tuple(share * form for share in unit),
         cost_scale=cost_scale,
-        tried=tried,
+        tried=_amplitudes(problem, machines, others),
     )
     return setup, redundant
+
+
+def _nominal(problem: Problem, canonical: Canonical, asked: NDArray[np.bool_]) -> Machine:
+    """State the machine that is to rest at the end, and what it is to be insensitive to."""
+    layout, scale = canonical.system.layout, canonical.data.scale
+    states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
+    exact = problem.worst_case is None or problem.worst_case.nominal_zero
+    modal = np.asarray(np.linalg.inv(canonical.basis), dtype=np.float64)
+    swung = initial_state(problem.plant, problem.initial)
+    return Machine(
+        equations=motion_equations(problem.plant, problem.desensitized, problem.order),
+        parameters=parameter_column(problem.plant, dict(problem.parameters)),
+        scale=scale[states],
+        start=np.pad(swung, (0, len(states) - len(swung))) / scale[states],
+        end=modal[np.ix_(states[asked[states] & exact], states)],
+    )
+
+
+def _other(problem: Problem, canonical: Canonical, parameters: Mapping[str, float]) -> Machine:
+    """State a machine of other parameters that follows the same motion."""
+    scale = canonical.data.scale[: 2 * canonical.system.layout.n_u]
+    return Machine(
+        equations=motion_equations(problem.plant, (), problem.order),
+        parameters=parameter_column(problem.plant, dict(parameters)),
+        scale=scale,
+        start=initial_state(problem.plant, problem.initial) / scale,
+        end=np.zeros((0, len(scale))),
+    )
+
+
+def _amplitudes(
+    problem: Problem, machines: Sequence[Machine], others: Sequence[Mapping[str, float]]
+) -> tuple[goals.Amplitudes, ...]:
+    """Say how what every machine swings with at the end shows, where the worst of them counts."""
+    if problem.worst_case is None:
+        return ()
+    limits = problem.worst_case.load_limits
+    return tuple(
+        goals.amplitudes(problem, values, limits, machine.scale)
+        for values, machine in zip([problem.parameters, *others], machines, strict=True)
+    )
 
 
 def _intervals(problem: Problem) -> int:
@@ -223,6 +247,8 @@ def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
     transcription, iterate = setup.transcription, start
     extra = goals.worst_case_variables(setup.tried) if setup.tried else 0
     solutions: list[ConicSolution] = []
+    points: list[Array] = []
+    images: list[Array] = []
     step, verdict = float("inf"), Verdict.FAILED
     while verdict is Verdict.FAILED and len(solutions) < MAX_ITERATIONS:
         maps = transcription.maps(iterate)
@@ -233,9 +259,13 @@ def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
             verdict = solutions[-1].verdict
             break
         before, step = step, goal.step(solutions)
+        points.append(iterate.flat())
         iterate = transcription.iterate(solutions[-1].x, maps)
+        images.append(iterate.flat())
         if step < STEP_TOLERANCE or (step < STALLED and step > 0.5 * before):
             verdict = Verdict.SOLVED
+        elif step > SLOW * before:
+            iterate = iterate.of_flat(accelerate(points, images, transcription.importance))
     return Found(verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)
 
 
@@ -422,4 +452,4 @@ def _cost(setup: Setup, iterate: Iterate, weights: goals.Weights) -> float:
 def sway_on_the_way(solution: Solution) -> float:
     """Greatest sway of the nominal machine's end load during the motion of a solution, in m."""
     problem = solution.problem
-    return greatest_sway(problem.plant, optimal_profile(solution), problem.parameters)
+    return greatest_sway(problem.plant, optimal_profile(solution), problem.parameters, problem.initial)

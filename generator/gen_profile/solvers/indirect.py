@@ -18,7 +18,7 @@ from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.profile import Array
 from gen_profile.solvers.canonical import Canonical, canonical_problem, independence
 from gen_profile.solvers.collocation import GAUSS, INTERPOLATION, STAGES, Trajectory, stage_times
-from gen_profile.solvers.continuation import advance
+from gen_profile.solvers.continuation import Advance, advance
 from gen_profile.solvers.refinement import defect, refine
 from gen_profile.solvers.solution import Optimum, Solution, Status
 
@@ -27,6 +27,7 @@ INTERVALS = 30
 SWAY_SAMPLES = 1001
 BETA_DECADES = 8.0  # from share 0 to 1
 HORIZONTAL = np.pi / 2.0
+UNRESOLVED = 0.1  # defect, as a share of a state's size, of a mesh that does not follow the motion
 TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the linear model implies
 MODERATE_ANGLE = np.pi / 4.0  # that a cure aims at
 SMALL_ANGLE = np.radians(50.0)  # of the linear model; from there on nonlinearity is blamed where Newton fails
@@ -52,7 +53,11 @@ def solve(problem: Problem) -> Solution:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
         solution = solve(attrs.evolve(problem, desensitized=kept))
         return attrs.evolve(solution, problem=problem, redundant=redundant)
-    quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
+    return _solve(problem, attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan)))
+
+
+def _solve(problem: Problem, quiet: Canonical) -> Solution:
+    """Follow the solution from the linear model's to that with the β asked for."""
     try:
         guess = _guess(quiet)
         quiet, guess = quiet.rescaled(quiet.solve_linear(quiet.flow(guess.points), guess))
@@ -60,32 +65,39 @@ def solve(problem: Problem) -> Solution:
         return _failure(
             problem, Status.DIVERGED, 1, "The end conditions contradict one another; allow more time."
         )
-
     linear_angle = quiet.greatest_angle(guess)
-    approach = advance(lambda share: attrs.evolve(quiet, final=share * quiet.final), guess, guess.scaled(0.0))
+    approach = advance(quiet.towards, guess, guess.scaled(0.0))
     if approach.reached < 1.0 or quiet.greatest_angle(approach.solution) > HORIZONTAL:
         return _too_hard(problem, approach.iterations, linear_angle)
     quiet, guess = quiet.rescaled(approach.solution)
     weighted = _with_sway_cost(problem, quiet, guess)
     climb = advance(lambda share: _lighter(weighted, share), guess)
-    iterations = approach.iterations + climb.iterations
+    climb = attrs.evolve(climb, iterations=approach.iterations + climb.iterations)
     if climb.reached < 1.0 and linear_angle < SMALL_ANGLE:
-        return _too_heavy(problem, iterations, climb.reached)
+        return _too_heavy(problem, climb.iterations, climb.reached)
     if climb.reached < 1.0:
-        return _too_hard(problem, iterations, linear_angle)
+        return _too_hard(problem, climb.iterations, linear_angle)
+    return _resolved(problem, weighted, climb, linear_angle)
+
+
+def _resolved(problem: Problem, weighted: Canonical, climb: Advance, linear_angle: float) -> Solution:
+    """Refine the mesh, and accept the solution where it stands up to a look between the mesh's points."""
     refined = refine(weighted, climb.solution)
-    best = refined.solution or climb.solution
+    best, iterations = refined.solution or climb.solution, climb.iterations + refined.iterations
     if weighted.greatest_angle(best) > HORIZONTAL:
         return _too_hard(problem, iterations, linear_angle)
     if weighted.missed(best) > TOLERATED_MISS:
         cure = "Check the machine's equations and parameters."
         return _failure(problem, Status.NOT_CONTROLLABLE, iterations, cure)
+    optimum = _optimum(weighted, best)
+    if optimum.defect is not None and optimum.defect > UNRESOLVED:
+        return _unresolved(problem, iterations)
     return Solution(
         status=Status.CONVERGED,
         method=METHOD,
         problem=problem,
-        optimum=_optimum(weighted, best),
-        iterations=iterations + refined.iterations,
+        optimum=optimum,
+        iterations=iterations,
         residual=refined.residual or climb.residual,
     )
 
@@ -178,6 +190,15 @@ def _too_heavy(problem: Problem, iterations: int, reached: float) -> Solution:
     share = 10.0 ** (BETA_DECADES * (reached - 1.0))
     cure = f"Lower cost.sway_weight (about {problem.sway_weight * share:.2g} works)"
     cure += "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
+    return _failure(problem, Status.DIVERGED, iterations, cure)
+
+
+def _unresolved(problem: Problem, iterations: int) -> Solution:
+    """Blame a cost so steep that the motion changes faster than any mesh."""
+    cure = "Lower cost.sway_weight" if problem.sway_weight else "Allow more time: raise move.duration"
+    cure += (
+        "." if problem.sway_scale is None or not problem.sway_weight else ', or set cost.sway_scale = "auto".'
+    )
     return _failure(problem, Status.DIVERGED, iterations, cure)
 
 

@@ -31,11 +31,13 @@ def optimal_profile(solution: Solution) -> Profile:
         ends.append(end)
     missed = np.array(ends[::-1])
     missed[0] -= target
+    missed[1] -= problem.final_velocity
     return Profile(
         knots=optimum.knots,
         coefficients=coefficients - _closing(missed, optimum.knots, coefficients.shape[1]),
         target=target,
         method="optimal",
+        final_velocity=np.array(problem.final_velocity),
     )
 
 

@@ -35,6 +35,8 @@ class Machine:
     parameters : (1, parameters) array
     scale : (n,) array
         Size of its states y, to measure them by.
+    start : (n,) array
+        Its dimensionless states at the start.
     end : (conditions, n) array
         What of its dimensionless states must be zero at the end.
     """
@@ -42,6 +44,7 @@ class Machine:
     equations: MotionEquations
     parameters: Array
     scale: Array
+    start: Array
     end: Array
 
 
@@ -60,6 +63,17 @@ class Iterate:
     local: Array
     stages: tuple[Array, ...]
 
+    def flat(self) -> Array:
+        """Put everything into one row."""
+        return np.concatenate([self.local.ravel(), *(stages.ravel() for stages in self.stages)])
+
+    def of_flat(self, values: Array) -> Iterate:
+        """Give such a row the shapes of this iterate."""
+        blocks = (self.local, *self.stages)
+        parts = np.split(values, np.cumsum([block.size for block in blocks])[:-1])
+        local, *stages = (part.reshape(block.shape) for part, block in zip(parts, blocks, strict=True))
+        return Iterate(local=local, stages=tuple(stages))
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class Transcription:
@@ -73,8 +87,8 @@ class Transcription:
     axes : AxesMap
     duration : float
         s.
-    target : (m,) array
-        Dimensionless positions at the end.
+    target, final_velocity : (m,) arrays
+        Dimensionless positions and velocities at the end.
     machines : tuple of Machine
         The nominal one first.
     """
@@ -84,6 +98,7 @@ class Transcription:
     axes: AxesMap
     duration: float
     target: Array
+    final_velocity: Array
     machines: tuple[Machine, ...]
 
     @property
@@ -103,6 +118,13 @@ class Transcription:
         orders = np.minimum(np.arange(self.piece.size), self.piece.order)
         local = np.tile(growth**orders, self.intervals * len(self.target))
         return np.concatenate([local, np.ones(self.variables - len(local))])
+
+    @property
+    def importance(self) -> Array:
+        """How much every number of an iterate counts for its size: the axes' motion, which determines all."""
+        axes = self.intervals * self.breadth
+        states = sum(len(machine.scale) for machine in self.machines) * self.intervals * STAGES
+        return np.concatenate([1.0 / self.units[:axes], np.zeros(states)])
 
     @property
     def local_columns(self) -> IntArray:
@@ -147,7 +169,7 @@ class Transcription:
         return tuple(found)
 
     def program(self, maps: Sequence[IntervalMaps], extra: int = 0) -> ConicProgram:
-        """Pose the motion: continuous, from rest to rest, and every machine moved by it.
+        """Pose the motion: continuous, from rest to its target, and every machine moved by it.
 
         The constraints, in the order of their multipliers: continuity of the axes, their end, then for every
         machine its states (the costates at the nodes, negative) and its end.
@@ -163,7 +185,7 @@ class Transcription:
             np.zeros(len(first) * self.intervals),
         )
         end = np.zeros((len(self.target), orders))
-        end[:, 0] = self.target
+        end[:, 0], end[:, 1] = self.target, self.final_velocity
         program.equal(place(last[None], columns[-1:], width), end.ravel())
         for index, (machine, linear) in enumerate(zip(self.machines, maps, strict=True)):
             n = len(machine.scale)
@@ -171,7 +193,7 @@ class Transcription:
             moved = place(linear.transition, nodes[:-1], width) + place(linear.drive, columns, width)
             program.equal(
                 self._repeat(np.eye(n), nodes, width) - _after(moved, n),
-                np.concatenate([np.zeros(n), linear.offset.ravel()]),
+                np.concatenate([machine.start, linear.offset.ravel()]),
             )
             program.equal(place(machine.end[None], nodes[-1:], width), np.zeros(len(machine.end)))
         return program

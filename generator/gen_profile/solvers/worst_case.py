@@ -137,7 +137,7 @@ def residual_shares(
     """Find the greatest share of a load's limit that every machine sways by, shape (machines,)."""
     slowest = min(linearize(problem.plant, p, problem.target).frequencies[0] for p in machines)
     watch = 2.0 * 2.0 * np.pi / slowest
-    swing = Swing(problem.plant, motion, machines, motion.duration + watch)
+    swing = Swing(problem.plant, motion, machines, motion.duration + watch, problem.initial)
     after = swing.at(motion.duration + np.linspace(0.0, watch, WATCH_SAMPLES))
     limits = np.array(worst_case.load_limits)
     return np.array([(peak(response.sway) / limits).max() for response in after])

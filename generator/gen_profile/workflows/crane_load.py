@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from gen_profile.errors import CosimulationError
 from gen_profile.metrics import length, peak
 from gen_profile.spec import Spec
 from gen_profile.workflows.planning import RESIDUAL_SAMPLES, STANDSTILL, watch_time
@@ -31,6 +32,11 @@ class CraneLoad:
     """
 
     def __init__(self, spec: Spec, on_build: Callable[[], None] | None = None) -> None:
+        if spec.move.initial:
+            raise CosimulationError(
+                "move.initial: the simulated crane would swing on while its drives start up, and nobody "
+                "knows how it swings when the motion begins; leave move.initial out, or --simulate-drive."
+            )
         machines = scenarios(spec)
         tau = spec.actuator.tau or 0.0
         self._settle, self._watch = STANDSTILL * tau, watch_time(spec, machines)

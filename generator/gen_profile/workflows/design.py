@@ -21,7 +21,7 @@ from gen_profile.workflows.foreign_check import judge_foreign
 from gen_profile.workflows.planning import Plan, plan, timed
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import Exporter, target_of
-from gen_profile_exporters.registry import find_exporter
+from gen_profile_exporters.registry import find_exporter, require_end
 
 Progress = Callable[[str], None]
 LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")
@@ -134,6 +134,7 @@ def design(
         Nothing was written.
     """
     exporters = {name: find_exporter(name) for name in dict.fromkeys(formats)}
+    require_end(exporters, stops=spec.move.stops)
     progress("solving")
     spec = timed(spec)
     planned = plan(spec)

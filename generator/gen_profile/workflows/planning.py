@@ -133,10 +133,24 @@ def try_motion(spec: Spec, motion: Profile) -> Trial:
     tau = spec.actuator.tau
     watch = watch_time(spec, machines)
     settle = 2.0 * max(spec.export.cycle_time, spec.can.sync_period) + STANDSTILL * (tau or 0.0)
-    swing = Swing(plant, motion, [m.parameters for m in machines], motion.duration + settle + watch)
+    until = motion.duration + settle + watch
+    _require_room(spec, until)
+    swing = Swing(plant, motion, [m.parameters for m in machines], until, spec.move.initial)
     return Trial(
         motion=motion, command=lag_compensated(motion, tau), machines=machines, swing=swing, watch=watch
     )
+
+
+def _require_room(spec: Spec, until: float) -> None:
+    """Refuse to judge a motion that goes on, while it is watched, to where the machine cannot be."""
+    move = spec.move
+    beyond = np.array(move.target) + (until - move.duration) * np.array(move.final_velocity)
+    for axis, at in zip(spec.machine().actuated, beyond, strict=True):
+        if not axis.lower <= at <= axis.upper:
+            raise InfeasibleProblem(
+                f"move.final_velocity: {axis.name} would be at {at:.3g} {axis.unit} while the sway is "
+                f"watched, and its range is {axis.lower:g} to {axis.upper:g} {axis.unit}; end slower."
+            )
 
 
 def watch_time(spec: Spec, machines: Sequence[Scenario]) -> float:

@@ -30,6 +30,11 @@ def shaped_motion(spec: Spec, name: str) -> Profile:
         The base move needs something that the spec does not state.
     """
     move = spec.move
+    if move.initial or not move.stops:
+        cause = "move.initial" if move.initial else "move.final_velocity"
+        raise InfeasibleProblem(
+            f"{cause}: a shaper moves from rest to rest only; take an optimal motion (solver.method)."
+        )
     # where the load would swing on; a shaper knows one frequency per mode, whatever the hoist does on the way
     linear = linearize(spec.machine(), spec.plant.parameters, move.target)
     shaped = shaped_move(

@@ -63,6 +63,8 @@ def cosimulate(
                     max_step=max_step(spec, machine),
                     settle=STANDSTILL * tau + watch_time(spec, machines),
                     output_step=output_step,
+                    initial=spec.move.initial,
+                    final_velocity=spec.move.final_velocity,
                 ),
                 arrival(spec, setpoints),
             )

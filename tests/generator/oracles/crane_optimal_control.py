@@ -6,7 +6,7 @@ change of L1. The Hamiltonian is differentiated here, and nothing is taken from 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import casadi as ca
 import numpy as np
@@ -64,8 +64,19 @@ def _relative_accelerations(angles, rates, push, L1, p):
     return ca.vertcat(first, second - first)
 
 
-def direct_cost(problem: CraneOptimalControl, distance: float, duration: float, intervals: int = 40) -> float:
-    """Minimum of ∫ g dt by direct collocation at five Gauss points, solved by IPOPT from a quintic move."""
+def direct_cost(
+    problem: CraneOptimalControl,
+    distance: float,
+    duration: float,
+    intervals: int = 40,
+    *,
+    swung: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
+    final_velocity: float = 0.0,
+) -> float:
+    """Minimum of ∫ g dt by direct collocation at five Gauss points, solved by IPOPT from a quintic move.
+
+    ``swung`` holds the angles and their rates at the start.
+    """
     degree = 5
     points = np.array(ca.collocation_points(degree, "legendre"))
     C, D, B = _lagrange(points)
@@ -86,7 +97,9 @@ def direct_cost(problem: CraneOptimalControl, distance: float, duration: float, 
         return x, u
 
     node, _ = unknown(0.0, False)
-    equations.append(node)
+    begin = np.zeros(problem.size)
+    begin[:4] = swung
+    equations.append(node - begin)
     for k in range(intervals):
         stages = [unknown((k + c) * h, True) for c in points]
         values = [node, *(x for x, _ in stages)]
@@ -98,7 +111,7 @@ def direct_cost(problem: CraneOptimalControl, distance: float, duration: float, 
         node, _ = unknown((k + 1) * h, False)
         equations.append(node - node_end)
     target = np.zeros(problem.size)
-    target[4] = distance
+    target[4:6] = distance, final_velocity
     equations.append(node - target)
     solver = ca.nlpsol(
         "solver",
