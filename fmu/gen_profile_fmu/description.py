@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 from gen_profile_fmu.base_units import BASE_UNITS
 from gen_profile_fmu.model import Model
-from gen_profile_fmu.variables import Variable, VariableTable
+from gen_profile_fmu.variables import Kind, Type, Variable, VariableTable
 
 LOG_CATEGORIES = {
     "logEvents": "life cycle of an instance",
@@ -61,11 +61,41 @@ def add_experiment(root: ElementTree.Element, model: Model) -> None:
     )
 
 
+def variable_attributes(reference: int, variable: Variable) -> dict[str, str]:
+    """Say which variable it is, and what an importer may do with it."""
+    kind = variable.kind
+    return {
+        "name": variable.name,
+        "valueReference": str(reference),
+        "description": variable.description,
+        "causality": kind.causality,
+        "variability": kind.variability,
+        **({"initial": kind.initial} if kind.initial is not None else {}),
+    }
+
+
 def value_attributes(variable: Variable) -> dict[str, str]:
-    """Give unit and bounds as both versions write them."""
+    """Give unit, bounds and start value."""
     bounds = {"min": variable.lower, "max": variable.upper}
     unit = {"unit": variable.unit} if variable.unit else {}
-    return {**unit, **{name: repr(float(bound)) for name, bound in bounds.items() if bound is not None}}
+    start = (
+        str(bool(variable.start)).lower() if variable.type is Type.BOOLEAN else repr(float(variable.start))
+    )
+    return {
+        **unit,
+        **{name: repr(float(bound)) for name, bound in bounds.items() if bound is not None},
+        **({"start": start} if variable.kind.has_start else {}),
+    }
+
+
+def outputs_of(table: VariableTable) -> list[int]:
+    """Value references of all outputs, rising."""
+    return table.references_of(Kind.STATE, Kind.OUTPUT, Kind.DISCRETE_OUTPUT)
+
+
+def initial_unknowns_of(table: VariableTable) -> list[int]:
+    """Value references of what is calculated at the start, rising."""
+    return table.references_of(Kind.OUTPUT, Kind.DISCRETE_OUTPUT, Kind.DERIVATIVE)
 
 
 def to_bytes(root: ElementTree.Element) -> bytes:

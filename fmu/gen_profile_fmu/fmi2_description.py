@@ -10,12 +10,15 @@ from gen_profile_fmu.description import (
     add_experiment,
     add_log_categories,
     add_units,
+    initial_unknowns_of,
+    outputs_of,
     root_element,
     to_bytes,
     value_attributes,
+    variable_attributes,
 )
 from gen_profile_fmu.model import Model
-from gen_profile_fmu.variables import Kind, Type, VariableTable
+from gen_profile_fmu.variables import Type, VariableTable
 
 
 def model_description(model: Model, guid: str, source_file: str) -> bytes:
@@ -61,39 +64,20 @@ def _add_variables(root: ElementTree.Element, table: VariableTable) -> None:
     variables = ElementTree.SubElement(root, "ModelVariables")
     state_of = dict(zip(table.derivatives, table.states, strict=True))
     for reference, variable in enumerate(table.variables):
-        kind = variable.kind
-        scalar = ElementTree.SubElement(
-            variables,
-            "ScalarVariable",
-            name=variable.name,
-            valueReference=str(reference),
-            description=variable.description,
-            causality=kind.causality,
-            variability=kind.variability,
-        )
-        if kind.initial is not None:
-            scalar.set("initial", kind.initial)
-        if variable.type is Type.BOOLEAN:
-            value = ElementTree.SubElement(scalar, "Boolean")
-            if kind.has_start:
-                value.set("start", str(bool(variable.start)).lower())
-            continue
-        value = ElementTree.SubElement(scalar, "Real", value_attributes(variable))
-        if kind.has_start:
-            value.set("start", repr(float(variable.start)))
+        scalar = ElementTree.SubElement(variables, "ScalarVariable", variable_attributes(reference, variable))
+        tag = "Boolean" if variable.type is Type.BOOLEAN else "Real"
+        value = ElementTree.SubElement(scalar, tag, value_attributes(variable))
         if reference in state_of:
             value.set("derivative", str(state_of[reference] + 1))
 
 
 def _add_structure(root: ElementTree.Element, model: Model) -> None:
     table, structure = model.variables, model.structure
-    outputs = table.references_of(Kind.STATE, Kind.OUTPUT, Kind.DISCRETE_OUTPUT)
-    calculated = table.references_of(Kind.OUTPUT, Kind.DISCRETE_OUTPUT, Kind.DERIVATIVE)
     element = ElementTree.SubElement(root, "ModelStructure")
-    _add_unknowns(element, "Outputs", outputs, structure.running)
+    _add_unknowns(element, "Outputs", outputs_of(table), structure.running)
     if table.derivatives:
         _add_unknowns(element, "Derivatives", table.derivatives, structure.running)
-    _add_unknowns(element, "InitialUnknowns", calculated, structure.starting)
+    _add_unknowns(element, "InitialUnknowns", initial_unknowns_of(table), structure.starting)
 
 
 def _add_unknowns(

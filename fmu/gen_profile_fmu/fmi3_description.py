@@ -10,12 +10,15 @@ from gen_profile_fmu.description import (
     add_experiment,
     add_log_categories,
     add_units,
+    initial_unknowns_of,
+    outputs_of,
     root_element,
     to_bytes,
     value_attributes,
+    variable_attributes,
 )
 from gen_profile_fmu.model import Model
-from gen_profile_fmu.variables import Kind, Type, VariableTable
+from gen_profile_fmu.variables import VariableTable
 
 
 def model_description(model: Model, token: str) -> bytes:
@@ -55,37 +58,18 @@ def _add_variables(root: ElementTree.Element, table: VariableTable) -> None:
     variables = ElementTree.SubElement(root, "ModelVariables")
     state_of = dict(zip(table.derivatives, table.states, strict=True))
     for reference, variable in enumerate(table.variables):
-        kind = variable.kind
-        element = ElementTree.SubElement(
-            variables,
-            variable.type.value,
-            name=variable.name,
-            valueReference=str(reference),
-            description=variable.description,
-            causality=kind.causality,
-            variability=kind.variability,
-        )
-        if kind.initial is not None:
-            element.set("initial", kind.initial)
-        for name, text in value_attributes(variable).items():
-            element.set(name, text)
-        if kind.has_start:
-            boolean = variable.type is Type.BOOLEAN
-            element.set(
-                "start", str(bool(variable.start)).lower() if boolean else repr(float(variable.start))
-            )
+        attributes = variable_attributes(reference, variable) | value_attributes(variable)
+        element = ElementTree.SubElement(variables, variable.type.value, attributes)
         if reference in state_of:
             element.set("derivative", str(state_of[reference]))
 
 
 def _add_structure(root: ElementTree.Element, model: Model) -> None:
     table, structure = model.variables, model.structure
-    outputs = table.references_of(Kind.STATE, Kind.OUTPUT, Kind.DISCRETE_OUTPUT)
-    calculated = table.references_of(Kind.OUTPUT, Kind.DISCRETE_OUTPUT, Kind.DERIVATIVE)
     element = ElementTree.SubElement(root, "ModelStructure")
-    _add_unknowns(element, "Output", outputs, structure.running)
+    _add_unknowns(element, "Output", outputs_of(table), structure.running)
     _add_unknowns(element, "ContinuousStateDerivative", table.derivatives, structure.running)
-    _add_unknowns(element, "InitialUnknown", calculated, structure.starting)
+    _add_unknowns(element, "InitialUnknown", initial_unknowns_of(table), structure.starting)
 
 
 def _add_unknowns(

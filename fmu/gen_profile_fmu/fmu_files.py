@@ -19,7 +19,7 @@ from gen_profile_fmu.model import Model
 from gen_profile_fmu.terminals import terminals_and_icons
 
 SOURCE_FILE = "fmu.c"  # includes all others
-_COMMON = ("instance.h", "message.c", "instance.c")
+_COMMON = ("instance.h", "message.c", "instance.c", "common_functions.c")
 
 
 class Version(Enum):

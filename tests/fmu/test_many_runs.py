@@ -117,7 +117,7 @@ def test_refusals_are_sentences(many, changes, message):
 
 
 def test_memory_stays_flat(many):
-    parameters = {"L1": np.linspace(0.4, 0.6, 200)}
+    parameters = {"L1": np.linspace(0.4, 0.6, 200), "max_step": np.full(200, 0.01)}
     inputs = {name: np.tile(values, (200, 1)) for name, values in INPUTS.items()}
     many.peaks(TIMES, inputs, parameters, OUTPUTS)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

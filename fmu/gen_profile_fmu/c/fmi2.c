@@ -1,5 +1,4 @@
-/* The functions of FMI 2.0.4, for model exchange and co-simulation. */
-#define FMI(status) ((fmi2Status)(status))
+/* The functions of FMI 2.0.4 that FMI 3.0 declares otherwise. */
 
 /* ---- inquiry, logging, life cycle ------------------------------------------------------------------------ */
 
@@ -7,21 +6,11 @@ const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
 const char *fmi2GetVersion(void) { return fmi2Version; }
 
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[]) {
-    ENTER(c, ANY_MODE, "fmi2SetDebugLogging");
-    REQUIRE_POINTER(categories, n, "fmi2SetDebugLogging");
-    return FMI(set_logging(instance, on, n, categories));
-}
-
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
     (void)resources, (void)visible;
     if (!callbacks || !callbacks->allocateMemory || !callbacks->freeMemory) return NULL;
     return create((Host){callbacks}, name, guid, type == fmi2ModelExchange, logging);
-}
-
-void fmi2FreeInstance(fmi2Component c) {
-    if (c) discard(c);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
@@ -36,34 +25,13 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     return FMI(begin_initialization(instance));
 }
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    ENTER(c, INITIALIZATION, "fmi2ExitInitializationMode");
-    return FMI(end_initialization(instance));
-}
-
-fmi2Status fmi2Terminate(fmi2Component c) {
-    ENTER(c, EVENT | CONTINUOUS | STEP | STEP_FAILED, "fmi2Terminate");
-    return FMI(terminate(instance));
-}
-
-fmi2Status fmi2Reset(fmi2Component c) {
-    ENTER(c, ANY_MODE, "fmi2Reset");
-    reset(instance);
-    tell(instance, "Reset.");
-    return fmi2OK;
-}
-
 /* ---- variables ------------------------------------------------------------------------------------------- */
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t n, fmi2Real values[]) {
     ENTER(c, INITIALIZED, "fmi2GetReal");
     REQUIRE_POINTER(references, n, "fmi2GetReal");
     REQUIRE_POINTER(values, n, "fmi2GetReal");
-    refresh_outputs(&instance->state);
-    for (size_t i = 0; i < n; i++) {
-        if (get_value(instance, references[i], REAL, &values[i]) != OK) return fmi2Error;
-    }
-    return fmi2OK;
+    return FMI(get_reals(instance, references, n, values));
 }
 
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference references[], size_t n, fmi2Boolean values[]) {
@@ -85,11 +53,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], s
     ENTER(c, SETTING, "fmi2SetReal");
     REQUIRE_POINTER(references, n, "fmi2SetReal");
     REQUIRE_POINTER(values, n, "fmi2SetReal");
-    mark_stale(&instance->state);
-    for (size_t i = 0; i < n; i++) {
-        if (set_value(instance, references[i], REAL, values[i]) != OK) return fmi2Error;
-    }
-    return fmi2OK;
+    return FMI(set_reals(instance, references, n, values));
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference references[], size_t n,
@@ -127,12 +91,6 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 
 /* ---- model exchange -------------------------------------------------------------------------------------- */
 
-fmi2Status fmi2EnterEventMode(fmi2Component c) {
-    ENTER(c, EVENT | CONTINUOUS, "fmi2EnterEventMode");
-    instance->state.mode = EVENT;
-    return fmi2OK;
-}
-
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     ENTER(c, EVENT, "fmi2NewDiscreteStates");
     REQUIRE_POINTER(info, 1, "fmi2NewDiscreteStates");
@@ -146,54 +104,10 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     return fmi2OK;
 }
 
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
-    ENTER(c, EVENT, "fmi2EnterContinuousTimeMode");
-    instance->state.mode = CONTINUOUS;
-    return fmi2OK;
-}
-
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_state_set_before,
-                                       fmi2Boolean *enter_event_mode, fmi2Boolean *terminate_simulation) {
-    ENTER(c, CONTINUOUS, "fmi2CompletedIntegratorStep");
-    REQUIRE_POINTER(enter_event_mode && terminate_simulation, 1, "fmi2CompletedIntegratorStep");
-    (void)no_state_set_before;
-    *enter_event_mode = *terminate_simulation = fmi2False;
-    return FMI(complete_step(instance));
-}
-
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-    ENTER(c, EVENT | CONTINUOUS, "fmi2SetTime");
-    return FMI(set_time(instance, time));
-}
-
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real states[], size_t n) {
-    ENTER(c, CONTINUOUS, "fmi2SetContinuousStates");
-    REQUIRE_POINTER(states, n, "fmi2SetContinuousStates");
-    return FMI(set_states(instance, states, n));
-}
-
-fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real states[], size_t n) {
-    ENTER(c, INITIALIZED, "fmi2GetContinuousStates");
-    REQUIRE_POINTER(states, n, "fmi2GetContinuousStates");
-    return FMI(get_states(instance, states, n));
-}
-
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t n) {
     ENTER(c, INITIALIZED, "fmi2GetDerivatives");
     REQUIRE_POINTER(derivatives, n, "fmi2GetDerivatives");
     return FMI(get_derivatives(instance, derivatives, n));
-}
-
-fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominals[], size_t n) {
-    ENTER(c, INITIALIZED, "fmi2GetNominalsOfContinuousStates");
-    REQUIRE_POINTER(nominals, n, "fmi2GetNominalsOfContinuousStates");
-    return FMI(get_nominals(instance, nominals, n));
-}
-
-fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real indicators[], size_t n) {
-    ENTER(c, INITIALIZED, "fmi2GetEventIndicators");
-    (void)indicators;
-    return n == 0 ? fmi2OK : FMI(fail(instance, "There are no event indicators."));
 }
 
 /* ---- co-simulation --------------------------------------------------------------------------------------- */

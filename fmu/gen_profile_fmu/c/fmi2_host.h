@@ -1,8 +1,16 @@
-/* Logging and memory, as an importer of FMI 2.0 hands them over. */
+/* FMI 2.0's names, and logging and memory as its importers hand them over. */
 #ifndef FMI2_HOST_H
 #define FMI2_HOST_H
 
 #include "fmi2Functions.h"
+
+#define NAMED(function) fmi2##function
+#define PREFIX "fmi2"
+#define FMI(status) ((fmi2Status)(status))
+typedef fmi2Status FmiStatus;
+typedef fmi2Component FmiInstance;
+typedef fmi2Boolean FmiBoolean;
+typedef fmi2String FmiString;
 
 typedef struct {
     const fmi2CallbackFunctions *callbacks;

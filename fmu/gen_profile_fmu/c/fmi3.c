@@ -1,15 +1,8 @@
-/* The functions of FMI 3.0, for model exchange and co-simulation. */
-#define FMI(status) ((fmi3Status)(status))
+/* The functions of FMI 3.0 that FMI 2.0 declares otherwise. */
 
 /* ---- inquiry, logging, life cycle ------------------------------------------------------------------------ */
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
-
-fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String categories[]) {
-    ENTER(c, ANY_MODE, "fmi3SetDebugLogging");
-    REQUIRE_POINTER(categories, n, "fmi3SetDebugLogging");
-    return FMI(set_logging(instance, on, n, categories));
-}
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
                                           fmi3Boolean visible, fmi3Boolean logging,
@@ -41,33 +34,12 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
     return refuse(&host, name, "Scheduled execution is not provided.");
 }
 
-void fmi3FreeInstance(fmi3Instance c) {
-    if (c) discard(c);
-}
-
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
                                        fmi3Float64 start, fmi3Boolean stop_defined, fmi3Float64 stop) {
     ENTER(c, INSTANTIATED, "fmi3EnterInitializationMode");
     (void)tolerance_defined, (void)tolerance; /* max_step rules the error */
     if (set_up(instance, start, stop_defined, stop) != OK) return fmi3Error;
     return FMI(begin_initialization(instance));
-}
-
-fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-    ENTER(c, INITIALIZATION, "fmi3ExitInitializationMode");
-    return FMI(end_initialization(instance));
-}
-
-fmi3Status fmi3Terminate(fmi3Instance c) {
-    ENTER(c, EVENT | CONTINUOUS | STEP | STEP_FAILED, "fmi3Terminate");
-    return FMI(terminate(instance));
-}
-
-fmi3Status fmi3Reset(fmi3Instance c) {
-    ENTER(c, ANY_MODE, "fmi3Reset");
-    reset(instance);
-    tell(instance, "Reset.");
-    return fmi3OK;
 }
 
 /* ---- variables ------------------------------------------------------------------------------------------- */
@@ -80,11 +52,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[],
     ENTER(c, INITIALIZED, "fmi3GetFloat64");
     REQUIRE_POINTER(references && values, n, "fmi3GetFloat64");
     REQUIRE_SIZE(n, n_values, "fmi3GetFloat64");
-    refresh_outputs(&instance->state);
-    for (size_t i = 0; i < n; i++) {
-        if (get_value(instance, references[i], REAL, &values[i]) != OK) return fmi3Error;
-    }
-    return fmi3OK;
+    return FMI(get_reals(instance, references, n, values));
 }
 
 fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference references[], size_t n, fmi3Boolean values[],
@@ -108,11 +76,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference references[],
     ENTER(c, SETTING, "fmi3SetFloat64");
     REQUIRE_POINTER(references && values, n, "fmi3SetFloat64");
     REQUIRE_SIZE(n, n_values, "fmi3SetFloat64");
-    mark_stale(&instance->state);
-    for (size_t i = 0; i < n; i++) {
-        if (set_value(instance, references[i], REAL, values[i]) != OK) return fmi3Error;
-    }
-    return fmi3OK;
+    return FMI(set_reals(instance, references, n, values));
 }
 
 fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference references[], size_t n,
@@ -215,12 +179,6 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
 
 /* ---- model exchange -------------------------------------------------------------------------------------- */
 
-fmi3Status fmi3EnterEventMode(fmi3Instance c) {
-    ENTER(c, EVENT | CONTINUOUS, "fmi3EnterEventMode");
-    instance->state.mode = EVENT;
-    return fmi3OK;
-}
-
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
     ENTER(c, INITIALIZATION | EVENT, "fmi3EvaluateDiscreteStates");
     return fmi3OK;
@@ -240,48 +198,10 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *needs_update, f
     return fmi3OK;
 }
 
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
-    ENTER(c, EVENT, "fmi3EnterContinuousTimeMode");
-    instance->state.mode = CONTINUOUS;
-    return fmi3OK;
-}
-
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_state_set_before, fmi3Boolean *enter_event_mode,
-                                       fmi3Boolean *terminate_simulation) {
-    ENTER(c, CONTINUOUS, "fmi3CompletedIntegratorStep");
-    REQUIRE_POINTER(enter_event_mode && terminate_simulation, 1, "fmi3CompletedIntegratorStep");
-    (void)no_state_set_before;
-    *enter_event_mode = *terminate_simulation = false;
-    return FMI(complete_step(instance));
-}
-
-fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
-    ENTER(c, EVENT | CONTINUOUS, "fmi3SetTime");
-    return FMI(set_time(instance, time));
-}
-
-fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 states[], size_t n) {
-    ENTER(c, CONTINUOUS, "fmi3SetContinuousStates");
-    REQUIRE_POINTER(states, n, "fmi3SetContinuousStates");
-    return FMI(set_states(instance, states, n));
-}
-
-fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 states[], size_t n) {
-    ENTER(c, INITIALIZED, "fmi3GetContinuousStates");
-    REQUIRE_POINTER(states, n, "fmi3GetContinuousStates");
-    return FMI(get_states(instance, states, n));
-}
-
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 derivatives[], size_t n) {
     ENTER(c, INITIALIZED, "fmi3GetContinuousStateDerivatives");
     REQUIRE_POINTER(derivatives, n, "fmi3GetContinuousStateDerivatives");
     return FMI(get_derivatives(instance, derivatives, n));
-}
-
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominals[], size_t n) {
-    ENTER(c, INITIALIZED, "fmi3GetNominalsOfContinuousStates");
-    REQUIRE_POINTER(nominals, n, "fmi3GetNominalsOfContinuousStates");
-    return FMI(get_nominals(instance, nominals, n));
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
@@ -296,12 +216,6 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
     REQUIRE_POINTER(n, 1, "fmi3GetNumberOfEventIndicators");
     *n = 0;
     return fmi3OK;
-}
-
-fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 indicators[], size_t n) {
-    ENTER(c, INITIALIZED, "fmi3GetEventIndicators");
-    (void)indicators;
-    return n == 0 ? fmi3OK : FMI(fail(instance, "There are no event indicators."));
 }
 
 /* ---- co-simulation --------------------------------------------------------------------------------------- */

@@ -1,10 +1,18 @@
-/* Logging, as an importer of FMI 3.0 hands it over, and memory. */
+/* FMI 3.0's names, logging as its importers hand it over, and memory. */
 #ifndef FMI3_HOST_H
 #define FMI3_HOST_H
 
 #include <stdlib.h>
 
 #include "fmi3Functions.h"
+
+#define NAMED(function) fmi3##function
+#define PREFIX "fmi3"
+#define FMI(status) ((fmi3Status)(status))
+typedef fmi3Status FmiStatus;
+typedef fmi3Instance FmiInstance;
+typedef fmi3Boolean FmiBoolean;
+typedef fmi3String FmiString;
 
 typedef struct {
     fmi3InstanceEnvironment environment;

@@ -181,6 +181,14 @@ static Status get_value(Instance *instance, unsigned reference, Type type, doubl
     return OK;
 }
 
+static Status get_reals(Instance *instance, const unsigned references[], size_t n, double values[]) {
+    refresh_outputs(&instance->state);
+    for (size_t i = 0; i < n; i++) {
+        if (get_value(instance, references[i], REAL, &values[i]) != OK) return FAILED;
+    }
+    return OK;
+}
+
 static int is_state(unsigned reference) {
     const int index = (int)reference - STATES;
     return index >= 0 && index < N_STATES;
@@ -224,6 +232,14 @@ static Status set_value(Instance *instance, unsigned reference, Type type, doubl
                     variable->upper, value);
     }
     instance->state.model.values[reference] = value;
+    return OK;
+}
+
+static Status set_reals(Instance *instance, const unsigned references[], size_t n, const double values[]) {
+    mark_stale(&instance->state);
+    for (size_t i = 0; i < n; i++) {
+        if (set_value(instance, references[i], REAL, values[i]) != OK) return FAILED;
+    }
     return OK;
 }
 
