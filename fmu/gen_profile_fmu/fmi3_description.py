@@ -18,7 +18,6 @@ from gen_profile_fmu.description import (
     variable_attributes,
 )
 from gen_profile_fmu.model import Model
-from gen_profile_fmu.variables import VariableTable
 
 
 def model_description(model: Model, token: str) -> bytes:
@@ -28,7 +27,7 @@ def model_description(model: Model, token: str) -> bytes:
     add_units(root, model.variables)
     add_log_categories(root)
     add_experiment(root, model)
-    _add_variables(root, model.variables)
+    _add_variables(root, model)
     _add_structure(root, model)
     return to_bytes(root)
 
@@ -51,15 +50,22 @@ def _add_interfaces(root: ElementTree.Element, model: Model) -> None:
         "providesAdjointDerivatives": "true",
     }
     ElementTree.SubElement(root, "ModelExchange", common)
-    ElementTree.SubElement(root, "CoSimulation", common | {"canHandleVariableCommunicationStepSize": "true"})
+    cosimulation = {
+        "canHandleVariableCommunicationStepSize": "true",
+        "providesIntermediateUpdate": str(model.interpolates_inputs).lower(),
+    }
+    ElementTree.SubElement(root, "CoSimulation", common | cosimulation)
 
 
-def _add_variables(root: ElementTree.Element, table: VariableTable) -> None:
+def _add_variables(root: ElementTree.Element, model: Model) -> None:
+    table = model.variables
     variables = ElementTree.SubElement(root, "ModelVariables")
     state_of = dict(zip(table.derivatives, table.states, strict=True))
     for reference, variable in enumerate(table.variables):
         attributes = variable_attributes(reference, variable) | value_attributes(variable)
         element = ElementTree.SubElement(variables, variable.type.value, attributes)
+        if model.interpolates_inputs and variable.kind.causality in {"input", "output"}:
+            element.set("intermediateUpdate", "true")
         if reference in state_of:
             element.set("derivative", str(state_of[reference]))
 

@@ -45,7 +45,7 @@ class Model:
     variables : VariableTable
     structure : Structure
     interpolates_inputs : bool
-        Whether inputs take time derivatives.
+        Whether inputs may vary within a step: by time derivatives in FMI 2, by intermediate updates in FMI 3.
     code : mapping of str to str
         C files by name, all but those of FMI itself.
     order : tuple of str

@@ -22,7 +22,7 @@ Array = np.ndarray
 class Instance:
     """An instance for one of the interfaces of FMI, by variables' names."""
 
-    def __init__(self, fmu: PlantFmu, version: Version, *, exchange: bool) -> None:
+    def __init__(self, fmu: PlantFmu, version: Version, *, exchange: bool, **options: object) -> None:
         self.version, self.exchange = version, exchange
         self.references = {variable.name: i for i, variable in enumerate(fmu.variables.variables)}
         self.states = fmu.variables.states
@@ -38,7 +38,7 @@ class Instance:
             unzipDirectory=str(fmu.folder),
             instanceName="test",
         )
-        self.fmu.instantiate()
+        self.fmu.instantiate(**options)
 
     def initialise(self, start: float = 0.0, **booleans: bool) -> None:
         if self.version is Version.FMI2:

@@ -137,7 +137,7 @@ def slave_reference(name):
 @pytest.mark.parametrize(
     ("kind", "arguments", "message"),
     [
-        (FMU3Slave, {"eventModeUsed": True}, "Neither event mode in co-simulation nor intermediate updates"),
+        (FMU3Slave, {"eventModeUsed": True}, "Event mode in co-simulation is not provided."),
         (FMU3ScheduledExecution, {}, "Scheduled execution is not provided."),
     ],
 )
@@ -146,6 +146,53 @@ def test_what_is_not_provided_is_not_instantiated(fmu, kind, arguments, message)
     with pytest.raises(Exception, match="nstantiate"):
         instance.instantiate(logMessage=instance.log, **arguments)
     assert instance.messages[0][2].startswith(message)
+    instance.freeLibrary()
+
+
+@pytest.mark.parametrize(
+    ("asked", "call", "arguments", "words"),
+    [
+        (True, "setFloat64", (["L1"], [0.5]), "L1 cannot be set in an intermediate update."),
+        (
+            True,
+            "getFloat64",
+            (["sway.hook"],),
+            "fmi3GetFloat64 must not be called in an intermediate update.",
+        ),
+        (
+            False,
+            "setFloat64",
+            (["cart.setpoint_acceleration"], [0.5]),
+            "fmi3SetFloat64 must not be called in",
+        ),
+        (False, "doStep", (0.0, 0.1), "fmi3DoStep must not be called in an intermediate update."),
+        (True, "reset", (), "fmi3Reset must not be called in an intermediate update."),
+    ],
+)
+def test_on_the_way_inputs_are_set_and_outputs_read_and_nothing_else(fmu, asked, call, arguments, words):
+    instance = load(fmu, FMU3Slave)
+
+    def update(_, time, asks, *__):
+        if asks is asked:
+            names, *values = arguments if "Float64" in call else ((), *arguments)
+            references = [[slave_reference(name) for name in names]] if names else []
+            status_of(getattr(instance, call), *references, *values)
+
+    instance.instantiate(logMessage=instance.log, intermediateUpdate=update)
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    assert status_of(instance.doStep, 0.0, 0.01) == ERROR
+    assert instance.messages[0][2].startswith(words)
+    assert len(instance.messages) == 1
+    instance.freeInstance()
+
+
+def test_who_follows_setpoints_takes_no_updates():
+    """A setpoint is for the whole of a step."""
+    instance = load(cached_fmu(model_of("plant-setpoint", CRANE), Version.FMI3), FMU3Slave)
+    with pytest.raises(Exception, match="nstantiate"):
+        instance.instantiate(logMessage=instance.log, requiredIntermediateVariables=[0])
+    assert instance.messages[0][2] == "Intermediate updates are not provided."
     instance.freeLibrary()
 
 

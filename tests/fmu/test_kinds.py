@@ -158,6 +158,32 @@ class TestCosimulation:
         instance.close()
 
     @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
+    def test_asks_for_inputs_on_the_way(self, kind):
+        """In FMI 3, where inputs have no derivatives: at the middle of each integration step of 1 ms."""
+        lag = kind == "plant-velocity"
+        name = "cart.setpoint_velocity" if lag else "cart.setpoint_acceleration"
+        seen, shown = [], []
+
+        def update(_, time, asked, readable, finished, may_return, *__):
+            assert (asked, may_return) == (not readable, False)
+            assert readable == finished
+            if asked:
+                instance.write({name: wave(time)})
+            else:
+                shown.append(time)
+                seen.append(instance.read(*OUTPUTS))
+
+        instance = Instance(cached_fmu(model_of(kind, CRANE), Version.FMI3), Version.FMI3, exchange=False,
+                            intermediateUpdate=update)  # fmt: skip
+        instance.begin({**OTHER, **({"tau": 0.05} if lag else {})})
+        cosimulate(instance, TIMES, lambda *_: None, OUTPUTS)
+        instance.close()
+        fine = np.linspace(0.0, 2.0, 2001)
+        np.testing.assert_allclose(shown, fine[1:], rtol=0.0, atol=1e-12)
+        follow = (lambda t, v: (wave(t) - v) / 0.05) if lag else (lambda t, v: wave(t))
+        np.testing.assert_allclose(seen, expected(follow, fine)[1:], rtol=0.0, atol=5e-6)
+
+    @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
     def test_holds_inputs_that_have_no_derivatives(self, open_instance, kind):
         instance = open_instance(kind, exchange=False)
         lag = kind == "plant-velocity"

@@ -122,9 +122,13 @@ def test_claims_the_capabilities_importers_look_for(kind, version):
         assert interface.get("canBeInstantiatedOnlyOncePerProcess", "false") == "false"
         assert [interface.get(name) for name in names] == ["true"] * len(names)
     assert interface.get("canHandleVariableCommunicationStepSize") == "true"
+    takes_slopes = kind in {"plant-acceleration", "plant-velocity"}
     if version is Version.FMI2:
-        takes_slopes = kind in {"plant-acceleration", "plant-velocity"}
         assert interface.get("canInterpolateInputs") == str(takes_slopes).lower()
+    else:
+        on_the_way = {v.get("causality") for v in root.find("ModelVariables") if v.get("intermediateUpdate")}
+        assert on_the_way == ({"input", "output"} if takes_slopes else set())
+        assert interface.get("providesIntermediateUpdate") == str(takes_slopes).lower()
     assert float(root.find("DefaultExperiment").get("tolerance")) > 0.0
 
 

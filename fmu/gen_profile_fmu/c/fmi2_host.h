@@ -24,6 +24,14 @@ static void host_log(const Host *host, const char *name, int status, const char 
     }
 }
 
+/* FMI 2.0 has no updates on the way of a step. */
+static int host_takes_updates(const Host *host) {
+    (void)host;
+    return 0;
+}
+
+static void host_update(const Host *host, double time, int asking) { (void)host, (void)time, (void)asking; }
+
 static void *host_allocate(const Host *host, size_t size) { return host->callbacks->allocateMemory(1, size); }
 
 static void host_free(const Host *host, void *memory) { host->callbacks->freeMemory(memory); }

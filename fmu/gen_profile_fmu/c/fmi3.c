@@ -8,7 +8,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3Boolean visible, fmi3Boolean logging,
                                           fmi3InstanceEnvironment environment, fmi3LogMessageCallback log) {
     (void)resources, (void)visible;
-    return create((Host){environment, log}, name, token, 1, logging);
+    return create((Host){environment, log, NULL}, name, token, 1, logging);
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
@@ -16,11 +16,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          const fmi3ValueReference intermediate[], size_t n_intermediate,
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
                                          fmi3IntermediateUpdateCallback update) {
-    (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)update;
-    const Host host = {environment, log};
-    if (event_mode || n_intermediate > 0) {
-        return refuse(&host, name, "Neither event mode in co-simulation nor intermediate updates are provided.");
-    }
+    (void)resources, (void)visible, (void)early_return, (void)intermediate;
+    const Host host = {environment, log, update};
+    if (event_mode) return refuse(&host, name, "Event mode in co-simulation is not provided.");
+    if (n_intermediate > 0 && !UPDATES_ON_THE_WAY) return refuse(&host, name, "Intermediate updates are not provided.");
     return create(host, name, token, 0, logging);
 }
 
@@ -30,7 +29,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
                                                fmi3ClockUpdateCallback update, fmi3LockPreemptionCallback lock,
                                                fmi3UnlockPreemptionCallback unlock) {
     (void)token, (void)resources, (void)visible, (void)logging, (void)update, (void)lock, (void)unlock;
-    const Host host = {environment, log};
+    const Host host = {environment, log, NULL};
     return refuse(&host, name, "Scheduled execution is not provided.");
 }
 
@@ -49,7 +48,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_def
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t n, fmi3Float64 values[],
                           size_t n_values) {
-    ENTER(c, INITIALIZED, "fmi3GetFloat64");
+    ENTER(c, READABLE, "fmi3GetFloat64");
     REQUIRE_POINTER(references && values, n, "fmi3GetFloat64");
     REQUIRE_SIZE(n, n_values, "fmi3GetFloat64");
     return FMI(get_reals(instance, references, n, values));
@@ -57,7 +56,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[],
 
 fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference references[], size_t n, fmi3Boolean values[],
                           size_t n_values) {
-    ENTER(c, INITIALIZED, "fmi3GetBoolean");
+    ENTER(c, READABLE, "fmi3GetBoolean");
     REQUIRE_POINTER(references && values, n, "fmi3GetBoolean");
     REQUIRE_SIZE(n, n_values, "fmi3GetBoolean");
     refresh_outputs(&instance->state);
@@ -69,7 +68,7 @@ fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference references[],
     return fmi3OK;
 }
 
-enum { SETTING = INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP };
+enum { SETTING = INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP | ASKING };
 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t n,
                           const fmi3Float64 values[], size_t n_values) {
@@ -143,7 +142,7 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
                                         const fmi3ValueReference knowns[], size_t n_knowns,
                                         const fmi3Float64 seed[], size_t n_seed, fmi3Float64 sensitivity[],
                                         size_t n_sensitivity) {
-    ENTER(c, INITIALIZED, "fmi3GetDirectionalDerivative");
+    ENTER(c, READABLE, "fmi3GetDirectionalDerivative");
     REQUIRE_POINTER(unknowns && sensitivity, n_unknowns, "fmi3GetDirectionalDerivative");
     REQUIRE_POINTER(knowns && seed, n_knowns, "fmi3GetDirectionalDerivative");
     REQUIRE_SIZE(n_knowns, n_seed, "fmi3GetDirectionalDerivative");
@@ -169,7 +168,7 @@ static Status adjoint_derivative(Instance *instance, const unsigned unknowns[], 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t n_unknowns,
                                     const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[],
                                     size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity) {
-    ENTER(c, INITIALIZED, "fmi3GetAdjointDerivative");
+    ENTER(c, READABLE, "fmi3GetAdjointDerivative");
     REQUIRE_POINTER(unknowns && seed, n_unknowns, "fmi3GetAdjointDerivative");
     REQUIRE_POINTER(knowns && sensitivity, n_knowns, "fmi3GetAdjointDerivative");
     REQUIRE_SIZE(n_unknowns, n_seed, "fmi3GetAdjointDerivative");

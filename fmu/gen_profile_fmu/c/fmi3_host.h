@@ -17,11 +17,21 @@ typedef fmi3String FmiString;
 typedef struct {
     fmi3InstanceEnvironment environment;
     fmi3LogMessageCallback log;
+    fmi3IntermediateUpdateCallback update; /* null where none is wanted */
 } Host;
 
 static void host_log(const Host *host, const char *name, int status, const char *category, const char *text) {
     (void)name;
     if (host->log) host->log(host->environment, (fmi3Status)status, category, text);
+}
+
+static int host_takes_updates(const Host *host) { return host->update != NULL; }
+
+/* Ask for inputs, or show outputs, on the way of a step; it never ends early. */
+static void host_update(const Host *host, double time, int asking) {
+    bool early_return = false;
+    double early_return_time = time;
+    host->update(host->environment, time, asking, !asking, !asking, false, &early_return, &early_return_time);
 }
 
 static void *host_allocate(const Host *host, size_t size) {

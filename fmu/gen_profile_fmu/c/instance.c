@@ -61,6 +61,8 @@ static const char *mode_name(int mode) {
         case CONTINUOUS: return "continuous-time mode";
         case STEP: return "step mode";
         case STEP_FAILED: return "the mode after a failed step";
+        case ASKING:
+        case SHOWING: return "an intermediate update";
         case TERMINATED: return "the mode after termination";
         default: return "the mode after an error";
     }
@@ -201,7 +203,7 @@ static int can_be_set(unsigned reference, int mode) {
         case STATE: return mode & starting;
         case TUNABLE_PARAMETER:
         case DISCRETE_INPUT: return mode & (starting | EVENT | STEP);
-        case INPUT: return mode & (starting | EVENT | CONTINUOUS | STEP);
+        case INPUT: return mode & (starting | EVENT | CONTINUOUS | STEP | ASKING);
         default: return 0;
     }
 }
@@ -348,12 +350,40 @@ static Status require_step(Instance *instance, double time, double step) {
     return OK;
 }
 
+/* Call the importer back. Returns whether it left the instance as it should. */
+static int call_back(Instance *instance, int mode, double time) {
+    instance->state.mode = mode;
+    mark_stale(&instance->state);
+    host_update(&instance->host, time, mode == ASKING);
+    if (instance->state.mode != mode) return 0;
+    instance->state.mode = STEP;
+    return 1;
+}
+
+/*
+ * Advance in integration steps, for an importer that wants to take part: it is asked for the inputs at the middle of
+ * each, whose values hold for the whole of it (so that the error is of second order), and shown the outputs at the end.
+ */
+static int advance_with_updates(Instance *instance, double step) {
+    Model *model = &instance->state.model;
+    const double start = model->time;
+    const long pieces = (long)model_substeps(model, step);
+    for (long i = 1; i <= pieces; i++) {
+        const double piece = start + step * (double)i / (double)pieces - model->time;
+        if (!call_back(instance, ASKING, model->time + 0.5 * piece)) return 0;
+        model_advance(model, piece);
+        if (!call_back(instance, SHOWING, model->time)) return 0;
+    }
+    return 1;
+}
+
 static Status do_step(Instance *instance, double time, double step) {
     State *state = &instance->state;
     if (require_step(instance, time, step) != OK) return FAILED;
     const Model before = state->model;
     state->model.time = time;
-    model_advance(&state->model, step);
+    if (!UPDATES_ON_THE_WAY || !host_takes_updates(&instance->host)) model_advance(&state->model, step);
+    else if (!advance_with_updates(instance, step)) return FAILED;
     mark_stale(state);
     for (int i = STATES; i < STATES + N_STATES; i++) {
         if (isfinite(state->model.values[i])) continue;

@@ -21,9 +21,14 @@ enum {
     STEP_FAILED = 32,
     TERMINATED = 64,
     ERRONEOUS = 128,
+    ASKING = 256,            /* on the way of a step: for inputs */
+    SHOWING = 512,           /* on the way of a step: outputs */
     INITIALIZED = INITIALIZATION | EVENT | CONTINUOUS | STEP | STEP_FAILED | TERMINATED | ERRONEOUS,
+    READABLE = INITIALIZED | SHOWING,
     ANY_MODE = INSTANTIATED | INITIALIZED
 };
+
+enum { UPDATES_ON_THE_WAY = N_SLOPED_INPUTS > 0 };  /* where inputs may vary within a step */
 
 enum { EVENTS = 1, WARNINGS = 2, ERRORS = 4, ALL_CATEGORIES = EVENTS | WARNINGS | ERRORS };
 
