@@ -243,14 +243,15 @@ def _per_axis(values: Array) -> str:
 
 
 def _literals(values: Array) -> str:
-    return _initialiser([literal(value) for value in values.tolist()])
+    return initialiser([literal(value) for value in values.tolist()])
 
 
 def _whole_numbers(values: Array) -> str:
-    return _initialiser([str(int(value)) for value in values.tolist()])
+    return initialiser([str(int(value)) for value in values.tolist()])
 
 
-def _initialiser(texts: Sequence[str]) -> str:
+def initialiser(texts: Sequence[str]) -> str:
+    """Write an array's initial values, a few in a line."""
     rows = [", ".join(texts[k : k + VALUES_PER_LINE]) for k in range(0, len(texts), VALUES_PER_LINE)]
     return "[\n        " + ",\n        ".join(rows) + "\n    ]"
 

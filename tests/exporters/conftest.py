@@ -1,7 +1,7 @@
 """Make this folder's helper modules importable, and leave out what needs a compiler that no registry has.
 
 Pytest's importlib mode leaves ``sys.path`` alone. The environment variable IEC2C names matiec's compiler, and
-MATIEC_LIB its folder ``lib``; without the first, ``test_compiled_block.py`` is not collected.
+MATIEC_LIB its folder ``lib``; without the first, ``test_compiled_*.py`` are not collected.
 """
 
 import os
@@ -10,7 +10,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-collect_ignore = [] if os.environ.get("IEC2C") else ["test_compiled_block.py"]
+collect_ignore = [] if os.environ.get("IEC2C") else ["test_compiled_block.py", "test_compiled_library.py"]
 
 
 def pytest_report_header():

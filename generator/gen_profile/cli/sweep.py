@@ -1,4 +1,4 @@
-"""The commands around profile libraries: sweep, and look one up."""
+"""The commands around profile libraries: sweep, look one up, and put one into a PLC."""
 
 from __future__ import annotations
 
@@ -116,6 +116,30 @@ def lookup(words: tuple[str, ...], as_json: bool) -> None:
         tell("checking by co-simulation")
         found = run(folder, asked, lambda: tell("compiling the plant's FMU, once"))
     print_outcome(found.to_dict(), tables.found_profile(found), as_json)
+
+
+@cli.command(epilog="Example: gen-profile library swept --out crane.st")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    "path",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    default=Path("library.st"),
+    help="Structured Text to write, its block named after it; ./library.st by default.",
+)
+@json_option
+@debug_option
+def library(folder: Path, path: Path, as_json: bool) -> None:
+    """Put a sweep's PLC blocks into one, with an input that selects the profile."""
+    from gen_profile.cli import words as tables
+    from gen_profile.workflows.sweep_plan import require_libraries
+
+    require_libraries()
+    from gen_profile.workflows.profile_library import write_library
+
+    written = write_library(folder, path)
+    print_outcome(written.to_dict(), tables.library(written), as_json)
 
 
 def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:

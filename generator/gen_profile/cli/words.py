@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from gen_profile.workflows.compare import Comparison
     from gen_profile.workflows.design import Design
     from gen_profile.workflows.identify import Identification
-    from gen_profile.workflows.report import Report
     from gen_profile.workflows.lookup import Found
+    from gen_profile.workflows.profile_library import Library
+    from gen_profile.workflows.report import Report
     from gen_profile.workflows.sweep import Sweep
 
 MANIFEST_WORDS = {
@@ -164,6 +165,20 @@ def found_profile(found: Found) -> str:
         *(("file", str(found.judgement.path.parent / one["path"])) for one in found.row["artefacts"]),
     ]
     return _block(found.judgement.spec.name, rows)
+
+
+def library(written: Library) -> str:
+    """Tell what is in a library."""
+    count = len(written.profiles)
+    rows = [
+        (
+            "block",
+            f"{written.block}, {count} profile{'s'[: count > 1]}, {written.bytes / 1000:.4g} kB of text",
+        ),
+        ("wrote", str(written.path)),
+        ("", f"{written.index} tells which is which"),
+    ]
+    return _block(written.path.stem, rows)
 
 
 def _values(values: Mapping[str, Any]) -> str:

@@ -11,15 +11,15 @@ import attrs
 import numpy as np
 from pyarrow import compute
 
-from gen_profile.errors import CheckFailed, OutputError, SpecError
-from gen_profile.manifest import FILENAME, parse_manifest, sha256
+from gen_profile.errors import CheckFailed, SpecError
+from gen_profile.manifest import FILENAME, parse_manifest
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import overridden, spec_from_dict
 from gen_profile.suggestion import suggestion
 from gen_profile.workflows.check import Judgement, check_artefact
 from gen_profile.workflows.sweep_case import PASSED
 from gen_profile.workflows.sweep_grid import Axis, Grid, overrides
-from gen_profile.workflows.sweep_store import grid_of
+from gen_profile.workflows.sweep_store import grid_of, read_swept
 from gen_profile.workflows.sweep_table import Table, cell, read_table
 
 TRIES = 64
@@ -184,21 +184,13 @@ def _judge(
 ) -> Judgement:
     artefact = row["artefacts"][0]
     path = folder / row["folder"] / artefact["path"]
-    if sha256(_read(path)) != artefact["sha256"]:
-        raise OutputError(f"{path} is not the file that the sweep wrote: it was altered; sweep again.")
+    read_swept(path, artefact["sha256"])
     return check_artefact(path, _spec_there(path.parent, wanted), on_build)
 
 
 def _spec_there(case: Path, wanted: Mapping[str, Any]) -> Spec:
     """Put the machine asked for into a case's spec."""
     path = case / FILENAME
-    document = parse_manifest(_read(path), str(path)).spec
+    document = parse_manifest(read_swept(path), str(path)).spec
     machine = {key: value for key, value in wanted.items() if key.startswith(MACHINE)}
     return spec_from_dict(overridden(document, overrides(machine)), case)
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise OutputError(f"Cannot read {path}: {error.strerror or error}; sweep again.") from error

@@ -22,6 +22,7 @@ from typing import Any
 import attrs
 
 from gen_profile.errors import OutputError
+from gen_profile.manifest import sha256
 from gen_profile.workflows.delivery import staged
 from gen_profile.workflows.sweep_case import Outcome, Recipe
 from gen_profile.workflows.sweep_grid import Axis, Grid
@@ -152,6 +153,23 @@ def grid_of(folder: Path) -> Grid:
     """
     vary = _description(folder)["vary"]
     return Grid(axes=tuple(Axis(key=key, values=tuple(values)) for key, values in vary.items()))
+
+
+def read_swept(path: Path, digest: str | None = None) -> bytes:
+    """Read a case's file, which must have the SHA-256 that the table has of it, if that is given.
+
+    Raises
+    ------
+    OutputError
+        It is gone or was altered.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise OutputError(f"Cannot read {path}: {error.strerror or error}; sweep again.") from error
+    if digest is not None and sha256(content) != digest:
+        raise OutputError(f"{path} is not the file that the sweep wrote: it was altered; sweep again.")
+    return content
 
 
 def _description(folder: Path) -> dict[str, Any]:

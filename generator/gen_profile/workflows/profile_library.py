@@ -1,0 +1,140 @@
+"""From a sweep to one PLC file that plays any of its profiles, made of the very files that passed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from gen_profile.errors import ExportError, SpecError
+from gen_profile.manifest import FILENAME, parse_manifest, sha256
+from gen_profile.spec_reading import spec_from_dict
+from gen_profile.workflows.delivery import staged
+from gen_profile.workflows.sweep_case import PASSED
+from gen_profile.workflows.sweep_store import grid_of, read_swept
+from gen_profile.workflows.sweep_table import Table, read_table
+from gen_profile_exporters.exporter import Target, target_of
+from gen_profile_exporters.profile_library import LibraryEntry, library_text, read_library
+from gen_profile_exporters.structured_text import block_name
+
+FORMAT = "plc"
+
+
+@attrs.frozen(kw_only=True)
+class Library:
+    """What was written.
+
+    Attributes
+    ----------
+    path, index : Path
+        Of the block, and of a JSON file that tells which profile is which.
+    block : str
+        Name of the function block.
+    bytes : int
+        Of the block's file.
+    profiles : tuple of dict
+        By number: case, values, hash, duration and worst sway.
+    """
+
+    path: Path
+    index: Path
+    block: str
+    bytes: int
+    profiles: tuple[dict[str, Any], ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "path": str(self.path),
+            "index": str(self.index),
+            "block": self.block,
+            "bytes": self.bytes,
+            "profiles": list(self.profiles),
+        }
+
+
+def write_library(folder: Path, path: Path) -> Library:
+    """Put the PLC blocks of all cases that passed into one, and make sure that it issues the same.
+
+    Parameters
+    ----------
+    folder : Path
+        Of a finished sweep that exported ``plc``.
+    path : Path
+        File to write, such as ``crane.st``; the function block is named after it.
+
+    Raises
+    ------
+    SpecError
+        The sweep did not export ``plc``, or no case passed.
+    OutputError
+        The sweep's files were altered, or the library cannot be written.
+    ExportError
+        The profiles do not fit into one block.
+    """
+    keys = [axis.key for axis in grid_of(folder).axes]
+    profiles: list[dict[str, Any]] = []
+    entries, target = [], None
+    for row in _passed(read_table(folder)):
+        artefact = next((one for one in row["artefacts"] if one["format"] == FORMAT), None)
+        if artefact is None:
+            raise SpecError("A library needs the cases' PLC blocks: sweep again with --export plc.")
+        content = read_swept(folder / row["folder"] / artefact["path"], artefact["sha256"])
+        target = target or _target(folder / row["folder"])
+        values = {key: row[key] for key in keys}
+        entries.append(LibraryEntry(text=content.decode("ascii"), label=_label(values)))
+        profiles.append(
+            {
+                "number": len(profiles),
+                "case": row["case"],
+                "values": values,
+                "payload_sha256": artefact["payload_sha256"],
+                "duration_s": row["duration_s"],
+                "sway_residual_worst_m": row["check_worst_sway_m"],
+            }
+        )
+    if target is None:
+        raise SpecError(
+            f"No case of the sweep in {folder} passed, so there is nothing to put into a library."
+        )
+    text = library_text(path.stem, entries)
+    index = path.with_suffix(".json")
+    block = block_name(path.stem)
+    with staged(path.parent) as staging:
+        written = staging.write(path.name, text.encode("ascii"))
+        _require_same(written, target, profiles)
+        staging.write(index.name, _index(block, written, profiles))
+        staging.deliver()
+    return Library(path=path, index=index, block=block, bytes=len(written), profiles=tuple(profiles))
+
+
+def _passed(table: Table) -> list[dict[str, Any]]:
+    return [row for row in table.to_pylist() if row["status"] == PASSED]
+
+
+def _target(case: Path) -> Target:
+    path = case / FILENAME
+    return target_of(spec_from_dict(parse_manifest(read_swept(path), str(path)).spec, case))
+
+
+def _label(values: dict[str, Any]) -> str:
+    """Write what a profile is for, as the block's comment takes it."""
+    return "  ".join(
+        f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in values.items()
+    )
+
+
+def _require_same(written: bytes, target: Target, profiles: list[dict[str, Any]]) -> None:
+    """Hold what the library's file issues to what was checked."""
+    for profile, motion in zip(profiles, read_library(written.decode("ascii"), target), strict=True):
+        if motion.payload_hash() != profile["payload_sha256"]:
+            raise ExportError(
+                f"Profile {profile['number']} would not issue what case {profile['case']} does."
+            )
+
+
+def _index(block: str, written: bytes, profiles: list[dict[str, Any]]) -> bytes:
+    document = {"block": block, "sha256": sha256(written), "profiles": profiles}
+    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")

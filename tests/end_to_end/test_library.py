@@ -1,0 +1,123 @@
+"""A sweep's profiles in one PLC file: which are in it, that it issues what was checked, what is refused."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from command_line import run_here
+
+from gen_profile.errors import ExportError
+from gen_profile.spec_reading import preset_spec
+from gen_profile.workflows import profile_library
+from gen_profile.workflows.sweep_table import read_table
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.profile_library import read_library
+
+CYCLE = "export.cycle_time=0.01"
+AXES = (
+    "--vary",
+    "check.residual_sway=1e-6,0.003",
+    "--vary",
+    "solver.method=zv,zvd",
+    "--vary",
+    "plant.L1=0.45,0.5",
+)
+
+
+def sweep(folder, *arguments):
+    assert run_here("sweep", "--preset", "paper-beta0", "--set", CYCLE, *arguments, "--out", folder).code == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    return sweep(tmp_path_factory.mktemp("swept"), *AXES, "--export", "csv", "--export", "plc")
+
+
+@pytest.fixture(scope="module")
+def library(swept, tmp_path_factory):
+    path = tmp_path_factory.mktemp("library") / "bay 3.st"
+    outcome = run_here("library", swept, "--out", path, "--json")
+    assert outcome.code == 0, outcome.err
+    return path, outcome.document
+
+
+def test_holds_the_profiles_that_passed_in_their_order(swept, library):
+    path, document = library
+    rows = [row for row in read_table(swept).to_pylist() if row["status"] == "passed"]
+    assert 2 <= len(rows) < 8
+    assert [entry["case"] for entry in document["profiles"]] == [row["case"] for row in rows]
+    for number, (entry, row) in enumerate(zip(document["profiles"], rows, strict=True)):
+        assert entry["number"] == number
+        assert entry["values"] == {
+            key: row[key] for key in ("check.residual_sway", "solver.method", "plant.L1")
+        }
+        assert entry["sway_residual_worst_m"] == row["check_worst_sway_m"] <= 0.003
+    index = json.loads(path.with_suffix(".json").read_text("utf-8"))
+    assert index["profiles"] == document["profiles"]
+    assert index["block"] == document["block"] == "FB_bay_3"
+    assert f"FUNCTION_BLOCK {index['block']}\n" in path.read_text("ascii")
+    assert document["bytes"] == path.stat().st_size
+
+
+def test_issues_what_was_checked(library):
+    path, document = library
+    target = target_of(preset_spec("paper-beta0", [CYCLE]))
+    motions = read_library(path.read_text("ascii"), target)
+    hashes = [entry["payload_sha256"] for entry in document["profiles"]]
+    assert [motion.payload_hash() for motion in motions] == hashes
+    assert len(set(hashes)) == len(hashes)
+
+
+def test_the_same_sweep_makes_the_same_bytes(swept, library, tmp_path):
+    path, _ = library
+    outcome = run_here("library", swept, "--out", tmp_path / path.name)
+    assert f"FB_bay_3, {len(library[1]['profiles'])} profiles" in outcome.out
+    for name in (path.name, "bay 3.json"):
+        assert (tmp_path / name).read_bytes() == (path.parent / name).read_bytes()
+
+
+def test_a_file_that_was_altered_is_not_put_in(swept, tmp_path):
+    copy = shutil.copytree(swept, tmp_path / "copy")
+    case = next(iter(sorted(copy.glob("cases/*/*/*.st"))))
+    case.write_bytes(case.read_bytes().replace(b"cLast : DINT := ", b"cLast : DINT := 1"))
+    outcome = run_here("library", copy, "--out", tmp_path / "library.st")
+    assert (outcome.code, outcome.errors) == (
+        2,
+        [f"Error: {case} is not the file that the sweep wrote: it was altered; sweep again."],
+    )
+    assert not (tmp_path / "library.st").exists()
+
+
+def test_a_library_that_would_issue_something_else_is_not_written(swept, tmp_path, monkeypatch):
+    def shuffled(name, entries):
+        return library_text(name, entries[::-1])
+
+    library_text = profile_library.library_text
+    monkeypatch.setattr(profile_library, "library_text", shuffled)
+    with pytest.raises(ExportError, match="Profile 0 would not issue what case"):
+        profile_library.write_library(swept, tmp_path / "library.st")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_sweep_without_plc_blocks_is_refused(tmp_path):
+    folder = sweep(tmp_path / "swept", "--vary", "solver.method=zvd")
+    outcome = run_here("library", folder, "--out", tmp_path / "library.st")
+    assert (outcome.code, outcome.errors) == (
+        2,
+        ["Error: A library needs the cases' PLC blocks: sweep again with --export plc."],
+    )
+
+
+def test_a_sweep_of_which_nothing_passed_is_refused(tmp_path):
+    folder = sweep(tmp_path / "swept", "--vary", "check.residual_sway=1e-9", "--set", "solver.method=zvd")
+    outcome = run_here("library", folder, "--out", tmp_path / "library.st")
+    assert outcome.code == 2
+    assert "passed, so there is nothing to put into a library" in outcome.err
+
+
+def test_no_folder_and_no_libraries_are_named(tmp_path):
+    assert "There is no sweep in" in run_here("library", tmp_path, "--out", tmp_path / "x.st").err
+    assert "DIR" in run_here("library").err
+    assert Path(tmp_path / "x.st").exists() is False
