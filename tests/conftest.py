@@ -1,6 +1,7 @@
 """For all tests: Hypothesis without deadlines, as machines differ, and derandomised; one cache of FMUs."""
 
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +10,9 @@ from hypothesis import settings
 
 settings.register_profile("gen-profile", deadline=None, derandomize=True)
 settings.load_profile("gen-profile")
+
+# in the background of a script this process ignores interruptions, and so would those that tests interrupt
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session", autouse=True)
