@@ -180,13 +180,8 @@ def free_swing(
         )
     if not integral.success:
         raise CosimulationError(f"The {plant.type}'s swing cannot be integrated: {integral.message}")
-    q_u = integral.y.reshape(*shape, len(times))[0].transpose(0, 2, 1)
-    seen = np.stack(
-        [
-            outputs(np.ascontiguousarray(q), position, machine[None])[:, :, 0]
-            for q, machine in zip(q_u, machines, strict=True)
-        ]
-    )
+    q_u = np.ascontiguousarray(integral.y.reshape(*shape, len(times))[0].transpose(0, 2, 1))
+    seen = np.stack([outputs(q, position, p[None])[:, :, 0] for q, p in zip(q_u, machines, strict=True)])
     loads = len(plant.loads)
     return seen[:, :, :loads], seen[:, :, loads:]
 

@@ -58,3 +58,26 @@ def test_both_methods_write_nearly_the_same(tmp_path):
     assert [document["solver"]["method"] for document in documents] == ["direct", "indirect"]
     assert documents[0]["solver"]["cost"] == pytest.approx(documents[1]["solver"]["cost"], rel=1e-6)
     assert documents[0]["solver"]["defect"] is None
+
+
+def test_the_shortest_motion_leaves_no_more_sway_than_the_check_allows(tmp_path):
+    """Within limits alone the paper's crane would do it in 2.56 s, and one with a shorter rope sway by 3.4 mm."""
+    words = ("--set", "limits.acceleration=0.7", "--json", "--out", tmp_path)
+    quick = run_here(*words, "--set", "move.duration=2.57")
+    assert quick.code == 4
+    shortest = run_here(*words, "--set", 'move.duration="minimum"')
+    assert shortest.code == 0, shortest.err
+    figures = shortest.document["figures"]
+    assert 2.57 < figures["duration_s"] < 2.7
+    assert 0.0029 < figures["sway_residual_worst_m"] < 0.003
+    hopeless = run_here(
+        *words,
+        "--set",
+        'move.duration="minimum"',
+        "--set",
+        "move.initial={theta1=0.3}",
+        "--set",
+        "check.residual_sway=1e-7",
+    )
+    assert hopeless.code == 3
+    assert "check.residual_sway: no duration leaves so little sway" in hopeless.err

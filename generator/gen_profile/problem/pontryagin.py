@@ -157,37 +157,26 @@ def optimality_system(
     d = dynamics(plant)
     weights = sym.symbols("weights", 5)
     beta, gamma, tau, duration, cost_scale = sym.split(weights)
-    pendulum, pendulum_rate = sym.column([d.q_u, d.dq_u]), sym.column([d.dq_u, d.ddq_u])
-    by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
-    reached = sensitivities(pendulum_rate, pendulum, by_name, desensitized, order)
-
     effort_weights = sym.symbols("effort_weights", len(plant.actuated))
     axes = _axis_chain(d, effort, tau, effort_weights)
-    x = sym.column([pendulum, *axes.chain, *(s.states for s in reached)])
-    f = sym.column([pendulum_rate, *axes.chain[1:], axes.top, *(s.rates for s in reached)])
+    layout, x, f = _state_equations(plant, d, axes, desensitized, order)
     end_sway = d.sway[plant.end_load]
     g = axes.effort + beta * (sym.exp(gamma**2 * sym.dot(end_sway, end_sway)) - 1)
 
     n = x.shape[0]
-    x_hat, costate = sym.symbols("x_hat", n), sym.symbols("costate", n)
-    offset, scale = sym.symbols("offset", n), sym.symbols("scale", n)
+    z, offset, scale = sym.symbols("z", 2 * n), sym.symbols("offset", n), sym.symbols("scale", n)
+    costate = z[n:]
     # f is affine and g quadratic in u: ∂H/∂u = 0 is a linear equation, and its solution the minimum
     u_star = -cost_scale / axes.weight * sym.gradient(sym.dot(costate, duration * f / scale), axes.u)
 
     def optimal(expression: Symbol) -> Symbol:
-        return sym.substitute(sym.substitute(expression, axes.u, u_star), x, offset + scale * x_hat)
+        return sym.substitute(sym.substitute(expression, axes.u, u_star), x, offset + scale * z[:n])
 
     hamiltonian = optimal(g / cost_scale + sym.dot(costate, duration * f / scale))
-    z = sym.column([x_hat, costate])
-    flow = sym.column([sym.gradient(hamiltonian, costate), -sym.gradient(hamiltonian, x_hat)])
+    slope = sym.gradient(hamiltonian, z)
+    flow = sym.column([slope[n:], -slope[:n]])
     quantities = [hamiltonian * cost_scale, optimal(sym.column([g, axes.top, d.sway, d.angle]))]
     inputs = {"z": z, "data": sym.column([d.p, weights, effort_weights, offset, scale])}
-    layout = StateLayout(
-        n_u=len(plant.unactuated),
-        m=len(plant.actuated),
-        orders=len(axes.chain),
-        sensitivity_rows=tuple((s.parameters, row) for s in reached for row in s.rows),
-    )
     return OptimalitySystem(
         plant=plant,
         layout=layout,
@@ -222,3 +211,21 @@ def _axis_chain(d: Dynamics, effort: Effort, tau: Symbol, weights: Symbol) -> _A
         effort=sym.dot(weights * jerk, jerk) / 2 + SNAP_TIME**2 * half_square,
         weight=SNAP_TIME**2 * weights,
     )
+
+
+def _state_equations(
+    plant: Plant, d: Dynamics, axes: _AxisChain, desensitized: tuple[str, ...], order: int
+) -> tuple[StateLayout, Symbol, Symbol]:
+    """Put what swings, the axes and the sensitivities into one state x, with ẋ = f."""
+    swing, rate = sym.column([d.q_u, d.dq_u]), sym.column([d.dq_u, d.ddq_u])
+    by_name = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
+    reached = sensitivities(rate, swing, by_name, desensitized, order)
+    layout = StateLayout(
+        n_u=len(plant.unactuated),
+        m=len(plant.actuated),
+        orders=len(axes.chain),
+        sensitivity_rows=tuple((s.parameters, row) for s in reached for row in s.rows),
+    )
+    x = sym.column([swing, *axes.chain, *(s.states for s in reached)])
+    f = sym.column([rate, *axes.chain[1:], axes.top, *(s.rates for s in reached)])
+    return layout, x, f

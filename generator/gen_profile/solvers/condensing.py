@@ -97,20 +97,30 @@ def interval_maps(
     numpy.linalg.LinAlgError
         The linearised equations are singular or not finite.
     """
+    rate, by_state, by_axes = _linearized(equations, parameters, axes(local), stages)
+    constant = (
+        rate
+        - np.einsum("ksab,ksb->ksa", by_state, stages)
+        + np.einsum("ksab,ksb->ksa", by_axes, axes.offset - axes(local))
+    )
+    return _eliminated(constant, by_state, by_axes @ axes.matrix, length * GAUSS.A)
+
+
+def _linearized(
+    equations: MotionEquations, parameters: Array, felt: Array, stages: Array
+) -> tuple[Array, Array, Array]:
+    """Evaluate ẏ and its derivatives by y and by the axes' motion, each (intervals, STAGES, n, …)."""
     intervals, _, n = stages.shape
-    felt = axes(local)
     values = equations.rate(stages.reshape(-1, n), felt.reshape(intervals * STAGES, -1), parameters)
     if not np.isfinite(values).all():
         raise np.linalg.LinAlgError("the equations of motion overflow")
     values = values.reshape(intervals, STAGES, n, -1)
-    rate, by_state, by_axes = values[..., 0], values[..., 1 : 1 + n], values[..., 1 + n :]
-    driven = by_axes @ axes.matrix
-    constant = (
-        rate
-        - np.einsum("ksab,ksb->ksa", by_state, stages)
-        + np.einsum("ksab,ksb->ksa", by_axes, axes.offset - felt)
-    )
-    integration = length * GAUSS.A
+    return values[..., 0], values[..., 1 : 1 + n], values[..., 1 + n :]
+
+
+def _eliminated(constant: Array, by_state: Array, driven: Array, integration: Array) -> IntervalMaps:
+    """Solve ``Y = y_k + h A (constant + by_state Y + driven ξ)`` for the stages Y of all intervals at once."""
+    intervals, _, n = constant.shape
     inner = np.einsum("ij,kjab->kiajb", -integration, by_state).reshape(intervals, STAGES * n, -1)
     diagonal = np.arange(STAGES * n)
     inner[:, diagonal, diagonal] += 1.0

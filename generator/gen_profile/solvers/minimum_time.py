@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import attrs
@@ -35,15 +36,36 @@ def shortest_duration(problem: Problem, solve: Callable[[Problem], Solution]) ->
         return solve(attrs.evolve(problem, duration=duration, sway_weight=0.0)).optimum is not None
 
     slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
-    period = 2.0 * 3.141592653589793 / float(slowest)
-    enough = period
-    while not feasible(enough):
-        enough *= STRIDE
-        if enough > LONGEST * period:
-            return None
-    short = enough / STRIDE
-    while feasible(short):
-        enough, short = short, short / STRIDE
+    period = 2.0 * math.pi / float(slowest)
+    return least(feasible, period, LONGEST * period)
+
+
+def least(feasible: Callable[[float], bool], guess: float, most: float) -> float | None:
+    """Bisect for the least duration that will do, where every longer one does.
+
+    Parameters
+    ----------
+    feasible : float → bool
+    guess : float
+        Roughly, in s.
+    most : float
+        Where to give up, in s.
+
+    Returns
+    -------
+    float or None
+        s; None where none up to `most` was found to do.
+    """
+    if feasible(guess):
+        enough, short = guess, guess / STRIDE
+        while feasible(short):
+            enough, short = short, short / STRIDE
+    else:
+        enough, short = STRIDE * guess, guess
+        while not feasible(enough):
+            enough, short = STRIDE * enough, enough
+            if enough > most:
+                return None
     while enough - short > PRECISION * enough:
         middle = (enough + short) / 2.0
         enough, short = (middle, short) if feasible(middle) else (enough, middle)

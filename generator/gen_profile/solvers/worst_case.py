@@ -52,11 +52,11 @@ def solve(problem: Problem) -> Solution:
     Solution
         Its `worst_case_bound` is what no motion on the same intervals goes below where angles are small.
     """
-    solution = _solve(problem)[0]
+    solution = _solve(problem)
     if solution.optimum is not None or problem.limits != LimitsSpec():
         return solution
     held = _held_back(problem)
-    return solution if held is None else attrs.evolve(_solve(held)[0], problem=problem)
+    return solution if held is None else attrs.evolve(_solve(held), problem=problem)
 
 
 def _held_back(problem: Problem) -> Problem | None:
@@ -73,19 +73,33 @@ def _held_back(problem: Problem) -> Problem | None:
 
 
 def solve_within_limits(problem: Problem) -> Solution:
-    """Minimise the worst residual sway, and call it infeasible where that still breaks a load's limit."""
-    solution, share = _solve(problem, most=1.0)
-    if share <= 1.0 or solution.optimum is None:
-        return solution
+    """Find any motion whose worst residual sway keeps every load's limit; the cost chooses among them.
+
+    Returns
+    -------
+    Solution
+        Infeasible where there is none.
+    """
+    worst_case, problem = _taken_apart(problem)
+    weights, iterations = resolve_weights(problem)
+    tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
+    for _ in range(ROUNDS):
+        setup, _ = set_up(problem, tried)
+        goal = LeastCost(setup=setup, weights=weights, sway_limit=problem.limits.sway, worst=1.0 - MARGIN)
+        found = sequence(setup, setup.transcription.rest(), goal)
+        iterations += found.iterations
+        solution = conclude(setup, found, weights, iterations)
+        if solution.optimum is None:
+            return solution
+        shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
+        if shares.max() <= 1.0:
+            return solution
+        tried = [*tried, everywhere[int(shares.argmax())]]
     return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
 
 
-def _solve(problem: Problem, most: float = float("inf")) -> tuple[Solution, float]:
-    """Solve, and find the worst share of a load's limit; give up where it must be more than `most`."""
-    worst_case = problem.worst_case
-    if worst_case is None:
-        raise ValueError("the problem has no worst case")
-    problem = attrs.evolve(problem, desensitized=())
+def _solve(problem: Problem) -> Solution:
+    worst_case, problem = _taken_apart(problem)
     weights, iterations = resolve_weights(problem)
     tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
     for _ in range(ROUNDS):
@@ -96,20 +110,25 @@ def _solve(problem: Problem, most: float = float("inf")) -> tuple[Solution, floa
             best = sequence(setup, setup.transcription.rest(), LeastWorst(setup=setup))
             iterations += best.iterations
             bound = float(best.solutions[0].x[-1])
-            if best.verdict is not Verdict.SOLVED or bound > most:
-                return conclude(setup, best, weights, iterations), float("inf")
+            if best.verdict is not Verdict.SOLVED:
+                return conclude(setup, best, weights, iterations)
             goal = attrs.evolve(goal, worst=SLACK * float(best.solutions[-1].x[-1]) + MARGIN)
             found = sequence(setup, best.iterate, goal)
         iterations += found.iterations
         solution = conclude(setup, found, weights, iterations)
         if solution.optimum is None:
-            return solution, float("inf")
+            return solution
         shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
         if goal.worst is not None and shares.max() <= WORSE * goal.worst:
             break
         tried = [*tried, everywhere[int(shares.argmax())]]
-    solution = attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
-    return solution, float(shares.max())
+    return attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
+
+
+def _taken_apart(problem: Problem) -> tuple[WorstCase, Problem]:
+    if problem.worst_case is None:
+        raise ValueError("the problem has no worst case")
+    return problem.worst_case, attrs.evolve(problem, desensitized=())
 
 
 def ends(problem: Problem, worst_case: WorstCase) -> list[Parameters]:

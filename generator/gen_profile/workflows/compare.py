@@ -6,13 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 import attrs
-import numpy as np
 
 from gen_profile.errors import GenProfileError, InfeasibleProblem
-from gen_profile.metrics import peak
 from gen_profile.spec import Spec
 from gen_profile.workflows.contenders import Contender, contenders
-from gen_profile.workflows.planning import RESIDUAL_SAMPLES, Trial, figures, try_motion
+from gen_profile.workflows.planning import Trial, figures, keeps_residual_sway, try_motion
 from gen_profile.workflows.recommendation import Recommendation, efficient, recommend
 
 Progress = Callable[[str], None]
@@ -120,13 +118,11 @@ def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
 
 def _row(spec: Spec, contender: Contender) -> Row:
     trial = try_motion(spec, contender.design())
-    duration, limits = trial.motion.duration, np.array(list(spec.check.residual_sway.values()))
-    after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
     return Row(
         method=contender.method,
         trial=trial,
         figures=figures(trial),
-        safe=all(bool((peak(response.sway) <= limits).all()) for response in after),
+        safe=keeps_residual_sway(spec, trial),
     )
 
 

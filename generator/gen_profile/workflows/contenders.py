@@ -74,15 +74,10 @@ def contenders(spec: Spec) -> Iterator[Contender]:
 
 
 def _other_robustness(spec: Spec) -> dict[str, Mapping[str, Any]]:
-    """Choose from `ROBUST` what the spec does not ask for anyway, and what does not take minutes."""
+    """Choose from `ROBUST` what the spec does not ask for anyway."""
     asked = spec.robustness
-    return {
-        kind: keys
-        for kind, keys in ROBUST.items()
-        if asked.uncertain
-        and attrs.evolve(asked, **keys) != asked
-        and not (kind == "range" and (asked.method == "range" or spec.move.shortest))
-    }
+    different = {kind: keys for kind, keys in ROBUST.items() if attrs.evolve(asked, **keys) != asked}
+    return different if asked.uncertain else {}
 
 
 def _optimal(spec: Spec) -> Profile:
