@@ -33,7 +33,6 @@ class Browser:
 
     def __init__(self, driver: webdriver.Chrome) -> None:
         self._driver = driver
-        self.errors: list[str] = []
 
     def open(self, page: Path, *, width: int = 1280, mobile: bool = False) -> None:
         """Load a page in a window of a width, and wait until it has drawn everything."""
@@ -62,6 +61,13 @@ class Browser:
     def complaints(self) -> list[str]:
         """What the console said since the last call: errors, warnings, what the page's policy refused."""
         return [entry["message"] for entry in self._driver.get_log("browser")]
+
+    @contextmanager
+    def on_paper(self) -> Iterator[None]:
+        """Lay the page out as for paper."""
+        self._driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+        yield
+        self._driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 
     def pdf(self) -> bytes:
         """Print the page."""

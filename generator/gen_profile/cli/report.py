@@ -28,6 +28,20 @@ from gen_profile.errors import CheckFailed
     default=("csv",),
     help="Format whose file is checked and told by its hash. Repeatable; csv by default.",
 )
+@click.option(
+    "--measured",
+    "log",
+    metavar="LOG.csv",
+    type=click.Path(path_type=Path),
+    help="What the machine really did: columns time_s, <axis>_position_mm, <load>_sway_mm, <load>_angle_deg.",
+)
+@click.option(
+    "--measured-start",
+    "log_start",
+    metavar="SECONDS",
+    type=float,
+    help="When the move begins in the log; found by itself by default.",
+)
 @click.option("--no-compare", is_flag=True, help="Leave other methods out, which takes less time.")
 @json_option
 @debug_option
@@ -37,6 +51,8 @@ def report(
     overrides: tuple[str, ...],
     path: Path | None,
     formats: tuple[str, ...],
+    log: Path | None,
+    log_start: float | None,
     no_compare: bool,
     as_json: bool,
 ) -> None:
@@ -49,10 +65,11 @@ def report(
     spec = chosen_spec(spec_path, preset, overrides)
     out = path or Path(f"{spec.name}.html")
     with progress() as tell:
-        made = run(spec, formats, compared=not no_compare, progress=tell)
+        made = run(spec, formats, log=log, log_start=log_start, compared=not no_compare, progress=tell)
         write_report(made.content, out)
     print_outcome(made.to_dict(out), words.report(made, out), as_json)
-    if not made.check.passed:
-        for sentence in made.check.reasons():
-            click.echo(f"Check failed: {sentence}", err=True)
+    faults = made.faults()
+    for sentence in faults:
+        click.echo(f"Check failed: {sentence}", err=True)
+    if faults:
         sys.exit(CheckFailed.exit_code)

@@ -15,7 +15,7 @@ from gen_profile.report.figures import rounded
 
 PLACE_DIGITS, SWING_DIGITS = 4, 6  # of the picture's size; a swing can be drawn larger than it is
 MARGIN = 0.06  # around a picture, of its size
-FLATTEST, NARROWEST = 0.3, 1.2  # height of a picture over its width
+FLATTEST, NARROWEST = 0.2, 1.2  # height of a picture over its width
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -57,7 +57,7 @@ class Drawing:
     shapes: Sequence[Shape]
 
 
-def stacked(*points: tuple[Array | float, Array | float], frames: int) -> Array:
+def stacked(*points: Array | Sequence[Array | float], frames: int) -> Array:
     """Put points, each a pair of coordinates over the frames, into one ``(frames, points, 2)`` array."""
     columns = [[np.broadcast_to(np.asarray(value, dtype=np.float64), frames) for value in p] for p in points]
     return np.moveaxis(np.array(columns), 2, 0)

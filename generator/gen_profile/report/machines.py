@@ -94,17 +94,20 @@ def _travel(positions: Array, beyond: float) -> tuple[float, float]:
 
 
 def _hanging(
-    title: str, pose: Pose, *, axis: Callable[[Pose], Array], columns: slice = slice(None)
+    title: str, pose: Pose, *, trolley: Callable[[Pose], tuple[Array, Array]], columns: slice = slice(None)
 ) -> Drawing:
     """Draw a trolley from the side, with loads on ropes below one another."""
     size = pose.size
-    left, right = _travel(axis(pose), 3.0 * size)
+    way = np.array(trolley(pose)).T
+    first, last = way[way[:, 0].argmin()], way[way[:, 0].argmax()]
+    along = last - first if last[0] > first[0] else np.array([1.0, 0.0])
+    beyond = 3.0 * size * along / np.linalg.norm(along)
 
     def points(pose: Pose) -> Array:
         sway, height = (values[columns] for values in pose.loads())
-        place = axis(pose)
-        loads = [(place - s, h) for s, h in zip(sway, height, strict=True)]
-        return stacked((left, 0.0), (right, 0.0), (place, 0.0), *loads, frames=len(place))
+        x, y = trolley(pose)
+        loads = [(x - s, y + h) for s, h in zip(sway, height, strict=True)]
+        return stacked(first - beyond, last + beyond, (x, y), *loads, frames=len(x))
 
     count = len(pose.plant.loads[columns])
     chain = range(2, 3 + count)
@@ -123,7 +126,12 @@ def _hanging(
 
 
 def _crane(pose: Pose) -> tuple[Drawing, ...]:
-    return (_hanging("from the side", pose, axis=lambda pose: pose.q_a[:, 0]),)
+    return (_hanging("from the side", pose, trolley=_level),)
+
+
+def _level(pose: Pose) -> tuple[Array, Array]:
+    """Move the trolley with the first axis along a level rail."""
+    return pose.q_a[:, 0], np.zeros(len(pose.q_a))
 
 
 def _gantry(pose: Pose) -> tuple[Drawing, ...]:
@@ -147,7 +155,7 @@ def _gantry(pose: Pose) -> tuple[Drawing, ...]:
         )
 
     return (
-        _hanging("from the side", pose, axis=lambda pose: pose.q_a[:, 0], columns=slice(0, 1)),
+        _hanging("from the side", pose, trolley=_level, columns=slice(0, 1)),
         _drawing(
             "from above",
             pose,
@@ -190,7 +198,12 @@ def _tower(pose: Pose) -> tuple[Drawing, ...]:
             Shape(kind="hook", points=[3], size=(0.8 * size, 0.8 * size)),
             Shape(kind="load", points=[4], size=(size, size)),
         ),
-        _hanging("along the jib", pose, axis=lambda pose: pose.q_a[:, 1], columns=slice(0, 1)),
+        _hanging(
+            "along the jib",
+            pose,
+            trolley=lambda pose: (pose.q_a[:, 1], np.zeros(len(pose.q_a))),
+            columns=slice(0, 1),
+        ),
     )
 
 
@@ -210,7 +223,7 @@ def _joint(pose: Pose) -> tuple[Drawing, ...]:
             above,
             Shape(kind="plumb", points=[0, 1]),
             Shape(kind="frame", points=[0, 1]),
-            Shape(kind="hook", points=[0], size=(0.15 * reach, 0.15 * reach)),
+            Shape(kind="hook", points=[0], size=(0.1 * reach, 0.1 * reach)),
             Shape(kind="load", points=[1], size=(BODY * reach, BODY * reach)),
         ),
     )
@@ -222,8 +235,8 @@ def _rail(pose: Pose) -> tuple[Drawing, ...]:
     count = len(pose.plant.loads)
     way = float(np.ptp(pose.q_a[:, 0])) if linear else 0.0
     most = float(np.abs(pose.loads()[0]).max())
-    apart = max(0.4 * way, 3.0 * most) / count
-    size = 0.2 * apart
+    apart = max(way, 3.0 * most) / count
+    size = 0.25 * apart
 
     def points(pose: Pose) -> Array:
         sway, _ = pose.loads()
@@ -290,15 +303,20 @@ def _from_outputs(pose: Pose) -> tuple[Drawing, ...]:
     _, height = pose.at_rest().loads()
     if not np.abs(height).max() > 0.0:
         return _rail(pose)
-    linear = pose.plant.actuated[0].unit == "m"
-    return (
-        _hanging(
-            "from the side",
-            pose,
-            axis=lambda pose: pose.q_a[:, 0] if linear else np.zeros(len(pose.q_a)),
-            columns=slice(0, len(pose.plant.loads) - pose.plant.directions + 1),
-        ),
-    )
+    columns = slice(0, len(pose.plant.loads) - pose.plant.directions + 1)
+    return (_hanging("from the side", pose, trolley=_suspension, columns=columns),)
+
+
+def _suspension(pose: Pose) -> tuple[Array, Array]:
+    """Find where the first load hangs from: above its place at rest, where the machine tells places."""
+    if not pose.plant.bodies:
+        turning = pose.plant.actuated[0].unit == "rad"
+        return (0.0 * pose.q_a[:, 0], 0.0 * pose.q_a[:, 0]) if turning else _level(pose)
+    rest = pose.at_rest()
+    x, _, z = rest.plant.mechanics(list(rest.q_u.T), list(rest.q_a.T), rest.p).place[0]
+    _, height = rest.loads()
+    places = stacked((x, z - height[0]), frames=len(rest.q_a))[:, 0]
+    return places[:, 0], places[:, 1]
 
 
 PICTURES: dict[str, Callable[[Pose], tuple[Drawing, ...]]] = {

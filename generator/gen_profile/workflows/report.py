@@ -19,6 +19,9 @@ from gen_profile.spec import Spec
 from gen_profile.workflows.compare import Comparison, compare
 from gen_profile.workflows.delivery import staged
 from gen_profile.workflows.design import LIBRARIES, Design, design
+from gen_profile.workflows.report_log import read_log
+from gen_profile.workflows.report_measured import Measured, compare_measured
+from gen_profile.workflows.report_measured_section import measured_verdict
 from gen_profile.workflows.report_sections import facts, sections, verdict
 from gen_profile.workflows.report_words import move, uncertain
 
@@ -34,18 +37,26 @@ class Report:
     design : Design
         Its artefacts were written and checked, and are gone; their hashes are what stays.
     comparison : Comparison or None
+    measured : Measured or None
     content : bytes
         The page.
     """
 
     design: Design
     comparison: Comparison | None
+    measured: Measured | None
     content: bytes
 
     @property
     def check(self) -> Check:
         """The verdict."""
         return _checked(self.design)
+
+    def faults(self) -> tuple[str, ...]:
+        """Say why the design, or the machine, does not do what it should; a sentence each."""
+        measured = () if self.measured is None else tuple(measured_verdict(self.measured).sentences)
+        exceeded = self.measured is not None and self.measured.passed is False
+        return (*self.check.reasons(), *(measured if exceeded else ()))
 
     def to_dict(self, path: Path) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -54,6 +65,7 @@ class Report:
             "spec_sha256": self.design.spec.sha256(),
             "figures": self.design.plan.figures,
             "check": self.check.to_dict(),
+            "measured": None if self.measured is None else self.measured.to_dict(),
             "report": {"path": str(path), "sha256": sha256(self.content), "bytes": len(self.content)},
         }
 
@@ -62,6 +74,8 @@ def report(
     spec: Spec,
     formats: Sequence[str],
     *,
+    log: Path | None = None,
+    log_start: float | None = None,
     compared: bool = True,
     progress: Progress = lambda _: None,
 ) -> Report:
@@ -72,6 +86,10 @@ def report(
     spec : Spec
     formats : sequence of str
         Whose artefacts are checked and told by their hashes.
+    log : Path, optional
+        What the machine really did, as a table; see `gen_profile.workflows.report_log`.
+    log_start : float, optional
+        When the move begins in it, in s; the start that fits best by default.
     compared : bool
         Whether other methods are tried as well.
     progress : callable
@@ -82,15 +100,17 @@ def report(
     GenProfileError
     """
     require_pages()
+    read = None if log is None else read_log(log, spec)
     with TemporaryDirectory(prefix="gen-profile-") as folder:
         outcome = design(spec, formats, Path(folder), keep_failed=True, progress=progress)
-    comparison = None
-    if compared:
-        progress("comparing")
-        comparison = compare(spec, progress)
+    arrival = _checked(outcome).arrival
+    measured = None
+    if read is not None:
+        measured = compare_measured(outcome.spec, outcome.plan.trial, read, arrival, log_start)
+    comparison = compare(spec, progress) if compared else None
     progress("writing the report")
-    page = _page(outcome, comparison)
-    return Report(design=outcome, comparison=comparison, content=render(page))
+    page = _page(outcome, comparison, measured)
+    return Report(design=outcome, comparison=comparison, measured=measured, content=render(page))
 
 
 def write_report(content: bytes, path: Path) -> None:
@@ -105,15 +125,15 @@ def write_report(content: bytes, path: Path) -> None:
         staging.deliver()
 
 
-def _page(outcome: Design, comparison: Comparison | None) -> Page:
+def _page(outcome: Design, comparison: Comparison | None, measured: Measured | None) -> Page:
     spec, check = outcome.spec, _checked(outcome)
     libraries = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
     return Page(
         title=spec.name,
         subtitle=f"{spec.machine().summary}: {move(spec)}; uncertain: {uncertain(spec)}",
-        verdicts=[verdict(check)],
+        verdicts=[verdict(check), *([] if measured is None else [measured_verdict(measured)])],
         facts=facts(spec, outcome.plan.trial, outcome.plan.figures, check),
-        sections=list(sections(outcome, check, comparison)),
+        sections=list(sections(outcome, check, comparison, measured)),
         colophon=f"Made by {libraries}.",
     )
 

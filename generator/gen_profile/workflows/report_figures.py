@@ -14,12 +14,12 @@ from gen_profile.report.figures import PALETTE, PLAIN, Band, Dash, Figure, Level
 from gen_profile.response import Response
 from gen_profile.spec import Spec
 from gen_profile.workflows.compare import Comparison, Row
-from gen_profile.workflows.comparison_plot import AFTERMATH, BEYOND, DECADES, spectrum
+from gen_profile.workflows.comparison_plot import BEYOND, DECADES, spectrum
 from gen_profile.workflows.planning import RESIDUAL_SAMPLES, Trial
 from gen_profile.workflows.report_words import machine
 
 SAMPLES = 800
-COMPARED = 400  # samples of each curve where there are many methods
+COMPARED = 500  # samples of each curve where there are many methods
 FREQUENCIES = 500
 TWINS = 7  # machines beside the nominal one whose sway is drawn
 NEAR = 2.5  # times a curve's peak within which a limit is drawn; beyond, it would flatten the curve
@@ -268,4 +268,4 @@ def _styles(comparison: Comparison) -> dict[str, Style]:
 
 def _until(row: Row) -> Array:
     duration = row.trial.motion.duration
-    return np.linspace(0.0, duration + min(AFTERMATH * duration, row.trial.watch), COMPARED)
+    return np.linspace(0.0, duration + row.trial.watch, COMPARED)

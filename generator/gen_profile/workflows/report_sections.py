@@ -22,6 +22,8 @@ from gen_profile.workflows.report_figures import (
     spectrum_figure,
     sway_figure,
 )
+from gen_profile.workflows.report_measured import Measured
+from gen_profile.workflows.report_measured_section import measured_section
 from gen_profile.workflows.report_words import bound, machine, mm, number
 
 UNITS_OF_TIME = ("s", "s²", "s³")
@@ -78,9 +80,13 @@ def facts(spec: Spec, trial: Trial, figures: Mapping[str, float], check: Check) 
     ]
 
 
-def sections(outcome: Design, check: Check, comparison: Comparison | None) -> Iterator[Section]:
+def sections(
+    outcome: Design, check: Check, comparison: Comparison | None, measured: Measured | None
+) -> Iterator[Section]:
     """Put the report in the order in which an engineer asks."""
     spec, trial = outcome.spec, outcome.plan.trial
+    if measured is not None:
+        yield measured_section(spec, trial, measured)
     yield Section(
         title="The machine plays the move",
         words=("All machines follow the same setpoints. Dashed: where the loads would be if nothing swung.",),

@@ -101,7 +101,11 @@
       const title = host.appendChild(document.createElement("h4"));
       title.append(actor.name);
       const value = title.appendChild(document.createElement("span"));
-      const pictures = animation.views.map((view, index) => picture(host, view, actor.views[index], actor.colour));
+      const pictures = animation.views.map((view, index) => {
+        const show = picture(host, view, actor.views[index], actor.colour);
+        if (animation.views.length > 1) host.appendChild(document.createElement("small")).append(view.title);
+        return show;
+      });
       return (frame, factor) => {
         const sway = actor.sway_mm[Math.round(frame)];
         value.textContent = `${animation.load} ${sway < 0 ? "−" : "+"}${Math.abs(sway).toFixed(2)} mm`;
@@ -117,8 +121,8 @@
     const actors = cast(find("stage"), animation);
     const moveCursor = strip(find("strip"), animation);
     let time = 0;
-    let last = null; // when the latest frame was shown; null while nothing plays
-    let request = 0;
+    let request = null; // of the next frame; null while nothing plays
+    let last = null; // when the latest frame was shown; null before the first one
 
     function show() {
       const frame = Math.min(time / animation.step, animation.frames - 1);
@@ -126,10 +130,10 @@
       moveCursor(time);
       slider.value = time;
       clock.textContent = `${time.toFixed(2)} s of ${duration.toFixed(1)} s${time >= animation.arrival ? ", arrived" : ""}`;
-      play.textContent = last === null ? "Play" : "Pause";
+      play.textContent = request === null ? "Play" : "Pause";
     }
     function tick(now) {
-      time = Math.min(time + (Number(speed.value) * (now - last)) / 1000, duration);
+      time = Math.min(time + (Number(speed.value) * (now - (last ?? now))) / 1000, duration);
       last = now;
       if (time >= duration) pause();
       else request = requestAnimationFrame(tick);
@@ -137,14 +141,13 @@
     }
     function pause() {
       cancelAnimationFrame(request);
-      last = null;
+      request = last = null;
     }
     play.addEventListener("click", () => {
-      if (last !== null) {
+      if (request !== null) {
         pause();
       } else {
         if (time >= duration) time = 0;
-        last = performance.now();
         request = requestAnimationFrame(tick);
       }
       show();

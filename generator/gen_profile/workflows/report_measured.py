@@ -1,0 +1,316 @@
+"""What the machine really did, beside what was planned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import trapezoid
+from scipy.optimize import minimize_scalar
+
+from gen_profile.errors import OutputError
+from gen_profile.problem.linearization import linearize
+from gen_profile.profile import Array
+from gen_profile.response import Response
+from gen_profile.spec import Spec
+from gen_profile.workflows.planning import Trial
+from gen_profile.workflows.report_log import MeasuredLog
+
+STARTS = 400  # starts of the move that are tried before the best is refined
+PERIODS = 1.0  # of the slowest mode that a log must hold after the arrival for a residual to be judged
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Signal:
+    """One measured quantity and the planned one at the same times.
+
+    Attributes
+    ----------
+    times : (samples,) array
+        s since the start of the move.
+    measured, planned : (samples,) arrays
+    unit : str
+        Theirs: ``"m"`` or ``"rad"``.
+    """
+
+    times: Array
+    measured: Array
+    planned: Array
+    unit: str
+
+    @property
+    def deviation(self) -> Array:
+        """How far the machine is from the plan, shape (samples,)."""
+        return np.asarray(self.measured - self.planned)
+
+    @property
+    def peak(self) -> float:
+        """Greatest deviation."""
+        return float(np.abs(self.deviation).max())
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the deviation over time."""
+        spans = self.times[-1] - self.times[0]
+        return float(np.sqrt(trapezoid(self.deviation**2, self.times) / spans))
+
+    def to_dict(self) -> dict[str, float]:
+        """Nest plain values for JSON."""
+        return {f"deviation_rms_{self.unit}": self.rms, f"deviation_peak_{self.unit}": self.peak}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class MeasuredSway:
+    """A load's sway, and what is left of it after the arrival.
+
+    Attributes
+    ----------
+    signal : Signal
+        Planned for the nominal machine.
+    residual : float or None
+        Greatest distance from its mean after the arrival, in m: a sensor's zero does not sway. None where the
+        log ends too soon.
+    limit : float
+        m.
+    from_angles : bool
+        Whether it was computed from the ropes' angles.
+    """
+
+    signal: Signal
+    residual: float | None
+    limit: float
+    from_angles: bool
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the load keeps its limit; None where that cannot be said."""
+        return None if self.residual is None else self.residual <= self.limit
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Measured:
+    """A log held against a trial.
+
+    Attributes
+    ----------
+    log : MeasuredLog
+    start : float
+        When the move begins in the log, in s.
+    arrival : float
+        When the axes shall stand still, in s since the start.
+    positions : mapping of str to Signal
+        By axis.
+    sways : mapping of str to MeasuredSway
+        By load.
+    angles : mapping of str to Signal
+        By load, of the nominal machine.
+    nearest : int or None
+        Which of the trial's machines swings most like it; None where no swing was logged.
+    """
+
+    log: MeasuredLog
+    start: float
+    arrival: float
+    positions: Mapping[str, Signal]
+    sways: Mapping[str, MeasuredSway]
+    angles: Mapping[str, Signal]
+    nearest: int | None
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether all loads that were measured keep their limits; None where none could be judged."""
+        verdicts = [sway.passed for sway in self.sways.values() if sway.passed is not None]
+        return all(verdicts) if verdicts else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "passed": self.passed,
+            "start_s": self.start,
+            "nearest": self.nearest,
+            "positions": {name: signal.to_dict() for name, signal in self.positions.items()},
+            "sways": {
+                name: {
+                    **sway.signal.to_dict(),
+                    "residual_m": sway.residual,
+                    "limit_m": sway.limit,
+                    "passed": sway.passed,
+                }
+                for name, sway in self.sways.items()
+            },
+            "angles": {name: signal.to_dict() for name, signal in self.angles.items()},
+        }
+
+
+def compare_measured(
+    spec: Spec, trial: Trial, log: MeasuredLog, arrival: float, start: float | None = None
+) -> Measured:
+    """Hold a log against the plan.
+
+    Parameters
+    ----------
+    spec : Spec
+    trial : Trial
+    log : MeasuredLog
+    arrival : float
+        When the axes stand still, in s since the start of the move.
+    start : float, optional
+        When the move begins in the log, in s; where not given, the start that fits best is taken.
+
+    Raises
+    ------
+    OutputError
+        The log does not hold the move.
+    """
+    start = _best_start(trial, log) if start is None else start
+    until = trial.motion.duration + trial.watch
+    kept = (log.times >= start) & (log.times <= start + until)
+    if kept.sum() < 2 or log.times[kept][-1] < start + trial.motion.duration:
+        raise OutputError(
+            f"--measured {log.source}: the log ends before the move that begins at {start:.4g} s in it does; "
+            "log on until the load is at rest, or state the start with --measured-start."
+        )
+    times = log.times[kept] - start
+    planned = trial.motion(times)
+    responses = trial.swing.at(times)
+    plant, loads = spec.machine(), list(spec.machine().loads)
+    sways = {name: (values[kept], False) for name, values in log.sways.items()}
+    for name, values in _sways_of_angles(spec, log, kept, planned.position).items():
+        sways.setdefault(name, (values, True))
+    return Measured(
+        log=log,
+        start=start,
+        arrival=arrival,
+        positions={
+            axis.name: Signal(
+                times=times,
+                measured=log.positions[axis.name][kept],
+                planned=planned.position[:, column],
+                unit=axis.unit,
+            )
+            for column, axis in enumerate(plant.actuated)
+            if axis.name in log.positions
+        },
+        sways={
+            name: _sway(
+                spec,
+                trial,
+                name,
+                Signal(
+                    times=times, measured=values, planned=responses[0].sway[:, loads.index(name)], unit="m"
+                ),
+                arrival=arrival,
+                from_angles=from_angles,
+            )
+            for name, (values, from_angles) in sways.items()
+        },
+        angles={
+            name: Signal(
+                times=times,
+                measured=values[kept],
+                planned=responses[0].angle[:, loads.index(name)],
+                unit="rad",
+            )
+            for name, values in log.angles.items()
+        },
+        nearest=_nearest(log, kept, responses, loads),
+    )
+
+
+def _nearest(
+    log: MeasuredLog, kept: NDArray[np.bool_], responses: Sequence[Response], loads: Sequence[str]
+) -> int | None:
+    """Find the machine whose swing is nearest to all that was logged, sensors' zeros aside."""
+    apart = np.zeros(len(responses))
+    for logged, kind in ((log.sways, "sway"), (log.angles, "angle")):
+        for name, values in logged.items():
+            planned = [getattr(response, kind)[:, loads.index(name)] for response in responses]
+            size = float(np.var(planned[0])) or 1.0
+            apart += [float(np.var(values[kept] - one)) / size for one in planned]
+    return int(np.argmin(apart)) if log.sways or log.angles else None
+
+
+def _sway(
+    spec: Spec,
+    trial: Trial,
+    load: str,
+    signal: Signal,
+    *,
+    arrival: float,
+    from_angles: bool,
+) -> MeasuredSway:
+    slowest = float(linearize(spec.machine(), trial.machines[0].parameters, spec.move.target).frequencies[0])
+    after = signal.times >= arrival
+    residual = None
+    if after.any() and signal.times[-1] - arrival >= PERIODS * 2.0 * np.pi / slowest:
+        left = signal.measured[after]
+        residual = float(np.abs(left - left.mean()).max())
+    return MeasuredSway(
+        signal=signal,
+        residual=residual,
+        limit=spec.check.residual_sway[load],
+        from_angles=from_angles,
+    )
+
+
+def _best_start(trial: Trial, log: MeasuredLog) -> float:
+    """Find when the move begins in a log: where a measured signal is nearest to the planned one.
+
+    An axis' position tells it best; the sway of a load where no axis that moves was logged.
+    """
+    plant, duration = trial.swing.plant, trial.motion.duration
+    ways = np.abs(trial.motion.target - trial.motion.start)
+    axes = [axis.name for axis in plant.actuated]
+    moving = [name for name in log.positions if ways[axes.index(name)] > 0.0]
+    grid = np.linspace(0.0, duration, 2001)
+    if moving:
+        signal = log.positions[moving[0]]
+        planned = trial.motion(grid).position[:, axes.index(moving[0])]
+    else:
+        name, signal = next(iter({**log.sways, **log.angles}.items()))
+        (nominal, *_) = trial.swing.at(grid)
+        seen = nominal.sway if name in log.sways else nominal.angle
+        planned = seen[:, plant.loads.index(name)]
+    times = log.times
+
+    def apart(start: float) -> float:
+        return float(np.mean((signal - np.interp(times - start, grid, planned)) ** 2))
+
+    first, last = float(times[0]) - 0.1 * duration, float(times[-1]) - 0.5 * duration
+    starts = np.linspace(first, max(last, first + duration), STARTS)
+    best = int(np.argmin([apart(start) for start in starts]))
+    step = starts[1] - starts[0]
+    return float(
+        minimize_scalar(
+            apart,
+            bounds=(starts[best] - step, starts[best] + step),
+            method="bounded",
+            options={"xatol": 1e-6},
+        ).x
+    )
+
+
+def _sways_of_angles(spec: Spec, log: MeasuredLog, kept: NDArray[np.bool_], q_a: Array) -> dict[str, Array]:
+    """Compute the sway of every load from the ropes' angles, where those tell all coordinates.
+
+    The angles are taken to be linear in the coordinates, as ropes' are.
+    """
+    plant = spec.machine()
+    p, n_u = SimpleNamespace(**spec.plant.parameters), len(plant.unactuated)
+    still = list(map(float, q_a[-1]))
+    rows = [plant.loads.index(name) for name in log.angles]
+    columns = [plant.outputs(list(unit), still, p).angle for unit in np.eye(n_u)]
+    gain = np.array(columns, dtype=np.float64).T[rows].reshape(-1, n_u)
+    if np.linalg.matrix_rank(gain) < n_u:
+        return {}
+    measured = np.stack([values[kept] for values in log.angles.values()])
+    q_u = np.linalg.lstsq(gain, measured, rcond=None)[0]
+    sways = plant.outputs(list(q_u), list(q_a.T), p).sway
+    return {
+        name: np.broadcast_to(np.asarray(sway, dtype=np.float64), len(q_a)).copy()
+        for name, sway in zip(plant.loads, sways, strict=True)
+    }

@@ -1,0 +1,153 @@
+"""A machine that was logged, simulated here by other equations, beside the plan."""
+
+import json
+
+import numpy as np
+import pytest
+from command_line import run_here
+from scipy.integrate import solve_ivp
+
+from gen_profile.spec_reading import preset_spec
+from gen_profile.workflows.planning import plan
+
+STEP = 0.01
+OFFSET, SENSOR = 1.234, 0.004  # s by which the log begins earlier; m by which a sensor's zero is off
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return preset_spec("paper")
+
+
+@pytest.fixture(scope="module")
+def motion(spec):
+    return plan(spec).trial.motion
+
+
+def swing(motion, p, until):
+    """Absolute angles of both ropes at multiples of STEP: Lagrange's equations in those coordinates."""
+
+    def rate(t, state):
+        a, b, da, db = state
+        y = motion.derivative(np.array([t]), 2)[0, 0]
+        mass = p["m1"] + p["m2"]
+        coupling = p["m2"] * p["L1"] * p["L2"] * np.cos(a - b)
+        M = [[mass * p["L1"] ** 2, coupling], [coupling, p["m2"] * p["L2"] ** 2]]
+        twist = p["m2"] * p["L1"] * p["L2"] * np.sin(a - b)
+        force = [
+            mass * p["L1"] * (y * np.cos(a) - p["g"] * np.sin(a)) - twist * db**2,
+            p["m2"] * p["L2"] * (y * np.cos(b) - p["g"] * np.sin(b)) + twist * da**2,
+        ]
+        return [da, db, *np.linalg.solve(M, force)]
+
+    times = np.arange(0.0, until, STEP)
+    solved = solve_ivp(rate, (0.0, until), [0.0] * 4, t_eval=times, rtol=1e-9, atol=1e-12, max_step=0.05)
+    return times, solved.y[0], solved.y[1]
+
+
+def log(path, motion, p, *, until=8.0, columns=("position", "payload", "angles")):
+    """Write what a machine with parameters p does, its clock and one sensor off."""
+    moving, first, second = swing(motion, p, until)
+    times = np.arange(0.0, until + OFFSET, STEP)
+    later = times - OFFSET
+    first, second = (np.interp(later, moving, angle) for angle in (first, second))
+    signals = {
+        "time_s": times,
+        "position": {"cart_position_mm": 1e3 * motion(later).position[:, 0]},
+        "payload": {"payload_sway_mm": 1e3 * (p["L1"] * np.sin(first) + p["L2"] * np.sin(second) + SENSOR)},
+        "angles": {"hook_angle_deg": np.degrees(first), "payload_angle_deg": np.degrees(second)},
+    }
+    table = {"time_s": signals["time_s"]} | {k: v for name in columns for k, v in signals[name].items()}
+    rows = np.array(list(table.values())).T
+    lines = [";".join(f"{value:.6f}".replace(".", ",") for value in row) for row in rows]
+    path.write_text("\n".join([";".join(table), *lines, ""]), "utf-8")
+    after = later >= motion.duration
+    return {
+        load: 1e3 * np.abs(sway[after] - sway[after].mean()).max()
+        for load, sway in {
+            "hook": p["L1"] * np.sin(first),
+            "payload": p["L1"] * np.sin(first) + p["L2"] * np.sin(second),
+        }.items()
+    }
+
+
+def report(tmp_path, *words):
+    out = tmp_path / "report.html"
+    outcome = run_here(
+        "report", "--no-compare", "--measured", tmp_path / "log.csv", "--out", out, "--json", *words
+    )
+    measured = json.loads(outcome.out)["measured"] if outcome.code in {0, 4} else None
+    return outcome, measured, out.read_text("utf-8") if out.exists() else ""
+
+
+@pytest.mark.parametrize(
+    "columns", [("position", "payload"), ("payload",), ("angles",), ("position", "angles")]
+)
+def test_the_start_is_found_and_the_residual_is_that_of_the_machine(tmp_path, spec, motion, columns):
+    p = {**spec.plant.parameters, "L1": 0.470 * 0.84}
+    truth = log(tmp_path / "log.csv", motion, p, columns=columns)
+    outcome, measured, page = report(tmp_path)
+    assert outcome.code == 0
+    known = "position" in columns  # otherwise it is where the sway fits best, which another rope's shifts
+    assert measured["start_s"] == pytest.approx(OFFSET, abs=1e-4 if known else 0.05)
+    assert measured["passed"] is True
+    loads = {"hook", "payload"} if "angles" in columns else {"payload"}
+    assert set(measured["sways"]) == loads
+    for load in loads:
+        found = 1e3 * measured["sways"][load]["residual_m"]
+        # angles were turned into sways with the rope's nominal length
+        assert found == pytest.approx(truth[load], rel=0.01 if columns[-1] == "payload" else 0.25)
+    assert "L1 −20\xa0% swings most like it." in page
+    assert "Measured: kept." in page
+
+
+def test_deviations_are_those_between_log_and_plan(tmp_path, spec, motion):
+    """A drive that lags by 20 ms is off by its velocity times that."""
+    times = np.arange(0.0, 8.0, STEP)
+    late = motion(times - 0.02).position[:, 0]
+    rows = "".join(f"{t:.3f},{x:.7f}\n" for t, x in zip(times, late, strict=True))
+    (tmp_path / "log.csv").write_text(f"time_s,position_m\n{rows}", "utf-8")
+    outcome, measured, page = report(tmp_path, "--measured-start", "0")
+    off = np.abs(late - motion(times).position[:, 0])
+    assert outcome.code == 0 and measured["start_s"] == 0.0
+    assert measured["positions"]["cart"]["deviation_peak_m"] == pytest.approx(off.max(), rel=1e-3)
+    assert measured["positions"]["cart"]["deviation_rms_m"] == pytest.approx(
+        np.sqrt(np.mean(off[times <= 7.0] ** 2)), rel=1e-2
+    )
+    assert measured["passed"] is None and "Measured, not judged." in page
+
+
+def test_a_machine_that_swings_too_much_fails(tmp_path, spec, motion):
+    p = {**spec.plant.parameters, "L1": 0.470 * 0.6}
+    truth = log(tmp_path / "log.csv", motion, p)
+    assert max(truth.values()) > 3.0
+    outcome, measured, page = report(tmp_path)
+    assert outcome.code == 4
+    assert measured["passed"] is False and "Measured: exceeded." in page
+    assert outcome.errors[0].startswith("Check failed: On the machine the ")
+
+
+def test_a_log_that_ends_at_the_arrival_is_drawn_and_not_judged(tmp_path, spec, motion):
+    log(tmp_path / "log.csv", motion, dict(spec.plant.parameters), until=3.5, columns=("position", "payload"))
+    outcome, measured, page = report(tmp_path)
+    assert outcome.code == 0 and measured["passed"] is None
+    assert measured["sways"]["payload"]["residual_m"] is None
+    assert "for as long as one slow swing after the arrival" in page
+
+
+def test_a_log_without_the_move_is_refused(tmp_path, spec, motion):
+    log(tmp_path / "log.csv", motion, dict(spec.plant.parameters), until=8.0)
+    outcome, _, page = report(tmp_path, "--measured-start", "7")
+    assert (outcome.code, page) == (2, "")
+    assert "log on until the load is at rest" in outcome.errors[-1]
+
+
+def test_angles_that_do_not_tell_all_coordinates_are_compared_only(tmp_path, spec, motion):
+    """One rope's angle says nothing about the other's."""
+    log(tmp_path / "log.csv", motion, dict(spec.plant.parameters), columns=("position", "angles"))
+    text = (tmp_path / "log.csv").read_text("utf-8").replace("payload_angle_deg", "temperature")
+    (tmp_path / "log.csv").write_text(text, "utf-8")
+    outcome, measured, page = report(tmp_path)
+    assert outcome.code == 0 and measured["sways"] == {} and set(measured["angles"]) == {"hook"}
+    assert measured["angles"]["hook"]["deviation_peak_rad"] < 1e-4
+    assert "Columns that were left alone: temperature." in page

@@ -1,0 +1,115 @@
+"""Logs of real moves: what is read of them, and what is refused."""
+
+import numpy as np
+import pytest
+from command_line import run_here
+
+from gen_profile.errors import OutputError
+from gen_profile.spec_reading import preset_spec
+from gen_profile.workflows.report_log import parse_log, read_log
+
+TIMES = [0.02 * k for k in range(20)]
+MILLIMETRES = ("axis.unit=mm", "axis.sign=-1")
+
+
+def table(head, *columns, separator=",", decimal="."):
+    rows = [[f"{value:.6f}".replace(".", decimal) for value in row] for row in zip(*columns, strict=True)]
+    return "\n".join([separator.join(head), *(separator.join(row) for row in rows), ""])
+
+
+def paper(*overrides):
+    return preset_spec("paper", overrides)
+
+
+@pytest.mark.parametrize("separator, decimal", [(",", "."), (";", "."), (";", ","), ("\t", ","), ("\t", ".")])
+def test_columns_are_told_by_their_names_and_units(separator, decimal):
+    head = ["time_s", "cart_position_mm", "payload sway [mm]", "hook_angle_deg", "hook_sway"]
+    columns = (TIMES, [10.0 * t for t in TIMES], [2.0] * 20, [90.0] * 20, [0.003] * 20)
+    log = parse_log(table(head, *columns, separator=separator, decimal=decimal), "log.csv", paper())
+    np.testing.assert_allclose(log.times, TIMES)
+    np.testing.assert_allclose(log.positions["cart"], 1e-2 * np.array(TIMES))
+    np.testing.assert_allclose(log.sways["payload"], 2e-3)
+    np.testing.assert_allclose(log.sways["hook"], 3e-3)
+    np.testing.assert_allclose(log.angles["hook"], np.pi / 2.0)
+    assert (list(log.positions), list(log.angles), log.ignored) == (["cart"], ["hook"], ())
+
+
+def test_names_may_be_left_out_where_one_axis_and_the_end_load_are_meant():
+    log = parse_log(table(["time", "Position", "SWAY (mm)"], TIMES, TIMES, TIMES), "log.csv", paper())
+    np.testing.assert_allclose(log.positions["cart"], TIMES)
+    np.testing.assert_allclose(log.sways["payload"], 1e-3 * np.array(TIMES))
+
+
+def test_an_axis_counts_as_the_spec_says():
+    text = table(["time_ms", "position", "sway"], [1e3 * t for t in TIMES], [300.0] * 20, TIMES)
+    log = parse_log(text, "log.csv", paper(*MILLIMETRES))
+    np.testing.assert_allclose(log.times, TIMES)
+    np.testing.assert_allclose(log.positions["cart"], -0.3)
+    counted = table(["time", "position_counts"], TIMES, [1000.0] * 20)
+    np.testing.assert_allclose(parse_log(counted, "log.csv", paper(*MILLIMETRES)).positions["cart"], -1e-3)
+    metres = table(["time", "position_m"], TIMES, [0.1] * 20)
+    np.testing.assert_allclose(parse_log(metres, "log.csv", paper(*MILLIMETRES)).positions["cart"], -0.1)
+
+
+def test_an_angle_s_axis_may_be_logged_in_degrees():
+    text = table(["time", "slew_position_deg", "trolley_position"], TIMES, [180.0] * 20, [5000.0] * 20)
+    log = parse_log(text, "log.csv", preset_spec("tower-crane", ["axis.trolley.unit=mm"]))
+    np.testing.assert_allclose(log.positions["slew"], np.pi)
+    np.testing.assert_allclose(log.positions["trolley"], 5.0)
+
+
+def test_other_columns_are_left_alone_and_named():
+    text = table(["time", "sway", "torque", "crab_sway_mm", "position_per_s"], *[TIMES] * 5)
+    assert parse_log(text, "log.csv", paper()).ignored == ("torque", "crab_sway_mm", "position_per_s")
+
+
+def test_the_exported_table_is_such_a_log(tmp_path):
+    assert run_here("--preset", "paper", "--out", tmp_path, "--no-check").code == 0
+    log = read_log(tmp_path / "paper.csv", paper())
+    assert log.positions["cart"][[0, -1]] == pytest.approx([0.0, 0.3], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text, complaint",
+    [
+        ("", "the log is empty"),
+        (table(["position", "sway"], TIMES, TIMES), "there is no column time_s; found position, sway"),
+        (table(["time_s", "velocity"], TIMES, TIMES), "there is no column of this machine (cart_position, "),
+        (
+            table(["time_s", "sway_deg"], TIMES, TIMES),
+            "column 'sway_deg' is in deg, which does not measure it",
+        ),
+        (table(["time_s", "sway_s"], TIMES, TIMES), "column 'sway_s' is in s, which does not measure it"),
+        (table(["time_s", "sway", "sway"], *[TIMES] * 3), "two columns are called 'sway'"),
+        (
+            table(["time_s", "sway_m", "payload_sway_mm"], *[TIMES] * 3),
+            "column 'sway_m' is there twice, in two units",
+        ),
+        (table(["time_s", "sway"], TIMES[:5], TIMES[:5]), "needs at least 16 samples, found 5"),
+        (table(["time_s", "sway"], TIMES[::-1], TIMES), "the times must rise"),
+        (table(["time_s", "sway"], TIMES, TIMES) + "0.5,x\n", "row 22: sway holds 'x', which is no number"),
+        (table(["time_s", "sway"], TIMES, TIMES) + "0.5\n", "row 22: sway holds '', which is no number"),
+        (table(["time_s", "sway"], TIMES, TIMES) + "0.5,nan\n", "row 22: sway holds 'nan'"),
+        ("time_s,sway\n0,0,5\n" * 9, "row 3: time_s holds 'time_s'"),
+    ],
+)
+def test_what_is_no_such_table_is_refused_with_a_sentence(text, complaint):
+    with pytest.raises(OutputError) as raised:
+        parse_log(text, "log.csv", paper())
+    message = str(raised.value)
+    assert message.startswith("--measured log.csv") and complaint in message and message.endswith(".")
+
+
+@pytest.mark.parametrize("content", [b"time_s,sway\n\xff\xfe,1\n", None])
+def test_a_file_that_cannot_be_read_is_refused_with_a_sentence(tmp_path, content):
+    if content is not None:
+        (tmp_path / "log.csv").write_bytes(content)
+    with pytest.raises(OutputError, match=r"--measured: cannot read .*log\.csv: "):
+        read_log(tmp_path / "log.csv", paper())
+
+
+def test_a_huge_file_is_refused_unread(tmp_path, monkeypatch):
+    monkeypatch.setattr("gen_profile.workflows.report_log.MOST_BYTES", 10)
+    (tmp_path / "log.csv").write_text("time_s,sway\n0,0\n", "utf-8")
+    with pytest.raises(OutputError, match="cut the move out of it"):
+        read_log(tmp_path / "log.csv", paper())
