@@ -21,11 +21,11 @@ from gen_profile.workflows.sweep_grid import parse_grid
 from gen_profile.workflows.sweep_plan import prepare
 
 AXES = ("--vary", "move.distance=0.1,0.3,1e6", "--vary", "plant.L1=0.4:0.5:4")
-QUICK = ("--preset", "paper-beta0", "--set", "export.cycle_time=0.01")
+QUICK = ("--preset", "paper", "--set", "export.cycle_time=0.01")
 
 
 def prepared(folder, *axes, overrides=(), formats=("csv",)):
-    text = (preset_text("paper-beta0"), "paper-beta0", folder)
+    text = (preset_text("paper"), "paper", folder)
     return prepare(text, ("export.cycle_time=0.01", *overrides), parse_grid(axes), formats, folder)
 
 
@@ -55,7 +55,7 @@ def test_has_a_row_for_every_combination(table):
 def test_a_row_is_what_a_design_of_its_own_finds(table, tmp_path):
     row = table[6]
     overrides = ("export.cycle_time=0.01", "move.distance=0.3", f"plant.L1={row['plant.L1']}")
-    own = design(preset_spec("paper-beta0", overrides), ["csv"], tmp_path)
+    own = design(preset_spec("paper", overrides), ["csv"], tmp_path)
     assert own.passed and row["status"] == "passed"
     assert row["spec_sha256"] == own.spec.sha256()
     for name, value in own.plan.figures.items():
@@ -108,6 +108,27 @@ def test_any_number_of_processes_finds_the_same_table(swept, tmp_path):
     alone = run_here("sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "1")
     assert alone.code == 0
     assert (tmp_path / "sweep.parquet").read_bytes() == (swept[0] / "sweep.parquet").read_bytes()
+
+
+def test_a_neighbour_s_solution_is_where_the_search_begins(table, tmp_path):
+    cold = [
+        design(
+            preset_spec(
+                "paper", ("export.cycle_time=0.01", "move.distance=0.3", f"plant.L1={row['plant.L1']}")
+            ),
+            ["csv"],
+            tmp_path,
+        ).plan.solution
+        for row in table[4:8]
+    ]
+    assert table[4]["solver_iterations"] == cold[0].iterations
+    for row, solution in zip(table[5:8], cold[1:], strict=True):
+        assert row["solver_iterations"] < solution.iterations
+        assert row["solver_cost"] == pytest.approx(solution.optimum.cost, rel=1e-7)
+
+
+def test_leaves_nothing_behind_but_the_sweep(swept):
+    assert {path.name for path in swept[0].iterdir()} == {"sweep.json", "sweep.parquet", "cases", ".lock"}
 
 
 def test_nothing_tells_of_a_clock_or_a_folder(swept):

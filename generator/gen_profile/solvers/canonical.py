@@ -54,6 +54,14 @@ class Canonical:
         """Turn ζ into states and costates as `system` knows them, shape (points, 2 n)."""
         return points @ self._transform.T
 
+    def dimensionless(self, solution: Trajectory) -> Trajectory:
+        """Turn ζ into states and costates along a solution."""
+        return solution.transformed(self._transform)
+
+    def modal(self, solution: Trajectory) -> Trajectory:
+        """Turn states and costates into ζ."""
+        return solution.transformed(self._inverse_transform)
+
     def flow(self, points: Array) -> Array:
         """Evaluate ζ' and beside it its Jacobian, shape (points, 2 n, 1 + 2 n).
 

@@ -10,6 +10,7 @@ from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers import direct, indirect, worst_case
+from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.direct import sway_on_the_way
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
@@ -19,7 +20,7 @@ from gen_profile.spec import LimitsSpec, SolverName
 COMFORT = 1.01  # of the shortest duration, in which there is but one motion
 
 
-def solve(problem: Problem, method: SolverName = "auto") -> Solution:
+def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
     """Solve a problem by the method that suits it.
 
     Parameters
@@ -27,12 +28,14 @@ def solve(problem: Problem, method: SolverName = "auto") -> Solution:
     problem : Problem
     method : str
         ``"indirect"`` knows no limits; ``"auto"`` takes it where none binds, and the direct method elsewhere.
+    near : Trajectory, optional
+        Of the solution of a similar problem: the indirect method begins there.
     """
     if problem.worst_case is not None:
         return _explained(worst_case.solve(problem))
     if method == "direct":
         return _explained(direct.solve(problem))
-    solution = indirect.solve(problem)
+    solution = indirect.solve(problem, near)
     if method == "indirect" or keeps_limits(solution):
         return solution
     other = direct.solve(problem)

@@ -104,6 +104,10 @@ class Trajectory:
         """Multiply every unknown by its factor."""
         return Trajectory(mesh=self.mesh, nodes=self.nodes * factors, stages=self.stages * factors)
 
+    def transformed(self, matrix: Array) -> Trajectory:
+        """Multiply the unknowns by a matrix."""
+        return Trajectory(mesh=self.mesh, nodes=self.nodes @ matrix.T, stages=self.stages @ matrix.T)
+
     @property
     def size(self) -> int:
         """Number of unknown functions."""

@@ -19,6 +19,7 @@ from gen_profile.profile import Array
 from gen_profile.solvers.canonical import Canonical, canonical_problem, independence
 from gen_profile.solvers.collocation import GAUSS, INTERPOLATION, STAGES, Trajectory, stage_times
 from gen_profile.solvers.continuation import Advance, advance
+from gen_profile.solvers.newton import solve_newton
 from gen_profile.solvers.refinement import defect, refine
 from gen_profile.solvers.solution import Optimum, Solution, Status
 
@@ -33,8 +34,14 @@ MODERATE_ANGLE = np.pi / 4.0  # that a cure aims at
 SMALL_ANGLE = np.radians(50.0)  # of the linear model; from there on nonlinearity is blamed where Newton fails
 
 
-def solve(problem: Problem) -> Solution:
+def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
     """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
+
+    Parameters
+    ----------
+    problem : Problem
+    near : Trajectory, optional
+        Of the solution of a similar problem, to begin at.
 
     Returns
     -------
@@ -51,12 +58,12 @@ def solve(problem: Problem) -> Solution:
     asked, redundant = independence(quiet)
     if redundant:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
-        solution = solve(attrs.evolve(problem, desensitized=kept))
+        solution = solve(attrs.evolve(problem, desensitized=kept), near)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
-    return _solve(problem, attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan)))
+    return _solve(problem, attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan)), near)
 
 
-def _solve(problem: Problem, quiet: Canonical) -> Solution:
+def _solve(problem: Problem, quiet: Canonical, near: Trajectory | None) -> Solution:
     """Follow the solution from the linear model's to that with the β asked for."""
     try:
         guess = _guess(quiet)
@@ -71,7 +78,7 @@ def _solve(problem: Problem, quiet: Canonical) -> Solution:
         return _too_hard(problem, approach.iterations, linear_angle)
     quiet, guess = quiet.rescaled(approach.solution)
     weighted = _with_sway_cost(problem, quiet, guess)
-    climb = advance(lambda share: _lighter(weighted, share), guess)
+    climb = _beside(weighted, guess, near) or advance(lambda share: _lighter(weighted, share), guess)
     climb = attrs.evolve(climb, iterations=approach.iterations + climb.iterations)
     if climb.reached < 1.0 and linear_angle < SMALL_ANGLE:
         return _too_heavy(problem, climb.iterations, climb.reached)
@@ -99,6 +106,19 @@ def _resolved(problem: Problem, weighted: Canonical, climb: Advance, linear_angl
         optimum=optimum,
         iterations=iterations,
         residual=refined.residual or climb.residual,
+        trajectory=weighted.dimensionless(best),
+    )
+
+
+def _beside(weighted: Canonical, guess: Trajectory, near: Trajectory | None) -> Advance | None:
+    """Find the solution from that of a similar problem, if that lies near enough."""
+    if near is None or near.size != guess.size or weighted.data.beta == 0.0:
+        return None
+    outcome = solve_newton(weighted, weighted.modal(near.on(guess.mesh)))
+    if outcome.solution is None:
+        return None
+    return Advance(
+        solution=outcome.solution, reached=1.0, iterations=outcome.iterations, residual=outcome.residual
     )
 
 

@@ -15,6 +15,7 @@ from gen_profile.check import Check
 from gen_profile.errors import OutputError
 from gen_profile.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256
 from gen_profile.profile import Profile, SampledProfile
+from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec import Spec
 from gen_profile.workflows.delivery import Staging, staged
 from gen_profile.workflows.foreign_check import judge_foreign
@@ -110,6 +111,7 @@ def design(
     *,
     check: bool = True,
     keep_failed: bool = False,
+    near: Trajectory | None = None,
     progress: Progress = lambda _: None,
 ) -> Design:
     """Solve, export, replay what was written, co-simulate, and deliver what passes.
@@ -125,6 +127,8 @@ def design(
         Without it the manifest says ``"unverified"``.
     keep_failed : bool
         Deliver even what failed, marked so in the manifest.
+    near : Trajectory, optional
+        Of a similar design's solution, to begin at.
     progress : callable
         Told what is being done.
 
@@ -137,7 +141,7 @@ def design(
     require_end(exporters, stops=spec.move.stops)
     progress("solving")
     spec = timed(spec)
-    planned = plan(spec)
+    planned = plan(spec, near)
     with staged(folder) as staging:
         progress("exporting")
         artefacts, replayed = _export(spec, planned.trial.command, exporters, staging)

@@ -114,6 +114,7 @@ def sweep(
         if chains:
             _work(store, chains, scheduler, workers, progress)
         table = write_table(store.folder, grid, _counted(store.records(), statuses, reasons))
+        store.tidy()
     return Sweep(
         store=store,
         statuses=dict(statuses),
@@ -151,8 +152,10 @@ def _work(
         completed = as_completed(loop=client.loop)
 
         def begin(chain: Sequence[int]) -> None:
-            future = client.submit(run_case, store.recipe, chain[0], store.grid[chain[0]], pure=False)
-            running[future] = (chain[0], chain[1:])
+            case = chain[0]
+            start = store.start(case)
+            future = client.submit(run_case, store.recipe, case, store.grid[case], start, pure=False)
+            running[future] = (case, chain[1:])
             completed.add(future)
 
         for chain in islice(waiting, CHAINS_AHEAD * _processes(client)):
@@ -160,7 +163,7 @@ def _work(
         for future in completed:
             case, rest = running.pop(future)
             outcome = _outcome(future, case, store.grid[case])
-            store.keep(case, outcome)
+            store.keep(case, outcome, followed=bool(rest))
             done, failures = done + 1, failures + (not outcome.passed)
             progress(Progress(done=done, failed=failures, total=total))
             following = rest or next(waiting, ())

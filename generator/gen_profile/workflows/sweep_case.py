@@ -10,11 +10,13 @@ import threading
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import attrs
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from gen_profile.errors import (
@@ -27,12 +29,14 @@ from gen_profile.errors import (
     SolverDiverged,
     SpecError,
 )
+from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import parse_spec
 from gen_profile.workflows.design import LIBRARIES, Design, design
 from gen_profile.workflows.sweep_grid import overrides
 
 _ALONE = threading.Lock()  # FMUs are no guests for threads, and a Dask worker may have several
+TRAJECTORY = tuple(field.name for field in attrs.fields(Trajectory))
 PASSED, CHECK_FAILED, CRASHED = "passed", "check failed", "crashed"
 STATUSES: dict[type[GenProfileError], str] = {
     SpecError: "faulty spec",
@@ -91,10 +95,13 @@ class Outcome:
         Plain values: the case's row of the table. It tells of no clock and no computer.
     files : dict of str to bytes
         Artefacts with their manifest; none where the case failed.
+    start : bytes or None
+        Where the search for the next case's solution may begin, if there is such a place.
     """
 
     record: dict[str, Any]
     files: dict[str, bytes]
+    start: bytes | None = None
 
     @property
     def passed(self) -> bool:
@@ -108,8 +115,17 @@ def versions() -> tuple[tuple[str, str], ...]:
     return tuple((library, version(library)) for library in LIBRARIES)
 
 
-def run_case(recipe: Recipe, case: int, values: Mapping[str, Any]) -> Outcome:
+def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes | None = None) -> Outcome:
     """Design, export and check one case; whatever is wrong with it becomes its record.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    case : int
+    values : mapping
+        Of the keys varied.
+    start : bytes, optional
+        Of the outcome of a neighbour.
 
     Raises
     ------
@@ -125,9 +141,10 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any]) -> Outcome:
         )
     try:
         with _ALONE, TemporaryDirectory(prefix="gen-profile-") as folder, threadpool_limits(1):
-            outcome = design(recipe.spec(values), recipe.formats, Path(folder))
+            near = None if start is None else _unpacked(start)
+            outcome = design(recipe.spec(values), recipe.formats, Path(folder), near=near)
             files = {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
-        return Outcome(record=_record(case, values, outcome), files=files)
+        return Outcome(record=_record(case, values, outcome), files=files, start=_packed(outcome))
     except OutputError:
         raise
     except GenProfileError as error:
@@ -172,6 +189,21 @@ def _record(case: int, values: Mapping[str, Any], outcome: Design) -> dict[str, 
         },
         "artefacts": [attrs.asdict(artefact) for artefact in outcome.artefacts],
     }
+
+
+def _packed(outcome: Design) -> bytes | None:
+    """Write down where the search for a neighbour's solution may begin."""
+    solution = outcome.plan.solution
+    if solution is None or solution.trajectory is None:
+        return None
+    buffer = BytesIO()
+    np.savez(buffer, **{name: getattr(solution.trajectory, name) for name in TRAJECTORY})
+    return buffer.getvalue()
+
+
+def _unpacked(start: bytes) -> Trajectory:
+    with np.load(BytesIO(start)) as arrays:
+        return Trajectory(**{name: arrays[name] for name in TRAJECTORY})
 
 
 def _listed(installed: tuple[tuple[str, str], ...]) -> str:

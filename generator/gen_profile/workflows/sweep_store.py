@@ -5,6 +5,7 @@
     sweep.json               what is varied, from which spec, with which versions
     sweep.parquet            one row per case, once all are finished
     cases/0000/017/          case 17: its artefacts with their manifest, and case.json, its row
+    .starts/17.npz           where the search for the solution of case 18 begins, as long as that is wanted
     .lock                    held by the one who sweeps
 
 A case is finished when its ``case.json`` is there, which is the last of its files to appear, whole.
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,7 +30,8 @@ from gen_profile.workflows.sweep_case import Outcome, Recipe
 from gen_profile.workflows.sweep_grid import Axis, Grid
 
 FORMAT, FORMAT_VERSION = "gen-profile sweep", 1
-DESCRIPTION, RECORD, TABLE, CASES, LOCK = "sweep.json", "case.json", "sweep.parquet", "cases", ".lock"
+DESCRIPTION, RECORD, TABLE, CASES = "sweep.json", "case.json", "sweep.parquet", "cases"
+STARTS, LOCK = ".starts", ".lock"
 PER_FOLDER = 1000
 
 
@@ -61,23 +64,43 @@ class Store:
         """Whether a case's record is there."""
         return (self.case_folder(case) / RECORD).is_file()
 
-    def keep(self, case: int, outcome: Outcome) -> None:
-        """Write a finished case.
+    def start(self, case: int) -> bytes | None:
+        """Find what a case's neighbour left for it to begin at."""
+        path = self._start_path(case - 1)
+        return path.read_bytes() if path.is_file() else None
+
+    def keep(self, case: int, outcome: Outcome, *, followed: bool) -> None:
+        """Write a finished case, and what the next one begins at if one follows.
+
+        That comes first and goes last: whenever this is interrupted, the case that is to come finds it.
 
         Raises
         ------
         OutputError
         """
+        if followed and outcome.start is not None:
+            path = self._start_path(case)
+            with staged(path.parent) as staging:
+                staging.write(path.name, outcome.start)
+                staging.deliver()
         with staged(self.case_folder(case)) as staging:
             for name, content in outcome.files.items():
                 staging.write(name, content)
             staging.write(RECORD, _json(outcome.record))
             staging.deliver()
+        self._start_path(case - 1).unlink(missing_ok=True)
+
+    def tidy(self) -> None:
+        """Remove what nobody needs once all cases are finished."""
+        shutil.rmtree(self.folder / STARTS, ignore_errors=True)
 
     def records(self) -> Iterator[dict[str, Any]]:
         """Read the records of all cases, which must be finished, in their order."""
         for case in range(len(self.grid)):
             yield json.loads((self.case_folder(case) / RECORD).read_bytes())
+
+    def _start_path(self, case: int) -> Path:
+        return self.folder / STARTS / f"{case}.npz"
 
     def describe(self) -> dict[str, Any]:
         """Nest plain values for ``sweep.json``: equal sweeps have equal ones, wherever their spec lies."""
