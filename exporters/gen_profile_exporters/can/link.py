@@ -7,7 +7,7 @@ which they came. That also makes it run on a clock that a test holds.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import can
 import canopen
@@ -22,6 +22,15 @@ ANSWER_TIMEOUT = NANOSECONDS // 2
 FRAMES_AT_ONCE = 64  # a flooded bus must keep nobody from looking at the clock
 
 
+@runtime_checkable
+class Launching(Protocol):
+    """A bus that sends frames at given instants by itself."""
+
+    def send_at(self, message: can.Message, instant: int) -> None:
+        """Have a frame sent at an instant of the clock, in ns."""
+        ...
+
+
 class Link:
     """A bus with a clock.
 
@@ -30,11 +39,17 @@ class Link:
     bus : can.BusABC
         Opened; it stays the caller's.
     clock : Clock
+
+    Attributes
+    ----------
+    launching : Launching or None
+        The bus, if it sends at given instants.
     """
 
     def __init__(self, bus: can.BusABC, clock: Clock) -> None:
         self.bus = bus
         self.clock = clock
+        self.launching = bus if isinstance(bus, Launching) else None
         self._takers: list[Callable[[can.Message], None]] = []
         self._network: Any = canopen.Network(bus)
         self._sdos: dict[int, _Sdo] = {}
@@ -43,15 +58,18 @@ class Link:
         """Hand every frame received from now on to `take`."""
         self._takers.append(take)
 
-    def send(self, message: can.Message) -> None:
-        """Send one frame, or say why not.
+    def send(self, message: can.Message, instant: int | None = None) -> None:
+        """Send one frame now, or have it sent at an instant if the bus can, or say why not.
 
         Raises
         ------
         StreamAborted
         """
         try:
-            self.bus.send(message)
+            if self.launching is not None and instant is not None:
+                self.launching.send_at(message, instant)
+            else:
+                self.bus.send(message)
         except (can.CanError, OSError) as error:
             raise StreamAborted(
                 f"Frame {message.arbitration_id:03X}h cannot be sent ({error}): the transmit buffer is full "

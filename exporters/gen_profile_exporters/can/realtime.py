@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 PRIORITY = 80  # SCHED_FIFO; above most interrupt threads, below what keeps the machine alive
+PEER_PRIORITY = 70  # of simulated drives: behind the streamer, before everything that can wait
 _LOCK_CURRENT_AND_FUTURE = 3  # MCL_CURRENT | MCL_FUTURE
 
 
@@ -21,7 +22,7 @@ def real_time() -> Iterator[tuple[str, ...]]:
     tuple of str
         What was refused, a sentence each.
     """
-    refused = (*_take_priority(), *_lock_memory())
+    refused = (*take_priority(PRIORITY), *_lock_memory())
     gc.collect()
     gc.freeze()
     collecting = gc.isenabled()
@@ -37,9 +38,10 @@ def real_time() -> Iterator[tuple[str, ...]]:
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
-def _take_priority() -> tuple[str, ...]:
+def take_priority(priority: int) -> tuple[str, ...]:
+    """Give the calling thread real-time priority, for good; return what was refused, as a sentence."""
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except OSError:
         return ("Real-time priority is not permitted (grant it with `ulimit -r 80` or CAP_SYS_NICE).",)
     return ()

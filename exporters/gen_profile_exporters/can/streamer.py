@@ -1,11 +1,12 @@
 """The streamer: configure → align → enable → stream → hold → disable, or abort from wherever it is.
 
 Setpoint k and its SYNC are sent at the absolute instant ``start + k * period``, the setpoint first, so that
-nothing drifts; what came late is never made up for by a burst. Before each cycle the drives' answers to the
-one before are judged. Whatever is wrong ends in a quick stop, sent at once and repeated every cycle until the
-drives say that they no longer move; no setpoint follows it. The drives brake on their own ramp (6085h), which
-needs nothing more from a controller or a bus that just proved unreliable. If not even that gets through, they
-stop by themselves, as they were set up to.
+nothing drifts; what came late is never made up for by a burst. A bus that sends at given instants by itself
+gets each cycle a quarter of a period ahead. Before each cycle the drives' answers to the one before are
+judged. Whatever is wrong ends in a quick stop, sent at once and repeated every cycle until the drives say
+that they no longer move; no setpoint follows it. The drives brake on their own ramp (6085h), which needs
+nothing more from a controller or a bus that just proved unreliable. If not even that gets through, they stop
+by themselves, as they were set up to.
 """
 
 from __future__ import annotations
@@ -116,7 +117,7 @@ class Streamer:
         self._heartbeat = message(frames.HEARTBEAT + frames.MASTER, b"\x05")
         self._beat_every = max(1, timeout // HEARTBEATS_PER_TIMEOUT // self._period)
         self._beats = 0
-        self._due = 0
+        self._due = self._launch = 0
         self._stop_asked = ""
         self._answers_for = -1  # cycle whose answers are still to come
         self._sent_at = 0
@@ -189,7 +190,7 @@ class Streamer:
         while cycle < len(self._plan.cycles):
             self._due = start + cycle * self._period
             self._judge()
-            self._clock.sleep_until(self._due)
+            self._await_due()
             missed = (self._clock.now() - self._due + self._period // 2) // self._period
             if missed:
                 self._require_skippable(cycle, missed)
@@ -197,7 +198,7 @@ class Streamer:
                 continue
             self._send(self._plan.cycles[cycle])
             self._sent_at = self._clock.now()
-            self._late[cycle] = self._sent_at - self._due
+            self._late[cycle] = max(0, self._sent_at - self._due)
             cycle += 1
             self._answers_for = cycle - 1
         self._due = start + cycle * self._period
@@ -232,6 +233,7 @@ class Streamer:
     def _abort(self) -> str:
         """Quick-stop all axes, and say whether they confirmed it."""
         self._begin(Phase.ABORTED)
+        self._clock.sleep_until(self._launch)  # no setpoint may follow the stop
         stop = self._commands(Controlword.QUICK_STOP)
         deadline = self._clock.now() + self._stopping_time()
         while True:
@@ -274,7 +276,7 @@ class Streamer:
     def _cycle(self, messages: Iterable[can.Message]) -> None:
         """Send frames and SYNC at the next instant, judged before and after."""
         self._judge()
-        self._clock.sleep_until(self._due)
+        self._await_due()
         self._send(messages)
         self._due = max(self._due + self._period, self._clock.now())
 
@@ -303,10 +305,16 @@ class Streamer:
                 "permit real-time priority, or choose a longer can.sync_period (see --self-test)."
             )
 
+    def _await_due(self) -> None:
+        """Sleep until the next cycle's instant, unless it is the bus that waits for it."""
+        if self._link.launching is None:
+            self._clock.sleep_until(self._due)
+
     def _send(self, messages: Iterable[can.Message]) -> None:
+        self._launch = self._due
         for frame in messages:
-            self._link.send(frame)
-        self._link.send(self._sync)
+            self._link.send(frame, self._due)
+        self._link.send(self._sync, self._due)
         self._beats += 1
         if self._beats % self._beat_every == 0:
             self._link.send(self._heartbeat)

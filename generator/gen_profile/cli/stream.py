@@ -138,7 +138,7 @@ def drive_sim(
     ):
         bank = run.drive_bank(spec, bus, load, make)
         tell("waiting for a stream")
-        bank.run(lambda: bank.finished)
+        run.serve(bank, lambda: bank.finished)
         sway = load.residual_sway()
     scales = [axis.counts_per_si for axis in spec.axis_scales()]
     document = {

@@ -25,7 +25,7 @@ from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.clock import SystemClock
 from gen_profile_exporters.can.lateness import Lateness, rehearse
 from gen_profile_exporters.can.plan import StreamPlan, plan_of
-from gen_profile_exporters.can.realtime import real_time
+from gen_profile_exporters.can.realtime import PEER_PRIORITY, real_time, take_priority
 from gen_profile_exporters.can.startup import startup_lists
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import format_of
@@ -76,6 +76,25 @@ class Port:
                 "python-can's documentation for its interfaces."
             ) from error
 
+    def open_for_streaming(self, bitrate: int) -> tuple[can.BusABC, tuple[str, ...]]:
+        """Open it with launch times where it keeps them; return what there is to say about that, too.
+
+        Raises
+        ------
+        SpecError
+        """
+        if self.interface != "socketcan":
+            return self.open(bitrate), ()
+        from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # Linux alone has it
+
+        bus = launching_bus(self.channel)
+        if bus is not None:
+            return bus, ("The kernel sends every cycle at its instant (launch times).",)
+        return self.open(bitrate), (
+            f"Frames leave when this program wakes up; `tc qdisc replace dev {self.channel} root fq` would "
+            "have the kernel send each at its instant.",
+        )
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class Outcome:
@@ -86,7 +105,7 @@ class Outcome:
     source : Source
     record : Record
     notes : tuple of str
-        What limited this machine's punctuality.
+        What limited this machine's punctuality, or made up for it.
     sway : float or None
         Of the simulated machine after the move, in m.
     """
@@ -257,7 +276,8 @@ def stream(
     from gen_profile_exporters.can.streamer import Streamer  # noqa: PLC0415  # canopen is an extra
 
     with ExitStack() as stack:
-        bus = stack.enter_context(port.open(source.spec.can.bitrate))
+        bus, remarks = port.open_for_streaming(source.spec.can.bitrate)
+        stack.enter_context(bus)
         load = None
         if simulate_drive:
             load = stack.enter_context(_simulated(source, port, tell))
@@ -265,7 +285,14 @@ def stream(
         streamer = Streamer(bus, _clock(refused), source.plan, tell)
         stack.enter_context(_stopped_by_signals(streamer))
         record = streamer.run()
-    return Outcome(source=source, record=record, notes=refused, sway=load.sway if load else None)
+    notes = (*refused, *remarks)
+    return Outcome(source=source, record=record, notes=notes, sway=load.sway if load else None)
+
+
+def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
+    """Have simulated drives answer until told to stop, as promptly as the machine permits."""
+    take_priority(PEER_PRIORITY)
+    bank.run(stop)
 
 
 def drive_bank(source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make) -> DriveBank:
@@ -301,7 +328,7 @@ def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
         port.open(source.spec.can.bitrate) as bus,
     ):
         bank = drive_bank(source.spec, bus, load, Make())
-        thread = Thread(target=bank.run, args=(over.is_set,), name="simulated drives")
+        thread = Thread(target=serve, args=(bank, over.is_set), name="simulated drives")
         sys.setswitchinterval(SWITCH_INTERVAL)
         thread.start()
         try:

@@ -4,6 +4,7 @@ What the tests judge is the bus alone: a third party on it takes down every fram
 """
 
 import itertools
+import random
 import struct
 
 import attrs
@@ -54,13 +55,15 @@ class FakeClock:
         self._now = BEGINNING
         self._step = step
         self.actors = []
+        self.alarms = []  # instants at which the others act for certain
 
     def now(self):
         return self._now
 
     def sleep_until(self, instant):
         while self._now < instant:
-            self._now = min(self._now + self._step, instant)
+            self.alarms = [alarm for alarm in self.alarms if alarm > self._now]
+            self._now = min(self._now + self._step, instant, *self.alarms)
             for act in self.actors:
                 act()
 
@@ -86,6 +89,34 @@ class Tampered:
         return self.receiving(self.inbox.pop() if self.inbox else self._bus.recv(timeout))
 
 
+class Launching(Tampered):
+    """One end of a bus that sends at given instants, as a kernel with launch times does."""
+
+    def __init__(self, bus, clock):
+        super().__init__(bus)
+        self._clock, self._waiting = clock, []
+        clock.actors.append(self._launch)
+
+    def send_at(self, message, instant):
+        self._waiting.append((instant, message))
+        self._clock.alarms.append(instant)
+
+    def _launch(self):
+        while self._waiting and self._waiting[0][0] <= self._clock.now():
+            self.send(self._waiting.pop(0)[1])
+
+
+class Sluggish:
+    """A clock that wakes its user up late, by up to a millisecond."""
+
+    def __init__(self, clock):
+        self._clock, self._generator = clock, random.Random(1)
+        self.now = clock.now
+
+    def sleep_until(self, instant):
+        self._clock.sleep_until(instant + self._generator.randrange(MS))
+
+
 @attrs.frozen
 class Heard:
     """A frame on the bus, at an instant in ms."""
@@ -98,7 +129,18 @@ class Heard:
 class Bench:
     """Everything on one bus."""
 
-    def __init__(self, *names, profile=None, make=None, load=None, stand=None, step=MS // 4, **options):
+    def __init__(
+        self,
+        *names,
+        profile=None,
+        make=None,
+        load=None,
+        stand=None,
+        step=MS // 4,
+        launching=False,
+        sluggish=False,
+        **options,
+    ):
         channel = f"bench-{next(_channels)}"
         self.clock = FakeClock(step)
         self.target = target(*names, **options)
@@ -106,14 +148,16 @@ class Bench:
         self.plan = plan_of(files[0].content, self.target)
         self._buses = [can.Bus(channel, interface="virtual") for _ in range(3)]
         self.witness = self._buses[0]
-        self.drive_end, self.streamer_end = map(Tampered, self._buses[1:])
+        self.drive_end = Tampered(self._buses[1])
+        self.streamer_end = Launching(self._buses[2], self.clock) if launching else Tampered(self._buses[2])
         self.heard = []
         self.clock.actors.append(self._listen)
         self.drives = self._drives(make or Make(), load, stand)
         self.drives_alive = True
         self.clock.actors.append(lambda: self.drives.poll() if self.drives_alive else None)
         self.phases = []
-        self.streamer = Streamer(self.streamer_end, self.clock, self.plan, self.phases.append)
+        clock = Sluggish(self.clock) if sluggish else self.clock
+        self.streamer = Streamer(self.streamer_end, clock, self.plan, self.phases.append)
         self.fault_at = None
 
     def __enter__(self):

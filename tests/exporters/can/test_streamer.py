@@ -115,6 +115,37 @@ class TestWholeStream:
             assert len(bench.of(0x081)) == heard == 0
 
 
+class TestLaunchTimes:
+    """A bus that sends at given instants by itself, and a machine that wakes up late."""
+
+    @pytest.mark.parametrize("launching", [True, False])
+    def test_frames_are_as_even_as_the_bus_sends_them(self, launching):
+        with Bench(launching=launching, sluggish=True) as bench:
+            record = bench.run()
+        assert (record.phase, record.final) == (Phase.DONE, (400_000,))
+        assert len(find(sent(bench), exported(quintic((0.1, 0.4)), bench.target))) == 1
+        instants = np.array([frame.at for frame in bench.of(0x080)])
+        uneven = np.abs(np.diff(instants[20:-20]) - PERIOD).max()
+        assert (uneven < 1e-9) == launching
+        assert (record.lateness.percentile(100) == 0.0) == launching
+
+    def test_no_setpoint_waits_behind_the_stop(self):
+        """A frame that cannot be sent ends the stream when another one already waits for its instant."""
+        axes = ("bridge", "trolley")
+        with Bench(*axes, profile=quintic((0.1, 0.4), (1.2, -0.7)), launching=True) as bench:
+
+            def refuse(message, instant):
+                if message.arbitration_id == 0x302 and bench.streamer.cycles_sent == 120:
+                    raise OSError("No buffer space available")
+                send_at(message, instant)
+
+            send_at, bench.streamer_end.send_at = bench.streamer_end.send_at, refuse
+            record = bench.run()
+        assert "transmit buffer is full" in record.reason
+        assert_quick_stop_is_last(bench)
+        assert [frame.data for frame in bench.of(0x301)][-1] == bytes(bench.plan.cycles[120][0].data)
+
+
 def say(cob_id, data):
     return lambda bench: bench.say(cob_id, data)
 

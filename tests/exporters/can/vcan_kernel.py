@@ -13,26 +13,31 @@ from contextlib import suppress
 from pathlib import Path
 
 UML = "linux.uml"
-TOOLS = ("candump", "cansend", "ip")
+TOOLS = ("candump", "cansend", "ip", "tc")
 MODULES = (
-    "net/can/can",
-    "net/can/can-raw",
-    "net/can/can-bcm",
-    "drivers/net/can/dev/can-dev",
-    "drivers/net/can/vcan",
+    "net/can/can.ko",
+    "net/can/can-raw.ko",
+    "net/can/can-bcm.ko",
+    "drivers/net/can/dev/can-dev.ko",
+    "drivers/net/can/vcan.ko echo=1",  # frames are heard when they are sent, as on a real bus, not queued
+    "net/sched/sch_fq.ko",
 )
 
 INIT = """#!/bin/sh
 export PATH={path}
 export HOME=/root
+export TMPDIR=/dev/shm
 mount -t proc proc /proc
 mount -t sysfs sys /sys
 mount -t devtmpfs dev /dev
 mkdir -p /dev/shm
 mount -t tmpfs shm /dev/shm
 mount -t hostfs -o {folder} scratch {folder}
-for module in {modules}; do insmod /usr/lib/uml/modules/$(uname -r)/kernel/$module.ko; done
+cd /usr/lib/uml/modules/$(uname -r)/kernel
+{insmods}
+cd /
 ip link set lo up
+echo -1 >/proc/sys/kernel/sched_rt_runtime_us
 {command} >{folder}/output 2>&1
 echo $? >{folder}/code
 sync
@@ -66,7 +71,7 @@ def _run_in_uml(script, folder):
         INIT.format(
             path=shlex.quote(f"{Path(sys.executable).parent}:/usr/sbin:/usr/bin:/sbin:/bin"),
             folder=shlex.quote(str(folder)),
-            modules=" ".join(MODULES),
+            insmods="\n".join(f"insmod {module}" for module in MODULES),
             command=f"sh {shlex.quote(str(script))}",
         )
     )
