@@ -185,7 +185,8 @@ def compare(
         overrides += (f"solver.base={base}",)
     spec = chosen_spec(spec_path, preset, overrides)
     if picture is not None:
-        from gen_profile.workflows.comparison_plot import draw, require_drawable
+        from gen_profile.workflows.comparison_plot import draw
+        from gen_profile.workflows.picture import require_drawable
 
         require_drawable(picture)
     with progress() as tell:

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from gen_profile.workflows.compare import Comparison
     from gen_profile.workflows.design import Design
     from gen_profile.workflows.identify import Identification
-    from gen_profile.workflows.report import Report
     from gen_profile.workflows.lookup import Found
     from gen_profile.workflows.profile_library import Library
     from gen_profile.workflows.report import Report
+    from gen_profile.workflows.robustness import Robustness
     from gen_profile.workflows.sweep import Sweep
 
 MANIFEST_WORDS = {
@@ -106,6 +106,29 @@ def comparison(found: Comparison) -> str:
         f"{kind}: {advice.method or 'none'}. {advice.reason}" for kind, advice in found.recommended.items()
     ]
     return "\n".join([f"{found.spec.name}: {_move(found.spec)}", _text(table), *left_out, *advice])
+
+
+def robustness(found: Robustness) -> str:
+    """Tell how much sway each method leaves at worst, and how far off the machine may be."""
+    table = Table(box=box.SIMPLE_HEAD)
+    names = ", ".join(found.errors)
+    heads = ["method\n", f"worst over {names}\nmm", "machines within\nlimits"]
+    if len(found.errors) == 1:
+        heads.append("all limits kept\nfrom … to")
+    for index, head in enumerate(heads):
+        table.add_column(head, justify="right" if index else "left")
+    for method in found.residual:
+        kept = 100.0 * float((found.share(method) <= 1.0).mean())
+        ends = found.insensitivity(method)
+        span = "" if ends is None else f"{100.0 * ends[0]:+.1f} … {100.0 * ends[1]:+.1f} %"
+        cells = (method, _figure(1e3 * found.end_load(method).max()), f"{kept:.0f} %", span)
+        table.add_row(*cells[: len(heads)])
+    ranges = (
+        f"{name} {100.0 * off[0]:+.3g} … {100.0 * off[-1]:+.3g} %" for name, off in found.errors.items()
+    )
+    title = f"{found.spec.name}: {_move(found.spec)}; tried {', '.join(ranges)}"
+    left_out = [f"{method}: {reason}" for method, reason in found.left_out.items()]
+    return "\n".join([title, _text(table), *left_out])
 
 
 def identification(found: Identification, path: Path) -> str:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from importlib.util import find_spec
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from gen_profile.errors import OutputError
 from gen_profile.problem.linearization import linearize
 from gen_profile.profile import Array, Profile
 from gen_profile.workflows.compare import Comparison, Row
+from gen_profile.workflows.picture import picture
 
 SAMPLES = 1500
 AFTERMATH = 0.5  # of the move's duration, shown after its end
@@ -21,24 +21,8 @@ BEYOND = 1.6  # of the fastest mode's frequency, where the spectrum ends
 DECADES = 4.0  # of the spectrum that are shown
 HEADROOM = 3.0  # bars of residuals end at so many limits, lest the worst method hide the others
 ORDERS = ("position ({})", "velocity ({}/s)", "acceleration ({}/s²)", "jerk ({}/s³)")
-# suffix → metadata that keeps the clock out of the file
-METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 
 Styles = Mapping[str, Mapping[str, Any]]
-
-
-def require_drawable(path: Path) -> None:
-    """Find out whether a picture can be drawn, before time goes into what it shows.
-
-    Raises
-    ------
-    OutputError
-        Matplotlib is not installed, or the file's suffix is none of a picture.
-    """
-    if path.suffix.lower() not in METADATA:
-        raise OutputError(f"--plot {path}: name a file that ends in {', '.join(METADATA)}.")
-    if find_spec("matplotlib") is None:
-        raise OutputError("--plot needs Matplotlib: pip install 'gen-profile[plot]'.")
 
 
 def draw(comparison: Comparison, path: Path) -> None:
@@ -51,44 +35,32 @@ def draw(comparison: Comparison, path: Path) -> None:
     """
     if not comparison.rows:
         raise OutputError("--plot: no method has a motion for this move; compare without --plot to see why.")
-    import matplotlib  # noqa: PLC0415  # an extra
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot  # noqa: PLC0415
-
-    figure, axes = pyplot.subplots(4, 2, figsize=(15, 16), layout="constrained")
-    try:
-        styles = _styles(comparison)
-        _reference(axes[:, 0], comparison, styles)
-        _spectrum(axes[0, 1], comparison, styles)
-        _sway(axes[1:3, 1], comparison, styles)
-        _residuals(axes[3, 1], comparison, styles)
+    with picture(path, comparison.spec.name, nrows=4, ncols=2, figsize=(15, 16)) as (figure, axes):
+        advised = {advice.method for advice in comparison.recommended.values()}
+        look = styles([row.method for row in comparison.rows], advised)
+        _reference(axes[:, 0], comparison, look)
+        _spectrum(axes[0, 1], comparison, look)
+        _sway(axes[1:3, 1], comparison, look)
+        _residuals(axes[3, 1], comparison, look)
         handles, labels = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=7)
         figure.suptitle(f"{comparison.spec.name}: {comparison.spec.plant.type}")
-        with matplotlib.rc_context({"svg.hashsalt": comparison.spec.name}):  # else ids are random
-            figure.savefig(path, dpi=110, metadata=METADATA[path.suffix.lower()])
-    except OSError as error:
-        raise OutputError(f"--plot {path}: cannot write the picture: {error.strerror or error}.") from error
-    finally:
-        pyplot.close(figure)
 
 
-def _styles(comparison: Comparison) -> Styles:
+def styles(methods: Sequence[str], advised: Collection[str | None] = ()) -> Styles:
     """Draw optimal motions solid, shapers dashed, and those recommended thick."""
     import matplotlib  # noqa: PLC0415
 
-    optimal = [row.method for row in comparison.rows if row.method.startswith("optimal")]
-    shapers = [row.method for row in comparison.rows if row.method not in optimal]
-    advised = {advice.method for advice in comparison.recommended.values()}
-    styles = {}
+    optimal = [method for method in methods if method.startswith("optimal")]
+    shapers = [method for method in methods if method not in optimal]
+    found = {}
     for kind, dashes, palette in ((optimal, "-", "tab10"), (shapers, "--", "Dark2")):
         colours = [*matplotlib.color_sequences[palette], "black"]
         for index, method in enumerate(kind):
             width = 2.4 if method in advised else 1.2
             colour = colours[index % len(colours)]
-            styles[method] = {"color": colour, "linestyle": dashes, "linewidth": width}
-    return styles
+            found[method] = {"color": colour, "linestyle": dashes, "linewidth": width}
+    return found
 
 
 def _times(row: Row) -> Array:

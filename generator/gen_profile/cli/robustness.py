@@ -1,0 +1,81 @@
+"""The command that shows how much sway is left on machines that are not as specified."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
+
+
+@cli.command(epilog="Example: gen-profile robustness crane.toml --parameter L1 --plot robustness.png")
+@spec_options
+@click.option(
+    "--parameter",
+    "parameters",
+    metavar="NAME",
+    multiple=True,
+    help="What is off: once for a curve, twice for a map; the first uncertain parameter by default.",
+)
+@click.option(
+    "--method",
+    "methods",
+    metavar="NAME",
+    multiple=True,
+    help="Method to try, as compare names them. Repeatable; all by default.",
+)
+@click.option(
+    "--range",
+    "half_range",
+    metavar="SHARE",
+    type=click.FloatRange(0.0, 0.9, min_open=True),
+    help="Greatest relative error, such as 0.3; one and a half times the spec's range by default.",
+)
+@click.option(
+    "--points",
+    metavar="N",
+    type=click.IntRange(3, 1001),
+    help="Errors tried per parameter; 61 of a curve, 25 of a map by default.",
+)
+@click.option(
+    "--plot", "picture", metavar="FILE", type=click.Path(path_type=Path), help="Draw it (png, svg or pdf)."
+)
+@click.option(
+    "--csv", "table", metavar="FILE", type=click.Path(path_type=Path), help="Write the numbers as a table."
+)
+@json_option
+@debug_option
+def robustness(
+    spec_path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    *,
+    parameters: tuple[str, ...],
+    methods: tuple[str, ...],
+    half_range: float | None,
+    points: int | None,
+    picture: Path | None,
+    table: Path | None,
+    as_json: bool,
+) -> None:
+    """Show residual sway over one or two parameters, optimal motions beside shapers."""
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import progress
+    from gen_profile.workflows.picture import require_drawable
+    from gen_profile.workflows.robustness import robustness as run
+    from gen_profile.workflows.robustness_table import write_table
+
+    spec = chosen_spec(spec_path, preset, overrides)
+    if picture is not None:
+        require_drawable(picture)
+    with progress() as tell:
+        found = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
+        if picture is not None:
+            from gen_profile.workflows.robustness_plot import draw
+
+            tell("drawing")
+            draw(found, picture)
+        if table is not None:
+            write_table(found, table)
+    print_outcome(found.to_dict(), words.robustness(found), as_json)
