@@ -20,6 +20,7 @@ from gen_profile.profile import Array, Profile, grid_length, grid_times
 from gen_profile.response import TRANSIENT_SAMPLES, Response, Swing
 from gen_profile.solvers import choice
 from gen_profile.solvers.collocation import Trajectory
+from gen_profile.solvers.minimum_time import STRIDE, least
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec import Spec
@@ -29,6 +30,8 @@ from gen_profile.workflows.shaping import shaped_motion
 SHORTEST_WATCH = 4.0  # s; a residual is watched for this long, or for two of the slowest periods
 STANDSTILL = 10.0  # time constants after which a lagging drive counts as standing: its speed is down to e⁻¹⁰
 RESIDUAL_SAMPLES = 4001
+CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
+LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -80,6 +83,9 @@ class Plan:
 def timed(spec: Spec) -> Spec:
     """Find the shortest duration where a spec asks for it; it ends on a cycle of the controller.
 
+    An optimal motion takes longer than its limits make it where it would otherwise leave more sway than the
+    check allows on some machine.
+
     Raises
     ------
     InfeasibleProblem
@@ -94,12 +100,38 @@ def timed(spec: Spec) -> Spec:
         raise InfeasibleProblem(
             "move.duration: no duration keeps the limits and brings the load to rest; widen the limits."
         )
-    cycle = spec.export.cycle_time
-    return _lasting(spec, float(grid_times(grid_length(shortest, cycle), cycle)[-1]))
+    quickest = _lasting(spec, shortest)
+    if _calms(quickest):
+        return quickest
+    calm = least(lambda time: _calms(_lasting(spec, time)), STRIDE * shortest, LONGEST * shortest)
+    if calm is None:
+        raise InfeasibleProblem(
+            "check.residual_sway: no duration leaves so little sway on every machine of "
+            "robustness.uncertain; allow more, or narrow the ranges."
+        )
+    return _lasting(spec, calm)
 
 
 def _lasting(spec: Spec, duration: float) -> Spec:
-    return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=duration, shortest=False))
+    """Give a spec a duration, rounded up to a cycle of its controller."""
+    cycle = spec.export.cycle_time
+    whole = float(grid_times(grid_length(duration, cycle), cycle)[-1])
+    return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=whole, shortest=False))
+
+
+def _calms(spec: Spec) -> bool:
+    """Whether the optimal motion of a spec leaves little enough sway on every machine."""
+    solution = choice.solve(problem_of(spec), spec.solver.solver)
+    if solution.optimum is None:
+        return False
+    return keeps_residual_sway(spec, try_motion(spec, optimal_profile(solution)), CALM)
+
+
+def keeps_residual_sway(spec: Spec, trial: Trial, share: float = 1.0) -> bool:
+    """Whether every load keeps a share of its limit of residual sway on all machines."""
+    limits = share * np.array(list(spec.check.residual_sway.values()))
+    after = trial.swing.at(trial.motion.duration + np.linspace(0.0, trial.watch, RESIDUAL_SAMPLES))
+    return all(bool((peak(response.sway) <= limits).all()) for response in after)
 
 
 def plan(spec: Spec, near: Trajectory | None = None) -> Plan:
