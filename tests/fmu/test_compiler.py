@@ -13,9 +13,10 @@ from gen_profile.errors import CosimulationError
 from gen_profile.plants.registry import find_plant
 from gen_profile.profile import sample
 from gen_profile_fmu import platforms
+from gen_profile_fmu.c_sources import FOLDER
 from gen_profile_fmu.compiler import compile_library, find_compiler
 from gen_profile_fmu.cosimulation import PlantCosimulation
-from gen_profile_fmu.fmu_files import SOURCE_FILE, Version, sources
+from gen_profile_fmu.fmu_files import SOURCE_FILE, Version, sources, standard_headers
 from gen_profile_fmu.plant_fmu import plant_fmu
 
 CRANE = find_plant("double-pendulum-crane")
@@ -59,6 +60,17 @@ def zig_cc(tmp_path, cache):
 def test_hand_written_c_has_no_warning(written, zig_cc, kind, version):
     written(kind, version)
     zig_cc(*STRICT, "-c", SOURCE_FILE, "-o", "object.o")
+
+
+def test_the_loop_of_many_runs_has_no_warning(tmp_path, zig_cc):
+    texts = {"many_runs.c": (FOLDER / "many_runs.c").read_text(encoding="utf-8")}
+    for version in Version:
+        texts |= {
+            name: f"#pragma GCC system_header\n{text}" for name, text in standard_headers(version).items()
+        }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    zig_cc(*STRICT, "-c", "many_runs.c", "-o", "object.o")
 
 
 @pytest.mark.parametrize("version", Version)

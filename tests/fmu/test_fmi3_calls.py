@@ -22,7 +22,7 @@ from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.plant_fmu import cached_fmu
 
 CRANE = find_plant("double-pendulum-crane")
-ERROR = 3
+DISCARD, ERROR = 2, 3
 
 
 @pytest.fixture
@@ -75,6 +75,88 @@ def test_exports_the_standards_functions_and_no_others(fmu):
     elf = lief.ELF.parse(str(library))  # owns its symbols
     exported = {symbol.name for symbol in elf.exported_symbols}
     assert exported == declared
+
+
+# in which modes the standard (3.0, sections 2.3, 3.2 and 4.2) allows a call: after instantiation,
+# initialization, event or (co-simulation) step, continuous time or (co-simulation) a discarded step, termination,
+# error
+ORDER = {
+    "fmi3EnterInitializationMode": ("100000", "100000"),
+    "fmi3ExitInitializationMode": ("010000", "010000"),
+    "fmi3Terminate": ("001100", "001100"),
+    "fmi3Reset": ("111111", "111111"),
+    "fmi3SetFloat64": ("111000", "111000"),  # of a tunable parameter
+    "fmi3GetFloat64": ("011111", "011111"),
+    "fmi3GetDirectionalDerivative": ("011111", "011111"),
+    "fmi3DoStep": (None, "001000"),
+    "fmi3UpdateDiscreteStates": ("001000", None),
+    "fmi3EnterEventMode": ("001100", None),
+    "fmi3EnterContinuousTimeMode": ("001000", None),
+    "fmi3CompletedIntegratorStep": ("000100", None),
+    "fmi3SetTime": ("001100", None),
+    "fmi3SetContinuousStates": ("000100", None),
+    "fmi3GetContinuousStateDerivatives": ("011111", None),
+}
+
+
+def arguments_of(function):
+    one, six, first = (c_double * 1)(0.5), (c_double * 6)(), (c_uint32 * 1)(0)
+    flags, time = [byref(c_bool()) for _ in range(5)], byref(c_double())
+    return {
+        "fmi3EnterInitializationMode": (c_bool(False), 0.0, 0.0, c_bool(False), 0.0),
+        "fmi3SetFloat64": (first, 1, one, 1),
+        "fmi3GetFloat64": (first, 1, one, 1),
+        "fmi3GetDirectionalDerivative": (first, 1, first, 1, one, 1, one, 1),
+        "fmi3DoStep": (0.0, 0.01, c_bool(True), *flags[:3], time),
+        "fmi3UpdateDiscreteStates": (*flags, time),
+        "fmi3CompletedIntegratorStep": (c_bool(True), *flags[:2]),
+        "fmi3SetTime": (0.0,),
+        "fmi3SetContinuousStates": (six, 6),
+        "fmi3GetContinuousStateDerivatives": (six, 6),
+    }.get(function, ())
+
+
+def bring(instance, mode):
+    """Lead an instance into one of the modes, by number, as `ORDER` lists them."""
+    instance.reset()
+    if mode > 0:
+        instance.enterInitializationMode()
+    if mode > 1:
+        instance.exitInitializationMode()
+    if mode == 3 and isinstance(instance, FMU3Model):
+        instance.enterContinuousTimeMode()
+        instance.completedIntegratorStep()
+    elif mode == 3:
+        instance.setFloat64([slave_reference("cart.setpoint_acceleration")], [1e250])
+        assert status_of(instance.doStep, 0.0, 0.01) == DISCARD
+    elif mode == 4:
+        instance.terminate()
+    elif mode == 5:
+        assert status_of(instance.getFloat64, [999]) == ERROR
+
+
+@pytest.mark.parametrize(
+    ("kind", "function", "allowed"),
+    [
+        (kind, function, allowed)
+        for function, each in ORDER.items()
+        for kind, allowed in zip((FMU3Model, FMU3Slave), each, strict=True)
+        if allowed is not None  # FMPy has no such function for that interface
+    ],
+)
+def test_the_order_of_calls_is_enforced(fmu, kind, function, allowed):
+    instance = load(fmu, kind)
+    instance.instantiate(logMessage=instance.log)
+    found = ""
+    for mode in range(6):
+        bring(instance, mode)
+        instance.messages.clear()
+        status = status_of(getattr(instance, function), instance.component, *arguments_of(function))
+        found += "1" if status == 0 else "0"
+        if status != 0:
+            assert re.search("must not be called in|cannot be set in", instance.messages[0][2])
+    instance.freeInstance()
+    assert found == allowed
 
 
 def test_steps_only_after_initialization(slave):

@@ -24,7 +24,7 @@ from gen_profile.workflows.design import design
 from gen_profile.workflows.foreign_check import _axis_inputs
 from gen_profile_fmu import foreign_child, safe_archive
 from gen_profile_fmu.building import build_fmu
-from gen_profile_fmu.fmu_files import Version
+from gen_profile_fmu.fmu_files import Version, sources
 from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
 from gen_profile_fmu.model import plant_model
 from gen_profile_fmu.plant_variables import InputKind
@@ -286,6 +286,28 @@ def test_damaged_archives_are_read_or_refused(tmp_path_factory, changes, cut):
         safe_archive.unpack(path, folder / "out")
     outside = [p for p in folder.rglob("*") if p.is_file() and "out" not in p.relative_to(folder).parts]
     assert outside == [path]
+
+
+DESCRIPTION = sources(plant_model(machine_of(CRANE), InputKind.ACCELERATION), Version.FMI3).description
+
+
+@settings(max_examples=100)
+@given(st.lists(st.tuples(st.integers(0, 1 << 20), st.binary(max_size=9)), min_size=1, max_size=4))
+def test_damaged_descriptions_are_read_or_refused(tmp_path_factory, changes):
+    text = bytearray(DESCRIPTION)
+    for position, replacement in changes:
+        place = position % len(text)
+        text[place : place + len(replacement)] = replacement
+    folder = tmp_path_factory.mktemp("fuzz")
+    (folder / "modelDescription.xml").write_bytes(bytes(text))
+    job = {
+        "machines": [{"L1": 0.5}],
+        "input_names": ["cart.setpoint_acceleration"],
+        "output_names": ["sway.hook"],
+    }
+    with suppress(CosimulationError):
+        description = foreign_child._description("a.fmu", folder)
+        foreign_child._references("a.fmu", description, job)
 
 
 TEXTS = st.text(max_size=5)
