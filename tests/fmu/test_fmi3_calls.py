@@ -78,8 +78,8 @@ def test_exports_the_standards_functions_and_no_others(fmu):
 
 
 # in which modes the standard (3.0, sections 2.3, 3.2 and 4.2) allows a call: after instantiation,
-# initialization, event or (co-simulation) step, continuous time or (co-simulation) a discarded step, termination,
-# error
+# initialization, event or (co-simulation) step, continuous time or (co-simulation) a discarded step,
+# termination, error
 ORDER = {
     "fmi3EnterInitializationMode": ("100000", "100000"),
     "fmi3ExitInitializationMode": ("010000", "010000"),
