@@ -285,7 +285,8 @@ class CanSpec:
     bitrate : int
         bit/s.
     mode : str
-        ``"csp"`` (cyclic synchronous position, 607Ah) or ``"ip"`` (interpolated position, 60C1h).
+        ``"csp"`` (cyclic synchronous position, 607Ah), ``"ip"`` (interpolated position, 60C1h) or ``"csv"``
+        (cyclic synchronous velocity, 60FFh).
     sync_period : float
         s; also the drives' interpolation period 60C2h.
     feed_forward : str
@@ -298,7 +299,8 @@ class CanSpec:
     start_tolerance : float
         How far the axis may stand from the first setpoint, in m (or rad).
     following_error : float or None
-        Window 6065h in m (or rad); None leaves the drive's own.
+        Window 6065h in m (or rad); None leaves the drive's own. In csv, where no drive watches it, the
+        streamer does, and it must be stated.
     quick_stop : float or None
         Deceleration 6085h in m/s² (or rad/s²); None takes twice the motion's greatest acceleration.
     travel : mapping of str to (float, float)
@@ -312,7 +314,7 @@ class CanSpec:
 
     node: Annotated[int, Bounds(least=1, most=127)] = 1
     bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
-    mode: Literal["csp", "ip"] = "csp"
+    mode: Literal["csp", "ip", "csv"] = "csp"
     sync_period: CycleTime = 0.004
     feed_forward: Literal["none", "velocity", "torque"] = "none"
     torque_per_acceleration: Positive | None = None

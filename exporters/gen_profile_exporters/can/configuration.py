@@ -93,7 +93,8 @@ def _configure_one(
     mode = MODES[target.can.mode]
     if (shown := _read(link, node, 0x6061)) != mode:
         raise StreamAborted(f"axis {node.name}: the drive shows mode {shown} (6061h) instead of {mode}.")
-    _require_window(link, node)
+    if target.can.mode != "csv":  # in which the streamer watches, not the drive
+        _require_window(link, node)
     _require_travel(link, node, motion)
     return _require_start(link, node, target, motion)
 

@@ -58,6 +58,6 @@ def _physical(field: Field, axis: AxisScale) -> tuple[str, str]:
     length = "rad" if axis.unit in {"rad", "deg"} else "m"
     if field in {frames.TARGET_POSITION, frames.INTERPOLATION_DATA, frames.ACTUAL_POSITION}:
         return metre, length
-    if field == frames.VELOCITY_OFFSET:
+    if field in {frames.VELOCITY_OFFSET, frames.TARGET_VELOCITY}:
         return metre, f"{length}/s"
     return ("0.1", "%") if field == frames.TORQUE_OFFSET else ("1", "")

@@ -49,7 +49,7 @@ class Make:
     fixed_period: tuple[int, int] | None = None
     own_mapping: bool = False
     following_error: int = WINDOW
-    modes: int = 1 << 7 | 1 << 6  # csp and ip
+    modes: int = 1 << 8 | 1 << 7 | 1 << 6  # csv, csp and ip
 
 
 def dictionary(node: int, make: Make) -> canopen.ObjectDictionary:
@@ -98,6 +98,7 @@ def _variables(make: Make) -> Iterator[tuple[int, str, int, str, int]]:
     yield 0x6085, "Quick stop deceleration", U32, "rw", 1_000_000
     yield 0x60B1, "Velocity offset", I32, "rw", 0
     yield 0x60B2, "Torque offset", I16, "rw", 0
+    yield 0x60FF, "Target velocity", I32, "rw", 0
     yield 0x6502, "Supported drive modes", U32, "ro", make.modes
 
 

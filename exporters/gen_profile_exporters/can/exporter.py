@@ -18,7 +18,7 @@ from gen_profile.profile import Profile, SampledProfile
 from gen_profile_exporters.can import candump, database, frames, startup, traces
 from gen_profile_exporters.can.candump import Frame
 from gen_profile_exporters.can.frames import MICROSECONDS, SYNC
-from gen_profile_exporters.can.scaling import Setpoints, setpoints
+from gen_profile_exporters.can.scaling import Setpoints, setpoints, travelled
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.setpoints import in_si, plausible_cycle_time, sampled
 
@@ -51,7 +51,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
-    """Read the positions that the drives take at each SYNC.
+    """Read the positions that the drives take at each SYNC, or that the velocities lead them to.
 
     Raises
     ------
@@ -60,6 +60,8 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     """
     taken, stamps = read_setpoints(content, target)
     counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
+    if target.can.mode == "csv":
+        return _led_by_velocity(taken[:, :, 0], _cycle_time(stamps), target)
     velocity = None
     if target.can.feed_forward == "velocity":
         velocity = in_si(taken[:, :, 1].astype(np.float64), counts_per_si)
@@ -71,16 +73,24 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     )
 
 
+def _led_by_velocity(velocity: frames.Integers, period: float, target: Target) -> SampledProfile:
+    """Tell where velocities lead the axes, which are kept from each SYNC to the next one."""
+    counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
+    distance = in_si(travelled(velocity, period), counts_per_si)
+    return SampledProfile(
+        cycle_time=period,
+        position=np.array(target.start) + distance,
+        resolution=in_si(np.full(len(target.axes), period), np.abs(counts_per_si)),
+    )
+
+
 def cyclic_frames(motion: Setpoints, target: Target) -> Iterator[Frame]:
     """List the frames of all cycles in the order in which they are sent."""
     period = frames.period_microseconds(target.can)
     pack = frames.packing(frames.setpoint_fields(target.can)).pack
     cob_ids = setpoint_ids(target)
-    for cycle in range(len(motion.position)):
-        for column, cob_id in enumerate(cob_ids):
-            values = [int(motion.position[cycle, column])]
-            if motion.offset is not None:
-                values.append(int(motion.offset[cycle, column]))
+    for cycle, setpoints_of_axes in enumerate(motion.sent.tolist()):
+        for cob_id, values in zip(cob_ids, setpoints_of_axes, strict=True):
             yield Frame(cycle * period, cob_id, pack(*values))
         yield Frame(cycle * period, SYNC, b"")
 

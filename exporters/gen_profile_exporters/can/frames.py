@@ -6,7 +6,7 @@ Per axis (node ids count up from ``can.node``), after the predefined connection 
 COB-ID     PDO                     content                                          sent
 ========== ======================= ================================================ =========================
 200h + n   RPDO1, to the drive     controlword 6040h                                when it changes
-300h + n   RPDO2, to the drive     607Ah, and 60B1h or 60B2h; or 60C1h:01           every cycle, before SYNC
+300h + n   RPDO2, to the drive     607Ah, and 60B1h or 60B2h; 60C1h:01; or 60FFh    every cycle, before SYNC
 180h + n   TPDO1, from the drive   statusword 6041h, actual position 6064h          on SYNC
 ========== ======================= ================================================ =========================
 
@@ -80,6 +80,7 @@ STATUSWORD = Field(index=0x6041, sub=0, code="H", name="Statusword")
 ACTUAL_POSITION = Field(index=0x6064, sub=0, code="i", name="ActualPosition")
 TARGET_POSITION = Field(index=0x607A, sub=0, code="i", name="TargetPosition")
 INTERPOLATION_DATA = Field(index=0x60C1, sub=1, code="i", name="InterpolationData")
+TARGET_VELOCITY = Field(index=0x60FF, sub=0, code="i", name="TargetVelocity")
 VELOCITY_OFFSET = Field(index=0x60B1, sub=0, code="i", name="VelocityOffset")
 TORQUE_OFFSET = Field(index=0x60B2, sub=0, code="h", name="TorqueOffset")
 
@@ -92,6 +93,8 @@ def setpoint_fields(can: CanSpec) -> tuple[Field, ...]:
     """List what one RPDO2 holds."""
     if can.mode == "ip":
         return (INTERPOLATION_DATA,)
+    if can.mode == "csv":
+        return (TARGET_VELOCITY,)
     return (TARGET_POSITION, *_FEED_FORWARD[can.feed_forward])
 
 

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 
 import attrs
 import can
+import numpy as np
 
 from gen_profile.errors import ExportError
+from gen_profile.profile import SampledProfile
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.exporter import read_setpoints, replay, setpoint_ids
+from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.scaling import Setpoints
 from gen_profile_exporters.exporter import Target
 
@@ -33,12 +36,12 @@ class StreamPlan:
     cycles: tuple[Cycle, ...]
 
     def preload(self, position: Sequence[int]) -> Cycle:
-        """Make setpoints at which the axes stand still."""
+        """Make setpoints at which the axes stand still where they are."""
         fields = frames.setpoint_fields(self.target.can)
         pack = frames.packing(fields).pack
         rest = [0] * (len(fields) - 1)
         return tuple(
-            message(cob_id, pack(at, *rest))
+            message(cob_id, pack(0 if self.motion.velocity is not None else at, *rest))
             for cob_id, at in zip(setpoint_ids(self.target), position, strict=True)
         )
 
@@ -62,11 +65,7 @@ def plan_of(content: bytes, target: Target) -> StreamPlan:
     cob_ids = setpoint_ids(target)
     return StreamPlan(
         target=target,
-        motion=Setpoints(
-            period=motion.cycle_time,
-            position=taken[:, :, 0],
-            offset=taken[:, :, 1] if taken.shape[2] > 1 else None,
-        ),
+        motion=_setpoints(taken, motion, target),
         cycles=tuple(
             tuple(
                 message(cob_id, fields.pack(*map(int, values)))
@@ -75,6 +74,15 @@ def plan_of(content: bytes, target: Target) -> StreamPlan:
             for cycle in taken
         ),
     )
+
+
+def _setpoints(taken: Integers, motion: SampledProfile, target: Target) -> Setpoints:
+    first, *others = np.moveaxis(taken, 2, 0)
+    if target.can.mode != "csv":
+        return Setpoints(period=motion.cycle_time, position=first, offset=others[0] if others else None)
+    counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
+    position = np.rint(motion.position * counts_per_si).astype(np.int64)
+    return Setpoints(period=motion.cycle_time, position=position, velocity=first)
 
 
 def message(cob_id: int, data: bytes) -> can.Message:

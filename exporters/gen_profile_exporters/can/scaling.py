@@ -55,11 +55,29 @@ class Setpoints:
     position : (samples, axes) integer array
     offset : (samples, axes) integer array or None
         Velocity 60B1h in counts/s, or torque 60B2h in ‰.
+    velocity : (samples, axes) integer array or None
+        60FFh in counts/s, each kept for one period: what is sent instead of positions in csv.
     """
 
     period: float
     position: Integers
-    offset: Integers | None
+    offset: Integers | None = None
+    velocity: Integers | None = None
+
+    @property
+    def sent(self) -> Integers:
+        """What each cycle's setpoints hold, shape (samples, axes, fields)."""
+        if self.velocity is not None:
+            return self.velocity[:, :, None]
+        fields = [self.position] if self.offset is None else [self.position, self.offset]
+        return np.stack(fields, axis=2)
+
+    @property
+    def at_sync(self) -> Integers:
+        """Where the axes are led to by the instant of each SYNC, shape (samples, axes)."""
+        if self.velocity is not None:
+            return self.position
+        return np.concatenate([self.position[:1], self.position[:-1]])
 
 
 def exact(value: float) -> Fraction:
@@ -103,7 +121,17 @@ def setpoints(motion: SampledProfile, target: Target) -> Setpoints:
             for column, axis in enumerate(target.axes)
         ]
     )
-    return Setpoints(period=motion.cycle_time, position=position, offset=_offsets(motion, target))
+    return Setpoints(
+        period=motion.cycle_time,
+        position=position,
+        offset=_offsets(motion, target),
+        velocity=_velocities(motion, target) if target.can.mode == "csv" else None,
+    )
+
+
+def travelled(velocity: Integers, period: float) -> Array:
+    """Distance in counts by the instant of each SYNC, if each velocity in counts/s is kept for a period."""
+    return np.asarray(np.cumsum(np.pad(velocity[:-1], ((1, 0), (0, 0))), axis=0) * period)
 
 
 def travel_counts(axis: AxisScale, can: CanSpec) -> tuple[int, int] | None:
@@ -158,6 +186,22 @@ def position_factor(can: CanSpec) -> Fraction:
     """Increments per count, 6093h = 608Fh × 6091h / 6092h (CiA 402-2)."""
     encoder, gear, feed = (Fraction(*(pair or (1, 1))) for pair in (can.encoder, can.gear, can.feed))
     return encoder * gear / feed
+
+
+def _velocities(motion: SampledProfile, target: Target) -> Integers:
+    """Choose velocities that lead the axes to every sample, within one period's least distance.
+
+    What rounding leaves over in one period goes into the next one, so nothing adds up.
+    """
+    columns = []
+    for column, axis in enumerate(target.axes):
+        distance = motion.position[:, column] - motion.position[0, column]
+        least = exact(axis.counts_per_si) / exact(motion.cycle_time)
+        velocity = np.append(np.diff(exact_counts(distance, least)), 0)
+        cure = "lower axis.counts_per_metre"
+        _require(velocity, INT32, f"axis {axis.name}, velocity", cure, motion.cycle_time)
+        columns.append(velocity)
+    return np.column_stack(columns)
 
 
 def _offsets(motion: SampledProfile, target: Target) -> Integers | None:

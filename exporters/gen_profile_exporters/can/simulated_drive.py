@@ -1,7 +1,8 @@
 """A CiA 402 drive on the bus, simulated: object dictionary, state machine, PDOs, and what it does in trouble.
 
 It takes its setpoint at each SYNC and leads its axis there within its interpolation period 60C2h, as real
-drives in csp and ip do. Without SYNC it goes on by its own clock.
+drives in csp and ip do; a velocity, in csv, is kept for that period. Without SYNC it goes on by its own
+clock.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from gen_profile_exporters.can.startup import MODES, OFF
 
 HEARTBEAT_LOST, SETPOINT_LOST = 0x8130, 0x8250  # EMCY codes of CiA 301
 FOLLOWING, SYNC_LOST = 0x8611, 0x8700  # and of CiA 402
+SETPOINTS = {0x607A, 0x60C1, 0x60FF}
 POWERED = {State.SWITCHED_ON, State.ENABLED, State.QUICK_STOP, State.FAULT_REACTION}
 
 
@@ -102,7 +104,7 @@ class SimulatedDrive:
             if self.value(0x1400 + pdo, 1) == cob_id:
                 for index, sub, value in _unpacked(self._mapping(0x1600 + pdo), data):
                     self.store(index, sub, value)
-                    if index in {0x607A, 0x60C1}:
+                    if index in SETPOINTS:
                         self._fresh, self._setpoint_heard = True, now
 
     def watch(self, now: int) -> None:
@@ -195,17 +197,23 @@ class SimulatedDrive:
     def _follow(self) -> None:
         if self._fresh:
             self._fresh, self._misses = False, 0
-            index, sub = (0x60C1, 1) if self.value(0x6061) == MODES["ip"] else (0x607A, 0)
-            self.command = self._within_travel(float(self.value(index, sub)))
+            self.command = self._within_travel(self._setpoint())
             return
         self._misses += 1
-        if self.make.miss == "extrapolate":
+        if self.make.miss == "extrapolate" or self.value(0x6061) == MODES["csv"]:  # which holds a velocity
             self.command = self._within_travel(self.command + self.velocity * self.period)
         if self._misses > self.make.misses:
             if self.make.miss == "extrapolate":
                 self.fault(SYNC_LOST)
             elif self.make.miss == "stop":
                 self.state = State.QUICK_STOP
+
+    def _setpoint(self) -> float:
+        """Where the axis is to be one period later, in counts."""
+        mode = self.value(0x6061)
+        if mode == MODES["csv"]:
+            return self.command + self.value(0x60FF) * self.period
+        return float(self.value(0x60C1, 1) if mode == MODES["ip"] else self.value(0x607A))
 
     def _brake(self) -> None:
         change = self.value(0x6085) * self.period
@@ -266,7 +274,7 @@ def _unpacked(mapping: list[int], data: bytes) -> list[tuple[int, int, int]]:
     parts, start = [], 0
     for entry in mapping:
         length = (entry & 0xFF) // 8
-        signed = entry >> 16 in {0x607A, 0x60C1, 0x60B1, 0x60B2, 0x6060}
+        signed = entry >> 16 in {*SETPOINTS, 0x60B1, 0x60B2, 0x6060}
         value = int.from_bytes(data[start : start + length], "little", signed=signed)
         parts.append((entry >> 16, entry >> 8 & 0xFF, value))
         start += length

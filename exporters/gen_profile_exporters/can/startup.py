@@ -29,7 +29,7 @@ from gen_profile_exporters.can.scaling import (
 )
 from gen_profile_exporters.exporter import Target
 
-MODES = {"ip": 7, "csp": 8}  # 6060h
+MODES = {"ip": 7, "csp": 8, "csv": 9}  # 6060h
 QUICK_STOP_ON_LOST_CONNECTION = 3  # 6007h
 RAMP_THEN_DISABLE = 2  # 605Ah
 OFF = 1 << 31  # of a PDO's COB-ID
@@ -188,7 +188,8 @@ def _pdo(index: int, cob_id: int, kind: int, fields: Sequence[Field], name: str)
 def _limits(axis: AxisScale, can: CanSpec) -> Iterator[Entry]:
     if can.following_error is not None:
         window = magnitude_counts(can.following_error, axis)
-        yield Entry(0x6065, 0, 32, window, "following error window (counts)")
+        watches = can.mode != "csv"  # there, the streamer does
+        yield Entry(0x6065, 0, 32, window, "following error window (counts)", optional=not watches)
     travel = travel_counts(axis, can)
     if travel is not None:
         yield Entry(0x607D, 1, 32, travel[0], "lower end of the travel (counts)")

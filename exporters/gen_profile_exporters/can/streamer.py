@@ -125,6 +125,7 @@ class Streamer:
         self._late = np.full(cycles, -1, dtype=np.int64)
         self._actual = np.zeros((cycles, len(self._nodes)), dtype=np.int64)
         self._told = np.zeros(cycles, dtype=np.bool_)
+        self._led = plan.motion.at_sync
 
     def ask_to_stop(self, reason: str) -> None:
         """Have the stream aborted before its next cycle; may be called from a signal handler."""
@@ -286,13 +287,27 @@ class Streamer:
         self._require_well()
         if self._answers_for >= 0:
             self._actual[self._answers_for] = [axis.position for axis in self._watch.axes]
-            self._told[self._answers_for] = all(axis.heard >= self._sent_at for axis in self._watch.axes)
+            told = all(axis.heard >= self._sent_at for axis in self._watch.axes)
+            self._told[self._answers_for] = told
+            if told and self._plan.motion.velocity is not None:
+                self._require_following(self._answers_for)
             self._answers_for = -1
 
     def _require_well(self) -> None:
         if self._stop_asked:
             raise StreamAborted(self._stop_asked)
         self._watch.require_well()
+
+    def _require_following(self, cycle: int) -> None:
+        """Hold the axes to the motion where no drive does: in csv it controls its velocity only."""
+        can, led = self._plan.target.can, self._led[cycle]
+        for axis, scale, at in zip(self._watch.axes, self._plan.target.axes, led, strict=True):
+            apart = abs(axis.position - int(at))
+            if apart > magnitude_counts(can.following_error or can.start_tolerance, scale):
+                raise StreamAborted(
+                    f"axis {axis.name}: it is {apart / abs(scale.counts_per_si):.3g} off the motion, more "
+                    "than can.following_error; check the drive's scaling, or whether the axis is blocked."
+                )
 
     def _require_skippable(self, cycle: int, missed: int) -> None:
         """Pass over one setpoint that is too late, if the next one is no greater a step than any other."""

@@ -36,7 +36,7 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @cli.command(epilog="Example: gen-profile stream deploy/paper.log --interface socketcan --channel can0")
 @spec_options
 @_bus_options
-@click.option("--mode", type=click.Choice(["csp", "ip"]), help="Mode of the drives, for a spec.")
+@click.option("--mode", type=click.Choice(["csp", "ip", "csv"]), help="Mode of the drives, for a spec.")
 @click.option("--node", type=int, help="CANopen node of the first axis, for a spec.")
 @click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
 @click.option("--self-test", is_flag=True, help="First measure whether this machine can hold the cycle.")

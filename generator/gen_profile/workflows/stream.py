@@ -123,8 +123,7 @@ class Outcome:
     @property
     def planned(self) -> Array:
         """Position that each axis is led to by the instant of each SYNC, in m, shape (cycles, axes)."""
-        position = self.source.plan.motion.position
-        return self._si(np.concatenate([position[:1], position[:-1]]))
+        return self._si(self.source.plan.motion.at_sync)
 
     @property
     def actual(self) -> Array:

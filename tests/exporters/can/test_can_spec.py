@@ -34,6 +34,7 @@ def test_everything_stated_comes_back():
         ("can.gear=3", "can.gear: must be an array of 2 numbers, found 3."),
         ("can.feed_forward=torque", "can.torque_per_acceleration: required with feed_forward"),
         ("can.timeout=0", "can.timeout: must be at least 0.001"),
+        ("can.mode=csv", 'can.following_error: required with mode = "csv"'),
         ("can.mode=pp", "can.mode: unknown value, found text 'pp'"),
     ],
 )

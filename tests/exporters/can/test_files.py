@@ -11,11 +11,12 @@ import canopen
 import cantools
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from motions import quintic, target
 
 from gen_profile.errors import ExportError
+from gen_profile.profile import sample
 from gen_profile.spec_reading import preset_spec
 from gen_profile_exporters.can import frames, scaling, startup
 from gen_profile_exporters.can.candump import read
@@ -109,13 +110,95 @@ OPTIONS = {
 }
 
 
+class TestVelocities:
+    @pytest.mark.parametrize("sign", [1, -1])
+    def test_cantools_decodes_them(self, sign):
+        moves, names = quintic((0.0, 0.4), (0.0, -0.7)), ("bridge", "trolley")
+        options = {"mode": "csv", "sign": sign, "counts_per_si": 20_000.0}
+        written = files(moves, *names, **options)
+        database = cantools.database.load_string(written[".dbc"].decode("ascii"))
+        found = [
+            database.decode_message(frame.cob_id, frame.data)["TargetVelocity"]
+            for frame in read(written[".log"])
+            if frame.cob_id == 0x302
+        ]
+        times = (np.arange(len(found)) + 0.5) * 0.004
+        np.testing.assert_allclose(found[:-1], moves(times).velocity[:-1, 1], atol=2e-4)
+        assert found[-1] == 0.0
+
+    @given(
+        st.floats(-5.0, 5.0),
+        st.floats(0.5, 8.0),
+        st.floats(10.0, 1e6),
+        st.sampled_from([0.001, 0.002, 0.004, 0.025]),
+    )
+    @settings(max_examples=30, deadline=None)
+    def test_nothing_adds_up(self, distance, duration, counts_per_si, period):
+        """However coarse the counts, the axes are led to within what one count/s makes in a period."""
+        profile = quintic((0.0, distance), duration=duration)
+        bus = target(mode="csv", counts_per_si=counts_per_si, sync_period=period, bitrate=1_000_000)
+        motion = replay(encode(profile, bus)[0].content, bus)
+        planned = sample(profile, period).position
+        np.testing.assert_allclose(motion.position, planned, atol=0.51 * period / counts_per_si, rtol=1e-12)
+        assert motion.resolution == pytest.approx([period / counts_per_si])
+
+    def test_velocities_beyond_32_bits_are_refused(self):
+        with pytest.raises(ExportError, match=r"axis cart, velocity: .* outside 32 bits"):
+            files(quintic((0.0, 0.9), duration=0.1), mode="csv", counts_per_si=2e9)
+
+
+class TestOthersDecode:
+    """Random configurations, decoded by cantools with our DBC and by canopen with our mappings."""
+
+    @given(
+        st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=1, max_size=4),
+        st.sampled_from([{}, {"mode": "ip"}, {"feed_forward": "velocity"}, TORQUE]),
+        st.integers(1, 120),
+        st.sampled_from([-1, 1]),
+        st.floats(100.0, 1e6),
+        st.sampled_from([0.004, 0.01, 0.025]),
+    )
+    @settings(max_examples=30, deadline=None)
+    def test_the_same_setpoints(self, moves, options, node, sign, counts_per_si, period):
+        names = [f"axis{number}" for number in range(len(moves))]
+        options = {**options, "node": node, "sign": sign, "counts_per_si": counts_per_si}
+        bus = target(*names, sync_period=period, **options)
+        written = files(quintic(*moves, duration=0.5), *names, sync_period=period, **options)
+        planned = sample(quintic(*moves, duration=0.5), period).position
+        database = cantools.database.load_string(written[".dbc"].decode("ascii"))
+        nodes = {node + n: set_up(node + n, written[f".node{node + n}.cdcf"]) for n in range(len(moves))}
+        cycle = 0
+        for frame in read(written[".log"]):
+            if frame.cob_id == frames.SYNC:
+                cycle += 1
+                continue
+            column = frame.cob_id - frames.RPDO2 - node
+            exact = round(Fraction(planned[cycle, column]) * scaling.exact(sign * counts_per_si))
+            signals = database.decode_message(frame.cob_id, frame.data, scaling=False)
+            assert next(iter(signals.values())) == exact
+            mapped = nodes[node + column].rpdo[2]
+            assert mapped.cob_id == frame.cob_id
+            mapped.data = bytearray(frame.data)
+            assert [variable.raw for variable in mapped] == list(signals.values())
+        assert cycle == len(planned)
+        assert frames.cycle_bits(bus) < frames.MOST_LOAD * round(bus.can.bitrate * period)
+
+
+def set_up(number, concise_dcf):
+    """Set a node of canopen up as a manager does with our list."""
+    node = canopen.LocalNode(number, dictionary(number, Make()))
+    for index, sub, data in concise(concise_dcf):
+        if index != 0x1017:  # would start a heartbeat
+            node.set_data(index, sub, data)
+    node.associate_network(canopen.Network())
+    node.rpdo[2].read()
+    return node
+
+
 class TestStartup:
     def test_a_drives_own_dictionary_takes_every_entry(self):
         # canopen's types and lengths of the standard's objects, not ours
-        node = canopen.LocalNode(1, dictionary(1, Make()))
-        for index, sub, data in concise(files(**OPTIONS)[".node1.cdcf"]):
-            if index != 0x1017:  # would start a heartbeat
-                node.set_data(index, sub, data)
+        node = set_up(1, files(**OPTIONS)[".node1.cdcf"])
         values = {
             (0x60C2, 1): 4, (0x60C2, 2): -3, (0x6060, 0): 8, (0x6065, 0): 10_000, (0x6085, 0): 500_000,
             (0x607D, 1): -500_000, (0x607D, 2): 500_000, (0x608F, 1): 65536, (0x6091, 1): 3,

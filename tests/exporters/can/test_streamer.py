@@ -115,6 +115,47 @@ class TestWholeStream:
             assert len(bench.of(0x081)) == heard == 0
 
 
+VELOCITY = {"mode": "csv", "following_error": 0.005}
+
+
+class TestVelocities:
+    """Drives that take speed only (60FFh)."""
+
+    @pytest.mark.parametrize("make", [Make(), OTHER_MAKE])
+    def test_they_lead_the_axes_to_the_target(self, make):
+        profile = quintic((0.0, 0.3), (0.0, -0.7))
+        with Bench("bridge", "trolley", profile=profile, make=make, **VELOCITY) as bench:
+            record = bench.run()
+            assert bench.asked(0x6061) == 9
+        assert (record.reason, record.final) == ("", (300_000, -700_000))
+        assert len(find(sent(bench, (0x301, 0x302)), exported(profile, bench.target))) == 1
+        assert bench.of(0x301)[0].data == bench.of(0x301)[-1].data == bytes(4)
+        np.testing.assert_allclose(record.actual, bench.plan.motion.at_sync, atol=1)
+
+    @pytest.mark.parametrize("fault", ["EMCY", "bit 12 lost", "TPDO late", "drive killed", "axis blocked"])
+    def test_every_fault_stops_the_axis(self, fault):
+        act, cycles, reason = FAULTS[fault]
+        reason = "off the motion, more than can.following_error" if fault == "axis blocked" else reason
+        with Bench(profile=quintic((0.0, 0.3)), timeout=0.02, **VELOCITY) as bench:
+            bench.at_cycle(120, lambda: act(bench))
+            record = bench.run()
+        assert re.search(reason, record.reason), record.reason
+        assert_quick_stop_is_last(bench)
+        stops = [frame.at for frame in bench.of(0x201) if frame.data == QUICK_STOP]
+        assert stops[0] <= bench.fault_at + cycles * PERIOD
+
+    def test_a_drive_that_is_fed_no_more_stops_by_itself(self):
+        """It would go on at its last velocity for ever."""
+        with Bench(profile=quintic((0.0, 0.3)), make=Make(miss="hold"), **VELOCITY) as bench:
+            bench.at_cycle(120, lambda: setattr(bench.streamer_end, "sending", lambda _: False))
+            bench.streamer.run()
+            bench.wait(300)
+            emergencies, at = bench.of(0x081), bench.drive.actual
+            bench.wait(100)
+        assert emergencies[0].at <= bench.fault_at + 20 + PERIOD
+        assert bench.drive.actual == at
+
+
 class TestLaunchTimes:
     """A bus that sends at given instants by itself, and a machine that wakes up late."""
 

@@ -21,6 +21,7 @@ from system_parts import missing
 HERE = Path(__file__).parent
 TIMEOUT = 0.1  # s
 PERIOD = 0.004  # s
+DISTURBED_PERIOD = 0.01  # s; a busy machine disturbs a faster stream before the test does
 YEAR = 365 * 86400.0  # s
 QUICK_STOP = b"\x02\x00"
 SLACK = 0.05  # s, for a simulated drive on a busy machine to speak up
@@ -38,13 +39,14 @@ def scenarios(tmp_path_factory, cache):
         if not folder.exists():
             folder.mkdir()
             environment = {"GEN_PROFILE_CACHE": str(cache)}
-            spec = ["--preset", "paper", "--set", f"can.timeout={TIMEOUT}"]
-            subprocess.run(
-                [PROGRAM, *spec, "--export", "can", "--out", folder / "deploy"],
-                check=True,
-                capture_output=True,
-                env={**os.environ, **environment},
-            )
+            for name, period in (("4ms", PERIOD), ("10ms", DISTURBED_PERIOD)):
+                spec = ["--set", f"can.timeout={TIMEOUT}", "--set", f"can.sync_period={period}"]
+                subprocess.run(
+                    [PROGRAM, "--preset", "paper", *spec, "--export", "can", "--out", folder / name],
+                    check=True,
+                    capture_output=True,
+                    env={**os.environ, **environment},
+                )
             command = [sys.executable, HERE / "vcan_scenarios.py", folder]
             code, output = vcan_kernel.run(command, folder, environment)
             (folder / "said").write_text(output)
@@ -69,7 +71,7 @@ def scenario(scenarios, request):
         frames=frames,
         stream=json.loads(told) if told else None,
         drive=json.loads(drive) if drive else None,
-        log=(scenarios / "deploy" / "paper.log").read_text(),
+        log=(scenarios / "4ms" / "paper.log").read_text(),
         codes=(ended["stream"], ended["drive"]),
         launches=ended["launches"],
     )
@@ -168,7 +170,7 @@ def test_what_somebody_says_stops_the_axis(scenario, frame, words):
     assert words in scenario.stream["reason"]
     said = next(at for at, *found in scenario.frames if tuple(found) == frame and at > moved(scenario))
     stop = assert_quick_stop(scenario)
-    assert stop - said < 2 * PERIOD + SLACK
+    assert stop - said < 2 * DISTURBED_PERIOD + SLACK
 
 
 @on("drive-frozen")
@@ -177,7 +179,7 @@ def test_a_drive_that_falls_silent_ends_the_stream(scenario):
     assert "no feedback" in scenario.stream["reason"]
     stop = instants(scenario, 0x201, QUICK_STOP)[0]
     assert max(instants(scenario, 0x301)) < stop
-    assert stop - max(instants(scenario, 0x181)) < TIMEOUT + 3 * PERIOD + SLACK
+    assert stop - max(instants(scenario, 0x181)) < TIMEOUT + 3 * DISTURBED_PERIOD + SLACK
 
 
 def moved(scenario):
