@@ -97,6 +97,8 @@ class Panel:
     bands : sequence of Band
     decades : float or None
         Of a logarithmic vertical axis, counted down from the greatest value; None for a linear one.
+    ceiling : float or None
+        Where a vertical axis that begins at 0 ends; None for one that shows everything.
     """
 
     title: str
@@ -106,6 +108,7 @@ class Panel:
     levels: Sequence[Level] = ()
     bands: Sequence[Band] = ()
     decades: float | None = None
+    ceiling: float | None = None
 
     def to_plotly(self) -> dict[str, Any]:
         """Write traces and layout; Plotly takes texts for markup, so they are escaped."""
@@ -122,6 +125,8 @@ class Panel:
                 "dtick": 1,
                 "exponentformat": "power",
             }
+        elif self.ceiling is not None:
+            layout["yaxis"] |= {"range": [0, self.ceiling]}
         return {"data": [_trace(line) for line in self.lines], "layout": layout}
 
 

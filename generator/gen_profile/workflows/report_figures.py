@@ -128,7 +128,7 @@ def sway_figure(spec: Spec, trial: Trial, arrival: float) -> Figure:
 def other_methods(comparison: Comparison) -> Figure:
     """Draw all methods: the motion, its spectrum, and the end load's sway (the paper's figures 2 to 5)."""
     spec, rows = comparison.spec, comparison.rows
-    styles = _styles(comparison)
+    styles = method_styles(comparison)
     first = spec.machine().actuated[0]
     panels = [
         Panel(
@@ -251,19 +251,37 @@ def _spectrum(spec: Spec, trial: Trial, motions: Mapping[str, Profile], styles: 
     )
 
 
-def _styles(comparison: Comparison) -> dict[str, Style]:
-    """Draw optimal motions solid and shapers dashed; show the paper's methods and the recommended ones."""
+def method_styles(comparison: Comparison) -> dict[str, Style]:
+    """Draw optimal motions solid, shapers dashed and the spec's own thick; show the most telling ones."""
+    own = own_method(comparison.spec)
     advised = {advice.method for advice in comparison.recommended.values()}
     methods = [row.method for row in comparison.rows]
     optimal = [method for method in methods if method.startswith("optimal")]
     shapers = [method for method in methods if method not in optimal]
-    shown = {*advised, *PAPERS, *(method for method in optimal if method == "optimal" or "beta" in method)}
+    shown = {
+        own,
+        *advised,
+        *PAPERS,
+        *(method for method in optimal if method == "optimal" or "beta" in method),
+    }
     groups: list[tuple[list[str], int, Dash]] = [(optimal, 0, "solid"), (shapers, 3, "dash")]
     return {
-        method: Style(colour=PALETTE[(first + place) % len(PALETTE)], dash=dash, shown=method in shown)
+        method: Style(
+            colour=PALETTE[(first + place) % len(PALETTE)],
+            dash=dash,
+            width=2.6 if method == own else 1.4,
+            shown=method in shown,
+        )
         for group, first, dash in groups
         for place, method in enumerate(group)
     }
+
+
+def own_method(spec: Spec) -> str:
+    """Name the spec's own method as a comparison does."""
+    if spec.solver.shaper is not None:
+        return spec.solver.shaper
+    return "optimal" if spec.cost.sway_scale is None else f"optimal-beta{spec.cost.sway_weight:g}"
 
 
 def _until(row: Row) -> Array:

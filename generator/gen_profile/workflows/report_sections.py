@@ -9,6 +9,7 @@ import tomli_w
 from gen_profile.check import Check
 from gen_profile.metrics import POINTS_PER_SEGMENT, greatest
 from gen_profile.report.content import Block, Listing, Row, Section, Share, Table, Terms, Verdict
+from gen_profile.report.figures import PLAIN
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec import Spec
 from gen_profile.workflows.compare import Comparison
@@ -17,13 +18,16 @@ from gen_profile.workflows.planning import Trial
 from gen_profile.workflows.report_animation import animation
 from gen_profile.workflows.report_figures import (
     hamiltonian_figure,
+    method_styles,
     motion_figure,
     other_methods,
+    own_method,
     spectrum_figure,
     sway_figure,
 )
 from gen_profile.workflows.report_measured import Measured
 from gen_profile.workflows.report_measured_section import measured_section
+from gen_profile.workflows.report_robustness import robustness_section
 from gen_profile.workflows.report_words import bound, machine, mm, number
 
 UNITS_OF_TIME = ("s", "s²", "s³")
@@ -98,6 +102,9 @@ def sections(
     )
     yield Section(title="The motion", blocks=[motion_figure(spec, trial), spectrum_figure(spec, trial)])
     yield Section(title="The loads", blocks=[sway_figure(spec, trial, check.arrival), _scenarios(check)])
+    robust = _robustness(spec, trial, comparison)
+    if robust is not None:
+        yield robust
     if comparison is not None:
         yield _methods(comparison)
     yield _evidence(outcome)
@@ -176,6 +183,16 @@ def _demand(check: Check, residual: Mapping[str, float]) -> float:
     return max((residual[load] + check.error_bound) / limit for load, limit in check.limit.items())
 
 
+def _robustness(spec: Spec, trial: Trial, comparison: Comparison | None) -> Section | None:
+    own = own_method(spec)
+    if comparison is None:
+        return robustness_section(spec, own, {own: trial.motion}, {own: PLAIN})
+    motions = {row.method: row.trial.motion for row in comparison.rows}
+    return robustness_section(
+        spec, own, {**motions, own: trial.motion}, {own: PLAIN, **method_styles(comparison)}
+    )
+
+
 def _methods(comparison: Comparison) -> Section:
     spec = comparison.spec
     unit = spec.machine().actuated[0].unit
@@ -213,13 +230,6 @@ def _methods(comparison: Comparison) -> Section:
         ),
         blocks=blocks,
     )
-
-
-def own_method(spec: Spec) -> str:
-    """Name the spec's own method as a comparison does."""
-    if spec.solver.shaper is not None:
-        return spec.solver.shaper
-    return "optimal" if spec.cost.sway_scale is None else f"optimal-beta{spec.cost.sway_weight:g}"
 
 
 def _evidence(outcome: Design) -> Section:

@@ -1,0 +1,73 @@
+"""How much sway a design, and other methods, leave on machines that are not as specified."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gen_profile.profile import Profile
+from gen_profile.report.content import Section
+from gen_profile.report.figures import Band, Figure, Level, Line, Panel, Style
+from gen_profile.spec import Spec
+from gen_profile.workflows.robustness import Robustness, error_grid, robustness_of
+
+MOST = 4  # parameters that have a curve each
+HEADROOM = 3.0  # limits of residual sway that are shown, lest the worst method hide the others
+
+
+def robustness_section(
+    spec: Spec, own: str, motions: Mapping[str, Profile], styles: Mapping[str, Style]
+) -> Section | None:
+    """Draw residual sway over the error of every uncertain parameter; None where the spec states none.
+
+    Parameters
+    ----------
+    spec : Spec
+    own : str
+        Which of the motions is the design's.
+    motions : mapping of str to Profile
+        Of the axes, by method.
+    styles : mapping of str to Style
+    """
+    names = list(spec.robustness.uncertain)[:MOST]
+    if not names:
+        return None
+    found = {name: robustness_of(spec, motions, error_grid(spec, (name,))) for name in names}
+    caption = "Shaded: the range that the spec states; dashed in red: what is allowed."
+    if len(spec.robustness.uncertain) > MOST:
+        caption += f" Of {len(spec.robustness.uncertain)} uncertain parameters the first {MOST}."
+    return Section(
+        title="Robustness",
+        words=[" ".join(_reach(name, one, own) for name, one in found.items())],
+        blocks=[Figure(caption=caption, panels=[_panel(name, one, styles) for name, one in found.items()])],
+    )
+
+
+def _reach(name: str, found: Robustness, own: str) -> str:
+    """Say between which errors every load keeps its limit."""
+    reach = found.insensitivity(own)
+    if reach is None:
+        return f"On the machine as specified a load exceeds its limit, whatever {name}."
+    low, high = (f"{100.0 * end:+.3g}\N{NO-BREAK SPACE}%".replace("-", "−") for end in reach)
+    (errors,) = found.errors.values()
+    if reach == (errors[0], errors[-1]):
+        return f"Every load keeps its limit over all errors of {name} tried, {low} to {high}."
+    return f"Every load keeps its limit while the error of {name} is between {low} and {high}."
+
+
+def _panel(name: str, found: Robustness, styles: Mapping[str, Style]) -> Panel:
+    spec, limit = found.spec, 1e3 * found.tolerance
+    stated = 100.0 * spec.robustness.uncertain[name]
+    (errors,) = found.errors.values()
+    lines = [
+        Line(name=method, x=100.0 * errors, y=1e3 * found.end_load(method), style=styles[method])
+        for method in found.residual
+    ]
+    return Panel(
+        title=f"Residual sway of the {spec.machine().loads[-1]} over {name}",
+        x_label=f"error of {name} (%)",
+        y_label="residual sway (mm)",
+        lines=lines,
+        levels=[Level(value=limit)],
+        bands=[Band(low=-stated, high=stated)],
+        ceiling=max(min(1.05 * max(float(line.y.max()) for line in lines), HEADROOM * limit), 1.2 * limit),
+    )

@@ -1,0 +1,210 @@
+"""`gen-profile report`: what it writes, when it fails, and that it writes the same bytes again."""
+
+import hashlib
+import json
+import re
+from html.parser import HTMLParser
+
+import attrs
+import pytest
+from command_line import run_here, run_process
+
+from gen_profile.errors import OutputError
+from gen_profile.report.page import NEEDED, require_pages
+from gen_profile.spec_reading import preset_spec
+from gen_profile.workflows.design import design
+from gen_profile.workflows.report_sections import sections
+
+QUICK = ("--set", "cost.sway_weight=0", "--no-compare")
+LIMITS = "{velocity=0.3, acceleration=0.8, travel=[-0.1, 0.5], sway=0.04}"
+
+
+class Reader(HTMLParser):
+    """What a page says and refers to, without its scripts."""
+
+    def __init__(self, content):
+        super().__init__()
+        self.texts, self.links, self._inside = [], [], []
+        self.feed(content)
+
+    def handle_starttag(self, tag, attrs):
+        self._inside.append(tag)
+        self.links += [value for name, value in attrs if name in {"src", "href", "srcset", "data", "action"}]
+
+    def handle_endtag(self, tag):
+        while self._inside and self._inside.pop() != tag:
+            pass
+
+    def handle_data(self, data):
+        if data.strip() and self._inside[-1:] not in (["script"], ["style"]):
+            self.texts.append(data.strip())
+
+
+def report(tmp_path, *words):
+    path = tmp_path / "report.html"
+    outcome = run_here("report", *words, "--out", path)
+    content = path.read_text("utf-8") if path.exists() else ""
+    return outcome, content, " ".join(Reader(content).texts)
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "paper.html"
+    outcome = run_here("report", "--preset", "paper", "--out", path, "--json")
+    return path, json.loads(outcome.out)
+
+
+def test_it_says_what_the_design_found(paper):
+    path, document = paper
+    text = " ".join(Reader(path.read_text("utf-8")).texts)
+    assert "After the move the hook sways by 2.193 mm at most (L1 −20\xa0%), and 3 mm are allowed." in text
+    for section in (
+        "The machine plays the move",
+        "Limits and margins",
+        "The motion",
+        "The loads",
+        "Robustness",
+        "Beside other methods",
+        "Solver evidence",
+        "Files",
+    ):
+        assert text.count(section) >= 2  # in the list of contents, and where it stands
+    assert document["check"]["passed"] is True and document["measured"] is None
+    assert document["report"] == {
+        "path": str(path),
+        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "bytes": path.stat().st_size,
+    }
+
+
+def test_the_robustness_it_states_is_where_the_check_begins_to_fail(paper):
+    path, _ = paper
+    text = " ".join(Reader(path.read_text("utf-8")).texts)
+    low, high = re.search(r"error of L1 is between (−[0-9.]+)\xa0% and \+([0-9.]+)\xa0%", text).groups()
+    low, high = float(low.replace("−", "-")), float(high)
+    for error, inside in ((low + 0.5, True), (low - 0.5, False), (high - 0.5, True), (high + 0.5, False)):
+        words = ("--set", f"plant.L1={0.47 * (1.0 + error / 100.0)!r}", "--set", "robustness={}")
+        code = run_here("check", path.parent / "paper.csv", "--preset", "paper", *words).code
+        assert (code == 0) == inside
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _exported(paper):
+    assert run_here("--preset", "paper", "--out", paper[0].parent).code == 0
+
+
+def test_its_hashes_are_those_of_the_files_that_a_design_writes(paper):
+    path, document = paper
+    text = " ".join(Reader(path.read_text("utf-8")).texts)
+    manifest = json.loads((path.parent / "manifest.json").read_text("utf-8"))
+    assert hashlib.sha256((path.parent / "paper.csv").read_bytes()).hexdigest() in text
+    assert manifest["profile_sha256"] in text and manifest["spec_sha256"] in text
+    assert document["spec_sha256"] == manifest["spec_sha256"]
+
+
+def test_it_needs_nothing_but_itself_and_is_below_six_megabytes(paper):
+    path, _ = paper
+    links = Reader(path.read_text("utf-8")).links
+    assert links and all(link.startswith("#") for link in links)
+    assert path.stat().st_size < 6_000_000
+
+
+def test_the_same_spec_gives_the_same_bytes_wherever_and_whenever(tmp_path):
+    pages = []
+    for folder, environment in (
+        ("here", {"TZ": "UTC", "PYTHONHASHSEED": "1", "LC_ALL": "C"}),
+        ("there", {"TZ": "Asia/Tokyo", "PYTHONHASHSEED": "2", "HOME": str(tmp_path)}),
+    ):
+        (tmp_path / folder).mkdir()
+        words = ("report", "--preset", "flexible-joint", "--out", "page.html")
+        assert run_process(*words, cwd=tmp_path / folder, **environment).code == 0
+        pages.append((tmp_path / folder / "page.html").read_bytes())
+    assert pages[0] == pages[1]
+    assert str(tmp_path).encode() not in pages[0]
+
+
+def test_a_design_that_fails_its_check_is_reported_as_failed(tmp_path):
+    outcome, content, text = report(tmp_path, *QUICK, "--set", "check.residual_sway=0.001")
+    assert outcome.code == 4
+    assert outcome.errors[0].startswith("Check failed: The payload sways by ")
+    assert "Failed. The payload sways by" in text and 'class="failed"' in content
+
+
+def test_limits_stand_beside_what_the_motion_takes(tmp_path):
+    outcome, content, text = report(tmp_path, *QUICK, "--set", f"limits={LIMITS}")
+    assert outcome.code == 0
+    assert "velocity of cart 0.2" in text and "0.3 m/s" in text
+    assert re.search(r"travel of cart 0 to 0.3 m −0.1 to 0.5 m 0.1 m", text)
+    assert re.search(r"sway on the way 29.4\d? mm 40 mm 10.\d+ mm", text)
+    figures = json.loads(re.search(r'type="application/json">(.*?)</script>', content)[1])["figures"]
+    levels = [[shape["y0"] for shape in panel["layout"]["shapes"]] for panel in figures[0]["panels"]]
+    assert levels == [[-0.1, 0.5], [0.3, -0.3], [0.8, -0.8], []]
+
+
+@pytest.mark.parametrize(
+    "words, expected",
+    [
+        (("--set", "robustness={}"), "Co-simulated from the written file on 1 machine;"),
+        (("--set", "solver.method=zvd"), "a quintic move through the shaper zvd; nothing was optimised"),
+        (("--set", "actuator={type='first-order', tau=0.05}"), "The command of each drive leads its lag."),
+        (("--set", "robustness.uncertain={L1=0.2, L2=0.1}"), "sensitivities to "),
+        (("--set", "solver.method=direct"), "Method direct: "),
+    ],
+)
+def test_designs_of_every_kind_are_reported(tmp_path, words, expected):
+    outcome, _, text = report(tmp_path, *QUICK, *words, "--set", "check.residual_sway=0.01")
+    assert outcome.code == 0 and expected in text
+
+
+def test_several_axes_are_told_apart(tmp_path):
+    outcome, _, text = report(tmp_path, "--preset", "gantry-crane", "--no-compare")
+    assert outcome.code == 0
+    assert "Peak velocity, x" in text and "Peak velocity, y" in text and "Jerk of y" in text
+
+
+def test_the_shortest_time_is_reported_as_found(tmp_path):
+    words = ("--set", "move.duration=minimum", "--set", "limits={acceleration=0.5}")
+    outcome, _, text = report(tmp_path, *QUICK, *words, "--set", "check.residual_sway=0.02")
+    assert outcome.code == 0
+    assert re.search(r"acceleration of cart 0.[45]\d* m/s² 0.5 m/s²", text)
+    duration = re.search(r"cart 0.3 m in ([0-9.]+) s; uncertain", text)[1]
+    assert f"Duration {duration} s" in text and float(duration) < 3.0
+
+
+def test_a_design_against_the_worst_machine_tells_its_bound(tmp_path):
+    outcome = design(preset_spec("paper"), ["csv"], tmp_path)
+    solution = attrs.evolve(outcome.plan.solution, worst_case_bound=1e-3)
+    outcome = attrs.evolve(outcome, plan=attrs.evolve(outcome.plan, solution=solution))
+    (evidence,) = (
+        one for one in sections(outcome, outcome.check, None, None) if one.title == "Solver evidence"
+    )
+    assert (
+        "Lower bound",
+        "no motion brings the worst machine below 1 mm, for small angles",
+    ) in evidence.blocks[0].rows
+
+
+def test_a_page_that_cannot_be_written_is_a_sentence(tmp_path):
+    (tmp_path / "file").write_text("", "utf-8")
+    outcome = run_here("report", *QUICK, "--out", tmp_path / "file" / "page.html")
+    assert outcome.code == 2
+    assert outcome.errors[-1].startswith(f"Error: Cannot write to the folder {tmp_path / 'file'}")
+
+
+def test_a_folder_is_no_file_to_write(tmp_path):
+    outcome = run_here("report", *QUICK, "--out", tmp_path)
+    assert outcome.code == 2 and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("missing", NEEDED)
+def test_without_its_libraries_the_sentence_tells_what_to_install(monkeypatch, missing):
+    monkeypatch.setattr("gen_profile.report.page.find_spec", lambda name: None if name == missing else name)
+    with pytest.raises(OutputError, match=r"pip install 'gen-profile\[report\]'"):
+        require_pages()
+
+
+def test_the_report_is_named_after_the_spec_by_default(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outcome = run_here("report", *QUICK, "--set", "name=bay-3")
+    assert outcome.code == 0 and [path.name for path in tmp_path.iterdir()] == ["bay-3.html"]
+    assert outcome.out.splitlines()[0] == "bay-3" and "bay-3.html" in outcome.out
