@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from gen_profile.workflows.compare import Comparison
     from gen_profile.workflows.design import Design
     from gen_profile.workflows.identify import Identification
-    from gen_profile.workflows.report import Report
     from gen_profile.workflows.lookup import Found
     from gen_profile.workflows.profile_library import Library
     from gen_profile.workflows.report import Report
