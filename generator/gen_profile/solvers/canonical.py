@@ -41,6 +41,8 @@ class Canonical:
     shown : (n,) array
         Sway in m, of the load that sways most, per unit of each state of `system` that is a mode's; 0 where
         the mode is too fast to be excited, and for the axes.
+    phase : float
+        Of the fastest mode that is excited, over the whole move in rad.
     """
 
     system: OptimalitySystem
@@ -49,6 +51,7 @@ class Canonical:
     initial: Array
     final: Array
     shown: Array
+    phase: float
 
     def unknowns(self, points: Array) -> Array:
         """Turn ζ into states and costates as `system` knows them, shape (points, 2 n)."""
@@ -199,10 +202,19 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
         offset=offset,
         scale=scale,
     )
-    basis, shown = _modal(layout, linear, _shown(linear, swung[: 2 * layout.n_u], reach, duration))
+    excited = _shown(linear, swung[: 2 * layout.n_u], reach, duration)
+    basis, shown = _modal(layout, linear, excited)
     final[[state for states, _ in layout.kinds for state in states if shown[state] == 0.0]] = np.nan
     initial = np.asarray(np.linalg.solve(basis, swung / scale), dtype=np.float64)
-    return Canonical(system=system, data=data, basis=basis, initial=initial, final=final, shown=shown)
+    return Canonical(
+        system=system,
+        data=data,
+        basis=basis,
+        initial=initial,
+        final=final,
+        shown=shown,
+        phase=float(duration * linear.frequencies[excited > 0.0].max(initial=0.0)),
+    )
 
 
 def independence(canonical: Canonical) -> tuple[NDArray[np.bool_], tuple[str, ...]]:

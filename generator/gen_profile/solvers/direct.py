@@ -40,7 +40,7 @@ from gen_profile.spec import LimitsSpec
 METHOD = "direct"
 INTERVALS = 40
 MAX_INTERVALS = 480
-RADIANS_PER_INTERVAL = 3.0  # of the fastest mode, which Gauss collocation still follows closely
+RADIANS_PER_INTERVAL = 1.5  # of the fastest mode, which Gauss collocation then follows to 1e-7 of the cost
 STEP_TOLERANCE = 1e-8  # of the motion's coordinates, relative
 STALLED = 1e-5  # step that is still taken for the programs' own tolerance when it ceases to shrink
 SLOW = 0.3  # share of the step before from which on steps are combined

@@ -25,6 +25,8 @@ from gen_profile.solvers.solution import Optimum, Solution, Status
 
 METHOD = "indirect"
 INTERVALS = 30
+MAX_INTERVALS = 480
+RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that is excited, to begin with
 SWAY_SAMPLES = 1001
 BETA_DECADES = 8.0  # from share 0 to 1
 HORIZONTAL = np.pi / 2.0
@@ -134,8 +136,9 @@ def _guess(canonical: Canonical) -> Trajectory:
             z[:, layout.axis(order)] = values[:, None] * canonical.final[layout.axis(0)]
         return z
 
-    mesh = np.linspace(0.0, 1.0, INTERVALS + 1)
-    stages = states(stage_times(mesh)).reshape(INTERVALS, STAGES, -1)
+    intervals = int(np.clip(np.ceil(canonical.phase / RADIANS_PER_INTERVAL), INTERVALS, MAX_INTERVALS))
+    mesh = np.linspace(0.0, 1.0, intervals + 1)
+    stages = states(stage_times(mesh)).reshape(intervals, STAGES, -1)
     return Trajectory(mesh=mesh, nodes=states(mesh), stages=stages)
 
 
