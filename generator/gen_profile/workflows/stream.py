@@ -69,6 +69,10 @@ class Port:
         import can  # noqa: PLC0415  # 0.1 s that a dry run does not need
 
         try:
+            if self.interface == "udp_multicast":
+                from gen_profile_exporters.can.multicast import MulticastBus  # noqa: PLC0415
+
+                return MulticastBus(self.channel)
             return can.Bus(channel=self.channel, interface=self.interface, bitrate=bitrate)
         except (can.CanError, OSError, ValueError, ImportError, NotImplementedError) as error:
             raise SpecError(
