@@ -63,6 +63,19 @@ def test_simulated_drives_end_without_sway(deployed, tmp_path):
     assert float(rows[-1][1]) == pytest.approx(0.3, abs=1e-4)
 
 
+def test_drives_that_take_only_speed(tmp_path):
+    """Velocities (60FFh) from the design over the check to the simulated load."""
+    spec = ("can.mode=csv", "can.following_error=0.01", "can.timeout=0.5", "can.sync_period=0.02")
+    options = [word for override in spec for word in ("--set", override)]
+    designed = run_here("--preset", "paper", *options, "--export", "can", "--out", tmp_path, "--json")
+    assert designed.document["check"]["passed"]
+    told = streamed(tmp_path / "paper.log", "--simulate-drive").document
+    assert (told["state"], told["reason"]) == ("done", "")
+    assert told["drive"]["position_error_m"] == 0.0
+    assert told["drive"]["following_error_max_m"] < 1.1e-6  # a count
+    assert 0.0 < told["drive"]["sway_residual_peak_m"] < 3e-4
+
+
 def test_in_words(deployed):
     outcome = run_here("stream", deployed / "paper.log", "--simulate-drive")
     assert "setpoints sent" in outcome.out

@@ -22,32 +22,44 @@ def real_time() -> Iterator[tuple[str, ...]]:
     tuple of str
         What was refused, a sentence each.
     """
-    refused = (*take_priority(PRIORITY), *_lock_memory())
-    gc.collect()
-    gc.freeze()
-    collecting = gc.isenabled()
-    gc.disable()
+    with priority(PRIORITY) as refused, _locked_memory() as also_refused:
+        gc.collect()
+        gc.freeze()
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            yield (*refused, *also_refused)
+        finally:
+            if collecting:
+                gc.enable()
+            gc.unfreeze()
+
+
+@contextmanager
+def priority(level: int) -> Iterator[tuple[str, ...]]:
+    """Run the block's thread with real-time priority; yields what was refused, as a sentence."""
     try:
-        yield refused
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(level))
+    except (OSError, AttributeError):  # not permitted; no such thing on this system
+        yield ("Real-time priority is not permitted (grant it with `ulimit -r 80` or CAP_SYS_NICE).",)
+        return
+    try:
+        yield ()
     finally:
-        if collecting:
-            gc.enable()
-        gc.unfreeze()
-        ctypes.CDLL(None).munlockall()
-        if not any("priority" in sentence for sentence in refused):
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
-def take_priority(priority: int) -> tuple[str, ...]:
-    """Give the calling thread real-time priority, for good; return what was refused, as a sentence."""
+@contextmanager
+def _locked_memory() -> Iterator[tuple[str, ...]]:
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except OSError:
-        return ("Real-time priority is not permitted (grant it with `ulimit -r 80` or CAP_SYS_NICE).",)
-    return ()
-
-
-def _lock_memory() -> tuple[str, ...]:
-    if ctypes.CDLL(None, use_errno=True).mlockall(_LOCK_CURRENT_AND_FUTURE) != 0:
-        return ("Memory cannot be locked (grant it with `ulimit -l unlimited` or CAP_IPC_LOCK).",)
-    return ()
+        system = ctypes.CDLL(None, use_errno=True)
+        locked = system.mlockall(_LOCK_CURRENT_AND_FUTURE) == 0
+    except (OSError, TypeError, AttributeError):  # no C library under that name; no such call in it
+        locked = False
+    if not locked:
+        yield ("Memory cannot be locked (grant it with `ulimit -l unlimited` or CAP_IPC_LOCK).",)
+        return
+    try:
+        yield ()
+    finally:
+        system.munlockall()

@@ -343,7 +343,7 @@ class Streamer:
         return Record(
             phase=phase,
             reason=reason,
-            sent=len(cycles),
+            sent=self.cycles_sent,
             lateness=Lateness(cycles=cycles, late=self._late[cycles], period=self._period),
             actual=self._actual,
             told=self._told,

@@ -25,7 +25,7 @@ from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.clock import SystemClock
 from gen_profile_exporters.can.lateness import Lateness, rehearse
 from gen_profile_exporters.can.plan import StreamPlan, plan_of
-from gen_profile_exporters.can.realtime import PEER_PRIORITY, real_time, take_priority
+from gen_profile_exporters.can.realtime import PEER_PRIORITY, priority, real_time
 from gen_profile_exporters.can.startup import startup_lists
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import format_of
@@ -294,8 +294,8 @@ def stream(
 
 def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
     """Have simulated drives answer until told to stop, as promptly as the machine permits."""
-    take_priority(PEER_PRIORITY)
-    bank.run(stop)
+    with priority(PEER_PRIORITY):
+        bank.run(stop)
 
 
 def drive_bank(source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make) -> DriveBank:

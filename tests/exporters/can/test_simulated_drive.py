@@ -1,6 +1,7 @@
 """The simulated drive by itself: states, faults, and what it does when nobody feeds it."""
 
 import gc
+import os
 import struct
 
 import can
@@ -161,16 +162,26 @@ class TestBus:
 
 
 class TestRealTime:
-    def test_what_is_refused_is_said(self, monkeypatch):
-        def refuse(*_):
-            raise PermissionError
+    @pytest.mark.parametrize("lacking", [PermissionError, AttributeError])
+    def test_what_is_refused_is_said(self, monkeypatch, lacking):
+        def refuse(*_, **__):
+            raise lacking
 
         monkeypatch.setattr("os.sched_setscheduler", refuse)
-        monkeypatch.setattr("ctypes.CDLL", lambda *_, **__: FakeLibrary())
+        monkeypatch.setattr(
+            "ctypes.CDLL", refuse if lacking is AttributeError else lambda *_, **__: Unwilling()
+        )
         with real_time() as refused:
             assert len(refused) == 2
         assert "ulimit -r" in refused[0]
         assert "ulimit -l" in refused[1]
+
+    def test_what_is_granted_is_given_back(self, monkeypatch):
+        asked = []
+        monkeypatch.setattr("os.sched_setscheduler", lambda _, policy, __: asked.append(policy))
+        with real_time():
+            assert asked == [os.SCHED_FIFO]
+        assert asked == [os.SCHED_FIFO, os.SCHED_OTHER]
 
     def test_collection_of_garbage_is_as_before(self):
         gc.disable()
@@ -182,9 +193,8 @@ class TestRealTime:
             gc.enable()
 
 
-class FakeLibrary:
+class Unwilling:
+    """A C library that locks no memory."""
+
     def mlockall(self, flags):
         return -1
-
-    def munlockall(self):
-        return 0
