@@ -18,8 +18,13 @@ from gen_profile.errors import CosimulationError
 from gen_profile_fmu.platforms import PLATFORMS, host_platform
 
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CC"
-# contraction to fused multiply-add would make results depend on the processor
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
+FLAGS = (
+    "-std=c99",
+    "-O2",
+    "-ffp-contract=off",  # fused multiply-add would make results depend on the processor
+    "-fno-math-errno",  # sine and cosine of an angle in one call, with the same bits: a third of the time
+    *("-fPIC", "-fvisibility=hidden", "-shared"),
+)
 # names as they are in a shared library; a library of several FMUs linked statically has prefixed ones
 DEFINITIONS = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
 
