@@ -9,7 +9,7 @@ import struct
 
 import attrs
 import can
-from motions import quintic, target
+from exporters.motions import quintic, target
 
 from gen_profile_exporters.can import exporter
 from gen_profile_exporters.can.drive_bank import DriveBank
