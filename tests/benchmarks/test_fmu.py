@@ -1,6 +1,6 @@
 """Cost of co-simulation: one step against the bare integration, and many runs against FMPy's own loop."""
 
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 from fmpy import read_model_description, simulate_fmu
@@ -17,7 +17,7 @@ TIMES = np.linspace(0.0, 7.0, 701)
 
 
 def test_many_runs(capsys):
-    """7 s at 10 ms; both with one integration step of 10 ms, and with ten of 1 ms."""
+    """7 s at 10 ms, with one integration step of 10 ms, and with ten of 1 ms; processor time of one thread."""
     fmu = cached_fmu(model_of("plant-acceleration", CRANE), Version.FMI2)
     inputs = {"cart.setpoint_acceleration": np.sin(3.0 * TIMES[:-1])}
     for max_step, runs in ((0.01, 2000), (0.001, 500)):
@@ -25,9 +25,9 @@ def test_many_runs(capsys):
         with ManyRuns(fmu, Version.FMI2) as many:
             parameters = {"L1": lengths, "max_step": steps}
             many.peaks(TIMES, inputs, {"L1": lengths[:1], "max_step": steps[:1]}, ["sway.payload"])
-            began = perf_counter()
+            began = process_time()
             found = many.peaks(TIMES, inputs, parameters, ["sway.payload"])
-            ours = (perf_counter() - began) / runs
+            ours = (process_time() - began) / runs
         with ManyRuns(fmu, Version.FMI2, workers=2) as many:
             began = perf_counter()
             np.testing.assert_array_equal(many.peaks(TIMES, inputs, parameters, ["sway.payload"]), found)
@@ -38,7 +38,7 @@ def test_many_runs(capsys):
                 f"\nmax_step {max_step * 1e3:g} ms: {ours * 1e3:.3g} ms a run, {ours / 700 * 1e6:.3g} µs a "
                 f"step, of which {_bare(fmu, max_step) * 1e6:.3g} µs are integration; FMPy "
                 f"{theirs * 1e3:.3g} ms a run, {theirs / ours:.3g} times as long; "
-                f"10 000 runs in {1e4 * ours:.3g} s, shared by two threads in {1e4 * shared:.3g} s"
+                f"10 000 runs in {1e4 * ours:.3g} s, on two threads in {1e4 * shared:.3g} s by the clock"
             )
         np.testing.assert_allclose(found[:20, 0], fmpys, rtol=1e-9)
 
@@ -46,14 +46,14 @@ def test_many_runs(capsys):
 def _bare(fmu, max_step):
     """Seconds that 10 ms of integration take by themselves: in one communication step of 70 s."""
     with ManyRuns(fmu, Version.FMI2) as many:
-        began = perf_counter()
+        began = process_time()
         many.peaks(
             np.array([0.0, 70.0]),
             {"cart.setpoint_acceleration": np.zeros(1)},
             {"theta1": np.full(10, 0.1), "max_step": np.full(10, max_step)},
             ["sway.payload"],
         )
-        return (perf_counter() - began) / 70_000
+        return (process_time() - began) / 70_000
 
 
 def _fmpy(fmu, inputs, lengths, max_step):
@@ -70,7 +70,7 @@ def _fmpy(fmu, inputs, lengths, max_step):
     signal = np.array(
         list(zip(TIMES, np.append(inputs[name], 0.0), strict=True)), dtype=[("time", float), (name, float)]
     )
-    peaks, began = [], perf_counter()
+    peaks, began = [], process_time()
     for length in lengths:
         slave.reset()
         result = simulate_fmu(
@@ -87,6 +87,6 @@ def _fmpy(fmu, inputs, lengths, max_step):
             use_event_mode=False,
         )
         peaks.append(np.abs(result["sway.payload"]).max())
-    seconds = (perf_counter() - began) / len(lengths)
+    seconds = (process_time() - began) / len(lengths)
     slave.freeInstance()
     return np.array(peaks), seconds
