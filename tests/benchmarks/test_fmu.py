@@ -17,7 +17,7 @@ TIMES = np.linspace(0.0, 7.0, 701)
 
 
 def test_many_runs(capsys):
-    """7 s at 10 ms, with one integration step of 10 ms, and with ten of 1 ms; processor time of one thread."""
+    """7 s at 10 ms, with one integration step of 10 ms, and with ten; processor time of one thread."""
     fmu = cached_fmu(model_of("plant-acceleration", CRANE), Version.FMI2)
     inputs = {"cart.setpoint_acceleration": np.sin(3.0 * TIMES[:-1])}
     for max_step, runs in ((0.01, 2000), (0.001, 500)):
