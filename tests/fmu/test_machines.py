@@ -45,22 +45,25 @@ def swinging(plant):
     undamped = dict.fromkeys(MACHINES[plant.type][2], 0.0)
     return {
         **undamped,
-        **{f"{axis.name}.start": 1.5 for axis in plant.actuated},
+        **{f"{axis.name}.{what}": 1.5 for axis in plant.actuated for what in ("start", "setpoint")},
         **{q.name: 0.3 / (1 + i) for i, q in enumerate(plant.unactuated)},
         **{f"{q.name}.rate": 0.2 for q in plant.unactuated},
     }
 
 
-@pytest.mark.parametrize("version", Version)
-@pytest.mark.parametrize("type_", MACHINES)
+@pytest.mark.parametrize(
+    ("type_", "version"),
+    [*((type_, Version.FMI2) for type_ in MACHINES), ("double-pendulum-crane", Version.FMI3)],
+)
 def test_free_swing_keeps_the_energy(type_, version):
     plant = find_plant(type_)
-    instance = Instance(cached_fmu(model_of("plant-acceleration", plant), version), version, exchange=False)
+    fmu = cached_fmu(model_of("plant-setpoint", plant), version)
+    instance = Instance(fmu, version, exchange=False)
     values = swinging(plant)
     instance.begin(values)
     energy = cosimulate(instance, np.linspace(0.0, 10.0, 201), lambda *_: None, ["energy"])
-    still = Instance(cached_fmu(model_of("plant-acceleration", plant), version), version, exchange=False)
-    still.begin({name: value for name, value in values.items() if name.endswith("start")})
+    still = Instance(fmu, version, exchange=False)
+    still.begin({name: value for name, value in values.items() if name.endswith(("start", "setpoint"))})
     swing = energy[0] - still.read("energy")
     for opened in (instance, still):
         opened.close()
