@@ -184,6 +184,29 @@ def test_a_design_against_the_worst_machine_tells_its_bound(tmp_path):
     ) in evidence.blocks[0].rows
 
 
+def test_of_many_uncertain_parameters_the_first_have_curves_and_the_worst_machines_are_listed(tmp_path):
+    ranges = "{m1=0.1, m2=0.1, L1=0.1, L2=0.1, g=0.001}"
+    words = (
+        "--set",
+        f"robustness={{method='none', uncertain={ranges}}}",
+        "--set",
+        "check.residual_sway=0.001",
+    )
+    outcome, content, text = report(tmp_path, *QUICK, *words)
+    assert outcome.code == 4
+    assert "Of 5 uncertain parameters the first 4." in text
+    assert "The 40 worst machines are listed; 3 sway less." in text and content.count('class="failed"') >= 40
+    drawn = re.search(r"([0-9]+) machines that sway less after the move are not drawn", text)[1]
+    assert int(drawn) == 1 + 2**5 + 2 * 5 - 8
+
+
+def test_a_design_that_fails_on_the_machine_as_specified_has_no_reach(tmp_path):
+    words = ("--set", "solver.method=ei", "--set", "check.residual_sway=0.001")
+    outcome, _, text = report(tmp_path, *QUICK, *words)
+    assert outcome.code == 4
+    assert "On the machine as specified a load exceeds its limit, whatever L1." in text
+
+
 def test_a_page_that_cannot_be_written_is_a_sentence(tmp_path):
     (tmp_path / "file").write_text("", "utf-8")
     outcome = run_here("report", *QUICK, "--out", tmp_path / "file" / "page.html")

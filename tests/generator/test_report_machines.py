@@ -2,12 +2,14 @@
 
 from types import SimpleNamespace
 
+import attrs
 import numpy as np
 import pytest
 from generator.lagrangian_machines import double_pendulum, flexible_joint, gantry, single_pendulum, tower
 from scipy.integrate import trapezoid
 
 from gen_profile.plants.machine_file import plant_of_file, read_machine_file
+from gen_profile.plants.plant import Coordinate
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.report.animation import Actor, Animation
 from gen_profile.report.machines import Pose, body_size, drawings
@@ -107,6 +109,16 @@ def test_a_machine_of_one_s_own_is_drawn_from_its_outputs(request):
     np.testing.assert_allclose(shown(side, "body"), pose.q_a * slope, atol=1e-12)
     rope = shown(side, "load") - shown(side, "body")
     np.testing.assert_allclose(np.linalg.norm(rope, axis=1), pose.p.L, rtol=1e-12)
+
+
+def test_one_s_own_turning_machine_without_places_hangs_from_where_it_turns(request):
+    plant = plant_of_file(read_machine_file(request.config.rootpath / EXAMPLE))
+    turning = Coordinate(name="turntable", unit="rad")
+    pose = swinging(attrs.evolve(plant, actuated=(turning,), bodies=()))
+    (side,) = drawings(pose)
+    np.testing.assert_allclose(shown(side, "body"), 0.0, atol=1e-12)
+    (sway,), (height,) = pose.loads()
+    np.testing.assert_allclose(shown(side, "load"), np.stack([-sway, height], 1), atol=1e-12)
 
 
 @pytest.mark.parametrize("type_", plant_types())

@@ -149,6 +149,14 @@ class Page:
     sections: Sequence[Section]
     colophon: str
 
-    def all(self, kind: type[Figure] | type[Animation]) -> list[Figure | Animation]:
-        """List the blocks of one kind, in their order."""
-        return [block for section in self.sections for block in section.blocks if isinstance(block, kind)]
+    @property
+    def figures(self) -> list[Figure]:
+        """All figures, in their order."""
+        return [block for section in self.sections for block in section.blocks if isinstance(block, Figure)]
+
+    @property
+    def animations(self) -> list[Animation]:
+        """All animations, in their order."""
+        return [
+            block for section in self.sections for block in section.blocks if isinstance(block, Animation)
+        ]

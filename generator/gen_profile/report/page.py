@@ -10,9 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from gen_profile.errors import OutputError
-from gen_profile.report.animation import Animation
 from gen_profile.report.content import Page
-from gen_profile.report.figures import Figure
 
 ASSETS = files("gen_profile.report") / "assets"
 SCRIPTS = ("figures.js", "animation.js")
@@ -59,8 +57,8 @@ def render(page: Page) -> bytes:
 
 def _data(page: Page) -> str:
     document = {
-        "figures": [block.to_json() for block in page.all(Figure)],
-        "animations": [block.to_json() for block in page.all(Animation)],
+        "figures": [block.to_json() for block in page.figures],
+        "animations": [block.to_json() for block in page.animations],
     }
     return _json(document)
 

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gen_profile.report.animation import Actor, Animation
 from gen_profile.report.machines import Pose, body_size, drawings
 from gen_profile.spec import Spec
 from gen_profile.workflows.planning import Trial
-from gen_profile.workflows.report_figures import cast, end_load_sway
+from gen_profile.workflows.report_figures import Shown, end_load_sway
 
 TWINS = 2
 FRAME_RATE = 30.0  # 1/s; the page draws between frames
 MOST_FRAMES = 600
 
 
-def animation(spec: Spec, trial: Trial, arrival: float) -> Animation:
+def animation(spec: Spec, trial: Trial, shown: Sequence[Shown], arrival: float) -> Animation:
     """Let the nominal machine and those that sway the most play the move, and swing on.
 
     Parameters
     ----------
     spec : Spec
     trial : Trial
+    shown : sequence of Shown
+        Of which the first ranks play.
     arrival : float
         When the axes stand still, in s.
     """
@@ -31,7 +35,9 @@ def animation(spec: Spec, trial: Trial, arrival: float) -> Animation:
     plant = spec.machine()
     size = body_size(plant, trial.machines[0].parameters, responses[0].position)
     actors = []
-    for one in cast(trial, TWINS):
+    for one in shown:
+        if one.rank > TWINS:
+            continue
         response, parameters = responses[one.index], trial.machines[one.index].parameters
         pose = Pose(plant=plant, parameters=parameters, q_a=response.position, q_u=response.q_u, size=size)
         sway = end_load_sway(spec, response)

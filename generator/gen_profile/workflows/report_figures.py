@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import attrs
 import numpy as np
@@ -32,31 +32,29 @@ FOLLOWED = Style(colour=PALETTE[1], dash="dash")
 
 @attrs.frozen(kw_only=True)
 class Shown:
-    """One of the trial's machines, as it is drawn."""
+    """One of the trial's machines, as it is drawn; the nominal one has rank 0, the worst one rank 1."""
 
     index: int
+    rank: int
     name: str
     style: Style
 
 
-def cast(trial: Trial, most: int = TWINS) -> list[Shown]:
-    """Choose the nominal machine, then those that leave the most sway, in the check's order.
-
-    Each has its colour, however many are shown.
-    """
+def cast(trial: Trial) -> list[Shown]:
+    """Choose the nominal machine and those that leave the most sway, in the check's order."""
     duration = trial.motion.duration
     after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
     end_load = trial.swing.plant.end_load
     residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in after]
-    worst = sorted(range(1, len(residuals)), key=lambda index: -residuals[index])
-    colours = dict(zip([0, *sorted(worst[:TWINS])], PALETTE, strict=False))
+    by_rank = [0, *sorted(range(1, len(residuals)), key=lambda index: -residuals[index])][: TWINS + 1]
     return [
         Shown(
             index=index,
+            rank=by_rank.index(index),
             name=machine(trial.machines[index].name),
-            style=Style(colour=colours[index], width=1.3 if index else 2.2),
+            style=Style(colour=colour, width=1.3 if index else 2.2),
         )
-        for index in [0, *sorted(worst[:most])]
+        for index, colour in zip(sorted(by_rank), PALETTE, strict=False)
     ]
 
 
@@ -97,12 +95,11 @@ def spectrum_figure(spec: Spec, trial: Trial) -> Figure:
     )
 
 
-def sway_figure(spec: Spec, trial: Trial, arrival: float) -> Figure:
+def sway_figure(spec: Spec, trial: Trial, shown: Sequence[Shown], arrival: float) -> Figure:
     """Draw the sway of every load on the nominal machine and on perturbed ones."""
-    chosen = cast(trial)
     times = np.linspace(0.0, trial.motion.duration + trial.watch, SAMPLES)
     responses = trial.swing.at(times)
-    left_out = len(trial.machines) - len(chosen)
+    left_out = len(trial.machines) - len(shown)
     more = f" {left_out} machines that sway less after the move are not drawn." if left_out else ""
     return Figure(
         caption=f"Dotted: the arrival. Dashed in red: what is allowed from then on.{more}",
@@ -115,7 +112,7 @@ def sway_figure(spec: Spec, trial: Trial, arrival: float) -> Figure:
                     Line(
                         name=one.name, x=times, y=1e3 * responses[one.index].sway[:, number], style=one.style
                     )
-                    for one in chosen
+                    for one in shown
                 ],
                 levels=sway_levels(spec, load, arrival, float(times[-1])),
                 bands=[Band(low=arrival, high=arrival)],

@@ -17,6 +17,7 @@ from gen_profile.workflows.design import Design
 from gen_profile.workflows.planning import Trial
 from gen_profile.workflows.report_animation import animation
 from gen_profile.workflows.report_figures import (
+    cast,
     hamiltonian_figure,
     method_styles,
     motion_figure,
@@ -33,6 +34,7 @@ from gen_profile.workflows.report_words import bound, machine, mm, number
 UNITS_OF_TIME = ("s", "s²", "s³")
 QUANTITIES = ("velocity", "acceleration", "jerk")
 JERK = 3
+MOST_LISTED = 40  # machines; the worst of them say enough
 # head → figure, and how many of the head's unit make one of the figure's
 COMPARED = {
     "time (s)": ("duration_s", 1.0),
@@ -88,20 +90,24 @@ def sections(
     outcome: Design, check: Check, comparison: Comparison | None, measured: Measured | None
 ) -> Iterator[Section]:
     """Put the report in the order in which an engineer asks."""
-    spec, trial = outcome.spec, outcome.plan.trial
+    spec, trial, shown = outcome.spec, outcome.plan.trial, cast(outcome.plan.trial)
     if measured is not None:
         yield measured_section(spec, trial, measured)
     yield Section(
         title="The machine plays the move",
         words=("All machines follow the same setpoints. Dashed: where the loads would be if nothing swung.",),
-        blocks=[animation(spec, trial, check.arrival)],
+        blocks=[animation(spec, trial, shown, check.arrival)],
     )
     yield Section(
         title="Limits and margins",
         blocks=[_limits(spec, trial, outcome.plan.figures, check)],
     )
     yield Section(title="The motion", blocks=[motion_figure(spec, trial), spectrum_figure(spec, trial)])
-    yield Section(title="The loads", blocks=[sway_figure(spec, trial, check.arrival), _scenarios(check)])
+    yield Section(
+        title="The loads",
+        words=_left_out(check),
+        blocks=[sway_figure(spec, trial, shown, check.arrival), _scenarios(check)],
+    )
     robust = _robustness(spec, trial, comparison)
     if robust is not None:
         yield robust
@@ -159,9 +165,9 @@ def _limit(name: str, taken: float, allowed: float, unit: str, factor: float = 1
 
 
 def _scenarios(check: Check) -> Table:
-    """List every machine that was tried, the worst first."""
+    """List the machines that were tried, the worst first."""
     loads = list(check.limit)
-    in_order = sorted(check.findings, key=lambda finding: -_demand(check, finding.residual))
+    in_order = sorted(check.findings, key=lambda finding: -_demand(check, finding.residual))[:MOST_LISTED]
     return Table(
         head=("machine", *(f"{load} (mm)" for load in loads), "share of the limit", "verdict"),
         rows=[
@@ -177,6 +183,12 @@ def _scenarios(check: Check) -> Table:
             for finding in in_order
         ],
     )
+
+
+def _left_out(check: Check) -> list[str]:
+    """Say how many machines are not listed."""
+    more = len(check.findings) - MOST_LISTED
+    return [f"The {MOST_LISTED} worst machines are listed; {more} sway less."] if more > 0 else []
 
 
 def _demand(check: Check, residual: Mapping[str, float]) -> float:
