@@ -119,7 +119,7 @@ def test_growth_with_intervals(intervals, monkeypatch):
     problem = crane_problem()
     for module in (indirect, direct):
         monkeypatch.setattr(module, "INTERVALS", intervals)
-        monkeypatch.setattr(direct, "MAX_INTERVALS", max(480, intervals))
+        monkeypatch.setattr(module, "MAX_INTERVALS", max(480, intervals))
         module.solve(problem)
         tracemalloc.start()
         module.solve(problem)

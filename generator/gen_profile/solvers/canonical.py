@@ -19,6 +19,7 @@ from gen_profile.solvers.collocation import Trajectory, newton_iterate
 # What a sensitivity left at a thousandth of itself adds to the sway is far less than what second order does.
 DEPENDENT = 1e-8
 INSENSITIVE = 1e-3
+PROMINENT = 1e-4  # sway left by a mode, as a share of the sway that another may leave
 NEGLIGIBLE = 1e-8  # sway left by a mode, as a share of the move
 QUINTIC_JERK = 60.0  # with which a quintic move starts, in distances per cube of its duration
 
@@ -42,7 +43,7 @@ class Canonical:
         Sway in m, of the load that sways most, per unit of each state of `system` that is a mode's; 0 where
         the mode is too fast to be excited, and for the axes.
     phase : float
-        Of the fastest mode that is excited, over the whole move in rad.
+        Of the fastest mode that is excited as much as others, over the whole move in rad.
     """
 
     system: OptimalitySystem
@@ -202,8 +203,8 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
         offset=offset,
         scale=scale,
     )
-    excited = _shown(linear, swung[: 2 * layout.n_u], reach, duration)
-    basis, shown = _modal(layout, linear, excited)
+    excited = _excited(linear, swung[: 2 * layout.n_u], reach, duration)
+    basis, shown = _modal(layout, linear, _shown(linear, excited, reach))
     final[[state for states, _ in layout.kinds for state in states if shown[state] == 0.0]] = np.nan
     initial = np.asarray(np.linalg.solve(basis, swung / scale), dtype=np.float64)
     return Canonical(
@@ -213,7 +214,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
         initial=initial,
         final=final,
         shown=shown,
-        phase=float(duration * linear.frequencies[excited > 0.0].max(initial=0.0)),
+        phase=float(duration * linear.frequencies[excited >= PROMINENT * excited.max()].max()),
     )
 
 
@@ -249,18 +250,26 @@ def _modal(layout: StateLayout, linear: Linearization, shown: Array) -> tuple[Ar
     return basis, sway
 
 
-def _shown(linear: Linearization, swung: Array, reach: Array, duration: float) -> Array:
+def _excited(linear: Linearization, swung: Array, reach: Array, duration: float) -> Array:
+    """Sway in m that each mode may be left with, shape (n_u,).
+
+    The jerk with which a move of distance D in time T begins leaves a fast mode swinging by its gain times
+    60 D / (ω T)³; it otherwise follows the axes statically, and swings as at the start.
+    """
+    drive = np.abs(np.linalg.solve(linear.modes, linear.input)) @ reach
+    z, dz = np.linalg.solve(linear.modes, swung.reshape(2, -1).T).T
+    begun = np.hypot(z, dz / linear.frequencies)
+    left = QUINTIC_JERK * drive / (linear.frequencies * duration) ** 3 + begun
+    return np.asarray(np.abs(linear.sway_gain @ linear.modes).max(axis=0) * left)
+
+
+def _shown(linear: Linearization, excited: Array, reach: Array) -> Array:
     """Sway in m per unit of each mode, shape (n_u,); 0 for modes that are too fast to be excited noticeably.
 
-    The jerk with which a move of distance D in time T begins leaves such a mode swinging by its gain times
-    60 D / (ω T)³; it otherwise follows the axes statically, and swings as at the start. Asking it to rest
-    would only spoil the equations' condition.
+    Asking those to rest would only spoil the equations' condition.
     """
     drive = np.abs(np.linalg.solve(linear.modes, linear.input)) @ reach
     shown = np.abs(linear.sway_gain @ linear.modes).max(axis=0)
-    z, dz = np.linalg.solve(linear.modes, swung.reshape(2, -1).T).T
-    begun = shown * np.hypot(z, dz / linear.frequencies)
-    excited = QUINTIC_JERK * shown * drive / (linear.frequencies * duration) ** 3 + begun
     # a mode that no axis drives is not too fast: whether it rests must be seen
     return np.where((drive > 0.0) & (excited < NEGLIGIBLE * reach.max()), 0.0, shown)
 

@@ -119,7 +119,7 @@ def _linearized(
 
 
 def _eliminated(constant: Array, by_state: Array, driven: Array, integration: Array) -> IntervalMaps:
-    """Solve ``Y = y_k + h A (constant + by_state Y + driven ξ)`` for the stages Y of all intervals at once."""
+    """Solve ``Y = y_k + h A (constant + by_state Y + driven ξ)`` for the stages Y of every interval."""
     intervals, _, n = constant.shape
     inner = np.einsum("ij,kjab->kiajb", -integration, by_state).reshape(intervals, STAGES * n, -1)
     diagonal = np.arange(STAGES * n)

@@ -26,7 +26,7 @@ from gen_profile.solvers.solution import Optimum, Solution, Status
 METHOD = "indirect"
 INTERVALS = 30
 MAX_INTERVALS = 480
-RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that is excited, to begin with
+RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that matters, to begin with
 SWAY_SAMPLES = 1001
 BETA_DECADES = 8.0  # from share 0 to 1
 HORIZONTAL = np.pi / 2.0
