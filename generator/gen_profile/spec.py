@@ -310,6 +310,8 @@ class CanSpec:
         revolutions) and 6092h (counts per shaft revolutions), for drives that scale positions themselves.
     vendor, product : int or None
         Identity 1018h:01 and :02 that a drive must have.
+    homed : (int, int, int) or None
+        Index, subindex and bits of the drive's object that are set once it knows where its axis is.
     """
 
     node: Annotated[int, Bounds(least=1, most=127)] = 1
@@ -328,6 +330,7 @@ class CanSpec:
     feed: tuple[Unsigned32, Unsigned32] | None = None
     vendor: Unsigned32 | None = None
     product: Unsigned32 | None = None
+    homed: tuple[Unsigned32, Annotated[int, Bounds(least=0, most=255)], Unsigned32] | None = None
 
 
 @attrs.frozen(kw_only=True)

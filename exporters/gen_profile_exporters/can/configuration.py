@@ -18,7 +18,8 @@ from canopen.sdo.exceptions import SdoError
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.cia402 import FAULTS, MOVING, state_of
+from gen_profile_exporters.can.cia402 import FAULTS, MOVING, Controlword, State, state_of
+from gen_profile_exporters.can.clock import NANOSECONDS
 from gen_profile_exporters.can.link import Link
 from gen_profile_exporters.can.scaling import Setpoints, magnitude_counts
 from gen_profile_exporters.can.startup import MODES, Entry, startup_lists
@@ -30,6 +31,7 @@ PDO_COB_IDS = range(0x1400, 0x1C00)
 COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it was set
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
+RESET_PATIENCE = NANOSECONDS  # for a drive to leave its fault
 PERIOD_DIGITS, PERIOD_EXPONENT = (0x60C2, 1), (0x60C2, 2)
 
 Place = tuple[int, int]  # index and subindex
@@ -44,8 +46,16 @@ class Node:
     name: str
 
 
-def configure(link: Link, target: Target, motion: Setpoints) -> tuple[int, ...]:
+def configure(link: Link, target: Target, motion: Setpoints, *, reset_fault: bool = False) -> tuple[int, ...]:
     """Set up all drives and find each of them fit to follow.
+
+    Parameters
+    ----------
+    link : Link
+    target : Target
+    motion : Setpoints
+    reset_fault : bool
+        Whether a drive that is in fault is reset first.
 
     Returns
     -------
@@ -58,12 +68,17 @@ def configure(link: Link, target: Target, motion: Setpoints) -> tuple[int, ...]:
         A drive is another one, in fault, cannot be set up, watches nothing, or stands elsewhere.
     """
     lists = startup_lists(motion, target)
-    return tuple(
-        _configure_one(
-            link, Node(number=number, column=column, name=axis.name), target, motion, lists[number]
-        )
+    nodes = [
+        Node(number=number, column=column, name=axis.name)
         for column, (number, axis) in enumerate(zip(lists, target.axes, strict=True))
-    )
+    ]
+    for node in nodes:
+        link.send(nmt(PRE_OPERATIONAL, node.number))
+        _require_identity(link, node, target)
+        if reset_fault:
+            _reset_fault(link, node)
+        _require_rest(link, node)
+    return tuple(_configure_one(link, node, target, motion, lists[node.number]) for node in nodes)
 
 
 def start(link: Link, target: Target) -> None:
@@ -87,8 +102,6 @@ def nmt(command: int, node: int) -> can.Message:
 def _configure_one(
     link: Link, node: Node, target: Target, motion: Setpoints, entries: Sequence[Entry]
 ) -> int:
-    link.send(nmt(PRE_OPERATIONAL, node.number))
-    _require_identity(link, node, target)
     _set(link, node, entries)
     mode = MODES[target.can.mode]
     if (shown := _read(link, node, 0x6061)) != mode:
@@ -96,6 +109,7 @@ def _configure_one(
     if target.can.mode != "csv":  # in which the streamer watches, not the drive
         _require_window(link, node)
     _require_travel(link, node, motion)
+    _require_homed(link, node, target)
     return _require_start(link, node, target, motion)
 
 
@@ -116,10 +130,29 @@ def _require_identity(link: Link, node: Node, target: Target) -> None:
             f"axis {node.name}: the drive does not know the mode {target.can.mode} (6502h); choose another "
             "one in can.mode."
         )
+
+
+def _reset_fault(link: Link, node: Node) -> None:
+    """Reset a fault, by a rising edge, and give the drive time for it."""
+    if state_of(_read(link, node, 0x6041)) is not State.FAULT:
+        return
+    channel = link.sdo(node.number)
+    try:
+        for word in (Controlword.DISABLE_VOLTAGE, Controlword.FAULT_RESET, Controlword.DISABLE_VOLTAGE):
+            channel.download(0x6040, 0, word.to_bytes(2, "little"))
+    except (SdoError, struct.error) as error:
+        raise _silent(node, error) from error
+    deadline = link.clock.now() + RESET_PATIENCE
+    while state_of(_read(link, node, 0x6041)) in FAULTS and link.clock.now() < deadline:
+        link.wait_until(link.clock.now() + RESET_PATIENCE // 10)
+
+
+def _require_rest(link: Link, node: Node) -> None:
     state = state_of(_read(link, node, 0x6041))
     if state in FAULTS | MOVING:
         raise StreamAborted(
-            f"axis {node.name}: the drive is in the state {state.words!r}; find out why, and reset it there."
+            f"axis {node.name}: the drive is in the state {state.words!r}; find out why, and reset it there "
+            "or by --reset-fault."
         )
 
 
@@ -189,6 +222,17 @@ def _require_travel(link: Link, node: Node, motion: Setpoints) -> None:
         raise StreamAborted(
             f"axis {node.name}: the motion from {column.min()} to {column.max()} counts leaves the drive's "
             f"travel of {low} to {high} counts (607Dh)."
+        )
+
+
+def _require_homed(link: Link, node: Node, target: Target) -> None:
+    if target.can.homed is None:
+        return
+    index, sub, bits = target.can.homed
+    if (held := _read(link, node, index, sub)) & bits != bits:
+        raise StreamAborted(
+            f"axis {node.name}: it is not homed, as can.homed asks ({index:04X}h:{sub:02X} is {held:X}h); "
+            "home it."
         )
 
 

@@ -94,12 +94,21 @@ class Streamer:
     plan : StreamPlan
     tell : callable, optional
         Told each phase as it begins.
+    reset_fault : bool
+        Whether drives that are in fault are reset first.
     """
 
     def __init__(
-        self, bus: can.BusABC, clock: Clock, plan: StreamPlan, tell: Callable[[str], None] = lambda _: None
+        self,
+        bus: can.BusABC,
+        clock: Clock,
+        plan: StreamPlan,
+        tell: Callable[[str], None] = lambda _: None,
+        *,
+        reset_fault: bool = False,
     ) -> None:
         self._plan, self._clock, self._tell = plan, clock, tell
+        self._reset_fault = reset_fault
         self._link = Link(bus, clock)
         target = plan.target
         self._nodes = frames.nodes(target)
@@ -144,7 +153,9 @@ class Streamer:
             self._link.wait_until(self._clock.now() + LISTEN)
             self._require_well()
             self._watch.raise_alert(Alert.CONFIGURING)
-            standing = configuration.configure(self._link, self._plan.target, self._plan.motion)
+            standing = configuration.configure(
+                self._link, self._plan.target, self._plan.motion, reset_fault=self._reset_fault
+            )
             self._require_well()
             commanded = True
             self._align(standing)

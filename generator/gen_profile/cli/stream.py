@@ -39,6 +39,7 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--mode", type=click.Choice(["csp", "ip", "csv"]), help="Mode of the drives, for a spec.")
 @click.option("--node", type=int, help="CANopen node of the first axis, for a spec.")
 @click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
+@click.option("--reset-fault", is_flag=True, help="Reset drives in fault first; know why they were.")
 @click.option("--self-test", is_flag=True, help="First measure whether this machine can hold the cycle.")
 @click.option("--dry-run", is_flag=True, help="Print the plan, and touch no bus.")
 @click.option("--accept-unverified", is_flag=True, help="Stream what was exported without its check.")
@@ -60,6 +61,7 @@ def stream(
     mode: str | None,
     node: int | None,
     simulate_drive: bool,
+    reset_fault: bool,
     self_test: bool,
     dry_run: bool,
     accept_unverified: bool,
@@ -87,7 +89,7 @@ def stream(
         if self_test:
             tell("measuring this machine")
             run.self_test(source)
-        outcome = run.stream(source, port, simulate_drive=simulate_drive, tell=tell)
+        outcome = run.stream(source, port, simulate_drive=simulate_drive, reset_fault=reset_fault, tell=tell)
     _conclude(outcome, table, as_json)
 
 

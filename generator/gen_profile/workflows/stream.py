@@ -256,7 +256,12 @@ def self_test(source: Source) -> Lateness:
 
 
 def stream(
-    source: Source, port: Port, *, simulate_drive: bool = False, tell: Tell = lambda _: None
+    source: Source,
+    port: Port,
+    *,
+    simulate_drive: bool = False,
+    reset_fault: bool = False,
+    tell: Tell = lambda _: None,
 ) -> Outcome:
     """Stream a motion, and stop the axes whatever happens.
 
@@ -266,6 +271,8 @@ def stream(
     port : Port
     simulate_drive : bool
         Put simulated drives on the bus, which move the spec's nominal machine.
+    reset_fault : bool
+        Whether drives that are in fault are reset first.
     tell : callable
         Told each phase.
 
@@ -285,7 +292,7 @@ def stream(
         if simulate_drive:
             load = stack.enter_context(_simulated(source, port, tell))
         refused = stack.enter_context(real_time())
-        streamer = Streamer(bus, _clock(refused), source.plan, tell)
+        streamer = Streamer(bus, _clock(refused), source.plan, tell, reset_fault=reset_fault)
         stack.enter_context(_stopped_by_signals(streamer))
         record = streamer.run()
     notes = (*refused, *remarks)

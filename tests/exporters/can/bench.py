@@ -139,6 +139,7 @@ class Bench:
         step=MS // 4,
         launching=False,
         sluggish=False,
+        reset_fault=False,
         **options,
     ):
         channel = f"bench-{next(_channels)}"
@@ -157,7 +158,9 @@ class Bench:
         self.clock.actors.append(lambda: self.drives.poll() if self.drives_alive else None)
         self.phases = []
         clock = Sluggish(self.clock) if sluggish else self.clock
-        self.streamer = Streamer(self.streamer_end, clock, self.plan, self.phases.append)
+        self.streamer = Streamer(
+            self.streamer_end, clock, self.plan, self.phases.append, reset_fault=reset_fault
+        )
         self.fault_at = None
 
     def __enter__(self):

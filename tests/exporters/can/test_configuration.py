@@ -78,6 +78,47 @@ def test_a_drive_in_another_state(state):
         refused(bench, f"in the state '{state.words}'")
 
 
+def in_fault(bench):
+    """Let the first drive have had a fault, of which everybody has already heard."""
+    bench.drive.fault(0x3210)
+    while bench.streamer_end.recv(0) is not None:
+        pass
+
+
+class TestFaultReset:
+    def test_it_is_asked_for(self):
+        with Bench(reset_fault=True) as bench:
+            in_fault(bench)
+            assert bench.run().phase is Phase.DONE
+
+    def test_a_drive_that_stays_in_fault(self):
+        with Bench(reset_fault=True) as bench:
+            in_fault(bench)
+            bench.drive._obey = lambda word: None
+            refused(bench, r"in the state 'fault'; .* or by --reset-fault")
+
+    def test_a_drive_that_is_not_in_fault_is_left_alone(self):
+        with Bench(reset_fault=True) as bench:
+            assert bench.run().phase is Phase.DONE
+        assert not [frame for frame in bench.of(0x601) if frame.data[1:3] == b"\x40\x60"]
+
+    def test_a_drive_that_does_not_take_it(self):
+        with Bench(reset_fault=True) as bench:
+            in_fault(bench)
+            bench.drive.local.object_dictionary[0x6040].access_type = "ro"
+            refused(bench, r"does not answer properly")
+
+
+@pytest.mark.parametrize(("held", "fits"), [(0x05, True), (0x04, False)])
+def test_the_drives_own_word_for_homed(held, fits):
+    with Bench(homed=(0x1001, 0, 0x05)) as bench:
+        bench.drive.store(0x1001, 0, held)
+        if fits:
+            assert bench.run().phase is Phase.DONE
+        else:
+            refused(bench, r"is not homed, as can\.homed asks \(1001h:00 is 4h\); home it")
+
+
 @pytest.mark.parametrize(
     ("ends", "fits"), [((0, 350_000), False), ((100_000, 400_000), True), ((5, -5), True)]
 )
