@@ -6,10 +6,15 @@ import re
 
 from gen_profile.spec import Spec
 
+SMALLEST, LARGEST = 1e-4, 1e4  # beyond, four digits would need a power of ten
+
 
 def number(value: float) -> str:
     """Write four digits, and none below a hundred-thousandth: of a millimetre, that is numerical error."""
-    return f"{round(value, 5) + 0.0:.4g}".replace("-", "−")
+    kept = round(value, 5) + 0.0
+    ordinary = kept == 0.0 or SMALLEST <= abs(kept) < LARGEST
+    text = f"{kept:.4g}" if ordinary else f"{kept:.5f}".rstrip("0").rstrip(".")
+    return text.replace("-", "−")
 
 
 def mm(metres: float) -> str:
