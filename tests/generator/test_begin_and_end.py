@@ -126,3 +126,19 @@ def test_limits_bind_a_motion_that_ends_at_speed():
     assert np.abs(motion.within_segments(33, 1)[1]).max() <= 0.16
     assert np.abs(motion.within_segments(33, 2)[1]).max() <= 0.3
     assert np.abs(sways(motion, problem.parameters, problem.initial)).max() < 1e-7
+
+
+@pytest.mark.parametrize("initial", [{}, SWUNG], ids=["rest", "swing"])
+def test_what_is_left_out_is_told_truly(initial):
+    """From rest, zero sensitivity to L1 is zero sensitivity to gravity, too; not so with a swing."""
+    solution = indirect.solve(crane_problem(initial=initial, desensitized=("L1", "g")))
+    assert solution.redundant == ("g",)
+    motion, p = optimal_profile(solution), CRANE.nominal()
+    both = [sways(motion, p | {"g": p["g"] * (1.0 + sign * 1e-3)}, initial) for sign in (1, -1)]
+    slope = np.abs(both[0] - both[1]).max() / 2e-3
+    if initial:
+        assert slope > 0.01
+        assert "cannot be zero as well" in solution.redundancy
+    else:
+        assert slope < 1e-5
+        assert "zero with that to the others" in solution.redundancy

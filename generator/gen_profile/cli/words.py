@@ -72,7 +72,7 @@ def design(outcome: Design) -> str:
         rows.append(("defaults used", ", ".join(f"plant.{name}" for name in outcome.spec.plant.defaults)))
     if solution is not None and solution.redundant:
         names = ", ".join(solution.redundant)
-        rows.append(("left out", f"sensitivity to {names}: zero with that to the others, to first order"))
+        rows.append(("left out", f"sensitivity to {names}: {solution.redundancy}"))
     rows += [("wrote", str(outcome.folder / artefact.path)) for artefact in outcome.artefacts]
     return _block(outcome.spec.name, rows)
 

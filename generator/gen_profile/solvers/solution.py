@@ -94,7 +94,7 @@ class Solution:
     residual : float
         Relative size of the last Newton step.
     redundant : tuple of str
-        Uncertain parameters whose sensitivities vanish with those of the others, so that they were left out.
+        Uncertain parameters whose sensitivities those of the others decide, so that they were left out.
     worst_case_bound : float or None
         Residual sway of the end load in m below which no motion could bring the worst machine, as far as
         angles are small; None where the worst machine was not what counted.
@@ -115,6 +115,13 @@ class Solution:
     worst_case_bound: float | None = None
     cure: str = ""
     trajectory: Trajectory | None = None
+
+    @property
+    def redundancy(self) -> str:
+        """Say what leaving out the sensitivities to the redundant parameters means."""
+        if any(self.problem.initial.values()):
+            return "cannot be zero as well where the load swings at the start"
+        return "zero with that to the others, to first order"
 
     def raise_for_status(self) -> Optimum:
         """Return the optimum.

@@ -271,7 +271,7 @@ def _solver(solution: Solution) -> Iterator[tuple[str, str]]:
         yield "Hamiltonian", f"constant to {optimum.hamiltonian_variation:.1e} of its size"
     if solution.redundant:
         names = ", ".join(solution.redundant)
-        yield "Left out", f"sensitivities to {names}: zero with the others, to first order"
+        yield "Left out", f"sensitivities to {names}: {solution.redundancy}"
     if solution.worst_case_bound is not None:
         least = mm(solution.worst_case_bound)
         yield "Lower bound", f"no motion brings the worst machine below {least}, for small angles"
@@ -295,7 +295,10 @@ def _files(outcome: Design) -> Section:
         hashes[f"Judge {spec.check.foreign.name}"] = spec.check.foreign.sha256
     return Section(
         title="Files",
-        words=("The design of this spec in these formats writes these very bytes.",),
+        words=(
+            "gen-profile writes these very bytes for this spec in these formats"
+            + ("." if outcome.passed else ", with --keep-failed only: the check failed."),
+        ),
         blocks=[
             table,
             Terms(rows=[(f"{name}, SHA-256", digest) for name, digest in hashes.items()]),
