@@ -247,10 +247,72 @@ class ForeignFmu:
 
 
 @attrs.frozen(kw_only=True)
+class PathSpec:
+    """The way of a setpoint from the artefact to the axis.
+
+    Attributes
+    ----------
+    quantum : float
+        Spacing in m (or rad) of the positions that the drive can be asked for; 0 where it takes any.
+    between : str
+        What the drive does until the next setpoint: interpolate linearly (60C2h), or hold the last one.
+    lag : (float, float) or None
+        Range of the drives' time constant in s, which need not be the one that the setpoints lead.
+    latency : float
+        s by which all setpoints come late.
+    jitter : float
+        s by which each of them comes earlier or later at most.
+    lost : float
+        Share of them that never comes; the axis stays where it is until the next one.
+    """
+
+    quantum: NotNegative = 0.0
+    between: Literal["linear", "hold"] = "linear"
+    lag: tuple[NotNegative, NotNegative] | None = None
+    latency: Annotated[float, Bounds(least=0.0, most=10.0)] = 0.0
+    jitter: Annotated[float, Bounds(least=0.0, most=1.0)] = 0.0
+    lost: Annotated[float, Bounds(least=0.0, most=0.5)] = 0.0
+
+    @property
+    def faulty(self) -> bool:
+        """Whether setpoints come at other times than they should, or not at all."""
+        return self.latency > 0.0 or self.jitter > 0.0 or self.lost > 0.0
+
+    @property
+    def bends(self) -> bool:
+        """Whether the drive makes something else of setpoints that come in time than straight lines."""
+        return self.quantum > 0.0 or self.between != "linear" or self.lag is not None
+
+
+@attrs.frozen(kw_only=True)
 class CheckSpec:
-    """Greatest residual sway in m of each load by name, over all scenarios, and an FMU that is to judge."""
+    """What may remain of the sway, on which machines, and who is to judge.
+
+    Attributes
+    ----------
+    residual_sway : mapping of str to float
+        Greatest in m of each load by name, in all scenarios.
+    uncertain : mapping of str to float, or None
+        Relative half-ranges of parameters; those of the design where it is None.
+    spans : mapping of str to (float, float)
+        Least and greatest value of parameters for which a share says nothing, such as a damping of 0.
+    samples : int
+        Machines drawn at random from all ranges, beside the ends and corners.
+    seed : int
+        Of what is random.
+    path : PathSpec
+    foreign : ForeignFmu or None
+        Somebody else's FMU that judges in place of ours.
+    """
 
     residual_sway: Mapping[str, Positive] = attrs.field(converter=_frozen_mapping)
+    uncertain: Mapping[str, RelativeRange] | None = attrs.field(
+        default=None, converter=attrs.converters.optional(_frozen_mapping)
+    )
+    spans: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=_frozen_mapping)
+    samples: Annotated[int, Bounds(least=0, most=1_000_000)] = 0
+    seed: Annotated[int, Bounds(least=0, most=0xFFFF_FFFF)] = 0
+    path: PathSpec = attrs.field(factory=PathSpec)
     foreign: ForeignFmu | None = None
     default: bool = attrs.field(default=False, eq=False)  # the limit was not stated
 
@@ -353,6 +415,15 @@ class Spec:
     def machine(self) -> Plant:
         """Load the plant."""
         return find_plant(self.plant.type) if self.plant.file is None else plant_of_file(self.plant.file)
+
+    def checked_ranges(self) -> dict[str, tuple[float, float]]:
+        """Least and greatest value of every parameter that the check changes, in the machine's order."""
+        shares = self.robustness.uncertain if self.check.uncertain is None else self.check.uncertain
+        ranges = dict(self.check.spans)
+        for name, share in shares.items():
+            low, high = (self.plant.parameters[name] * (1.0 + sign * share) for sign in (-1, +1))
+            ranges.setdefault(name, (low, high))
+        return {name: ranges[name] for name in self.plant.parameters if name in ranges}
 
     def axis_scales(self) -> tuple[AxisScale, ...]:
         """How the target counts each axis, in the plant's order."""

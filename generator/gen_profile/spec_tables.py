@@ -16,9 +16,8 @@ from gen_profile.errors import SpecError
 from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_machine_file
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant, plant_types
-from gen_profile.spec import RESIDUAL_SHARE, Spec
-from gen_profile.spec_foreign import KEYS as FOREIGN
-from gen_profile.spec_foreign import foreign_fmu
+from gen_profile.spec import Spec
+from gen_profile.spec_check import check_table
 from gen_profile.spec_structure import Faults, Table, finite, found, place
 from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
@@ -53,11 +52,7 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     tables["move"] = _move(tables["move"], plant, faults)
     _still_at_speed(tables["move"], tables, plant, faults)
     tables["robustness"] = _robustness(tables["robustness"], tables["plant"].get("parameters"), faults)
-    uncertain = list(tables["robustness"]["uncertain"])
-    foreign = foreign_fmu(tables["check"], plant, uncertain, folder, faults)
-    if foreign is not None and (tables["move"]["initial"] or any(tables["move"]["final_velocity"])):
-        faults.add("check.fmu", "judges moves from rest to rest only; remove move.initial and final_velocity")
-    tables["check"] = {**_check(tables["check"], tables["move"], plant, faults), "foreign": foreign}
+    tables["check"] = check_table(tables, plant, folder, faults)
     tables["limits"] = _limits(tables["limits"], tables["move"], plant, faults)
     tables["axis"] = _axis(tables["axis"], plant, faults)
     _check_columns(tables["export"].get("csv_columns"), faults)
@@ -295,34 +290,6 @@ def _limits(table: Table, move: Table, plant: Plant | None, faults: Faults) -> T
                 if not low <= move[key][column] <= high:
                     faults.add(where, f"must contain the move's {key}, found {travel}")
     return {**table, "axis": axes if own else {}}
-
-
-def _check(table: Table, move: Table, plant: Plant | None, faults: Faults) -> Table:
-    """Give every load its limit: one number is for all; in a table, the end load's is the others' default."""
-    for key in table:
-        if key != "residual_sway":
-            faults.add(place("check", key), f"unknown key{suggestion(key, ['residual_sway', *FOREIGN])}")
-    where = "check.residual_sway"
-    given = table.get("residual_sway")
-    in_metres = [axis.unit == "m" for axis in plant.actuated] if plant else [True] * len(move["start"])
-    moves = zip(move["start"], move["target"], in_metres, strict=False)
-    longest = max((abs(b - a) for a, b, linear in moves if linear), default=0.0)
-    idle = move["start"] == move["target"] and not any(move["final_velocity"]) and not move["initial"]
-    if given is None and longest == 0.0 and not idle:
-        faults.add(where, "required where no axis moves in m; state what may remain, in m")
-    usual = RESIDUAL_SHARE * (longest or 1.0)
-    stated = given if isinstance(given, Mapping) else {} if given is None else {"": given}
-    for load, limit in stated.items():
-        at = place(where, load) if load else where
-        if load and plant and load not in plant.loads:
-            faults.add(at, f"unknown load{suggestion(load, plant.loads)}")
-        elif (number := finite(limit)) is None or number <= 0.0:
-            faults.add(at, f"must be a finite number greater than 0, found {found(limit)}")
-    if plant is None:
-        return {"residual_sway": {}}
-    rest = stated.get("", stated.get(plant.loads[-1], usual))
-    limits = {load: stated.get(load, rest) for load in plant.loads}
-    return {"residual_sway": limits, "default": given is None}
 
 
 def _axis(table: Table, plant: Plant | None, faults: Faults) -> Table:

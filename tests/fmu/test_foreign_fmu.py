@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 from gen_profile.errors import CosimulationError, SpecError
 from gen_profile.manifest import FILENAME
 from gen_profile.plants.registry import find_plant
-from gen_profile.profile import SampledProfile
 from gen_profile.spec_reading import preset_spec, spec_from_dict
 from gen_profile.workflows.check import check_artefact
 from gen_profile.workflows.design import design
 from gen_profile.workflows.foreign_check import _axis_inputs
+from gen_profile.workflows.many_machines import Feed
 from gen_profile_fmu import foreign_child, safe_archive
 from gen_profile_fmu.building import build_fmu
 from gen_profile_fmu.fmu_files import Version, sources
@@ -353,10 +353,33 @@ def test_positions_alone_become_accelerations():
     """Velocity passes through each cycle's mean at its middle, and stands at both ends."""
     times = np.arange(101) * 0.02
     position = (0.3 * np.sin(0.25 * np.pi * times) ** 2)[:, None]
-    setpoints = SampledProfile(cycle_time=0.02, position=position)
-    grid, inputs = _axis_inputs("acceleration", setpoints, 0.0)
+    grid, inputs = _axis_inputs("acceleration", Feed(times=times, position=position), None, 0.0)
     velocity = np.cumsum(inputs[:, 0] * np.diff(grid))
     np.testing.assert_allclose(velocity[:-1], np.diff(position[:, 0]) / 0.02, atol=1e-12)
     assert velocity[-1] == pytest.approx(0.0, abs=1e-12)
     middles = 0.5 * (np.append(0.0, velocity[:-1]) + velocity) * np.diff(grid)
     assert middles.sum() == pytest.approx(0.3, abs=1e-4)
+
+
+ROUGH = {"lag": [0.01, 0.03], "quantum": 1e-4, "latency": 0.01, "jitter": 0.001, "lost": 0.05}
+
+
+@pytest.mark.parametrize("group", ["drives", "samples", "timing"])
+def test_any_scenario_can_be_replayed_on_a_foreign_fmu(tmp_path, group):
+    write_fmu(tmp_path / "customer.fmu")
+    folder = tmp_path / "own"
+    asked = {"samples": 4, "path": ROUGH}
+    document = preset_spec("paper", ("export.cycle_time=0.004",)).to_dict()
+    document["check"] |= asked
+    outcome = design(spec_from_dict(document), ["csv"], folder)
+    artefact = folder / outcome.artefacts[0].path
+    ours = check_artefact(artefact).check
+    chosen = ours.groups[group][-1]
+    theirs = check_artefact(artefact, spec_with(tmp_path, **asked), row=chosen.scenario.row).check
+    (replayed,) = theirs.findings
+    assert replayed.scenario == chosen.scenario
+    for load, sway in chosen.residual.items():
+        apart = abs(replayed.residual[load] - sway)
+        assert apart < 1e-6 + ours.error_bound + theirs.error_bound
+    alone = check_artefact(artefact, row=chosen.scenario.row).check
+    assert alone.findings[0].residual == pytest.approx(chosen.residual, rel=1e-9)

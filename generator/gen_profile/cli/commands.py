@@ -200,17 +200,33 @@ def compare(
 @cli.command(epilog="Example: gen-profile check deploy/paper.st")
 @click.argument("artefact", type=click.Path(path_type=Path))
 @spec_options
+@click.option(
+    "--samples",
+    metavar="N",
+    type=click.IntRange(0, 1_000_000),
+    help="Draw N machines, in place of check.samples.",
+)
+@click.option("--scenario", metavar="N", type=int, help="Try only the scenario of this number (row).")
+@click.option("--strict", is_flag=True, help="Let faults in the timing of setpoints count as well.")
 @json_option
 @debug_option
 def check(
-    artefact: Path, spec_path: Path | None, preset: str | None, overrides: tuple[str, ...], as_json: bool
+    artefact: Path,
+    spec_path: Path | None,
+    preset: str | None,
+    overrides: tuple[str, ...],
+    *,
+    samples: int | None,
+    scenario: int | None,
+    strict: bool,
+    as_json: bool,
 ) -> None:
     """Replay, co-simulate and judge an artefact.
 
     The spec comes from the manifest beside the artefact unless one is named.
     """
     from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
+    from gen_profile.cli.progress import counted, progress
     from gen_profile.workflows.check import check_artefact
 
     given = spec_path is not None or preset is not None
@@ -219,8 +235,18 @@ def check(
     spec = chosen_spec(spec_path, preset, overrides) if given else None
     with progress() as tell:
         tell("checking by co-simulation")
-        judgement = check_artefact(artefact, spec, lambda: tell("compiling the plant's FMU, once"))
+        judgement = check_artefact(
+            artefact,
+            spec,
+            lambda: tell("compiling the plant's FMU, once"),
+            samples=samples,
+            row=scenario,
+            strict=strict,
+            progress=counted(tell, "checking by co-simulation"),
+        )
     print_outcome(judgement.to_dict(), words.judgement(judgement), as_json)
+    for sentence in judgement.check.warnings():
+        click.echo(f"Beware: {sentence}", err=True)
     if not judgement.check.passed:
         _fail(judgement.check.reasons(), "Do not deploy it.")
 

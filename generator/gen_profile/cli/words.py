@@ -79,13 +79,35 @@ def design(outcome: Design) -> str:
 
 def judgement(found: Judgement) -> str:
     """Tell how an artefact was judged."""
+    check = found.check
     findings = [
         (finding.scenario.name, ", ".join(f"{load} {_mm(sway)}" for load, sway in finding.residual.items()))
-        for finding in found.check.findings
+        for finding in check.findings
+        if finding.scenario.group == "machines" or len(check.findings) == 1
     ]
-    manifest = MANIFEST_WORDS[found.manifest]
-    rows = [("move", _move(found.spec)), ("manifest", manifest), *findings, ("check", _verdict(found.check))]
+    rows = [
+        ("move", _move(found.spec)),
+        ("manifest", MANIFEST_WORDS[found.manifest]),
+        *findings,
+        *_groups(check),
+        ("check", _verdict(check)),
+    ]
     return _block(str(found.path), rows)
+
+
+def _groups(check: Check) -> list[tuple[str, str]]:
+    """Sum up each group of scenarios where there is more than the machines'."""
+    groups = check.to_dict()["groups"]
+    return [(f"{group['group']}, {group['rows']}", _group(group)) for group in groups if len(groups) > 1]
+
+
+def _group(group: Mapping[str, Any]) -> str:
+    verdict = "passed" if group["passed"] else "FAILED"
+    aside = "" if group["counts"] else " (counts with --strict)"
+    worst = group["worst"]
+    shares = ", ".join(f"{100.0 * float(q):g} % ≤ {_mm(sway)}" for q, sway in group["quantiles_m"].items())
+    peak = f"worst {worst['load']} {_mm(worst['residual_peak_m'])} (row {worst['row']})"
+    return f"{verdict}{aside}: {peak}; end load {shares}"
 
 
 def comparison(found: Comparison) -> str:

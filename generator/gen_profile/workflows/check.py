@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from gen_profile.check import Check
+from gen_profile.check import Check, Scenario
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.manifest import FILENAME, Manifest, parse_manifest, sha256
 from gen_profile.profile import SampledProfile
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import spec_from_dict
 from gen_profile.workflows.foreign_check import judge_foreign
-from gen_profile.workflows.scenarios import scenarios
+from gen_profile.workflows.monte_carlo import Progress, with_further
+from gen_profile.workflows.scenarios import further_scenarios, scenarios
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
@@ -55,7 +56,14 @@ class Judgement:
 
 
 def check_artefact(
-    path: Path, spec: Spec | None = None, on_build: Callable[[], None] | None = None
+    path: Path,
+    spec: Spec | None = None,
+    on_build: Callable[[], None] | None = None,
+    *,
+    samples: int | None = None,
+    row: int | None = None,
+    strict: bool = False,
+    progress: Progress = lambda _, __: None,
 ) -> Judgement:
     """Replay a file, co-simulate it, and compare it with its manifest.
 
@@ -67,11 +75,21 @@ def check_artefact(
         Taken from ``manifest.json`` beside the file when not given.
     on_build : callable, optional
         Called before the plant's FMU is compiled.
+    samples : int, optional
+        Draws in place of those that the spec asks for.
+    row : int, optional
+        Number of the only scenario to try.
+    strict : bool
+        Whether faults in the timing of setpoints count as well.
+    progress : callable
+        Told how many scenarios beyond the machines are done, and of how many.
 
     Raises
     ------
     OutputError
         The file cannot be read, or there is no spec.
+    SpecError
+        There is no such scenario.
     ExportError
         The file is damaged.
     CosimulationError
@@ -83,7 +101,10 @@ def check_artefact(
         spec = _spec_of(manifest, path)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
     standing = _provenance(manifest, content, spec)
-    check = _verdict(spec, setpoints, on_build)
+    if samples is not None:
+        spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
+    check = _verdict(spec, setpoints, _rows(spec, row), on_build, progress)
+    check = attrs.evolve(check, strict=strict)
     faults = (*_missed_ends(spec, setpoints), *check.faults)
     if standing == "differs":
         faults += (
@@ -95,22 +116,46 @@ def check_artefact(
     )
 
 
-def _verdict(spec: Spec, setpoints: SampledProfile, on_build: Callable[[], None] | None) -> Check:
+def _rows(spec: Spec, row: int | None) -> tuple[Scenario, ...]:
+    """List all scenarios, or the one of a number."""
+    machines = scenarios(spec)
+    rows = (*machines, *further_scenarios(spec, machines))
+    if row is None:
+        return rows
+    if not 0 <= row < len(rows):
+        raise SpecError(
+            f"--scenario {row}: the scenarios of this spec are numbered from 0 to {len(rows) - 1}."
+        )
+    return (rows[row],)
+
+
+def _verdict(
+    spec: Spec,
+    setpoints: SampledProfile,
+    rows: Sequence[Scenario],
+    on_build: Callable[[], None] | None,
+    progress: Progress,
+) -> Check:
     """Judge setpoints by themselves.
 
     Holding velocity over a cycle errs with the cycle's square, so setpoints of twice the cycle tell how much.
     """
-    machines = scenarios(spec)
     resolution = float(setpoints.resolution.max())
     if spec.check.foreign is not None:
-        check = judge_foreign(spec, spec.check.foreign, setpoints, machines)
+        check = judge_foreign(spec, spec.check.foreign, setpoints, rows)
         return attrs.evolve(check, error_bound=check.error_bound + resolution)
+    further = [row for row in rows if row.group != "machines"]
+    # where a single scenario is asked for, the nominal machine tells what cycles err by
+    machines = [row for row in rows if row.group == "machines"] or scenarios(spec)[:1]
     spacing = sample_spacing(spec, setpoints, machines)
     followed = _of_even_cycles(setpoints, spec)
     found = cosimulate(spec, followed, machines, output_step=spacing, on_build=on_build)
     expected = cosimulate(spec, _every_other(followed), machines, output_step=spacing)
     check = judge(spec, setpoints, machines, found, expected)
-    return attrs.evolve(check, error_bound=check.error_bound + resolution)
+    check = attrs.evolve(check, error_bound=check.error_bound + resolution)
+    if len(rows) == len(further):
+        check = attrs.evolve(check, findings=())
+    return with_further(spec, setpoints, check, further, progress)
 
 
 def _of_even_cycles(setpoints: SampledProfile, spec: Spec) -> SampledProfile:

@@ -19,7 +19,9 @@ from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec import Spec
 from gen_profile.workflows.delivery import Staging, staged
 from gen_profile.workflows.foreign_check import judge_foreign
+from gen_profile.workflows.monte_carlo import with_further
 from gen_profile.workflows.planning import Plan, plan, timed
+from gen_profile.workflows.scenarios import further_scenarios
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import Exporter, target_of
 from gen_profile_exporters.registry import find_exporter, require_end
@@ -187,10 +189,11 @@ def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progre
     """Judge all artefacts against the continuous motion, and keep the verdict on the worst."""
     progress("checking by co-simulation")
     machines = planned.trial.machines
+    further = further_scenarios(spec, machines)
     checks = []
     for setpoints in replayed:
         if spec.check.foreign is not None:
-            checks.append(judge_foreign(spec, spec.check.foreign, setpoints, machines))
+            checks.append(judge_foreign(spec, spec.check.foreign, setpoints, [*machines, *further]))
             continue
         found = cosimulate(
             spec,
@@ -200,7 +203,18 @@ def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progre
             on_build=lambda: progress("compiling the plant's FMU, once"),
         )
         expected = planned.trial.swing.at(found[0].times)
-        checks.append(judge(spec, setpoints, machines, found, expected))
+        check = judge(spec, setpoints, machines, found, expected)
+        checks.append(
+            with_further(
+                spec,
+                setpoints,
+                check,
+                further,
+                lambda done, total: progress(
+                    f"checking by co-simulation, {done} of {total} further scenarios"
+                ),
+            )
+        )
     return max(checks, key=lambda check: check.demand)
 
 

@@ -10,10 +10,15 @@ from gen_profile.check import Check, Finding, Scenario
 from gen_profile.metrics import peak
 from gen_profile.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.spec import ForeignFmu, Spec
+from gen_profile.workflows.many_machines import Feed
+from gen_profile.workflows.monte_carlo import standstill
 from gen_profile.workflows.planning import STANDSTILL, watch_time
+from gen_profile.workflows.scenarios import scenarios
+from gen_profile.workflows.transmission import transmitted
 from gen_profile.workflows.verification import ERROR_FLOOR, above_samples, arrival, contradictions
 from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
 
+STEPS_PER_LAG = 4  # at least, of drives that lag
 SPACING = 0.01  # s, at most, of samples while the axes stand
 
 
@@ -34,34 +39,57 @@ def judge_foreign(
     foreign : ForeignFmu
     setpoints : SampledProfile
     machines : sequence of Scenario
-        Parameters that the FMU has no variable for stay what they are in it.
+        Parameters that the FMU has no variable for stay what they are in it. Those at the ends and corners
+        share one run of the FMU's process, any others have one each, on setpoints of their own.
 
     Raises
     ------
+    SpecError
+        What the spec says of the setpoints' path does not fit the artefact's cycle.
     CosimulationError
         The FMU cannot be run to the end.
     """
-    tau = spec.actuator.tau or 0.0
-    times, inputs = _axis_inputs(foreign.input, setpoints, tau)
-    settle = STANDSTILL * tau + watch_time(spec, machines)
-    held = grid_times(grid_length(settle, SPACING), SPACING)[1:]
-    rest = inputs[-1:] if foreign.input == "setpoint" else np.zeros_like(inputs[-1:])
-    times = np.concatenate([times, times[-1] + held])
-    inputs = np.concatenate([inputs, np.repeat(rest, len(held), axis=0)])
-    found = _sways(foreign, times, inputs, machines)
-    finer = _sways(foreign, *_halved(foreign, times, inputs), machines)[:, ::2]
-    standing = times >= arrival(spec, setpoints) * (1.0 - 1e-12)
-    found, finer = found[:, standing], finer[:, standing]
-    error = float(np.abs(found - finer).max()) + max(above_samples(sways) for sways in found)
+    alike = [machine for machine in machines if machine.group == "machines"]
+    together = [alike] if alike else []
+    together += [[machine] for machine in machines if machine.group != "machines"]
+    findings: list[Finding] = []
+    error = 0.0
+    for rows in together:
+        found, apart = _judged(spec, foreign, setpoints, rows)
+        findings += found
+        error = max(error, apart)
     return Check(
         limit={load: spec.check.residual_sway[load] for load in foreign.sway},
         error_bound=error + ERROR_FLOOR,
         arrival=arrival(spec, setpoints),
-        findings=tuple(
-            _finding(foreign, machine, sways) for machine, sways in zip(machines, found, strict=True)
-        ),
+        findings=tuple(findings),
         faults=contradictions(setpoints),
     )
+
+
+def _judged(
+    spec: Spec, foreign: ForeignFmu, setpoints: SampledProfile, rows: Sequence[Scenario]
+) -> tuple[list[Finding], float]:
+    """Run scenarios that share setpoints and drives; their findings, and what these err by at most in m."""
+    first = rows[0]
+    since = arrival(spec, setpoints) if first.group == "machines" else standstill(spec, setpoints)
+    feed = transmitted(spec, setpoints, rows[:1])
+    if feed.times.ndim == 2:
+        feed = Feed(times=feed.times[0], position=feed.position[0])
+    velocity = setpoints.velocity if first.group == "machines" else None
+    tau = (spec.actuator.tau or 0.0) if first.lag is None else first.lag
+    times, inputs = _axis_inputs(foreign.input, feed, velocity, tau)
+    settle = max(since - times[-1], 0.0) + watch_time(spec, scenarios(spec))
+    held = grid_times(grid_length(settle, SPACING), SPACING)[1:]
+    rest = inputs[-1:] if foreign.input == "setpoint" else np.zeros_like(inputs[-1:])
+    times = np.concatenate([times, times[-1] + held])
+    inputs = np.concatenate([inputs, np.repeat(rest, len(held), axis=0)])
+    found = _sways(foreign, times, inputs, rows)
+    finer = _sways(foreign, *_halved(foreign, times, inputs), rows)[:, ::2]
+    standing = times >= since * (1.0 - 1e-12)
+    found, finer = found[:, standing], finer[:, standing]
+    error = float(np.abs(found - finer).max()) + max(above_samples(sways) for sways in found)
+    return [_finding(foreign, row, sways) for row, sways in zip(rows, found, strict=True)], error
 
 
 def _finding(foreign: ForeignFmu, machine: Scenario, sways: Array) -> Finding:
@@ -96,34 +124,41 @@ def _halved(foreign: ForeignFmu, times: Array, inputs: Array) -> tuple[Array, Ar
     return np.sort(np.concatenate([times, middles])), twice
 
 
-def _axis_inputs(kind: str, setpoints: SampledProfile, tau: float) -> tuple[Array, Array]:
+def _axis_inputs(kind: str, feed: Feed, velocities: Array | None, tau: float) -> tuple[Array, Array]:
     """Choose communication points during the motion, and what the axes are fed with between them.
 
     A plant that takes velocities or setpoints has drives of its own. One that takes accelerations gets those
     of our drives: exactly the change of velocity in each step.
     """
-    cycle, position = setpoints.cycle_time, setpoints.position
-    times, velocity = setpoints.times, np.diff(position, axis=0) / cycle
+    times, position = feed.times, feed.position
+    steps = np.diff(times)[:, None]
+    velocity = np.diff(position, axis=0) / steps
     if kind == "setpoint":
         return times, position[1:]
     if kind == "velocity":
         return times, velocity
     if tau > 0.0:
-        return _lagging(times, velocity, cycle, tau)
-    if setpoints.velocity is not None:
-        return times, np.diff(setpoints.velocity, axis=0) / cycle
+        return _lagging(times, velocity, tau)
+    if velocities is not None:
+        return times, np.diff(velocities, axis=0) / steps
     # between the middles of two cycles velocity rises evenly: of second order where a step would be of first
-    grid = np.concatenate([times[:1], times[:-1] + 0.5 * cycle, times[-1:]])
+    grid = np.concatenate([times[:1], times[:-1] + 0.5 * steps[:, 0], times[-1:]])
     still = np.zeros_like(velocity[:1])
     return grid, np.diff(np.concatenate([still, velocity, still]), axis=0) / np.diff(grid)[:, None]
 
 
-def _lagging(times: Array, reference: Array, cycle: float, tau: float) -> tuple[Array, Array]:
-    """Mean accelerations in each cycle of drives with a first-order lag, until they stand."""
-    more = grid_length(STANDSTILL * tau, cycle)
-    reference = np.concatenate([reference, np.zeros((more, reference.shape[1]))])
-    decay = np.exp(-cycle / tau)
+def _lagging(times: Array, reference: Array, tau: float) -> tuple[Array, Array]:
+    """Mean accelerations of drives with a first-order lag, in steps that resolve it, until they stand."""
+    cycle = float(times[-1] - times[-2])
+    more = grid_times(grid_length(STANDSTILL * tau, cycle), cycle)[1:]
+    times = np.concatenate([times, times[-1] + more])
+    reference = np.concatenate([reference, np.zeros((len(more), reference.shape[1]))])
+    parts = np.ceil(np.diff(times) * STEPS_PER_LAG / tau).astype(int)
+    steps = np.repeat(np.diff(times) / parts, parts)
+    reference = np.repeat(reference, parts, axis=0)
+    times = times[0] + np.concatenate([[0.0], np.cumsum(steps)])
+    decay = np.exp(-steps / tau)
     velocity = np.zeros((len(reference) + 1, reference.shape[1]))
     for k, asked in enumerate(reference):
-        velocity[k + 1] = asked + (velocity[k] - asked) * decay
-    return grid_times(len(reference), cycle), np.diff(velocity, axis=0) / cycle
+        velocity[k + 1] = asked + (velocity[k] - asked) * decay[k]
+    return times, np.diff(velocity, axis=0) / steps[:, None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import attrs
@@ -94,6 +94,6 @@ def residual_peaks(
     return runs.peaks(feed.times, inputs, values, outputs, since=since)
 
 
-def parameter_rows(plant: Plant, machines: Sequence[dict[str, float]]) -> Array:
+def parameter_rows(plant: Plant, machines: Sequence[Mapping[str, float]]) -> Array:
     """Order the parameters of machines as `Plant.parameters`, shape (machines, parameters)."""
     return np.array([[values[parameter.name] for parameter in plant.parameters] for values in machines])

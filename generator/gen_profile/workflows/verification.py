@@ -121,10 +121,15 @@ def arrival(spec: Spec, setpoints: SampledProfile) -> float:
 
 
 def max_step(spec: Spec, machine: Scenario) -> float:
-    """Choose the longest integration step in s that a machine's fastest mode permits."""
+    """Choose the longest integration step in s, where trajectories are to be had."""
+    return min(LONGEST_STEP, longest_step(spec, machine))
+
+
+def longest_step(spec: Spec, machine: Scenario) -> float:
+    """Find the longest integration step in s that a machine's fastest mode permits."""
     ends = (spec.move.start, spec.move.target)
     fastest = max(linearize(spec.machine(), machine.parameters, q_a).frequencies[-1] for q_a in ends)
-    return min(LONGEST_STEP, STEP_PHASE / float(fastest))
+    return STEP_PHASE / float(fastest)
 
 
 def _from(response: Response, arrival: float) -> Response:
