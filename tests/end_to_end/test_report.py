@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 
 import attrs
 import pytest
+import tomli_w
 from command_line import run_here, run_process
 
 from gen_profile.errors import OutputError
@@ -127,6 +128,7 @@ def test_a_design_that_fails_its_check_is_reported_as_failed(tmp_path):
     outcome, content, text = report(tmp_path, *QUICK, "--set", "check.residual_sway=0.001")
     assert outcome.code == 4
     assert outcome.errors[0].startswith("Check failed: The payload sways by ")
+    assert "with --keep-failed only: the check failed." in text
     assert "Failed. The payload sways by" in text and 'class="failed"' in content
 
 
@@ -199,6 +201,33 @@ def test_of_many_uncertain_parameters_the_first_have_curves_and_the_worst_machin
     assert content.count('<tr class="failed">') == 40 + 2  # and the limits of both loads
     drawn = re.search(r"([0-9]+) machines that sway less after the move are not drawn", text)[1]
     assert int(drawn) == 1 + 2**5 + 2 * 5 - 8
+
+
+def test_a_judge_and_a_machine_of_one_s_own_are_told_by_their_hashes(tmp_path, request):
+    """The FMU that judges is ours, written as anybody's."""
+    machine = request.config.rootpath / "examples/inclined_crane.py"
+    (tmp_path / machine.name).write_bytes(machine.read_bytes())
+    judge, path = tmp_path / "customer.fmu", tmp_path / "spec.toml"
+    document = {
+        "plant": {"file": machine.name},
+        "move": {"distance": 2.0, "duration": 8.0},
+        "robustness": {"uncertain": {"L": 0.1}},
+        "check": {"residual_sway": 0.05},
+        "export": {"cycle_time": 0.004},
+    }
+    path.write_text(tomli_w.dumps(document), "utf-8")
+    assert run_here("fmu", "plant", path, "--input", "acceleration", "--out", judge).code == 0
+    document["check"] |= {
+        "fmu": judge.name,
+        "input": {"acceleration": "trolley.setpoint_acceleration"},
+        "output": {"sway": {"load": "sway.load"}},
+        "parameters": {"L": "L"},
+    }
+    path.write_text(tomli_w.dumps(document), "utf-8")
+    outcome, _, text = report(tmp_path, path, "--no-compare")
+    assert outcome.code == 0
+    for name, file in (("Judge customer.fmu", judge), ("Machine inclined_crane.py", machine)):
+        assert f"{name}, SHA-256 {hashlib.sha256(file.read_bytes()).hexdigest()}" in text
 
 
 def test_a_design_that_fails_on_the_machine_as_specified_has_no_reach(tmp_path):

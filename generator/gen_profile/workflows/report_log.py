@@ -106,11 +106,14 @@ def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
     OutputError
         It is no such table.
     """
-    lines = text.splitlines()
+    lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         raise OutputError(f"--measured {source}: the log is empty.")
     separator = max(";\t,", key=lines[0].count)
-    rows = [row for row in csv.reader(lines, delimiter=separator) if any(cell.strip() for cell in row)]
+    try:
+        rows = list(csv.reader(lines, delimiter=separator))
+    except csv.Error as error:
+        raise OutputError(f"--measured {source}: it is no table ({error}).") from error
     names = [cell.strip() for cell in rows[0]]
     columns = {name: _column(name, spec, source) for name in names}
     known = {name: column for name, column in columns.items() if column is not None}
@@ -124,8 +127,12 @@ def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
     times = signals.pop(("time", ""))
     if len(times) < LEAST_SAMPLES:
         raise OutputError(f"--measured {source}: needs at least {LEAST_SAMPLES} samples, found {len(times)}.")
-    if not (np.diff(times) > 0.0).all():
-        raise OutputError(f"--measured {source}: the times must rise from row to row.")
+    back = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(back):
+        raise OutputError(
+            f"--measured {source}: the times must rise from row to row, and do not after "
+            f"{times[back[0]]:.6g} s."
+        )
     by_quantity: dict[str, dict[str, Array]] = {"position": {}, "sway": {}, "angle": {}}
     for (quantity, owner), values in signals.items():
         by_quantity[quantity][owner] = read_only(values)
