@@ -59,12 +59,17 @@ def run_foreign(run: ForeignRun) -> Array:
     """
     with tempfile.TemporaryDirectory(prefix="gen-profile-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
-        names = {"input_names": list(run.input_names), "output_names": list(run.output_names)}
-        job = {"archive": str(run.archive.absolute()), "machines": [dict(m) for m in run.machines], **names}
-        (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
-        np.savez(folder / "motion.npz", times=run.times, inputs=run.inputs)
+        write_job(run, folder)
         _run_child(run, folder)
         return _result(run, folder)
+
+
+def write_job(run: ForeignRun, folder: Path) -> None:
+    """Tell the child what to do."""
+    names = {"input_names": list(run.input_names), "output_names": list(run.output_names)}
+    job = {"archive": str(run.archive.absolute()), "machines": [dict(m) for m in run.machines], **names}
+    (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+    np.savez(folder / "motion.npz", times=run.times, inputs=run.inputs)
 
 
 def _run_child(run: ForeignRun, folder: Path) -> None:

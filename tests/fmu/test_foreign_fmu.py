@@ -25,7 +25,7 @@ from gen_profile.workflows.many_machines import Feed
 from gen_profile_fmu import foreign_child, safe_archive
 from gen_profile_fmu.building import build_fmu
 from gen_profile_fmu.fmu_files import Version, sources
-from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
+from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign, write_job
 from gen_profile_fmu.model import plant_model
 from gen_profile_fmu.plant_variables import InputKind
 from gen_profile_fmu.platforms import host_platform
@@ -201,6 +201,7 @@ def test_wrong_descriptions_are_refused(tmp_path, change, message):
     with_description(path, change)
     with pytest.raises(CosimulationError, match=message):
         run_foreign(run_of(path))
+    assert message in done_here(run_of(path), tmp_path / "work")
 
 
 def zipped(*members):
@@ -233,11 +234,13 @@ def test_archives_that_do_harm_are_refused(tmp_path, content, message):
     with pytest.raises(CosimulationError, match=message):
         run_foreign(run_of(path))
     assert [p.name for p in tmp_path.rglob("*")] == ["customer.fmu"]
+    assert message in done_here(run_of(path), tmp_path / "work")
 
 
 def test_a_missing_archive_is_a_sentence(tmp_path):
     with pytest.raises(CosimulationError, match=r"none.fmu: the FMU cannot be read \(No such file"):
         run_foreign(run_of(tmp_path / "none.fmu"))
+    assert "cannot be read (No such file" in done_here(run_of(tmp_path / "none.fmu"), tmp_path / "work")
 
 
 def test_too_large_archives_are_refused(tmp_path, monkeypatch):
@@ -327,26 +330,23 @@ def test_any_variable_map_is_read_or_refused(changes):
         spec_with(folder, **{"fmu": "kinds.py", **changes})
 
 
+def done_here(run, folder):
+    """The child's work in this process, where coverage looks; its refusal, if any."""
+    folder.mkdir()
+    write_job(run, folder)
+    foreign_child.main(folder)
+    refusal = folder / "refusal.txt"
+    return refusal.read_text() if refusal.exists() else None
+
+
 @pytest.mark.parametrize("version", Version)
 def test_the_childs_work_in_this_process(tmp_path, version):
-    """The same as in a process of its own, where coverage does not look."""
     path = write_fmu(tmp_path / "customer.fmu", version=version)
-    run = run_of(path)
-    expected = run_foreign(run)
-    for outputs in (["sway.payload"], ["sway.boom"]):
-        folder = tmp_path / outputs[0]
-        folder.mkdir()
-        job = {
-            "archive": str(path),
-            "machines": run.machines,
-            "input_names": run.input_names,
-            "output_names": outputs,
-        }
-        (folder / "job.json").write_text(json.dumps(job))
-        np.savez(folder / "motion.npz", times=run.times, inputs=run.inputs)
-        foreign_child.main(folder)
-    np.testing.assert_array_equal(np.load(tmp_path / "sway.payload" / "result.npy"), expected)
-    assert "no real scalar variable" in (tmp_path / "sway.boom" / "refusal.txt").read_text()
+    assert done_here(run_of(path), tmp_path / "work") is None
+    np.testing.assert_array_equal(np.load(tmp_path / "work" / "result.npy"), run_foreign(run_of(path)))
+    unknown, negative = run_of(path, output_names=["sway.boom"]), run_of(path, machines=[{"L1": -1.0}])
+    assert "no real scalar variable 'sway.boom'" in done_here(unknown, tmp_path / "unknown")
+    assert f"refused fmi{version.value}Set" in done_here(negative, tmp_path / "negative")
 
 
 def test_positions_alone_become_accelerations():
