@@ -146,7 +146,7 @@ def test_limits_stand_beside_what_the_motion_takes(tmp_path):
 @pytest.mark.parametrize(
     "words, expected",
     [
-        (("--set", "robustness={}"), "Co-simulated from the written file on 1 machine;"),
+        (("--set", "robustness={}"), "Co-simulated from the written file in 1 scenario;"),
         (("--set", "solver.method=zvd"), "a quintic move through the shaper zvd; nothing was optimised"),
         (("--set", "actuator={type='first-order', tau=0.05}"), "The command of each drive leads its lag."),
         (("--set", "robustness.uncertain={L1=0.2, L2=0.1}"), "sensitivities to "),
@@ -197,10 +197,10 @@ def test_of_many_uncertain_parameters_the_first_have_curves_and_the_worst_machin
     outcome, content, text = report(tmp_path, *QUICK, *words)
     assert outcome.code == 4
     assert "Of 5 uncertain parameters the first 4." in text
-    assert "The 40 worst machines are listed; 3 sway less." in text
-    assert content.count('<tr class="failed">') == 40 + 2  # and the limits of both loads
+    assert "the worst of 43 scenarios" in text and "corners" in text
+    assert content.count('<tr class="failed">') == 40 + 2 + 2  # and the limits of both loads, and both groups
     drawn = re.search(r"([0-9]+) machines that sway less after the move are not drawn", text)[1]
-    assert int(drawn) == 1 + 2**5 + 2 * 5 - 8
+    assert int(drawn) == 1 + 2 + 2 * 5 - 8  # the other corners are tried without being followed
 
 
 def test_a_judge_and_a_machine_of_one_s_own_are_told_by_their_hashes(tmp_path, request):

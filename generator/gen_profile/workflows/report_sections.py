@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import tomli_w
 
@@ -34,7 +35,8 @@ from gen_profile.workflows.report_words import bound, machine, mm, number
 UNITS_OF_TIME = ("s", "s²", "s³")
 QUANTITIES = ("velocity", "acceleration", "jerk")
 JERK = 3
-MOST_LISTED = 40  # machines; the worst of them say enough
+MOST_LISTED = 40  # scenarios; the worst of them say enough
+GROUPED = ("how many", "median (mm)", "99 % (mm)", "worst (mm)", "verdict")
 # head → figure, and how many of the head's unit make one of the figure's
 COMPARED = {
     "time (s)": ("duration_s", 1.0),
@@ -52,15 +54,16 @@ def verdict(check: Check) -> Verdict:
     if not check.passed:
         return Verdict(word="Failed.", passed=False, sentences=check.reasons())
     load, finding = check.worst
-    tried = len(check.findings)
+    tried = len(check.judged)
     return Verdict(
         word="Passed.",
         passed=True,
         sentences=(
             f"After the move the {load} sways by {mm(finding.residual[load])} at most "
             f"({machine(finding.scenario.name)}), and {mm(check.limit[load])} are allowed.",
-            f"Co-simulated from the written file on {tried} machine{'s' if tried > 1 else ''}; "
+            f"Co-simulated from the written file in {tried} scenario{'s' if tried > 1 else ''}; "
             f"numerical error below {bound(check.error_bound)}, counted against the margin.",
+            *(f"Beware: {sentence}" for sentence in check.warnings()),
         ),
     )
 
@@ -105,8 +108,7 @@ def sections(
     yield Section(title="The motion", blocks=[motion_figure(spec, trial), spectrum_figure(spec, trial)])
     yield Section(
         title="The loads",
-        words=_left_out(check),
-        blocks=[sway_figure(spec, trial, shown, check.arrival), _scenarios(check)],
+        blocks=[sway_figure(spec, trial, shown, check.arrival), *_scenarios(check)],
     )
     robust = _robustness(spec, trial, comparison)
     if robust is not None:
@@ -127,7 +129,7 @@ def _limits(spec: Spec, trial: Trial, figures: Mapping[str, float], check: Check
     if spec.limits.sway is not None:
         rows.append(_limit("sway on the way", figures["sway_transient_peak_m"], spec.limits.sway, "mm", 1e3))
     for load, limit in check.limit.items():
-        worst = max(finding.residual[load] for finding in check.findings) + check.error_bound
+        worst = max(finding.residual[load] for finding in check.judged) + check.error_bound
         rows.append(_limit(f"residual sway of the {load}, error included", worst, limit, "mm", 1e3))
     return Table(head=("", "takes", "allowed", "margin", "share"), rows=rows)
 
@@ -164,12 +166,17 @@ def _limit(name: str, taken: float, allowed: float, unit: str, factor: float = 1
     return Row(cells=(name, *texts, Share(taken / allowed)), mark="failed" if taken > allowed else "")
 
 
-def _scenarios(check: Check) -> Table:
-    """List the machines that were tried, the worst first."""
+def _scenarios(check: Check) -> Iterator[Table]:
+    """Sum up the groups of scenarios, where there are several, and list the worst scenarios."""
+    groups = check.to_dict()["groups"]
+    if len(groups) > 1:
+        yield Table(head=("scenarios", "", *GROUPED), rows=[_group(group) for group in groups], words=2)
     loads = list(check.limit)
-    in_order = sorted(check.findings, key=lambda finding: -_demand(check, finding.residual))[:MOST_LISTED]
-    return Table(
-        head=("machine", *(f"{load} (mm)" for load in loads), "share of the limit", "verdict"),
+    worst_first = sorted(check.findings, key=lambda finding: -_demand(check, finding.residual))
+    listed = worst_first[:MOST_LISTED]
+    what = "scenario" if len(listed) == len(worst_first) else f"the worst of {len(worst_first)} scenarios"
+    yield Table(
+        head=(what, *(f"{load} (mm)" for load in loads), "share of the limit", "verdict"),
         rows=[
             Row(
                 cells=(
@@ -180,15 +187,24 @@ def _scenarios(check: Check) -> Table:
                 ),
                 mark="" if check.keeps_limit(finding) else "failed",
             )
-            for finding in in_order
+            for finding in listed
         ],
     )
 
 
-def _left_out(check: Check) -> list[str]:
-    """Say how many machines are not listed."""
-    more = len(check.findings) - MOST_LISTED
-    return [f"The {MOST_LISTED} worst machines are listed; {more} sway less."] if more > 0 else []
+def _group(group: Mapping[str, Any]) -> Row:
+    sways = (group["quantiles_m"]["0.5"], group["quantiles_m"]["0.99"], group["worst"]["residual_peak_m"])
+    verdict = "passed" if group["passed"] else "failed"
+    return Row(
+        cells=(
+            group["group"],
+            group["what"],
+            str(group["rows"]),
+            *(number(1e3 * sway) for sway in sways),
+            verdict if group["counts"] else f"{verdict}, not counted",
+        ),
+        mark="" if group["passed"] else "failed",
+    )
 
 
 def _demand(check: Check, residual: Mapping[str, float]) -> float:
