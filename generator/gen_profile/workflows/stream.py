@@ -87,9 +87,9 @@ class Port:
         ------
         SpecError
         """
-        if self.interface != "socketcan":
+        if self.interface != "socketcan" or sys.platform != "linux":
             return self.open(bitrate), ()
-        from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # Linux alone has it
+        from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # as above
 
         bus = launching_bus(self.channel)
         if bus is not None:

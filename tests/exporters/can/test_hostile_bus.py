@@ -5,6 +5,7 @@ import random
 import can
 import pytest
 from exporters.can.bench import QUICK_STOP, Bench
+from motions import quintic
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can.streamer import Phase
@@ -38,8 +39,9 @@ def answers(generator):
 @pytest.mark.parametrize("seed", range(ROUNDS))
 def test_nothing_on_the_bus_crashes_it_or_moves_the_axis_elsewhere(make_frame, seed):
     generator = random.Random(seed)
-    with Bench() as bench:
-        begins = [0, 1, 150][seed % 3] * 1_000_000  # while it listens, configures or streams
+    mode = [{}, {"mode": "ip"}, {"mode": "csv", "following_error": 0.01}][seed % 3]
+    with Bench(profile=quintic((0.0, 0.3)), **mode) as bench:
+        begins = [0, 1, 150][seed // 3 % 3] * 1_000_000  # while it listens, configures or streams
         count = [0]
 
         def chatter():
