@@ -1,0 +1,35 @@
+"""A library of profiles for a whole range of ropes and distances, and the one that fits the crane of today.
+
+python examples/09_profile_library.py [FOLDER]
+
+The same as `gen-profile sweep`, `gen-profile lookup` and `gen-profile library`; see docs/sweeps.md.
+"""
+
+import sys
+from pathlib import Path
+
+from gen_profile.spec_reading import preset_text
+from gen_profile.workflows.lookup import lookup
+from gen_profile.workflows.profile_library import write_library
+from gen_profile.workflows.sweep import sweep
+from gen_profile.workflows.sweep_grid import parse_grid
+from gen_profile.workflows.sweep_plan import prepare
+
+
+def main(folder: Path) -> None:
+    text = (preset_text("paper"), "paper", Path())
+    grid = parse_grid(["move.distance=0.2:0.3:2", "plant.L1=0.45:0.5:3"])
+    done = sweep(prepare(text, ["export.cycle_time=0.01"], grid, ["plc"], folder))
+    print(f"{len(grid)} cases: {done.statuses}; {done.table.name} has a row for each")
+
+    found = lookup(folder, {"move.distance": "0.28", "plant.L1": "0.46"})
+    expected, designed = found.sway
+    print(f"0.28 m on a rope of 0.46 m: case {found.row['case']}, designed for {found.used},")
+    print(f"leaves {1e3 * expected:.2f} mm at worst, {1e3 * designed:.2f} mm on its own crane")
+
+    library = write_library(folder, folder / "profiles.st")
+    print(f"{library.path.name}: {library.block} plays any of {len(library.profiles)}, by nProfile")
+
+
+if __name__ == "__main__":  # the sweep's processes read this file, too
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "profile-library"))
