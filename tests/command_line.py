@@ -41,7 +41,7 @@ class Outcome:
 def run_here(*arguments: str | Path) -> Outcome:
     """Call the entry point in this process, where coverage sees it."""
     out, err = (TextIOWrapper(BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
-    terminate = signal.getsignal(signal.SIGTERM)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     code: Any = 0
     with (
         patch.object(sys, "argv", ["gen-profile", *map(str, arguments)]),
@@ -53,7 +53,8 @@ def run_here(*arguments: str | Path) -> Outcome:
         except SystemExit as stop:
             code = stop.code
         finally:
-            signal.signal(signal.SIGTERM, terminate)
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
     return Outcome(code or 0, _text(out), _text(err))
 
 

@@ -18,6 +18,7 @@ from gen_profile.errors import CheckFailed, GenProfileError, OutputError, SpecEr
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
+    from gen_profile.check import Check
     from gen_profile.spec import Spec
 
 DEFAULT_PRESET = "paper"
@@ -146,6 +147,7 @@ def design(
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
     print_outcome(outcome.to_dict(), words.design(outcome), as_json)
+    _warn(outcome.check)
     if not outcome.passed and outcome.check is not None:
         _fail(
             outcome.check.reasons(), "The files were kept." if outcome.artefacts else "Nothing was written."
@@ -245,8 +247,7 @@ def check(
             progress=counted(tell, "checking by co-simulation"),
         )
     print_outcome(judgement.to_dict(), words.judgement(judgement), as_json)
-    for sentence in judgement.check.warnings():
-        click.echo(f"Beware: {sentence}", err=True)
+    _warn(judgement.check)
     if not judgement.check.passed:
         _fail(judgement.check.reasons(), "Do not deploy it.")
 
@@ -303,7 +304,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # and not closed by the caller
             stream.reconfigure(errors="replace")  # a terminal may lack β
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up then as for Ctrl-C
+    interruptions = _interruptible()
     debug, as_json = "--debug" in sys.argv, "--json" in sys.argv
     if debug:
         import logging
@@ -314,7 +315,22 @@ def main() -> None:
     except Exception as error:
         if debug:
             raise
-        sys.exit(_report(error, as_json))
+        # what is interrupted while compiled code runs may end in an error of that code's own
+        sys.exit(_report(click.Abort() if interruptions else error, as_json))
+
+
+def _interruptible() -> list[int]:
+    """Clean up on SIGTERM as on Ctrl-C; list the signals that come."""
+    signals: list[int] = []
+
+    def interrupt(number: int, _frame: object) -> None:
+        signals.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # and not ignored, as in the background
+        signal.signal(signal.SIGINT, interrupt)
+    return signals
 
 
 def chosen_spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
@@ -358,6 +374,11 @@ def _definitions(rows: dict[str, str]) -> str:
     formatter.indent()
     formatter.write_dl(list(rows.items()))
     return formatter.getvalue().rstrip("\n")
+
+
+def _warn(check: Check | None) -> None:
+    for sentence in () if check is None else check.warnings():
+        click.echo(f"Beware: {sentence}", err=True)
 
 
 def _fail(reasons: tuple[str, ...], consequence: str) -> None:
