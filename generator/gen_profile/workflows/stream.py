@@ -89,7 +89,7 @@ class Port:
         """
         if self.interface != "socketcan" or sys.platform != "linux":
             return self.open(bitrate), ()
-        from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # as above
+        from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # needs sockets of Linux
 
         bus = launching_bus(self.channel)
         if bus is not None:
