@@ -15,10 +15,13 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from gen_profile.check import MOST_LISTED
-from gen_profile.profile import SampledProfile
+from gen_profile.metrics import peak
+from gen_profile.profile import SampledProfile, sample
+from gen_profile.response import Swing
 from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.check import check_artefact
+from gen_profile.workflows.check import _verdict, check_artefact
 from gen_profile.workflows.monte_carlo import standstill
+from gen_profile.workflows.planning import plan, watch_time
 from gen_profile.workflows.scenarios import further_scenarios, scenarios
 from gen_profile.workflows.transmission import transmitted
 
@@ -277,3 +280,33 @@ def test_one_altered_count_fails_on_its_hash(right, tmp_path):
     outcome = run_here("check", tmp_path / "paper.csv")
     assert outcome.code == 4
     assert "altered after its export" in outcome.err
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ("gantry-crane",),
+        ("tower-crane",),
+        ("single-pendulum-crane",),
+        ("paper", "move.initial={theta1=0.02}"),
+        ("paper", "move.final_velocity=0.1", "move.initial={'theta2.rate'=0.05}"),
+    ],
+    ids=lambda overrides: overrides[-1],
+)
+def test_draws_of_any_machine_agree_with_the_exact_motion(overrides):
+    """Several axes, a hoist, a load that swings at the start, and axes that go on."""
+    name, *rest = overrides
+    spec = preset_spec(name, [*rest, "check.samples=6"])
+    motion = plan(spec).trial.motion
+    setpoints = sample(motion, spec.export.cycle_time)
+    machines = scenarios(spec)
+    rows = (*machines, *further_scenarios(spec, machines))
+    check = _verdict(spec, setpoints, rows, None, lambda _, __: None)
+    drawn, still = check.groups["samples"], standstill(spec, setpoints)
+    watched = np.linspace(still, still + watch_time(spec, machines), 8001)
+    drawn_machines = [finding.scenario.parameters for finding in drawn]
+    exact = Swing(spec.machine(), motion, drawn_machines, watched[-1], spec.move.initial).at(watched)
+    expected = [peak(response.sway) for response in exact]
+    found = [list(finding.residual.values()) for finding in drawn]
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=check.error_bound)
+    assert len(drawn) == 6 and np.max(found) > 1e-4

@@ -1,5 +1,6 @@
 """Verdicts: which load, which machine, and the numerical error that counts against the artefact."""
 
+import attrs
 import pytest
 
 from gen_profile.check import Check, Finding, Scenario
@@ -73,3 +74,37 @@ def test_the_document_holds_the_contract_s_keys():
     assert [row["passed"] for row in document["scenarios"]] == [True, False]
     assert document["scenarios"][0]["parameters"] == {"L1": 1.0}
     assert document["reasons"] == list(found.reasons())
+
+
+def timed(name, hook, payload, group, row):
+    found = finding(name, hook, payload)
+    return attrs.evolve(found, scenario=attrs.evolve(found.scenario, group=group, row=row))
+
+
+def test_faults_of_timing_count_only_where_that_is_asked_for():
+    rows = (finding("nominal", 0.0, 0.0), timed("lost", 0.0, 0.0025, "timing", 1))
+    lenient = check(*rows)
+    assert lenient.passed and lenient.worst[1].scenario.name == "nominal"
+    (warning,) = lenient.warnings()
+    assert warning.startswith("The payload sways by 2.5 mm after the move (lost)")
+    assert warning.endswith("It counts with --strict.")
+    strict = attrs.evolve(lenient, strict=True)
+    assert not strict.passed and strict.warnings() == ()
+    assert check(finding("nominal", 0.0, 0.0)).warnings() == ()
+    assert not check(rows[1]).passed  # asked for alone, it is what is judged
+
+
+def test_each_group_has_its_verdict_worst_row_and_quantiles():
+    rows = [timed(f"sample {n}", 0.0, 1e-5 * n, "samples", 1 + n) for n in range(201)]
+    found = check(finding("nominal", 0.0, 0.0), *rows)
+    machines, samples = found.to_dict()["groups"]
+    assert (machines["group"], machines["rows"], machines["passed"]) == ("machines", 1, True)
+    assert (samples["rows"], samples["passed"], samples["counts"]) == (201, True, True)
+    assert samples["worst"] == {"load": "payload", "row": 201, "residual_peak_m": pytest.approx(0.002)}
+    assert samples["quantiles_m"] == {
+        "0.5": pytest.approx(1e-3),
+        "0.9": pytest.approx(1.8e-3),
+        "0.99": pytest.approx(1.98e-3),
+    }
+    listed = [row["row"] for row in found.to_dict()["scenarios"]]
+    assert listed == [0, 1, *range(153, 202)]  # the first, and the 49 worst

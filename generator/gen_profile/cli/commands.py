@@ -228,7 +228,7 @@ def check(
     The spec comes from the manifest beside the artefact unless one is named.
     """
     from gen_profile.cli import words
-    from gen_profile.cli.progress import counted, progress
+    from gen_profile.cli.progress import progress
     from gen_profile.workflows.check import check_artefact
 
     given = spec_path is not None or preset is not None
@@ -244,7 +244,7 @@ def check(
             samples=samples,
             row=scenario,
             strict=strict,
-            progress=counted(tell, "checking by co-simulation"),
+            progress=lambda done, total: tell(f"checking by co-simulation, {done} of {total} scenarios"),
         )
     print_outcome(judgement.to_dict(), words.judgement(judgement), as_json)
     _warn(judgement.check)

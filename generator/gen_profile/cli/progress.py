@@ -26,19 +26,6 @@ def _print_line(text: str) -> None:
     click.echo(f"{text} …", err=True)
 
 
-def counted(tell: Callable[[str], None], what: str) -> Callable[[int, int], None]:
-    """Tell how much of something is done, at every tenth of the way."""
-    told = -1
-
-    def count(done: int, total: int) -> None:
-        nonlocal told
-        if 10 * done // total > told:
-            told = 10 * done // total
-            tell(f"{what}, {done} of {total}")
-
-    return count
-
-
 @contextmanager
 def counting(things: str) -> Iterator[Callable[[int, int, str], None]]:
     """Show how many of some things are done and the time left: a bar on a terminal, lines elsewhere.

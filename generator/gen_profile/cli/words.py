@@ -65,6 +65,7 @@ def design(outcome: Design) -> str:
         *_peaks(outcome),
         ("sway on the way", _mm(figures["sway_transient_peak_m"])),
         ("residual sway", residual),
+        *([] if outcome.check is None else _groups(outcome.check)),
         ("check", _verdict(outcome.check)),
         *_cost_of_lag(figures),
     ]

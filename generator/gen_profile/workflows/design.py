@@ -210,9 +210,7 @@ def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progre
                 setpoints,
                 check,
                 further,
-                lambda done, total: progress(
-                    f"checking by co-simulation, {done} of {total} further scenarios"
-                ),
+                lambda done, total: progress(f"checking by co-simulation, {done} of {total} scenarios"),
             )
         )
     return max(checks, key=lambda check: check.demand)

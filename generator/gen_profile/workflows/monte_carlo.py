@@ -54,7 +54,7 @@ def with_further(
     rows : sequence of Scenario
         Of `gen_profile.workflows.scenarios.further_scenarios`.
     progress : callable
-        Told how many rows are done, and of how many.
+        Told how many rows are done, and of how many, at every tenth of the way.
 
     Raises
     ------
@@ -71,7 +71,8 @@ def with_further(
             peaks, apart = _batch(spec, setpoints, batch, runs)
             error = max(error, apart)
             findings += [_finding(spec, row, found) for row, found in zip(batch, peaks, strict=True)]
-            progress(first.stop, len(rows))
+            if 10 * first.stop // len(rows) > 10 * first.start // len(rows):
+                progress(first.stop, len(rows))
     return attrs.evolve(check, findings=tuple(findings), error_bound=check.error_bound + error)
 
 
