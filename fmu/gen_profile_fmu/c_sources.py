@@ -115,6 +115,8 @@ static const double KNOTS[N_SEGMENTS + 1] = {{{_numbers(profile.knots)}}};
 
 static const double TARGET[] = {{{_numbers(profile.target)}}};
 
+static const double FINAL_VELOCITY[] = {{{_numbers(profile.final_velocity)}}};
+
 static const double COEFFICIENTS[N_SEGMENTS][N_POWERS][{axes}] = {{
 {_lines(rows)}
 }};

@@ -33,7 +33,7 @@ _ERROR = (
 )
 _BEGINNING = (
     "It begins at start_time or, with wait_for_trigger, as soon as trigger is true from then on. Before, it "
-    "rests; after its end it holds the target."
+    "rests; after its end it holds the target, or goes on at the final velocity."
 )
 
 
@@ -122,7 +122,7 @@ def _push(machine: Machine) -> Profile:
 
 def _sway_plot(machine: Machine, profile: Profile, until: float) -> str:
     times = np.linspace(0.0, until, _SAMPLES)
-    (response,) = Swing(machine.plant, profile, [machine.parameters], until).at(times)
+    (response,) = Swing(machine.plant, profile, [machine.parameters], until, machine.initial).at(times)
     return _plot(times, response.sway, machine.plant.loads, "sway in m")
 
 

@@ -41,6 +41,8 @@ class Machine:
         Cycle of the setpoints in s.
     position : sequence of float
         Where the axes rest at the start, in m or rad; zeros if not given.
+    initial : mapping of str to float
+        What swings at the start: unactuated coordinates by name, their rates as ``NAME.rate``.
     """
 
     plant: Plant
@@ -48,6 +50,7 @@ class Machine:
     tau: float = 0.0
     period: float = 0.004
     position: Sequence[float] = attrs.field()
+    initial: Mapping[str, float] = attrs.field(factory=dict)
 
     @position.default
     def _origin(self) -> Sequence[float]:
@@ -69,7 +72,7 @@ def plant_variables(machine: Machine, kind: InputKind) -> VariableTable:
             "START": _at(machine.position, _per_axis(axes, "start", words, 0, Kind.FIXED_PARAMETER)),
             "INPUTS": _inputs(machine, kind),
             "PERIOD": (_period(machine.period),) if kind is InputKind.SETPOINT else (),
-            **_states_and_outputs(machine.plant),
+            **_states_and_outputs(machine),
             "TIME": (_time(),),
         }
     )
@@ -90,7 +93,7 @@ def system_variables(machine: Machine) -> VariableTable:
         blocks={
             **_parameters(machine, InputKind.SETPOINT),
             **_trigger(),
-            **_states_and_outputs(machine.plant),
+            **_states_and_outputs(machine),
             **_command(machine.plant.actuated),
             "TIME": (_time(),),
         }
@@ -187,13 +190,16 @@ def _inputs(machine: Machine, kind: InputKind) -> tuple[Variable, ...]:
             return _at(machine.position, _per_axis(axes, "setpoint", words, 0, Kind.INPUT))
 
 
-def _states_and_outputs(plant: Plant) -> Blocks:
-    axes = plant.actuated
+def _states_and_outputs(machine: Machine) -> Blocks:
+    plant, axes = machine.plant, machine.plant.actuated
     accelerations = _per_axis(axes, "velocity", "acceleration of the axis", 2, Kind.DERIVATIVE)
     velocities = _per_axis(axes, "position", "velocity of the axis", 1, Kind.DERIVATIVE)
     return {
-        "Q_U": _unactuated(plant, "{}", "unactuated coordinate", 0, Kind.STATE),
-        "DQ_U": _unactuated(plant, "{}.rate", "rate of an unactuated coordinate", 1, Kind.STATE),
+        "Q_U": _swinging(machine.initial, _unactuated(plant, "{}", "unactuated coordinate", 0, Kind.STATE)),
+        "DQ_U": _swinging(
+            machine.initial,
+            _unactuated(plant, "{}.rate", "rate of an unactuated coordinate", 1, Kind.STATE),
+        ),
         "Q_A": _per_axis(axes, "position", "position of the axis", 0, Kind.OUTPUT),
         "DQ_A": _per_axis(axes, "velocity", "velocity of the axis", 1, Kind.OUTPUT),
         DERIVATIVES: (
@@ -207,6 +213,10 @@ def _states_and_outputs(plant: Plant) -> Blocks:
         "ANGLE": _of_loads(plant, "angle", "rad", "angle of the rope from the vertical"),
         **_of_bodies(plant),
     }
+
+
+def _swinging(initial: Mapping[str, float], states: tuple[Variable, ...]) -> tuple[Variable, ...]:
+    return tuple(attrs.evolve(state, start=initial.get(state.name, 0.0)) for state in states)
 
 
 def _unactuated(plant: Plant, pattern: str, description: str, order: int, kind: Kind) -> tuple[Variable, ...]:

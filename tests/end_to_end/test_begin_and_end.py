@@ -43,8 +43,6 @@ REFUSED = [
     ((*ONWARD, "--export", "csv", "--export", "can"), 5, r"what plays can holds the last setpoint"),
     ((*ONWARD, "--method", "zvd"), 3, r"move\.final_velocity: a shaper moves from rest to rest only"),
     ((*SWUNG, "--method", "zvd"), 3, r"move\.initial: a shaper moves from rest to rest only"),
-    (("fmu", "profile", *ONWARD), 5, r"move\.final_velocity: an FMU of a motion stands still"),
-    (("fmu", "system", *SWUNG), 5, r"move\.initial: the machine of a system FMU starts at rest"),
     (("--set", "move.initial={theta3=0.1}"), 2, r"move\.initial\.theta3: unknown coordinate"),
     (("--set", "move.initial={theta1=2.0}"), 2, r"move\.initial\.theta1: must be from -1\.4 to 1\.4 rad"),
     (("--set", "move.initial={theta1='a'}"), 2, r"move\.initial\.theta1: must be a finite number"),

@@ -2,6 +2,7 @@
 
 import zipfile
 
+import numpy as np
 import pytest
 from command_line import run_here
 from fmpy import read_model_description, simulate_fmu
@@ -37,6 +38,18 @@ def test_writes_an_fmu_that_others_run(tmp_path, kind, version):
     if kind == "system":
         assert result["cart.position"][-1] == pytest.approx(0.3, abs=1e-12)
         assert abs(result["sway.payload"][result["time"] > 3.0]).max() < 1e-6
+
+
+def test_a_system_begins_with_the_swing_and_goes_on_at_speed(tmp_path):
+    path = tmp_path / "a.fmu"
+    swung = ("--set", 'move.initial={theta1=0.05, "theta1.rate"=-0.1}', "--set", "move.final_velocity=0.1")
+    assert run_here("fmu", "system", *swung, "--out", path).code == 0
+    result = simulate_fmu(str(path), stop_time=5.0, output_interval=0.01, fmi_type="CoSimulation")
+    after = result["time"] > 3.0
+    assert result["sway.hook"][0] == pytest.approx(0.47 * np.sin(0.05))
+    assert abs(result["sway.payload"][after]).max() < 1e-6
+    expected = 0.3 + 0.1 * (result["time"][after] - 3.0)
+    np.testing.assert_allclose(result["cart.position"][after], expected, rtol=0.0, atol=1e-12)
 
 
 def test_is_named_after_the_spec(tmp_path, monkeypatch):

@@ -10,8 +10,11 @@ from fmu.kinds import model_of, motion
 from scipy.integrate import solve_ivp
 
 from gen_profile.plants.registry import find_plant
+from gen_profile.profile import Profile
 from gen_profile_fmu.fmu_files import Version
+from gen_profile_fmu.model import profile_model, system_model
 from gen_profile_fmu.plant_fmu import cached_fmu
+from gen_profile_fmu.plant_variables import Machine
 
 CRANE = find_plant("double-pendulum-crane")
 OTHER = {"m1": 0.5, "m2": 0.1, "L1": 0.6, "L2": 0.25, "g": 9.7, "c1": 0.01, "c2": 0.02}
@@ -241,6 +244,31 @@ class TestCosimulation:
         for order in range(4):
             exact = motion(1).derivative(times - 0.1, order)[:, 0]
             np.testing.assert_allclose(found[:, order], exact, rtol=0.0, atol=1e-13)
+
+    def test_begins_with_a_swing_and_goes_on_at_speed(self, version):
+        """What a spec's `move.initial` and `move.final_velocity` ask for."""
+        given = np.array([[0.1], [0.0], [0.15]])[None]
+        onward = Profile(
+            knots=[0.0, 1.0], coefficients=given, target=[0.25], final_velocity=[0.3], method="test"
+        )
+        swing = {"theta1": 0.2, "theta2": -0.1, "theta2.rate": 0.3}
+        machine = Machine(plant=CRANE, parameters=OTHER, initial=swing)
+        models = system_model("onward", machine, onward), profile_model("onward", CRANE.actuated, onward)
+        outputs = OUTPUTS, ("cart.setpoint", "cart.setpoint_velocity")
+        found = []
+        for model, names in zip(models, outputs, strict=True):
+            instance = Instance(cached_fmu(model, version), version, exchange=False)
+            instance.begin({})
+            found.append(cosimulate(instance, TIMES, lambda *_: None, names))
+            instance.close()
+        swung, moved = found
+        exact = np.column_stack([onward.derivative(TIMES, order)[:, 0] for order in range(2)])
+        np.testing.assert_allclose(moved, exact, rtol=0.0, atol=1e-14)
+        np.testing.assert_allclose(swung[:, 2:], exact, rtol=0.0, atol=1e-12)
+        first = expected(lambda *_: 0.3, TIMES[:101], start=(0.2, 0.1, 0.0, 0.3), cart=(0.1, 0.0))
+        np.testing.assert_allclose(swung[:101, :2], first[:, :2], rtol=0.0, atol=1e-8)
+        still = np.abs(np.diff(swung[101:, 3]))
+        assert still.max() == 0.0
 
     @pytest.mark.parametrize("kind", ["profile", "system"])
     def test_waits_for_its_trigger(self, open_instance, kind):

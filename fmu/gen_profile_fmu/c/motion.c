@@ -30,8 +30,11 @@ static void motion_from_now(const Model *model, double position[N_A][N_POWERS]) 
     memset(position, 0, N_A * sizeof *position);
     for (int i = 0; i < N_A; i++) {
         if (model->segment < 0) position[i][0] = COEFFICIENTS[0][0][i];
-        else if (model->segment == N_SEGMENTS) position[i][0] = TARGET[i];
-        else {
+        else if (model->segment == N_SEGMENTS) {
+            const double beyond = model->time - model->began - KNOTS[N_SEGMENTS];
+            position[i][0] = TARGET[i] + beyond * FINAL_VELOCITY[i];
+            position[i][1] = FINAL_VELOCITY[i];
+        } else {
             const double since = model->time - model->began - KNOTS[model->segment];
             for (int j = 0; j < N_POWERS; j++) position[i][j] = COEFFICIENTS[model->segment][j][i];
             /* Horner's scheme, repeated, shifts the polynomial's origin */

@@ -1,5 +1,6 @@
 /*
- * A motion of the axes: polynomials between knots, before them at rest at the start, after them at the target.
+ * A motion of the axes: polynomials between knots, before them at rest at the start, after them at the target, or on
+ * from there at the final velocity.
  * Its numbers lie in motion_table.h, which is generated.
  */
 #ifndef MOTION_H

@@ -9,7 +9,6 @@ from typing import Any
 
 import attrs
 
-from gen_profile.errors import ExportError
 from gen_profile.spec import Spec
 from gen_profile.workflows.delivery import staged
 from gen_profile.workflows.planning import plan, timed
@@ -114,25 +113,12 @@ def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Callable[[str
         tau=spec.actuator.tau or 0.0,
         period=spec.export.cycle_time,
         position=spec.move.start,
+        initial=spec.move.initial,
     )
     if kind == "plant":
         return plant_model(machine, input_kind, name)
-    _require_rest(spec, kind)
     progress("solving")
     command = plan(timed(spec)).trial.command
     if kind == "profile":
         return profile_model(name, machine.plant.actuated, command)
     return system_model(name, machine, command)
-
-
-def _require_rest(spec: Spec, kind: str) -> None:
-    """Refuse what an FMU that holds a motion does not do: begin with a swing, or go on at the end."""
-    if not spec.move.stops:
-        raise ExportError(
-            "move.final_velocity: an FMU of a motion stands still after it; export csv, or end at rest."
-        )
-    if spec.move.initial and kind == "system":
-        raise ExportError(
-            "move.initial: the machine of a system FMU starts at rest; take the FMUs of the plant, whose "
-            "states can be set, and of the profile."
-        )
