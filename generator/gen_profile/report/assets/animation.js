@@ -92,8 +92,8 @@
   }
 
   function cast(stage, animation) {
-    const columns = Math.min(animation.actors.length, 3);
-    stage.style.gridTemplateColumns = `repeat(auto-fit, minmax(min(100%, max(9.5rem, ${92 / columns}% - 1.6rem)), 1fr))`;
+    stage.style.gridTemplateColumns = `repeat(${animation.actors.length}, 1fr)`;
+    stage.style.setProperty("--views", animation.views.length); // all of them shall fit a screen
     return animation.actors.map((actor) => {
       const host = stage.appendChild(document.createElement("div"));
       host.className = "actor";
