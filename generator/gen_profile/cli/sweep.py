@@ -131,7 +131,10 @@ def lookup(words: tuple[str, ...], as_json: bool) -> None:
 @json_option
 @debug_option
 def library(folder: Path, path: Path, as_json: bool) -> None:
-    """Put a sweep's PLC blocks into one, with an input that selects the profile."""
+    """Put a sweep's PLC blocks into one.
+
+    An input of the block selects the profile.
+    """
     from gen_profile.cli import words as tables
     from gen_profile.workflows.sweep_plan import require_libraries
 
