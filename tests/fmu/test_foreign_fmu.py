@@ -18,6 +18,7 @@ from gen_profile.errors import CosimulationError, SpecError
 from gen_profile.manifest import FILENAME
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec_reading import preset_spec, spec_from_dict
+from gen_profile.workflows import foreign_check
 from gen_profile.workflows.check import check_artefact
 from gen_profile.workflows.design import design
 from gen_profile.workflows.foreign_check import _axis_inputs
@@ -383,3 +384,17 @@ def test_any_scenario_can_be_replayed_on_a_foreign_fmu(tmp_path, group):
         assert apart < 1e-6 + ours.error_bound + theirs.error_bound
     alone = check_artefact(artefact, row=chosen.scenario.row).check
     assert alone.findings[0].residual == pytest.approx(chosen.residual, rel=1e-9)
+
+
+def test_scenarios_that_share_setpoints_share_a_process(tmp_path, monkeypatch):
+    write_fmu(tmp_path / "customer.fmu")
+    monkeypatch.setattr("gen_profile.workflows.scenarios.FEWEST_TIMINGS", 1)
+    started = []
+    run = foreign_check.run_foreign
+    monkeypatch.setattr(
+        foreign_check, "run_foreign", lambda job: started.append(len(job.machines)) or run(job)
+    )
+    check = design(spec_with(tmp_path, samples=5, path={"lost": 0.1}), ["csv"], tmp_path).check
+    assert [len(findings) for findings in check.groups.values()] == [3, 5, 3]
+    assert started == [3, 3, 5, 5, *[1] * 6]  # each with its steps, and with steps of half the length
+    assert [finding.scenario.row for finding in check.findings] == list(range(11))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 
 import numpy as np
 
-from gen_profile.check import Check, Finding, Scenario
+from gen_profile.check import TIMING, Check, Finding, Scenario
 from gen_profile.metrics import peak
 from gen_profile.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.spec import ForeignFmu, Spec
@@ -14,7 +15,7 @@ from gen_profile.workflows.many_machines import Feed
 from gen_profile.workflows.monte_carlo import standstill
 from gen_profile.workflows.planning import STANDSTILL, watch_time
 from gen_profile.workflows.scenarios import scenarios
-from gen_profile.workflows.transmission import transmitted
+from gen_profile.workflows.transmission import follows_exactly, transmitted
 from gen_profile.workflows.verification import ERROR_FLOOR, above_samples, arrival, contradictions
 from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
 
@@ -39,8 +40,8 @@ def judge_foreign(
     foreign : ForeignFmu
     setpoints : SampledProfile
     machines : sequence of Scenario
-        Parameters that the FMU has no variable for stay what they are in it. Those at the ends and corners
-        share one run of the FMU's process, any others have one each, on setpoints of their own.
+        Parameters that the FMU has no variable for stay what they are in it. Those that share setpoints and
+        drives share one process of the FMU, and its time limit.
 
     Raises
     ------
@@ -49,11 +50,9 @@ def judge_foreign(
     CosimulationError
         The FMU cannot be run to the end.
     """
-    alike = [machine for machine in machines if machine.group == "machines"]
-    together = [alike] if alike else []
-    together += [[machine] for machine in machines if machine.group != "machines"]
     findings: list[Finding] = []
     error = 0.0
+    together = [list(rows) for _, rows in groupby(machines, _driven_alike)]
     for rows in together:
         found, apart = _judged(spec, foreign, setpoints, rows)
         findings += found
@@ -67,16 +66,22 @@ def judge_foreign(
     )
 
 
+def _driven_alike(scenario: Scenario) -> tuple[object, ...]:
+    """Tell scenarios apart that differ in more than their machines."""
+    return follows_exactly(scenario), scenario.lag, scenario.row if scenario.group == TIMING else None
+
+
 def _judged(
     spec: Spec, foreign: ForeignFmu, setpoints: SampledProfile, rows: Sequence[Scenario]
 ) -> tuple[list[Finding], float]:
     """Run scenarios that share setpoints and drives; their findings, and what these err by at most in m."""
     first = rows[0]
-    since = arrival(spec, setpoints) if first.group == "machines" else standstill(spec, setpoints)
+    exact = follows_exactly(first)
+    since = arrival(spec, setpoints) if exact else standstill(spec, setpoints)
     feed = transmitted(spec, setpoints, rows[:1])
     if feed.times.ndim == 2:
         feed = Feed(times=feed.times[0], position=feed.position[0])
-    velocity = setpoints.velocity if first.group == "machines" else None
+    velocity = setpoints.velocity if exact else None
     tau = (spec.actuator.tau or 0.0) if first.lag is None else first.lag
     times, inputs = _axis_inputs(foreign.input, feed, velocity, tau)
     settle = max(since - times[-1], 0.0) + watch_time(spec, scenarios(spec))

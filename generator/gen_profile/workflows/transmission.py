@@ -38,18 +38,23 @@ def transmitted(spec: Spec, setpoints: SampledProfile, rows: Sequence[Scenario])
     SpecError
         The jitter is too large for the artefact's cycle.
     """
-    path, group = spec.check.path, rows[0].group
+    path = spec.check.path
     times, position = setpoints.times, setpoints.position
-    if group in ("machines", "corners"):
+    if follows_exactly(rows[0]):
         return Feed(times=times, position=position)
     if path.quantum > 0.0:
         position = path.quantum * np.round(position / path.quantum)
-    if group == TIMING:
+    if rows[0].group == TIMING:
         feeds = [_mistimed(spec, times, position, row) for row in rows]
         times, position = (np.stack(arrays) for arrays in zip(*feeds, strict=True))
     if path.between == "hold":
         times, position = _held(times, position, setpoints.cycle_time)
     return Feed(times=times, position=position)
+
+
+def follows_exactly(scenario: Scenario) -> bool:
+    """Whether the drives follow the setpoints as the artefact has them."""
+    return scenario.group in ("machines", "corners")
 
 
 def delay(path: PathSpec) -> float:
