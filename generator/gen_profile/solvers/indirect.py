@@ -80,7 +80,7 @@ def _solve(problem: Problem, quiet: Canonical, near: Trajectory | None) -> Solut
         return _too_hard(problem, approach.iterations, linear_angle)
     quiet, guess = quiet.rescaled(approach.solution)
     weighted = _with_sway_cost(problem, quiet, guess)
-    climb = _beside(weighted, guess, near) or advance(lambda share: _lighter(weighted, share), guess)
+    climb = _beside(weighted, guess, near) or _climb(weighted, guess)
     climb = attrs.evolve(climb, iterations=approach.iterations + climb.iterations)
     if climb.reached < 1.0 and linear_angle < SMALL_ANGLE:
         return _too_heavy(problem, climb.iterations, climb.reached)
@@ -110,6 +110,16 @@ def _resolved(problem: Problem, weighted: Canonical, climb: Advance, linear_angl
         residual=refined.residual or climb.residual,
         trajectory=weighted.dimensionless(best),
     )
+
+
+def _climb(weighted: Canonical, guess: Trajectory) -> Advance:
+    """Raise β to what is asked for; on a coarser mesh, which smooths the way, where a fine one fails."""
+    fine = advance(lambda share: _lighter(weighted, share), guess)
+    if fine.reached == 1.0 or len(guess.mesh) <= INTERVALS + 1:
+        return fine
+    coarse = advance(lambda share: _lighter(weighted, share), guess.on(np.linspace(0.0, 1.0, INTERVALS + 1)))
+    better = max(fine, coarse, key=lambda climb: climb.reached)
+    return attrs.evolve(better, iterations=fine.iterations + coarse.iterations)
 
 
 def _beside(weighted: Canonical, guess: Trajectory, near: Trajectory | None) -> Advance | None:
@@ -218,10 +228,8 @@ def _too_heavy(problem: Problem, iterations: int, reached: float) -> Solution:
 
 def _unresolved(problem: Problem, iterations: int) -> Solution:
     """Blame a cost so steep that the motion changes faster than any mesh."""
-    cure = "Lower cost.sway_weight" if problem.sway_weight else "Allow more time: raise move.duration"
-    cure += (
-        "." if problem.sway_scale is None or not problem.sway_weight else ', or set cost.sway_scale = "auto".'
-    )
+    cure = "Lower cost.sway_weight"
+    cure += "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
     return _failure(problem, Status.DIVERGED, iterations, cure)
 
 
