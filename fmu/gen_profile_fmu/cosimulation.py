@@ -126,13 +126,8 @@ class PlantCosimulation:
         CosimulationError
             When a parameter is missing, unknown or out of range, or the FMU refuses a step.
         """
-        values = {
-            **self._plant_values(parameters),
-            **self._start_values(setpoints),
-            **initial,
-            TAU: tau,
-            MAX_STEP: max_step,
-        }
+        values = self._plant_values(parameters) | self._start_values(setpoints)
+        values |= {**initial, TAU: tau, MAX_STEP: max_step}
         steps = _steps(setpoints, settle, output_step, final_velocity)
         samples = np.split(self._simulate(values, steps), self._output_blocks, axis=1)
         return Response(times=steps.times, **dict(zip(_OBSERVED.values(), samples, strict=True)))

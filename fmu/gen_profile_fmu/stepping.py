@@ -12,6 +12,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Plant
 from gen_profile.profile import Array, SampledProfile
 from gen_profile_fmu.cosimulation import PlantCosimulation, _Steps
+from gen_profile_fmu.plant_variables import MAX_STEP, TAU
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -65,14 +66,8 @@ class SteppedPlant(PlantCosimulation):
     ) -> None:
         super().__init__(plant, on_build)
         rest = SampledProfile(cycle_time=1.0, position=[position, position])
-        self._initialise(
-            {
-                **self._plant_values(parameters),
-                **self._start_values(rest),
-                "tau": tau,
-                "max_step": max_step,
-            }
-        )
+        values = self._plant_values(parameters) | self._start_values(rest)
+        self._initialise(values | {TAU: tau, MAX_STEP: max_step})
         self._time = 0.0
 
     def advance(self, position: Sequence[float], duration: float) -> Instant:

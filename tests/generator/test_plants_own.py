@@ -263,7 +263,8 @@ def test_bodies_must_be_whole():
     assert len(faults_of(nameless)) == 2
     with pytest.raises(SpecError, match="do not take symbols"):
         dynamics(nameless)
-    assert any("2 moving parts are named" in fault for fault in faults_of(attrs.evolve(WINCH, bodies=("a", "a"))))
+    twins = attrs.evolve(WINCH, bodies=("a", "a"))
+    assert any("2 moving parts are named" in fault for fault in faults_of(twins))
 
     def breaking(q_u, dq_u, q_a, dq_a, p):
         if q_u[0] != 0.0:
