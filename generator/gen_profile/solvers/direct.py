@@ -3,8 +3,9 @@
 A machine's equations are nearly linear in the motion, and everything else is convex: effort, sway, limits on
 Bézier coefficients, and the amplitudes of the modes after the move. So the equations are linearised about the
 last motion, and the convex program that results is solved to the end, until the motion stays (sequential
-convex programming; Malyuta et al., 2022). The first of these programs, linearised at rest, bounds from below
-what any motion can do where angles are small.
+convex programming; Malyuta et al., 2022); where motions overshoot one another, the last few predict the next
+(see `solvers.acceleration`). The first of these programs, linearised at rest, bounds from below what any
+motion can do where angles are small.
 """
 
 from __future__ import annotations
