@@ -106,20 +106,13 @@ def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
     OutputError
         It is no such table.
     """
-    lines = [line for line in text.splitlines() if line.strip()]
-    if not lines:
-        raise OutputError(f"--measured {source}: the log is empty.")
-    separator = max(";\t,", key=lines[0].count)
-    try:
-        rows = list(csv.reader(lines, delimiter=separator))
-    except csv.Error as error:
-        raise OutputError(f"--measured {source}: it is no table ({error}).") from error
+    rows, decimal_comma = _cells(text, source)
     names = [cell.strip() for cell in rows[0]]
     columns = {name: _column(name, spec, source) for name in names}
     known = {name: column for name, column in columns.items() if column is not None}
     _require(known, names, spec, source)
     places = {name: names.index(name) for name in known}
-    numbers = _numbers(rows, places, source, decimal_comma=separator != ",")
+    numbers = _numbers(rows, places, source, decimal_comma=decimal_comma)
     signals = {
         (column.quantity, column.owner): numbers[:, place] / column.divisor
         for place, column in enumerate(known.values())
@@ -144,6 +137,19 @@ def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
         angles=by_quantity["angle"],
         ignored=tuple(name for name in names if name not in known),
     )
+
+
+def _cells(text: str, source: str) -> tuple[list[list[str]], bool]:
+    """Split a text into rows of cells, and tell whether a comma may be a decimal sign."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise OutputError(f"--measured {source}: the log is empty.")
+    separator = max(";\t,", key=lines[0].count)
+    try:
+        rows = list(csv.reader(lines, delimiter=separator))
+    except csv.Error as error:
+        raise OutputError(f"--measured {source}: it is no table ({error}).") from error
+    return rows, separator != ","
 
 
 def _column(name: str, spec: Spec, source: str) -> _Column | None:

@@ -8,7 +8,6 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 from scipy.optimize import minimize_scalar
 
@@ -98,8 +97,9 @@ class Measured:
     Attributes
     ----------
     log : MeasuredLog
+        What it holds of the move.
     start : float
-        When the move begins in the log, in s.
+        When the move begins in the whole log, in s.
     arrival : float
         When the axes shall stand still, in s since the start.
     positions : mapping of str to Signal
@@ -167,6 +167,45 @@ def compare_measured(
         The log does not hold the move.
     """
     start = _best_start(trial, log) if start is None else start
+    move = _the_move(trial, log, start)
+    q_a, responses = trial.motion(move.times).position, trial.swing.at(move.times)
+    plant, loads = spec.machine(), spec.machine().loads
+    sways = {**_sways_of_angles(spec, move, q_a), **move.sways}
+
+    def signal(measured: Array, planned: Array, unit: str) -> Signal:
+        return Signal(times=move.times, measured=measured, planned=planned, unit=unit)
+
+    return Measured(
+        log=move,
+        start=start,
+        arrival=arrival,
+        positions={
+            axis.name: signal(move.positions[axis.name], q_a[:, column], axis.unit)
+            for column, axis in enumerate(plant.actuated)
+            if axis.name in move.positions
+        },
+        sways={
+            load: _sway(
+                spec,
+                load,
+                signal(sways[load], responses[0].sway[:, column], "m"),
+                arrival=arrival,
+                from_angles=load not in move.sways,
+            )
+            for column, load in enumerate(loads)
+            if load in sways
+        },
+        angles={
+            load: signal(move.angles[load], responses[0].angle[:, column], "rad")
+            for column, load in enumerate(loads)
+            if load in move.angles
+        },
+        nearest=_nearest(move, responses, loads),
+    )
+
+
+def _the_move(trial: Trial, log: MeasuredLog, start: float) -> MeasuredLog:
+    """Cut out of a log what was planned, the swing afterwards included; its times begin with the move."""
     until = trial.motion.duration + trial.watch
     kept = (log.times >= start) & (log.times <= start + until)
     if kept.sum() < 2 or log.times[kept][-1] < start + trial.motion.duration:
@@ -174,76 +213,32 @@ def compare_measured(
             f"--measured {log.source}: the log ends before the move that begins at {start:.4g} s in it does; "
             "log on until the load is at rest, or state the start with --measured-start."
         )
-    times = log.times[kept] - start
-    planned = trial.motion(times)
-    responses = trial.swing.at(times)
-    plant, loads = spec.machine(), list(spec.machine().loads)
-    sways = {name: (values[kept], False) for name, values in log.sways.items()}
-    for name, values in _sways_of_angles(spec, log, kept, planned.position).items():
-        sways.setdefault(name, (values, True))
-    return Measured(
-        log=log,
-        start=start,
-        arrival=arrival,
-        positions={
-            axis.name: Signal(
-                times=times,
-                measured=log.positions[axis.name][kept],
-                planned=planned.position[:, column],
-                unit=axis.unit,
-            )
-            for column, axis in enumerate(plant.actuated)
-            if axis.name in log.positions
-        },
-        sways={
-            name: _sway(
-                spec,
-                trial,
-                name,
-                Signal(
-                    times=times, measured=values, planned=responses[0].sway[:, loads.index(name)], unit="m"
-                ),
-                arrival=arrival,
-                from_angles=from_angles,
-            )
-            for name, (values, from_angles) in sways.items()
-        },
-        angles={
-            name: Signal(
-                times=times,
-                measured=values[kept],
-                planned=responses[0].angle[:, loads.index(name)],
-                unit="rad",
-            )
-            for name, values in log.angles.items()
-        },
-        nearest=_nearest(log, kept, responses, loads),
+
+    def cut(signals: Mapping[str, Array]) -> dict[str, Array]:
+        return {name: values[kept] for name, values in signals.items()}
+
+    return attrs.evolve(
+        log,
+        times=log.times[kept] - start,
+        positions=cut(log.positions),
+        sways=cut(log.sways),
+        angles=cut(log.angles),
     )
 
 
-def _nearest(
-    log: MeasuredLog, kept: NDArray[np.bool_], responses: Sequence[Response], loads: Sequence[str]
-) -> int | None:
+def _nearest(move: MeasuredLog, responses: Sequence[Response], loads: Sequence[str]) -> int | None:
     """Find the machine whose swing is nearest to all that was logged, sensors' zeros aside."""
     apart = np.zeros(len(responses))
-    for logged, kind in ((log.sways, "sway"), (log.angles, "angle")):
+    for logged, kind in ((move.sways, "sway"), (move.angles, "angle")):
         for name, values in logged.items():
             planned = [getattr(response, kind)[:, loads.index(name)] for response in responses]
             size = float(np.var(planned[0])) or 1.0
-            apart += [float(np.var(values[kept] - one)) / size for one in planned]
-    return int(np.argmin(apart)) if log.sways or log.angles else None
+            apart += [float(np.var(values - one)) / size for one in planned]
+    return int(np.argmin(apart)) if move.sways or move.angles else None
 
 
-def _sway(
-    spec: Spec,
-    trial: Trial,
-    load: str,
-    signal: Signal,
-    *,
-    arrival: float,
-    from_angles: bool,
-) -> MeasuredSway:
-    slowest = float(linearize(spec.machine(), trial.machines[0].parameters, spec.move.target).frequencies[0])
+def _sway(spec: Spec, load: str, signal: Signal, *, arrival: float, from_angles: bool) -> MeasuredSway:
+    slowest = float(linearize(spec.machine(), spec.plant.parameters, spec.move.target).frequencies[0])
     after = signal.times >= arrival
     residual = None
     if after.any() and signal.times[-1] - arrival >= PERIODS * 2.0 * np.pi / slowest:
@@ -294,7 +289,7 @@ def _best_start(trial: Trial, log: MeasuredLog) -> float:
     )
 
 
-def _sways_of_angles(spec: Spec, log: MeasuredLog, kept: NDArray[np.bool_], q_a: Array) -> dict[str, Array]:
+def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Array]:
     """Compute the sway of every load from the ropes' angles, where those tell all coordinates.
 
     The angles are taken to be linear in the coordinates, as ropes' are.
@@ -302,12 +297,12 @@ def _sways_of_angles(spec: Spec, log: MeasuredLog, kept: NDArray[np.bool_], q_a:
     plant = spec.machine()
     p, n_u = SimpleNamespace(**spec.plant.parameters), len(plant.unactuated)
     still = list(map(float, q_a[-1]))
-    rows = [plant.loads.index(name) for name in log.angles]
+    rows = [plant.loads.index(name) for name in move.angles]
     columns = [plant.outputs(list(unit), still, p).angle for unit in np.eye(n_u)]
     gain = np.array(columns, dtype=np.float64).T[rows].reshape(-1, n_u)
     if np.linalg.matrix_rank(gain) < n_u:
         return {}
-    measured = np.stack([values[kept] for values in log.angles.values()])
+    measured = np.stack(list(move.angles.values()))
     q_u = np.linalg.lstsq(gain, measured, rcond=None)[0]
     sways = plant.outputs(list(q_u), list(q_a.T), p).sway
     return {
