@@ -15,6 +15,9 @@ from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 
 FIFTY_DEGREES = np.radians(50.0)  # beyond, Newton may fail although a motion exists
+# beyond, the ropes' tension changes so much that the phase in which a fast second mode arrives turns by
+# radians from one Newton step to the next: some of these moves are refused, with more time as the cure
+TENSE_ENOUGH = np.radians(20.0)
 SLOW_ENOUGH = 1200.0  # rad; a faster second mode is followed by its own, exact linear equation
 
 
@@ -85,10 +88,13 @@ def test_every_crane_comes_to_rest(drawn):
     problem, phase = drawn
     solution = solve(problem)
     if solution.status is not Status.CONVERGED:
-        assert solution.status is Status.SWINGS_TOO_FAR
-        best = least_peak_angle(problem.parameters, problem.target[0], problem.duration)
         quiet = solve(attrs.evolve(problem, sway_weight=0.0, target=(problem.target[0] * 1e-4,)))
         linear = quiet.raise_for_status().angle * 1e4
+        if phase > SLOW_ENOUGH and linear > TENSE_ENOUGH:
+            assert solution.status in {Status.DIVERGED, Status.SWINGS_TOO_FAR}
+            return
+        assert solution.status is Status.SWINGS_TOO_FAR
+        best = least_peak_angle(problem.parameters, problem.target[0], problem.duration)
         assert best is None or max(best, linear) > FIFTY_DEGREES
         return
     profile = optimal_profile(solution)
