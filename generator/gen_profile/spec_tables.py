@@ -331,7 +331,7 @@ def _can(table: Table, plant: Plant | None, faults: Faults) -> Table:
             "can.torque_per_acceleration",
             'required with feed_forward = "torque" (‰ of the rated torque per m/s²)',
         )
-    if table.get("mode") in {"ip", "csv"} and table.get("feed_forward", "none") != "none":
+    if table.get("mode") in ("ip", "csv") and table.get("feed_forward", "none") != "none":
         faults.add("can.feed_forward", 'only with mode = "csp"; remove it or set the mode')
     if table.get("mode") == "csv" and "following_error" not in table:
         faults.add(

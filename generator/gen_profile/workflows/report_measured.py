@@ -300,7 +300,7 @@ def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Arr
     rows = [plant.loads.index(name) for name in move.angles]
     columns = [plant.outputs(list(unit), still, p).angle for unit in np.eye(n_u)]
     gain = np.array(columns, dtype=np.float64).T[rows].reshape(-1, n_u)
-    if np.linalg.matrix_rank(gain) < n_u:
+    if len(rows) < n_u or np.linalg.matrix_rank(gain) < n_u:
         return {}
     measured = np.stack(list(move.angles.values()))
     q_u = np.linalg.lstsq(gain, measured, rcond=None)[0]
