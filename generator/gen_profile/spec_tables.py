@@ -128,8 +128,14 @@ def _plant(table: Table, plant: Plant | None, faults: Faults) -> Table:
     }
 
 
+MOVE_KEYS = ("distance", "start", "target", "duration", "initial", "final_velocity")
+
+
 def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
     """Turn ``distance`` into start and target."""
+    for key in [key for key in table if key not in (*MOVE_KEYS, "shortest")]:
+        faults.add(place("move", key), f"unknown key{suggestion(key, MOVE_KEYS)}")
+        del table[key]
     axes = len(plant.actuated) if plant else None
     start, target = table.pop("start", None), table.pop("target", None)
     if "distance" in table:
