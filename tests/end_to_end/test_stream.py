@@ -141,6 +141,14 @@ class TestArtefact:
         manifest.write_text(json.dumps(document))
         assert "failed its check" in self.refused(path, "--accept-unverified")
 
+    def test_that_begins_with_a_swing(self, tmp_path):
+        swung = ("--preset=paper", "--set", "move.initial={theta1=0.05}")
+        assert run_here(*swung, "--no-check", "--export", "can", "--out", tmp_path).code == 0
+        for source in [(tmp_path / "paper.log", "--accept-unverified"), swung]:
+            assert "move.initial: drives need a while" in self.refused(*source, "--simulate-drive")
+        alone = run_here("drive-sim", *swung, "--interface", "virtual", "--channel", "swung")
+        assert (alone.code, "move.initial: the simulated crane" in alone.err) == (4, True)
+
     def test_missing(self, tmp_path):
         assert "Cannot read" in self.refused(tmp_path / "nothing.log")
 

@@ -173,7 +173,7 @@ def _source(
     tell: Callable[[str], None],
 ) -> Source:
     """Take an artefact, or design one for a spec."""
-    from gen_profile.workflows.stream import verified
+    from gen_profile.workflows.stream import require_rest, verified
 
     if path is not None and path.suffix.lower() != ".toml":
         if preset is not None or overrides:
@@ -185,6 +185,7 @@ def _source(
     from gen_profile.workflows.design import design
 
     spec = chosen_spec(path, preset, overrides)
+    require_rest(spec)
     with TemporaryDirectory(prefix="gen-profile-") as folder:
         outcome = design(spec, ("can",), Path(folder), progress=tell)
         if not outcome.artefacts:

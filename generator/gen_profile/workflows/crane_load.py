@@ -35,7 +35,7 @@ class CraneLoad:
         if spec.move.initial:
             raise CosimulationError(
                 "move.initial: the simulated crane would swing on while its drives start up, and nobody "
-                "knows how it swings when the motion begins; leave move.initial out, or --simulate-drive."
+                "knows how it swings when the motion begins; leave move.initial out."
             )
         machines = scenarios(spec)
         tau = spec.actuator.tau or 0.0

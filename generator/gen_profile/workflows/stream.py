@@ -183,6 +183,20 @@ def require_extra() -> None:
         raise OutputError("Streaming needs canopen: pip install 'gen-profile[can]'.")
 
 
+def require_rest(spec: Spec) -> None:
+    """Refuse a motion that begins with a swing: it would meet the load in another phase of it.
+
+    Raises
+    ------
+    SpecError
+    """
+    if spec.move.initial:
+        raise SpecError(
+            "move.initial: drives need a while to start up, and nobody knows how the load swings by then; "
+            "let it come to rest, leave move.initial out, and export again."
+        )
+
+
 def verified(path: Path, *, accept_unverified: bool = False) -> Source:
     """Read an artefact, and require that its manifest vouches for it.
 
@@ -191,7 +205,7 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
     OutputError
         It or its manifest cannot be read.
     SpecError
-        It is no CAN log, was altered, or failed its check or never had one.
+        It is no CAN log, was altered, failed its check or never had one, or begins with a swing.
     ExportError
         It is damaged.
     """
@@ -207,6 +221,7 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
     if manifest.check is not None and not manifest.check.get("passed"):
         raise SpecError(f"{path} failed its check, as {beside} tells; it is not streamed.")
     spec = spec_from_dict(manifest.spec, path.parent)
+    require_rest(spec)
     return Source(spec=spec, plan=plan_of(content, target_of(spec)))
 
 
