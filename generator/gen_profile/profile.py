@@ -135,7 +135,8 @@ class Profile:
 
     def payload_hash(self) -> str:
         """SHA-256 of the numbers, in hexadecimal: the identity of the motion, whatever format carries it."""
-        return _sha256(self.knots, self.coefficients, self.target)
+        onward = (self.final_velocity,) if self.final_velocity.any() else ()  # formats that stop tell none
+        return _sha256(self.knots, self.coefficients, self.target, *onward)
 
 
 def grid_length(duration: float, cycle_time: float) -> int:

@@ -117,6 +117,9 @@ def test_the_hash_tells_motions_apart_and_nothing_else(profile):
     assert renamed.payload_hash() == profile.payload_hash()
     nudged = np.nextafter(profile.target, np.inf)
     assert Profile(**parts | {"target": nudged}, method="drawn").payload_hash() != profile.payload_hash()
+    stopped, onward = (np.full(profile.axes, speed) for speed in (0.0, 0.1))
+    assert Profile(**parts, final_velocity=stopped, method="drawn").payload_hash() == profile.payload_hash()
+    assert Profile(**parts, final_velocity=onward, method="drawn").payload_hash() != profile.payload_hash()
 
 
 def test_the_hash_is_the_same_in_every_process():
