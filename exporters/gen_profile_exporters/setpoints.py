@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from decimal import ROUND_CEILING, Decimal
-from typing import get_args
+from typing import Any, get_args
 
 import attrs
 import numpy as np
@@ -15,9 +15,11 @@ from gen_profile.spec import Bounds, CycleTime
 from gen_profile.units import COUNTS, AxisScale
 from gen_profile_exporters.exporter import Target
 
-INT32 = np.iinfo(np.int32)
+INT32: np.iinfo[Any] = np.iinfo(np.int32)
+INT16: np.iinfo[Any] = np.iinfo(np.int16)
 CYCLE_TIME: Bounds = get_args(CycleTime)[1]
 MAX_SAMPLES = 1_000_001
+TOO_FAR = "lower axis.counts_per_metre or put the origin nearer"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -102,14 +104,26 @@ def counts(position: Array, axis: AxisScale, cycle_time: float) -> NDArray[np.in
         A count does not fit 32 bits, which is what drives take (CiA 402, object 607Ah).
     """
     rounded = np.rint(in_axis_units(position, np.array(axis.counts_per_si)))
-    outside = np.flatnonzero((rounded < INT32.min) | (rounded > INT32.max))
+    require_within(INT32, rounded, f"axis {axis.name}", TOO_FAR, cycle_time)
+    return rounded.astype(np.int32)
+
+
+def require_within(
+    limits: np.iinfo[Any], counts: NDArray[Any], what: str, cure: str, cycle_time: float
+) -> None:
+    """Refuse whole numbers, one per cycle, of which some do not fit the bits that they are sent in.
+
+    Raises
+    ------
+    ExportError
+    """
+    outside = np.flatnonzero((counts < limits.min) | (counts > limits.max))
     if outside.size:
         first = int(outside[0])
         raise ExportError(
-            f"axis {axis.name}: {rounded[first]:.15g} counts at {first * cycle_time:g} s lie outside 32 bits "
-            f"({INT32.min} to {INT32.max}); lower axis.counts_per_metre or put the origin nearer."
+            f"{what}: {counts[first]:.15g} counts at {first * cycle_time:g} s lie outside {limits.bits} bits "
+            f"({limits.min} to {limits.max}); {cure}."
         )
-    return rounded.astype(np.int32)
 
 
 def is_count(values: Array) -> NDArray[np.bool_]:

@@ -18,30 +18,11 @@ from gen_profile.spec import CanSpec
 from gen_profile.units import AxisScale
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.setpoints import INT16, INT32, TOO_FAR, require_within
 
 NEAR_TIE = 1e-6  # of a count; doubles decide the rounding of what is further from a half
 DECELERATION_MARGIN = 2.0  # of a quick stop, over the motion's own greatest acceleration
 DIFFERENCE = 0.02  # s; velocities so far apart tell an acceleration without the noise of rounding
-
-
-@attrs.frozen
-class Range:
-    """Signed whole numbers of some length."""
-
-    bits: int
-
-    @property
-    def min(self) -> int:
-        """Lowest."""
-        return -(1 << self.bits - 1)
-
-    @property
-    def max(self) -> int:
-        """Highest."""
-        return (1 << self.bits - 1) - 1
-
-
-INT32, INT16 = Range(32), Range(16)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -159,18 +140,11 @@ def quick_stop_deceleration(position: Integers, period: float, can: CanSpec, axi
 
 def _positions(values: Array, axis: AxisScale, can: CanSpec, period: float) -> Integers:
     counts = exact_counts(values, exact(axis.counts_per_si))
-    _require(
-        counts, INT32, f"axis {axis.name}", "lower axis.counts_per_metre or put the origin nearer", period
-    )
+    require_within(INT32, counts, f"axis {axis.name}", TOO_FAR, period)
     if can.encoder is not None or can.gear is not None or can.feed is not None:
         increments = np.array([round(int(count) * position_factor(can)) for count in counts], dtype=object)
-        _require(
-            increments,
-            INT32,
-            f"axis {axis.name}, in the drive's increments",
-            "choose a coarser encoder",
-            period,
-        )
+        what = f"axis {axis.name}, in the drive's increments"
+        require_within(INT32, increments, what, "choose a coarser encoder", period)
     travel = travel_counts(axis, can)
     if travel is not None:
         outside = np.flatnonzero((counts < travel[0]) | (counts > travel[1]))
@@ -199,7 +173,7 @@ def _velocities(motion: SampledProfile, target: Target) -> Integers:
         least = exact(axis.counts_per_si) / exact(motion.cycle_time)
         velocity = np.append(np.diff(exact_counts(distance, least)), 0)
         cure = "lower axis.counts_per_metre"
-        _require(velocity, INT32, f"axis {axis.name}, velocity", cure, motion.cycle_time)
+        require_within(INT32, velocity, f"axis {axis.name}, velocity", cure, motion.cycle_time)
         columns.append(velocity)
     return np.column_stack(columns)
 
@@ -217,16 +191,6 @@ def _offsets(motion: SampledProfile, target: Target) -> Integers | None:
             ratio = exact(can.torque_per_acceleration or 0.0) * (1 if ratio > 0 else -1)
             values, limits, cure = motion.acceleration, INT16, "lower can.torque_per_acceleration"
         counts = exact_counts(values[:, column], ratio)
-        _require(counts, limits, f"axis {axis.name}, {can.feed_forward}", cure, motion.cycle_time)
+        require_within(limits, counts, f"axis {axis.name}, {can.feed_forward}", cure, motion.cycle_time)
         columns.append(counts)
     return np.column_stack(columns)
-
-
-def _require(counts: Integers, limits: Range, what: str, cure: str, period: float) -> None:
-    outside = np.flatnonzero((counts < limits.min) | (counts > limits.max))
-    if outside.size:
-        first = int(outside[0])
-        raise ExportError(
-            f"{what}: {counts[first]} counts at {first * period:g} s lie outside {limits.bits} bits "
-            f"({limits.min} to {limits.max}); {cure}."
-        )
