@@ -6,12 +6,12 @@
 
 static int is_due(const Model *model) {
     const double *values = model->values;
-    return model->time >= values[START_TIME] && (values[WAIT] == 0.0 || values[TRIGGER] != 0.0);
+    return is_come(model, values[START_TIME]) && (values[WAIT] == 0.0 || values[TRIGGER] != 0.0);
 }
 
 static double next_knot(const Model *model) {
     if (model->segment >= 0) return model->segment < N_SEGMENTS ? model->began + KNOTS[model->segment + 1] : HUGE_VAL;
-    return model->time < model->values[START_TIME] ? model->values[START_TIME] : HUGE_VAL;
+    return is_come(model, model->values[START_TIME]) ? HUGE_VAL : model->values[START_TIME];
 }
 
 static void motion_pass_knots(Model *model) {
@@ -20,7 +20,7 @@ static void motion_pass_knots(Model *model) {
         model->began = model->values[WAIT] != 0.0 ? model->time : model->values[START_TIME];
         model->segment = 0;
     }
-    while (model->segment >= 0 && next_knot(model) <= model->time) model->segment++;
+    while (model->segment >= 0 && is_come(model, next_knot(model))) model->segment++;
     model->next_event = next_knot(model);
     model->values[MOVING] = model->segment >= 0 && model->segment < N_SEGMENTS;
     model->values[DONE] = model->segment == N_SEGMENTS;

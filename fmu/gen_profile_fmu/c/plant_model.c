@@ -21,7 +21,7 @@ static void model_start(Model *model) {
 }
 
 static int model_event(Model *model) {
-    if (INPUT_KIND != SETPOINT_INPUT || model->time < model->next_event) return 0;
+    if (INPUT_KIND != SETPOINT_INPUT || !is_come(model, model->next_event)) return 0;
     const double period = model->values[PERIOD];
     for (int i = 0; i < N_A; i++) {
         model->held[i] = (model->values[INPUTS + i] - model->reached[i]) / period;
