@@ -210,7 +210,7 @@ def test_the_missing_extra_is_a_sentence(deployed, monkeypatch):
 def test_eds_of_the_simulated_drive(tmp_path):
     assert run_here("drive-sim", "--eds", tmp_path / "drive.eds").code == 0
     assert canopen.import_od(str(tmp_path / "drive.eds"), 1)[0x1000].default == 0x0002_0192
-    outcome = run_here("drive-sim", "--eds", tmp_path / "no" / "drive.eds")
+    outcome = run_here("drive-sim", "--eds", tmp_path / "drive.eds" / "below.eds")
     assert (outcome.code, "Cannot write" in outcome.err) == (2, True)
 
 

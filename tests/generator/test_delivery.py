@@ -1,12 +1,13 @@
 """Nobody ever sees half of an output folder."""
 
 import errno
+import os
 from pathlib import Path
 
 import pytest
 
 from gen_profile.errors import OutputError
-from gen_profile.workflows.delivery import staged
+from gen_profile.workflows.delivery import deliver, staged
 
 
 def tree(folder):
@@ -63,8 +64,9 @@ def test_a_full_disk_is_a_sentence_and_leaves_nothing(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", write_half)
+    sentence = r"^Cannot write .*: No space left on device; choose another one\.$"
     for out in (tmp_path, tmp_path / "new"):
-        full = pytest.raises(OutputError, match=r"^Cannot write .*: No space left on device; .* --out\.$")
+        full = pytest.raises(OutputError, match=sentence)
         with full, staged(out) as staging:
             staging.write("one.txt", b"new")
     assert tree(tmp_path) == {"one.txt": b"old"}
@@ -74,11 +76,21 @@ def test_a_full_disk_is_a_sentence_and_leaves_nothing(tmp_path, monkeypatch):
 def test_a_folder_that_cannot_be_is_a_sentence_and_leaves_nothing(tmp_path, out):
     (tmp_path / "file").write_bytes(b"in the way")
     with (
-        pytest.raises(OutputError, match=r"^Cannot write to the folder .*; choose another .* with --out\.$"),
+        pytest.raises(OutputError, match=r"^Cannot write to the folder .*; choose another one\.$"),
         staged(tmp_path / out),
     ):
         pytest.fail("there is no such folder")
     assert tree(tmp_path) == {"file": b"in the way"}
+
+
+def test_one_file_replaces_another_but_no_device(tmp_path):
+    deliver(tmp_path / "new" / "one.txt", b"1")
+    deliver(tmp_path / "new" / "one.txt", b"2")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OutputError, match="it is no regular file"):
+        deliver(tmp_path / "pipe", b"1")
+    assert (tmp_path / "pipe").is_fifo()
+    assert (tmp_path / "new" / "one.txt").read_bytes() == b"2"
 
 
 def test_a_file_that_cannot_be_replaced_is_a_sentence(tmp_path):

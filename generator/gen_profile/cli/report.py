@@ -59,14 +59,14 @@ def report(
     """Write everything about a design into one HTML file."""
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
+    from gen_profile.workflows.delivery import deliver
     from gen_profile.workflows.report import report as run
-    from gen_profile.workflows.report import write_report
 
     spec = chosen_spec(spec_path, preset, overrides)
     out = path or Path(f"{spec.name}.html")
     with progress() as tell:
         made = run(spec, formats, log=log, log_start=log_start, compared=not no_compare, progress=tell)
-        write_report(made.content, out)
+        deliver(out, made.content)
     print_outcome(made.to_dict(out), words.report(made, out), as_json)
     faults = made.faults()
     for sentence in faults:

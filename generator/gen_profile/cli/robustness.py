@@ -42,7 +42,7 @@ from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option
     "--plot", "picture", metavar="FILE", type=click.Path(path_type=Path), help="Draw it (png, svg or pdf)."
 )
 @click.option(
-    "--csv", "table", metavar="FILE", type=click.Path(path_type=Path), help="Write the numbers as a table."
+    "--csv", "path", metavar="FILE", type=click.Path(path_type=Path), help="Write the numbers as a table."
 )
 @json_option
 @debug_option
@@ -56,15 +56,16 @@ def robustness(
     half_range: float | None,
     points: int | None,
     picture: Path | None,
-    table: Path | None,
+    path: Path | None,
     as_json: bool,
 ) -> None:
     """Show residual sway over one or two parameters, optimal motions beside shapers."""
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
+    from gen_profile.workflows.delivery import deliver
     from gen_profile.workflows.picture import require_drawable
     from gen_profile.workflows.robustness import robustness as run
-    from gen_profile.workflows.robustness_table import write_table
+    from gen_profile.workflows.robustness_table import table
 
     spec = chosen_spec(spec_path, preset, overrides)
     if picture is not None:
@@ -76,6 +77,6 @@ def robustness(
 
             tell("drawing")
             draw(found, picture)
-        if table is not None:
-            write_table(found, table)
+        if path is not None:
+            deliver(path, table(found).encode("utf-8"))
     print_outcome(found.to_dict(), words.robustness(found), as_json)

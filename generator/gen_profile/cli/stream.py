@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
-from gen_profile.errors import OutputError, SpecError, StreamAborted
+from gen_profile.errors import SpecError, StreamAborted
 
 if TYPE_CHECKING:
     from gen_profile.workflows.stream import Outcome, Source
@@ -125,12 +125,13 @@ def drive_sim(
 
     run.require_extra()
     from gen_profile.workflows.crane_load import CraneLoad
+    from gen_profile.workflows.delivery import deliver
     from gen_profile_exporters.can import drive_dictionary
 
     spec = chosen_spec(spec_path, preset, overrides)
     make = drive_dictionary.Make(miss=miss, own_mapping=own_mapping)
     if eds is not None:
-        _write(eds, drive_dictionary.eds(spec.can.node, make).encode("utf-8"))
+        deliver(eds, drive_dictionary.eds(spec.can.node, make).encode("utf-8"))
         return
     port = run.Port(**_port(interface, channel, False))
     with (
@@ -157,8 +158,10 @@ for parameter in stream.params:
 
 
 def _conclude(outcome: Outcome, table: Path | None, as_json: bool) -> None:
+    from gen_profile.workflows.delivery import deliver
+
     if table is not None:
-        _write(table, outcome.table())
+        deliver(table, outcome.table())
     print_outcome(outcome.to_dict(), _outcome_words(outcome), as_json)
     if not outcome.done:
         click.echo(f"Stream aborted: {outcome.record.reason}", err=True)
@@ -199,13 +202,6 @@ def _port(interface: str | None, channel: str | None, simulated: bool) -> dict[s
     if interface is None or channel is None:
         raise SpecError("--interface and --channel: name the bus, as --interface socketcan --channel can0.")
     return {"interface": interface, "channel": channel}
-
-
-def _write(path: Path, content: bytes) -> None:
-    try:
-        path.write_bytes(content)
-    except OSError as error:
-        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
 
 
 def _plan_words(plan: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Writing a folder of artefacts so that nobody ever sees half of it."""
+"""Writing files, alone or as a folder of artefacts, so that nobody ever sees half of it."""
 
 from __future__ import annotations
 
@@ -53,9 +53,23 @@ def staged(destination: Path) -> Iterator[Staging]:
             _remove_empty(made)
     except OSError as error:
         raise OutputError(
-            f"Cannot write to the folder {destination}: {error.strerror or error}; "
-            "choose another one with --out."
+            f"Cannot write to the folder {destination}: {error.strerror or error}; choose another one."
         ) from error
+
+
+def deliver(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written, or a device or pipe stands in its place.
+    """
+    if path.exists() and not path.is_file():  # root's rename would replace even /dev/null
+        raise OutputError(f"Cannot write {path}: it is no regular file; choose another one.")
+    with staged(path.parent) as staging:
+        staging.write(path.name, content)
+        staging.deliver()
 
 
 def _remove_empty(folders: list[Path]) -> None:

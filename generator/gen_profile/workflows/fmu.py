@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 
 from gen_profile.spec import Spec
-from gen_profile.workflows.delivery import staged
+from gen_profile.workflows.delivery import deliver
 from gen_profile.workflows.planning import plan, timed
 from gen_profile_fmu.building import build_fmu
 from gen_profile_fmu.fmu_files import Version
@@ -89,9 +89,7 @@ def export_fmu(
     model = _model(spec, kind, input_kind, progress)
     path = path or Path(f"{model.identifier}.fmu")
     content = build_fmu(model, version, platforms, progress)
-    with staged(path.parent) as staging:
-        staging.write(path.name, content)
-        staging.deliver()
+    deliver(path, content)
     return Export(path=path, content=content, model=model, version=version, platforms=platforms)
 
 

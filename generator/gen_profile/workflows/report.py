@@ -16,7 +16,6 @@ from gen_profile.report.content import Page
 from gen_profile.report.page import render, require_pages
 from gen_profile.spec import Spec
 from gen_profile.workflows.compare import Comparison, compare
-from gen_profile.workflows.delivery import staged
 from gen_profile.workflows.design import LIBRARIES, Design, design
 from gen_profile.workflows.report_log import read_log
 from gen_profile.workflows.report_measured import Measured, compare_measured
@@ -110,18 +109,6 @@ def report(
     progress("writing the report")
     page = _page(outcome, comparison, measured)
     return Report(design=outcome, comparison=comparison, measured=measured, content=render(page))
-
-
-def write_report(content: bytes, path: Path) -> None:
-    """Write a page, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-    """
-    with staged(path.parent) as staging:
-        staging.write(path.name, content)
-        staging.deliver()
 
 
 def _page(outcome: Design, comparison: Comparison | None, measured: Measured | None) -> Page:

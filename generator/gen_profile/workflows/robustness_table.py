@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import csv
 from io import StringIO
-from pathlib import Path
 
 import numpy as np
 
-from gen_profile.workflows.delivery import staged
 from gen_profile.workflows.robustness import Robustness
 
 
@@ -27,15 +25,3 @@ def table(found: Robustness) -> str:
     writer.writerow(head)
     writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
     return text.getvalue()
-
-
-def write_table(found: Robustness, path: Path) -> None:
-    """Write the table, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-    """
-    with staged(path.parent) as staging:
-        staging.write(path.name, table(found).encode("utf-8"))
-        staging.deliver()

@@ -25,7 +25,7 @@ import attrs
 
 from gen_profile.errors import OutputError
 from gen_profile.manifest import sha256
-from gen_profile.workflows.delivery import staged
+from gen_profile.workflows.delivery import deliver, staged
 from gen_profile.workflows.sweep_case import Outcome, Recipe
 from gen_profile.workflows.sweep_grid import Axis, Grid
 
@@ -79,10 +79,7 @@ class Store:
         OutputError
         """
         if followed and outcome.start is not None:
-            path = self._start_path(case)
-            with staged(path.parent) as staging:
-                staging.write(path.name, outcome.start)
-                staging.deliver()
+            deliver(self._start_path(case), outcome.start)
         with staged(self.case_folder(case)) as staging:
             for name, content in outcome.files.items():
                 staging.write(name, content)
@@ -136,9 +133,7 @@ def opened(store: Store) -> Iterator[None]:
     with _locked(store.folder):
         asked = store.describe()
         if not (store.folder / DESCRIPTION).exists():
-            with staged(store.folder) as staging:
-                staging.write(DESCRIPTION, _json(asked))
-                staging.deliver()
+            deliver(store.folder / DESCRIPTION, _json(asked))
         found = _description(store.folder)
         if found != asked:
             other = ", ".join(key for key in asked if found.get(key) != asked[key])
@@ -156,7 +151,7 @@ def _locked(folder: Path) -> Iterator[None]:
         lock = (folder / LOCK).open("w")
     except OSError as error:
         raise OutputError(
-            f"Cannot write to the folder {folder}: {error.strerror or error}; choose another one with --out."
+            f"Cannot write to the folder {folder}: {error.strerror or error}; choose another one."
         ) from error
     with lock:
         try:
