@@ -10,6 +10,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from gen_profile.workflows.wording import mm, number
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -57,13 +59,13 @@ def design(outcome: Design) -> str:
         status, seconds = solution.status.name.lower(), outcome.plan.solver_time
         found = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
     residual = (
-        f"{_mm(figures['sway_residual_peak_m'])} nominal, {_mm(figures['sway_residual_worst_m'])} at worst"
+        f"{mm(figures['sway_residual_peak_m'])} nominal, {mm(figures['sway_residual_worst_m'])} at worst"
     )
     rows = [
         ("move", _move(outcome.spec)),
         ("solver", found),
         *_peaks(outcome),
-        ("sway on the way", _mm(figures["sway_transient_peak_m"])),
+        ("sway on the way", mm(figures["sway_transient_peak_m"])),
         ("residual sway", residual),
         *([] if outcome.check is None else _groups(outcome.check)),
         ("check", _verdict(outcome.check)),
@@ -82,7 +84,7 @@ def judgement(found: Judgement) -> str:
     """Tell how an artefact was judged."""
     check = found.check
     findings = [
-        (finding.scenario.name, ", ".join(f"{load} {_mm(sway)}" for load, sway in finding.residual.items()))
+        (finding.scenario.name, ", ".join(f"{load} {mm(sway)}" for load, sway in finding.residual.items()))
         for finding in check.findings
         if finding.scenario.group == "machines" or len(check.findings) == 1
     ]
@@ -106,8 +108,8 @@ def _group(group: Mapping[str, Any]) -> str:
     verdict = "passed" if group["passed"] else "FAILED"
     aside = "" if group["counts"] else " (counts with --strict)"
     worst = group["worst"]
-    shares = ", ".join(f"{100.0 * float(q):g} % ≤ {_mm(sway)}" for q, sway in group["quantiles_m"].items())
-    peak = f"worst {worst['load']} {_mm(worst['residual_peak_m'])} (row {worst['row']})"
+    shares = ", ".join(f"{100.0 * float(q):g} % ≤ {mm(sway)}" for q, sway in group["quantiles_m"].items())
+    peak = f"worst {worst['load']} {mm(worst['residual_peak_m'])} (row {worst['row']})"
     return f"{verdict}{aside}: {peak}; end load {shares}"
 
 
@@ -121,7 +123,7 @@ def comparison(found: Comparison) -> str:
     table.add_column("limit\nkept", justify="center")
     table.add_column("Pareto\nfront", justify="center")
     for row in found.rows:
-        cells = (_figure(factor * row.figures[key]) for _, key, factor in COLUMNS.values())
+        cells = (number(factor * row.figures[key]) for _, key, factor in COLUMNS.values())
         marks = ("●" if mark else "" for mark in (row.safe, row.method in found.efficient))
         table.add_row(row.method, *cells, *marks)
     left_out = [f"{method}: {reason}" for method, reason in found.left_out.items()]
@@ -144,7 +146,7 @@ def robustness(found: Robustness) -> str:
         kept = 100.0 * float((found.share(method) <= 1.0).mean())
         ends = found.insensitivity(method)
         span = "" if ends is None else f"{100.0 * ends[0]:+.1f} … {100.0 * ends[1]:+.1f} %"
-        cells = (method, _figure(1e3 * found.end_load(method).max()), f"{kept:.0f} %", span)
+        cells = (method, number(1e3 * found.end_load(method).max()), f"{kept:.0f} %", span)
         table.add_row(*cells[: len(heads)])
     ranges = (
         f"{name} {100.0 * off[0]:+.3g} … {100.0 * off[-1]:+.3g} %" for name, off in found.errors.items()
@@ -202,7 +204,7 @@ def found_profile(found: Found) -> str:
     """Tell which profile is nearest, and what it costs to use it."""
     expected, designed = found.sway
     costs = [f"{key} {value:+g}" for key, value in found.costs.items() if value]
-    costs.append(f"worst residual sway {_mm(expected)}, {_mm(designed)} where it was designed for")
+    costs.append(f"worst residual sway {mm(expected)}, {mm(designed)} where it was designed for")
     rows = [
         ("asked for", _values(found.asked)),
         ("nearest", f"{_values(found.used)} (case {found.row['case']})"),
@@ -252,7 +254,7 @@ def _cost_of_lag(figures: Mapping[str, float]) -> list[tuple[str, str]]:
     over = figures["command_overshoot_m"]
     if times < COSTLY_LAG and over < COSTLY_OVERSHOOT * figures["sway_transient_peak_m"]:
         return []
-    text = f"leading it takes {times:.1f} times the motion's acceleration and overshoots by {_mm(over)}"
+    text = f"leading it takes {times:.1f} times the motion's acceleration and overshoots by {mm(over)}"
     return [("drive lag", f'{text}; a longer move, or cost.effort = "snap", takes less')]
 
 
@@ -285,18 +287,9 @@ def _verdict(check: Check | None) -> str:
         return "not asked for: UNVERIFIED"
     load, finding = check.worst
     return (
-        f"{'passed' if check.passed else 'FAILED'}: {load} {_mm(finding.residual[load])} at worst "
-        f"({finding.scenario.name}), {_mm(check.limit[load])} allowed, error below {_mm(check.error_bound)}"
+        f"{'passed' if check.passed else 'FAILED'}: {load} {mm(finding.residual[load])} at worst "
+        f"({finding.scenario.name}), {mm(check.limit[load])} allowed, error below {mm(check.error_bound)}"
     )
-
-
-def _mm(metres: float) -> str:
-    return f"{_figure(1e3 * metres)} mm"
-
-
-def _figure(value: float) -> str:
-    """Write four digits, and none below a hundred-thousandth: of a millimetre, that is numerical error."""
-    return f"{round(value, 5):.4g}"
 
 
 def _block(title: str, rows: Sequence[tuple[str, str]]) -> str:

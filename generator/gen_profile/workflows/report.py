@@ -21,7 +21,7 @@ from gen_profile.workflows.report_log import read_log
 from gen_profile.workflows.report_measured import Measured, compare_measured
 from gen_profile.workflows.report_measured_section import measured_verdict
 from gen_profile.workflows.report_sections import facts, sections, verdict
-from gen_profile.workflows.report_words import move, uncertain
+from gen_profile.workflows.wording import move, uncertain
 
 Progress = Callable[[str], None]
 

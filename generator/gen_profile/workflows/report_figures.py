@@ -16,7 +16,7 @@ from gen_profile.spec import Spec
 from gen_profile.workflows.compare import Comparison, Row
 from gen_profile.workflows.comparison_plot import BEYOND, DECADES, spectrum
 from gen_profile.workflows.planning import RESIDUAL_SAMPLES, Trial
-from gen_profile.workflows.report_words import machine
+from gen_profile.workflows.wording import machine
 
 SAMPLES = 800
 COMPARED = 500  # samples of each curve where there are many methods

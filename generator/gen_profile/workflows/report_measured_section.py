@@ -13,7 +13,7 @@ from gen_profile.spec import Spec
 from gen_profile.workflows.planning import Trial
 from gen_profile.workflows.report_figures import TIME, sway_levels
 from gen_profile.workflows.report_measured import Measured, MeasuredSway, Signal
-from gen_profile.workflows.report_words import machine, mm, number
+from gen_profile.workflows.wording import machine, mm, number
 
 DRAWN = 1500  # samples of a log that are drawn; all of them are judged
 PLANNED = Style(colour=PALETTE[0], width=2.0)

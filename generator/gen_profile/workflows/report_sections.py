@@ -30,7 +30,7 @@ from gen_profile.workflows.report_figures import (
 from gen_profile.workflows.report_measured import Measured
 from gen_profile.workflows.report_measured_section import measured_section
 from gen_profile.workflows.report_robustness import robustness_section
-from gen_profile.workflows.report_words import bound, machine, mm, number
+from gen_profile.workflows.wording import bound, machine, mm, number
 
 UNITS_OF_TIME = ("s", "s²", "s³")
 QUANTITIES = ("velocity", "acceleration", "jerk")

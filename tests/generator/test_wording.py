@@ -1,8 +1,8 @@
-"""Numbers and names as a report writes them."""
+"""Numbers and names as people read them."""
 
 import pytest
 
-from gen_profile.workflows.report_words import bound, machine, mm, number
+from gen_profile.workflows.wording import bound, machine, mm, number
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Figures and moves in words, as a report says them."""
+"""How figures, moves and machines read, in a terminal and in a report."""
 
 from __future__ import annotations
 
