@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -67,14 +67,25 @@ def spec_options(command: Command) -> Command:
     return command
 
 
-export_option = click.option(
-    "--export",
-    "formats",
-    metavar="FORMAT",
-    multiple=True,
-    default=("csv",),
-    shell_complete=_complete_formats,
-    help="Format to write (see gen-profile formats). Repeatable; csv by default.",
+def export_option(what: str) -> Callable[[Command], Command]:
+    """Add the choice of formats, and say what becomes of each."""
+    return click.option(
+        "--export",
+        "formats",
+        metavar="FORMAT",
+        multiple=True,
+        default=("csv",),
+        shell_complete=_complete_formats,
+        help=f"{what} (see gen-profile formats). Repeatable; csv by default.",
+    )
+
+
+plot_option = click.option(
+    "--plot",
+    "picture",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Draw it (png, svg or pdf).",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
 debug_option = click.option(
@@ -93,7 +104,7 @@ def cli() -> None:
 
 @cli.command(epilog="Example: gen-profile --preset paper --export plc --export can --out deploy")
 @spec_options
-@export_option
+@export_option("Format to write")
 @click.option(
     "--out",
     "folder",
@@ -133,16 +144,17 @@ def design(
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.design import design as run
 
-    if cycle_time is not None:
-        overrides += (f"export.cycle_time={cycle_time}", f"can.sync_period={cycle_time}")
-    if plc_layout is not None:
-        overrides += (f"export.plc_layout={plc_layout}",)
-    if csv_dialect is not None:
-        overrides += (f"export.csv_dialect={csv_dialect}",)
-    if csv_columns is not None:
-        overrides += (f"export.csv_columns={[name.strip() for name in csv_columns.split(',')]}",)
-    if method is not None:
-        overrides += (f"solver.method={method}",)
+    columns = None if csv_columns is None else [name.strip() for name in csv_columns.split(",")]
+    overrides += as_overrides(
+        {
+            "export.cycle_time": cycle_time,
+            "can.sync_period": cycle_time,
+            "export.plc_layout": plc_layout,
+            "export.csv_dialect": csv_dialect,
+            "export.csv_columns": columns,
+            "solver.method": method,
+        }
+    )
     spec = chosen_spec(spec_path, preset, overrides)
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
@@ -156,13 +168,7 @@ def design(
 
 @cli.command(epilog="Example: gen-profile compare --preset paper --plot comparison.png")
 @spec_options
-@click.option(
-    "--plot",
-    "picture",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="Draw the comparison (png, svg or pdf).",
-)
+@plot_option
 @click.option(
     "--base",
     type=click.Choice(["quintic", "septic", "jerk-limited"]),
@@ -183,9 +189,7 @@ def compare(
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.compare import compare as run
 
-    if base is not None:
-        overrides += (f"solver.base={base}",)
-    spec = chosen_spec(spec_path, preset, overrides)
+    spec = chosen_spec(spec_path, preset, overrides + as_overrides({"solver.base": base}))
     if picture is not None:
         from gen_profile.workflows.comparison_plot import draw
         from gen_profile.workflows.picture import require_drawable
@@ -331,6 +335,11 @@ def _interruptible() -> list[int]:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # and not ignored, as in the background
         signal.signal(signal.SIGINT, interrupt)
     return signals
+
+
+def as_overrides(values: Mapping[str, object]) -> tuple[str, ...]:
+    """Write options that stand for keys of the spec as --set would; None is for one that was not given."""
+    return tuple(f"{key}={value}" for key, value in values.items() if value is not None)
 
 
 def chosen_spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:

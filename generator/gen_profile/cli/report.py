@@ -7,7 +7,15 @@ from pathlib import Path
 
 import click
 
-from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
+from gen_profile.cli.commands import (
+    chosen_spec,
+    cli,
+    debug_option,
+    export_option,
+    json_option,
+    print_outcome,
+    spec_options,
+)
 from gen_profile.errors import CheckFailed
 
 
@@ -20,14 +28,7 @@ from gen_profile.errors import CheckFailed
     type=click.Path(path_type=Path, dir_okay=False),
     help="File to write; named after the spec in this folder by default.",
 )
-@click.option(
-    "--export",
-    "formats",
-    metavar="FORMAT",
-    multiple=True,
-    default=("csv",),
-    help="Format whose file is checked and told by its hash. Repeatable; csv by default.",
-)
+@export_option("Format whose file is checked and told by its hash")
 @click.option(
     "--measured",
     "log",

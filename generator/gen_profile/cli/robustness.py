@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
-from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
+from gen_profile.cli.commands import (
+    chosen_spec,
+    cli,
+    debug_option,
+    json_option,
+    plot_option,
+    print_outcome,
+    spec_options,
+)
 
 
 @cli.command(epilog="Example: gen-profile robustness crane.toml --parameter L1 --plot robustness.png")
@@ -38,9 +46,7 @@ from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option
     type=click.IntRange(3, 1001),
     help="Errors tried per parameter; 61 of a curve, 25 of a map by default.",
 )
-@click.option(
-    "--plot", "picture", metavar="FILE", type=click.Path(path_type=Path), help="Draw it (png, svg or pdf)."
-)
+@plot_option
 @click.option(
     "--csv", "path", metavar="FILE", type=click.Path(path_type=Path), help="Write the numbers as a table."
 )

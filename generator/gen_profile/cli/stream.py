@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
+from gen_profile.cli.commands import (
+    as_overrides,
+    chosen_spec,
+    cli,
+    debug_option,
+    json_option,
+    print_outcome,
+    spec_options,
+)
 from gen_profile.errors import SpecError, StreamAborted
 
 if TYPE_CHECKING:
@@ -77,8 +85,7 @@ def stream(
     from gen_profile.workflows import stream as run
 
     run.require_extra()
-    named = {"can.mode": mode, "can.node": node}
-    overrides += tuple(f"{key}={value}" for key, value in named.items() if value is not None)
+    overrides += as_overrides({"can.mode": mode, "can.node": node})
     with progress() as tell:
         source = _source(spec_path, preset, overrides, accept_unverified, tell)
         if dry_run:

@@ -31,7 +31,7 @@ from gen_profile.cli.commands import (
     help="A key of the spec and its values: N from LO to HI, or KEY=VALUE,VALUE,… Repeatable: all "
     "combinations; the last one is solved along.",
 )
-@export_option
+@export_option("Format to write")
 @click.option(
     "--out",
     "folder",
