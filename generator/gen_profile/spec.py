@@ -194,6 +194,11 @@ class LimitsSpec:
         stated = {name: getattr(own, name) for name in names if getattr(own, name) is not None}
         return AxisLimitsSpec(**{name: getattr(self, name) for name in names} | stated)
 
+    def place(self, column: int, name: str) -> str:
+        """Where one kind of limit of one axis stands in the spec."""
+        axis, own = self.own(column)
+        return f"limits.{name}" if getattr(own, name) is None else f"limits.axis.{axis}.{name}"
+
     def without(self, name: str) -> LimitsSpec:
         """Leave one kind of limit out, such as ``"jerk"``, for all axes."""
         if name == "sway":
@@ -352,7 +357,7 @@ class CanSpec:
     sync_period : float
         s; also the drives' interpolation period 60C2h.
     feed_forward : str
-        What goes along with each position in csp: nothing, the velocity 60B1h, or the torque 60B2h.
+        What goes along with each position in csp: nothing, the velocity 60B1h, the torque 60B2h, or both.
     torque_per_acceleration : float or None
         For the torque: ‰ of the rated torque per m/s² (or rad/s²) of the axis.
     timeout : float or None
@@ -380,7 +385,7 @@ class CanSpec:
     bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
     mode: Literal["csp", "ip", "csv"] = "csp"
     sync_period: CycleTime = 0.004
-    feed_forward: Literal["none", "velocity", "torque"] = "none"
+    feed_forward: Literal["none", "velocity", "torque", "both"] = "none"
     torque_per_acceleration: Positive | None = None
     timeout: Annotated[float, Bounds(least=0.001, most=30.0)] | None = None
     start_tolerance: Positive = 0.001

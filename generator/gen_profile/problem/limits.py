@@ -20,7 +20,7 @@ class Breach:
     Attributes
     ----------
     limit : str
-        Its key in the spec.
+        Its place in the spec, such as ``limits.velocity``.
     found, allowed : float
         What the motion needs, and what it may have.
     power : int
@@ -34,7 +34,7 @@ class Breach:
 
     def sentence(self) -> str:
         """Say it."""
-        return f"limits.{self.limit}: {self.allowed:g} is allowed, the motion needs {self.found:.4g}."
+        return f"{self.limit}: {self.allowed:g} is allowed, the motion needs {self.found:.4g}."
 
 
 def breaches(limits: LimitsSpec, command: Profile, transient_sway: float) -> tuple[Breach, ...]:
@@ -74,23 +74,19 @@ def require_limits(limits: LimitsSpec, command: Profile, transient_sway: float) 
 def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Breach]:
     """List what the motion needs of every limit there is."""
     for column in range(command.axes):
-        (axis, own), allowed_here = limits.own(column), limits.of(column)
-        places = {
-            name: name if getattr(own, name) is None else f"axis.{axis}.{name}"
-            for name in ("velocity", "acceleration", "jerk", "travel")
-        }
+        allowed_here = limits.of(column)
         for order, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
             allowed = getattr(allowed_here, name)
             if allowed is not None:
                 _, values = command.within_segments(POINTS_PER_SEGMENT, order)
                 found = float(np.abs(values[:, column]).max())
-                yield Breach(limit=places[name], found=found, allowed=allowed, power=order)
+                yield Breach(limit=limits.place(column, name), found=found, allowed=allowed, power=order)
         if allowed_here.travel is not None:
-            low, high = allowed_here.travel
+            (low, high), travel = allowed_here.travel, limits.place(column, "travel")
             _, values = command.within_segments(POINTS_PER_SEGMENT, 0)
             rounding = 1e-12 * max(abs(low), abs(high))
             top, bottom = float(values[:, column].max()), float(values[:, column].min())
-            yield Breach(limit=places["travel"], found=top - rounding, allowed=high, power=0)
-            yield Breach(limit=places["travel"], found=-bottom - rounding, allowed=-low, power=0)
+            yield Breach(limit=travel, found=top - rounding, allowed=high, power=0)
+            yield Breach(limit=travel, found=-bottom - rounding, allowed=-low, power=0)
     if limits.sway is not None:
-        yield Breach(limit="sway", found=sway, allowed=limits.sway, power=2)
+        yield Breach(limit="limits.sway", found=sway, allowed=limits.sway, power=2)

@@ -22,8 +22,6 @@ from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
-TARGET_TOLERANCE = 1e-6  # of the axis' move, beside the artefact's own resolution
-
 
 @attrs.frozen(kw_only=True, eq=False)
 class Judgement:
@@ -105,7 +103,7 @@ def check_artefact(
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     check = _verdict(spec, setpoints, _rows(spec, row), on_build, progress)
     check = attrs.evolve(check, strict=strict)
-    faults = (*_missed_ends(spec, setpoints), *check.faults)
+    faults = check.faults
     if standing == "differs":
         faults += (
             f"{path.name} is none of the files that {FILENAME} beside it lists: "
@@ -208,25 +206,3 @@ def _provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
     if sha256(content) in {artefact.sha256 for artefact in manifest.artefacts}:
         return "matches"
     return "differs"
-
-
-def _missed_ends(spec: Spec, setpoints: SampledProfile) -> tuple[str, ...]:
-    """Say where the motion does not begin or end as the spec asks."""
-    distance = np.abs(spec.move.distance)
-    size = np.where(distance > 0.0, distance, distance.max() or 1.0)
-    allowed = TARGET_TOLERANCE * size + setpoints.resolution
-    beyond = setpoints.times[-1] - spec.move.duration + (spec.actuator.tau or 0.0)
-    end = np.array(spec.move.target) + beyond * np.array(spec.move.final_velocity)
-    axes = spec.machine().actuated
-    faults = []
-    for word, found, asked in (
-        ("starts", setpoints.position[0], spec.move.start),
-        ("ends", setpoints.position[-1], end),
-    ):
-        for axis, at, due, tolerance in zip(axes, found, asked, allowed, strict=True):
-            if abs(at - due) > tolerance:
-                faults.append(
-                    f"Axis {axis.name} {word} at {at:.9g} {axis.unit}, "
-                    f"and the spec asks for {due:.9g} {axis.unit}."
-                )
-    return tuple(faults)

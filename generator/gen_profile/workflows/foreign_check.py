@@ -14,9 +14,10 @@ from gen_profile.spec import ForeignFmu, Spec
 from gen_profile.workflows.many_machines import Feed
 from gen_profile.workflows.monte_carlo import standstill
 from gen_profile.workflows.planning import STANDSTILL, watch_time
+from gen_profile.workflows.plausibility import implausibilities
 from gen_profile.workflows.scenarios import scenarios
 from gen_profile.workflows.transmission import follows_exactly, transmitted
-from gen_profile.workflows.verification import ERROR_FLOOR, above_samples, arrival, contradictions
+from gen_profile.workflows.verification import ERROR_FLOOR, above_samples, arrival
 from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
 
 STEPS_PER_LAG = 4  # at least, of drives that lag
@@ -62,7 +63,7 @@ def judge_foreign(
         error_bound=error + ERROR_FLOOR,
         arrival=arrival(spec, setpoints),
         findings=tuple(findings),
-        faults=contradictions(setpoints),
+        faults=implausibilities(spec, setpoints),
     )
 
 

@@ -13,12 +13,12 @@ from gen_profile.profile import Array, SampledProfile
 from gen_profile.response import Response
 from gen_profile.spec import Spec
 from gen_profile.workflows.planning import RESIDUAL_SAMPLES, STANDSTILL, modal_amplitudes, watch_time
+from gen_profile.workflows.plausibility import implausibilities
 from gen_profile_fmu.cosimulation import PlantCosimulation
 
 LONGEST_STEP = 1e-3  # s, of the FMU's integrator
 STEP_PHASE = 0.05  # rad of the fastest mode that one step may cover
 ERROR_FLOOR = 1e-8  # m; covers what both integrations leave
-VELOCITY_TOLERANCE = 0.01  # of the greatest velocity, between a velocity column and the positions beside it
 
 
 def cosimulate(
@@ -101,7 +101,7 @@ def judge(
             _finding(spec, machine, response) for machine, response in zip(machines, found, strict=True)
         ),
         directions=spec.machine().directions,
-        faults=contradictions(setpoints),
+        faults=implausibilities(spec, setpoints),
     )
 
 
@@ -154,30 +154,3 @@ def _finding(spec: Spec, machine: Scenario, response: Response) -> Finding:
         residual=dict(zip(plant.loads, map(float, peak(response.sway)), strict=True)),
         modal=dict(zip(plant.loads, map(float, modal), strict=True)),
     )
-
-
-def contradictions(setpoints: SampledProfile) -> tuple[str, ...]:
-    """Say where a velocity column does not belong to the positions beside it.
-
-    A drive fed with both would follow one and not the other.
-    """
-    if setpoints.velocity is None or len(setpoints.position) < 3:
-        return ()
-    central = (setpoints.position[2:] - setpoints.position[:-2]) / (2.0 * setpoints.cycle_time)
-    size = max(float(np.abs(central).max()), float(np.abs(setpoints.velocity).max()))
-    noise = float(setpoints.resolution.max()) / setpoints.cycle_time
-    apart: Array = np.abs(setpoints.velocity[1:-1] - central).max(axis=1)
-    worst = int(apart.argmax())
-    if apart[worst] <= VELOCITY_TOLERANCE * size + noise + _curvature(setpoints):
-        return ()
-    return (
-        f"The velocity at {setpoints.times[worst + 1]:.6g} s contradicts the positions around it by "
-        f"{apart[worst]:.3g} m/s: the artefact was altered; export it again.",
-    )
-
-
-def _curvature(setpoints: SampledProfile) -> float:
-    """Bound what a central difference misses of a smooth velocity: h²/6 of the accelerations' slope."""
-    if setpoints.acceleration is None:
-        return 0.0
-    return float(np.abs(np.diff(setpoints.acceleration, axis=0)).max()) * setpoints.cycle_time / 6.0
