@@ -179,7 +179,11 @@ def test_what_an_axis_breaks_is_named():
     free = optimal_profile(indirect.solve(problem_of(spec)))
     broken = {breach.limit: breach for breach in breaches(spec.limits, free, 0.0)}
     assert broken.keys() == {"limits.velocity", "limits.axis.hoist.velocity"}
-    assert broken["limits.axis.hoist.velocity"].sentence().startswith("limits.axis.hoist.velocity: 0.45 is allowed")
+    assert (
+        broken["limits.axis.hoist.velocity"]
+        .sentence()
+        .startswith("limits.axis.hoist.velocity: 0.45 is allowed")
+    )
 
 
 def test_the_shortest_move_waits_for_the_slowest_axis():
