@@ -332,12 +332,13 @@ def _can(table: Table, plant: Plant | None, faults: Faults) -> Table:
     for key in travel:
         if plant and key not in (names := [axis.name for axis in plant.actuated]):
             faults.add(place("can.travel", key), f"unknown axis{suggestion(key, names)}")
-    if table.get("feed_forward") == "torque" and "torque_per_acceleration" not in table:
+    ahead = table.get("feed_forward", "none")
+    if ahead in ("torque", "both") and "torque_per_acceleration" not in table:
         faults.add(
             "can.torque_per_acceleration",
-            'required with feed_forward = "torque" (‰ of the rated torque per m/s²)',
+            f'required with feed_forward = "{ahead}" (‰ of the rated torque per m/s²)',
         )
-    if table.get("mode") in ("ip", "csv") and table.get("feed_forward", "none") != "none":
+    if table.get("mode") in ("ip", "csv") and ahead != "none":
         faults.add("can.feed_forward", 'only with mode = "csp"; remove it or set the mode')
     if table.get("mode") == "csv" and "following_error" not in table:
         faults.add(

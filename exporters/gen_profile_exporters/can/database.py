@@ -12,6 +12,7 @@ from gen_profile_exporters.can.scaling import exact
 from gen_profile_exporters.exporter import Target
 
 MASTER_NAME = "Controller"
+SETPOINTS = {frames.RPDO2: "Setpoint", frames.RPDO3: "FeedForward"}
 
 
 def dbc(target: Target) -> bytes:
@@ -23,10 +24,12 @@ def dbc(target: Target) -> bytes:
     blocks = ['VERSION ""', "NS_ :", "BS_:", f"BU_: {MASTER_NAME} {' '.join(names)}"]
     blocks.append(f"BO_ {frames.SYNC} Sync: 0 {MASTER_NAME}")
     for name, axis, node in zip(names, target.axes, frames.nodes(target), strict=True):
-        setpoint = frames.setpoint_fields(target.can)
         blocks += [
             _message(frames.RPDO1 + node, f"{name}_Command", frames.COMMAND, axis, (MASTER_NAME, name)),
-            _message(frames.RPDO2 + node, f"{name}_Setpoint", setpoint, axis, (MASTER_NAME, name)),
+            *(
+                _message(base + node, f"{name}_{SETPOINTS[base]}", fields, axis, (MASTER_NAME, name))
+                for base, fields in frames.setpoint_pdos(target.can).items()
+            ),
             _message(frames.TPDO1 + node, f"{name}_Feedback", frames.FEEDBACK, axis, (name, MASTER_NAME)),
         ]
     return ("\n\n".join(blocks) + "\n").encode("ascii")

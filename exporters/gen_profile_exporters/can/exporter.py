@@ -1,15 +1,16 @@
 """The format ``can``: setpoints for CiA 402 drives as logs, with a DBC and what the drives must be set to.
 
-Each cycle holds one RPDO2 per axis and after them one SYNC, which makes the drives take it. Between two SYNCs
-a drive interpolates over its interpolation period 60C2h, which is the SYNC period. See
+Each cycle holds the setpoints of every axis and after them one SYNC, which makes the drives take them.
+Between two SYNCs a drive interpolates over its interpolation period 60C2h, which is the SYNC period. See
 `gen_profile_exporters.can.frames` for the frames.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import pairwise
+from struct import Struct
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     if target.can.mode == "csv":
         return _led_by_velocity(taken[:, :, 0], _cycle_time(stamps), target)
     velocity = None
-    if target.can.feed_forward == "velocity":
+    if frames.VELOCITY_OFFSET in frames.setpoint_fields(target.can):
         velocity = in_si(taken[:, :, 1].astype(np.float64), counts_per_si)
     return SampledProfile(
         cycle_time=_cycle_time(stamps),
@@ -87,48 +88,41 @@ def _led_by_velocity(velocity: frames.Integers, period: float, target: Target) -
 def cyclic_frames(motion: Setpoints, target: Target) -> Iterator[Frame]:
     """List the frames of all cycles in the order in which they are sent."""
     period = frames.period_microseconds(target.can)
-    pack = frames.packing(frames.setpoint_fields(target.can)).pack
-    cob_ids = setpoint_ids(target)
-    for cycle, setpoints_of_axes in enumerate(motion.sent.tolist()):
-        for cob_id, values in zip(cob_ids, setpoints_of_axes, strict=True):
-            yield Frame(cycle * period, cob_id, pack(*values))
+    expected = frames.setpoint_frames(target)
+    for cycle, values in enumerate(motion.sent.tolist()):
+        for frame in expected:
+            yield Frame(cycle * period, frame.cob_id, frame.pack(values))
         yield Frame(cycle * period, SYNC, b"")
 
 
-def setpoint_ids(target: Target) -> tuple[int, ...]:
-    """COB-IDs of the setpoints, in the axes' order."""
-    return tuple(frames.RPDO2 + node for node in frames.nodes(target))
-
-
 def read_setpoints(content: bytes, target: Target) -> tuple[frames.Integers, list[Frame]]:
-    """Read a log: what each RPDO2 holds, shape (cycles, axes, fields), and the SYNCs."""
-    cob_ids = setpoint_ids(target)
-    unpack = frames.packing(frames.setpoint_fields(target.can))
-    taken: list[list[tuple[int, ...]]] = []
+    """Read a log: what the drives are sent in each cycle, shape (cycles, axes, fields), and the SYNCs."""
+    expected = {frame.cob_id: frame.packing for frame in frames.setpoint_frames(target)}
+    taken: list[list[int]] = []
     syncs: list[Frame] = []
     pending: dict[int, tuple[int, ...]] = {}
     for frame in candump.read(content):
         if frame.cob_id == SYNC:
-            _require_complete(pending, cob_ids, frame)
-            taken.append([pending[cob_id] for cob_id in cob_ids])
+            _require_complete(pending, expected, frame)
+            taken.append([value for cob_id in expected for value in pending[cob_id]])
             syncs.append(frame)
             pending = {}
         else:
-            _require_expected(frame, pending, cob_ids, unpack.size)
-            pending[frame.cob_id] = unpack.unpack(frame.data)
+            _require_expected(frame, pending, expected)
+            pending[frame.cob_id] = expected[frame.cob_id].unpack(frame.data)
     if pending:
         raise ExportError("The CAN log ends without a SYNC after its last setpoint; export it again.")
     if len(syncs) < 2:
         raise ExportError(f"The CAN log holds {len(syncs)} SYNCs, a motion needs 2 or more; export it again.")
-    return np.array(taken, dtype=np.int64), syncs
+    return np.array(taken, dtype=np.int64).reshape(len(taken), len(target.axes), -1), syncs
 
 
-def _require_complete(pending: dict[int, tuple[int, ...]], cob_ids: Sequence[int], sync: Frame) -> None:
+def _require_complete(pending: Container[int], expected: Iterable[int], sync: Frame) -> None:
     if sync.data:
         raise ExportError(
             f"line {sync.line}: SYNC with data, which this format has not; export the log again."
         )
-    missing = [cob_id for cob_id in cob_ids if cob_id not in pending]
+    missing = [cob_id for cob_id in expected if cob_id not in pending]
     if missing:
         raise ExportError(
             f"line {sync.line}: SYNC without a setpoint {missing[0]:03X}h before it; "
@@ -136,11 +130,9 @@ def _require_complete(pending: dict[int, tuple[int, ...]], cob_ids: Sequence[int
         )
 
 
-def _require_expected(
-    frame: Frame, pending: dict[int, tuple[int, ...]], cob_ids: Sequence[int], size: int
-) -> None:
-    if frame.cob_id not in cob_ids:
-        known = ", ".join(f"{cob_id:03X}h" for cob_id in (*cob_ids, SYNC))
+def _require_expected(frame: Frame, pending: Container[int], expected: Mapping[int, Struct]) -> None:
+    if frame.cob_id not in expected:
+        known = ", ".join(f"{cob_id:03X}h" for cob_id in (*expected, SYNC))
         raise ExportError(
             f"line {frame.line}: frame {frame.cob_id:03X}h is none of this target's ({known}); "
             "check the log with the spec that it was exported with, or export it again."
@@ -149,6 +141,7 @@ def _require_expected(
         raise ExportError(
             f"line {frame.line}: second setpoint {frame.cob_id:03X}h before a SYNC; export the log again."
         )
+    size = expected[frame.cob_id].size
     if len(frame.data) != size:
         raise ExportError(
             f"line {frame.line}: setpoint {frame.cob_id:03X}h with {len(frame.data)} data bytes instead of "

@@ -7,6 +7,8 @@ COB-ID     PDO                     content                                      
 ========== ======================= ================================================ =========================
 200h + n   RPDO1, to the drive     controlword 6040h                                when it changes
 300h + n   RPDO2, to the drive     607Ah, and 60B1h or 60B2h; 60C1h:01; or 60FFh    every cycle, before SYNC
+400h + n   RPDO3, to the drive     60B2h beside 60B1h: 80 bits are more than one    every cycle, before SYNC
+                                   frame holds; not used otherwise
 180h + n   TPDO1, from the drive   statusword 6041h, actual position 6064h          on SYNC
 ========== ======================= ================================================ =========================
 
@@ -16,6 +18,7 @@ The controlword has a PDO of its own, so that setpoints which still wait in a qu
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 
 import attrs
@@ -33,6 +36,7 @@ EMCY = 0x080
 TPDO1 = 0x180
 RPDO1 = 0x200
 RPDO2 = 0x300
+RPDO3 = 0x400
 SDO_ANSWER = 0x580
 SDO_REQUEST = 0x600
 HEARTBEAT = 0x700
@@ -86,21 +90,55 @@ TORQUE_OFFSET = Field(index=0x60B2, sub=0, code="h", name="TorqueOffset")
 
 COMMAND = (CONTROLWORD,)
 FEEDBACK = (STATUSWORD, ACTUAL_POSITION)
-_FEED_FORWARD = {"none": (), "velocity": (VELOCITY_OFFSET,), "torque": (TORQUE_OFFSET,)}
+
+Pdos = Mapping[int, tuple[Field, ...]]  # by COB-ID of node 0
+
+_OTHER_MODES: Mapping[str, Pdos] = {"ip": {RPDO2: (INTERPOLATION_DATA,)}, "csv": {RPDO2: (TARGET_VELOCITY,)}}
+_FEED_FORWARD: Mapping[str, Pdos] = {
+    "none": {RPDO2: (TARGET_POSITION,)},
+    "velocity": {RPDO2: (TARGET_POSITION, VELOCITY_OFFSET)},
+    "torque": {RPDO2: (TARGET_POSITION, TORQUE_OFFSET)},
+    "both": {RPDO2: (TARGET_POSITION, VELOCITY_OFFSET), RPDO3: (TORQUE_OFFSET,)},
+}
+
+
+def setpoint_pdos(can: CanSpec) -> Pdos:
+    """List what the RPDOs with a drive's setpoints hold."""
+    return _OTHER_MODES.get(can.mode, _FEED_FORWARD[can.feed_forward])
 
 
 def setpoint_fields(can: CanSpec) -> tuple[Field, ...]:
-    """List what one RPDO2 holds."""
-    if can.mode == "ip":
-        return (INTERPOLATION_DATA,)
-    if can.mode == "csv":
-        return (TARGET_VELOCITY,)
-    return (TARGET_POSITION, *_FEED_FORWARD[can.feed_forward])
+    """List what a drive is sent in each cycle, in all its RPDOs."""
+    return tuple(field for fields in setpoint_pdos(can).values() for field in fields)
 
 
-def packing(fields: tuple[Field, ...]) -> struct.Struct:
+def packing(fields: Sequence[Field]) -> struct.Struct:
     """Pack the fields as a PDO does: little-endian, without gaps."""
     return struct.Struct("<" + "".join(field.code for field in fields))
+
+
+@attrs.frozen(kw_only=True)
+class SetpointFrame:
+    """One of the frames that every cycle holds.
+
+    Attributes
+    ----------
+    cob_id : int
+    column : int
+        Of the axes, whose it is.
+    fields : slice
+        Which of the axis's fields it carries.
+    packing : struct.Struct
+    """
+
+    cob_id: int
+    column: int
+    fields: slice
+    packing: struct.Struct
+
+    def pack(self, setpoints: Sequence[Sequence[int]]) -> bytes:
+        """Take its content from all fields of all axes in one cycle."""
+        return self.packing.pack(*setpoints[self.column][self.fields])
 
 
 def nodes(target: Target) -> tuple[int, ...]:
@@ -118,6 +156,26 @@ def nodes(target: Target) -> tuple[int, ...]:
             f"({MASTER} is the master's)."
         )
     return tuple(range(first, first + axes))
+
+
+def setpoint_frames(target: Target) -> tuple[SetpointFrame, ...]:
+    """List the frames of a cycle in the order in which they are sent, SYNC after them.
+
+    Raises
+    ------
+    ExportError
+        There are too few node ids.
+    """
+    found = []
+    for column, node in enumerate(nodes(target)):
+        first = 0
+        for base, fields in setpoint_pdos(target.can).items():
+            carried = slice(first, first + len(fields))
+            found.append(
+                SetpointFrame(cob_id=base + node, column=column, fields=carried, packing=packing(fields))
+            )
+            first = carried.stop
+    return tuple(found)
 
 
 def period_digits(can: CanSpec) -> tuple[int, int]:
@@ -155,9 +213,9 @@ def frame_bits(data_bytes: int) -> int:
 
 
 def cycle_bits(target: Target) -> int:
-    """Bits of one cycle at their most: SYNC and, per axis, a setpoint and an answer."""
-    setpoint, answer = packing(setpoint_fields(target.can)).size, packing(FEEDBACK).size
-    return frame_bits(0) + len(target.axes) * (frame_bits(setpoint) + frame_bits(answer))
+    """Bits of one cycle at their most: SYNC and, per axis, setpoints and an answer."""
+    setpoints = [packing(fields).size for fields in setpoint_pdos(target.can).values()]
+    return frame_bits(0) + len(target.axes) * sum(map(frame_bits, [*setpoints, packing(FEEDBACK).size]))
 
 
 def require_load(target: Target) -> None:

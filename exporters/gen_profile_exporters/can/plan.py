@@ -11,8 +11,8 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.profile import SampledProfile
 from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.exporter import read_setpoints, replay, setpoint_ids
-from gen_profile_exporters.can.frames import Integers
+from gen_profile_exporters.can.exporter import read_setpoints, replay
+from gen_profile_exporters.can.frames import Integers, SetpointFrame
 from gen_profile_exporters.can.scaling import Setpoints
 from gen_profile_exporters.exporter import Target
 
@@ -28,7 +28,7 @@ class StreamPlan:
     target : Target
     motion : Setpoints
     cycles : tuple of tuple of can.Message
-        The setpoints of each cycle, one per axis; SYNC follows them.
+        The setpoints of each cycle, axis by axis; SYNC follows them.
     """
 
     target: Target
@@ -37,13 +37,9 @@ class StreamPlan:
 
     def preload(self, position: Sequence[int]) -> Cycle:
         """Make setpoints at which the axes stand still where they are."""
-        fields = frames.setpoint_fields(self.target.can)
-        pack = frames.packing(fields).pack
-        rest = [0] * (len(fields) - 1)
-        return tuple(
-            message(cob_id, pack(0 if self.motion.velocity is not None else at, *rest))
-            for cob_id, at in zip(setpoint_ids(self.target), position, strict=True)
-        )
+        rest = [0] * len(frames.setpoint_fields(self.target.can))
+        held = [rest if self.motion.velocity is not None else [at, *rest[1:]] for at in position]
+        return _cycle(frames.setpoint_frames(self.target), held)
 
 
 def plan_of(content: bytes, target: Target) -> StreamPlan:
@@ -61,28 +57,25 @@ def plan_of(content: bytes, target: Target) -> StreamPlan:
             f"{target.can.sync_period:g} s; export the log again."
         )
     taken, _ = read_setpoints(content, target)
-    fields = frames.packing(frames.setpoint_fields(target.can))
-    cob_ids = setpoint_ids(target)
+    layout = frames.setpoint_frames(target)
     return StreamPlan(
         target=target,
         motion=_setpoints(taken, motion, target),
-        cycles=tuple(
-            tuple(
-                message(cob_id, fields.pack(*map(int, values)))
-                for cob_id, values in zip(cob_ids, cycle, strict=True)
-            )
-            for cycle in taken
-        ),
+        cycles=tuple(_cycle(layout, values) for values in taken.tolist()),
     )
 
 
+def _cycle(layout: Sequence[SetpointFrame], setpoints: Sequence[Sequence[int]]) -> Cycle:
+    return tuple(message(frame.cob_id, frame.pack(setpoints)) for frame in layout)
+
+
 def _setpoints(taken: Integers, motion: SampledProfile, target: Target) -> Setpoints:
-    first, *others = np.moveaxis(taken, 2, 0)
+    first, others = taken[:, :, 0], taken[:, :, 1:]
     if target.can.mode != "csv":
-        return Setpoints(period=motion.cycle_time, position=first, offset=others[0] if others else None)
+        return Setpoints(period=motion.cycle_time, position=first, offsets=others)
     counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
     position = np.rint(motion.position * counts_per_si).astype(np.int64)
-    return Setpoints(period=motion.cycle_time, position=position, velocity=first)
+    return Setpoints(period=motion.cycle_time, position=position, offsets=others, velocity=first)
 
 
 def message(cob_id: int, data: bytes) -> can.Message:

@@ -16,7 +16,8 @@ from gen_profile.errors import ExportError
 from gen_profile.profile import Array, SampledProfile
 from gen_profile.spec import CanSpec
 from gen_profile.units import AxisScale
-from gen_profile_exporters.can.frames import Integers
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.frames import Field, Integers
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.setpoints import INT16, INT32, TOO_FAR, require_within
 
@@ -34,24 +35,22 @@ class Setpoints:
     period : float
         s.
     position : (samples, axes) integer array
-    offset : (samples, axes) integer array or None
-        Velocity 60B1h in counts/s, or torque 60B2h in ‰.
+    offsets : (samples, axes, offsets) integer array
+        Feed-forward, as many as are sent: velocity 60B1h in counts/s, torque 60B2h in ‰.
     velocity : (samples, axes) integer array or None
         60FFh in counts/s, each kept for one period: what is sent instead of positions in csv.
     """
 
     period: float
     position: Integers
-    offset: Integers | None = None
+    offsets: Integers
     velocity: Integers | None = None
 
     @property
     def sent(self) -> Integers:
         """What each cycle's setpoints hold, shape (samples, axes, fields)."""
-        if self.velocity is not None:
-            return self.velocity[:, :, None]
-        fields = [self.position] if self.offset is None else [self.position, self.offset]
-        return np.stack(fields, axis=2)
+        leading = self.position if self.velocity is None else self.velocity
+        return np.concatenate([leading[:, :, None], self.offsets], axis=2)
 
     @property
     def at_sync(self) -> Integers:
@@ -105,7 +104,7 @@ def setpoints(motion: SampledProfile, target: Target) -> Setpoints:
     return Setpoints(
         period=motion.cycle_time,
         position=position,
-        offset=_offsets(motion, target),
+        offsets=_offsets(motion, target),
         velocity=_velocities(motion, target) if target.can.mode == "csv" else None,
     )
 
@@ -178,19 +177,25 @@ def _velocities(motion: SampledProfile, target: Target) -> Integers:
     return np.column_stack(columns)
 
 
-def _offsets(motion: SampledProfile, target: Target) -> Integers | None:
-    can = target.can
-    if can.feed_forward == "none" or motion.velocity is None or motion.acceleration is None:
-        return None
+def _offsets(motion: SampledProfile, target: Target) -> Integers:
+    offsets = frames.setpoint_fields(target.can)[1:]
+    columns = [_offset(field, motion, target) for field in offsets]
+    return np.stack(columns, axis=2) if columns else np.empty((*motion.position.shape, 0), dtype=np.int64)
+
+
+def _offset(field: Field, motion: SampledProfile, target: Target) -> Integers:
     columns = []
     for column, axis in enumerate(target.axes):
         ratio = exact(axis.counts_per_si)
-        if can.feed_forward == "velocity":
-            values, limits, cure = motion.velocity, INT32, "lower axis.counts_per_metre"
+        if field == frames.VELOCITY_OFFSET:
+            values, limits, what = motion.velocity, INT32, "velocity"
+            cure = "lower axis.counts_per_metre"
         else:
-            ratio = exact(can.torque_per_acceleration or 0.0) * (1 if ratio > 0 else -1)
-            values, limits, cure = motion.acceleration, INT16, "lower can.torque_per_acceleration"
+            values, limits, what = motion.acceleration, INT16, "torque"
+            cure = "lower can.torque_per_acceleration"
+            ratio = exact(target.can.torque_per_acceleration or 0.0) * (1 if ratio > 0 else -1)
+        assert values is not None  # samples of a profile have them all
         counts = exact_counts(values[:, column], ratio)
-        require_within(limits, counts, f"axis {axis.name}, {can.feed_forward}", cure, motion.cycle_time)
+        require_within(limits, counts, f"axis {axis.name}, {what}", cure, motion.cycle_time)
         columns.append(counts)
     return np.column_stack(columns)

@@ -35,6 +35,8 @@ RAMP_THEN_DISABLE = 2  # 605Ah
 OFF = 1 << 31  # of a PDO's COB-ID
 NO_REMOTE_REQUEST = 1 << 30
 ON_SYNC, ON_EVENT = 1, 255  # transmission types
+# PDOs that are not always used: their parameters, and COB-ID of node 0
+OTHERS = {0x1402: frames.RPDO3, 0x1403: 0x500, 0x1801: 0x280, 0x1802: 0x380, 0x1803: 0x480}
 SHORTEST_TIMEOUT = 0.02  # s, unless the spec asks for less
 CYCLES_PER_TIMEOUT = 3
 SLOWEST_HEARTBEAT = 100  # ms; a drive's own
@@ -159,18 +161,16 @@ def _monitoring(can: CanSpec) -> Iterator[Entry]:
 
 def _mapping(node: int, can: CanSpec) -> Iterator[Entry]:
     yield from _pdo(0x1400, frames.RPDO1 + node, ON_EVENT, frames.COMMAND, "controlword")
-    yield from _pdo(0x1401, frames.RPDO2 + node, ON_SYNC, frames.setpoint_fields(can), "setpoint")
+    used = frames.setpoint_pdos(can)
+    yield from _pdo(0x1401, frames.RPDO2 + node, ON_SYNC, used[frames.RPDO2], "setpoint")
     yield Entry(0x1401, 5, 16, timeout_ms(can), "longest wait for a setpoint (ms)", optional=True)
+    if frames.RPDO3 in used:
+        yield from _pdo(0x1402, frames.RPDO3 + node, ON_SYNC, used[frames.RPDO3], "feed-forward")
     answer = NO_REMOTE_REQUEST | (frames.TPDO1 + node)
     yield from _pdo(0x1800, answer, ON_SYNC, frames.FEEDBACK, "feedback")
-    for index, cob_id in (
-        (0x1402, 0x400),
-        (0x1403, 0x500),
-        (0x1801, 0x280),
-        (0x1802, 0x380),
-        (0x1803, 0x480),
-    ):
-        yield Entry(index, 1, 32, OFF | cob_id + node, "not used: off", optional=True)
+    for index, cob_id in OTHERS.items():
+        if cob_id not in used:
+            yield Entry(index, 1, 32, OFF | cob_id + node, "not used: off", optional=True)
 
 
 def _pdo(index: int, cob_id: int, kind: int, fields: Sequence[Field], name: str) -> Iterator[Entry]:

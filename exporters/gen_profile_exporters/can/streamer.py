@@ -120,6 +120,7 @@ class Streamer:
             period=self._period,
             heartbeat=startup.heartbeat_ms(target.can) * NANOSECONDS // 1000,
             timeout=timeout,
+            setpoints=[frame.cob_id for frame in frames.setpoint_frames(target)],
         )
         self._link.subscribe(self._watch.take)
         self._sync = message(frames.SYNC, b"")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
 
 import attrs
@@ -65,10 +65,19 @@ class Watch:
         SYNC period, and period of the drives' heartbeats, in ns.
     timeout : int
         How long a drive may leave SYNC unanswered, in ns.
+    setpoints : iterable of int
+        COB-IDs of the setpoints, which nobody else may send.
     """
 
     def __init__(
-        self, axes: Sequence[Axis], clock: Clock, *, period: int, heartbeat: int, timeout: int
+        self,
+        axes: Sequence[Axis],
+        clock: Clock,
+        *,
+        period: int,
+        heartbeat: int,
+        timeout: int,
+        setpoints: Iterable[int],
     ) -> None:
         self.axes = tuple(axes)
         self.alert = Alert.LISTENING
@@ -84,9 +93,8 @@ class Watch:
                 (frames.HEARTBEAT, self._take_heartbeat),
             )
         }
-        ours = (frames.RPDO1, frames.RPDO2, frames.SDO_REQUEST)
-        self._ours = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER}
-        self._ours |= {base + axis.node for base in ours for axis in self.axes}
+        self._ours = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER, *setpoints}
+        self._ours |= {base + axis.node for base in (frames.RPDO1, frames.SDO_REQUEST) for axis in self.axes}
 
     def take(self, message: can.Message) -> None:
         """Take in one frame, whatever it is."""

@@ -35,6 +35,7 @@ def test_everything_stated_comes_back():
         ("can.homed=[1, 2]", "can.homed: must be an array of 3 numbers, found an array."),
         ("can.gear=3", "can.gear: must be an array of 2 numbers, found 3."),
         ("can.feed_forward=torque", "can.torque_per_acceleration: required with feed_forward"),
+        ("can.feed_forward=both", 'can.torque_per_acceleration: required with feed_forward = "both"'),
         ("can.timeout=0", "can.timeout: must be at least 0.001"),
         ("can.mode=csv", 'can.following_error: required with mode = "csv"'),
         ("can.mode=pp", "can.mode: unknown value, found text 'pp'"),

@@ -27,6 +27,7 @@ from gen_profile_exporters.exporter import target_of
 MOVE = quintic((0.1, 0.4))
 TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))
 TORQUE = {"feed_forward": "torque", "torque_per_acceleration": 80.0}
+BOTH = {"feed_forward": "both", "torque_per_acceleration": 80.0}
 
 
 def files(profile=MOVE, *names, **options):
@@ -60,7 +61,7 @@ class TestTraces:
 
 
 class TestDatabase:
-    @pytest.mark.parametrize("options", [{}, {"mode": "ip"}, {"feed_forward": "velocity"}, TORQUE])
+    @pytest.mark.parametrize("options", [{}, {"mode": "ip"}, {"feed_forward": "velocity"}, TORQUE, BOTH])
     @pytest.mark.parametrize("sign", [1, -1])
     def test_cantools_decodes_the_motion(self, options, sign):
         written = files(TWO_MOVES, "bridge", "trolley 2", sign=sign, counts_per_si=20_000.0, **options)
@@ -69,19 +70,22 @@ class TestDatabase:
         found = {"bridge": [], "trolley_2": []}
         for frame in read(written[".log"]):
             name = database.get_message_by_frame_id(frame.cob_id).name
-            if name != "Sync":
-                found[name.removesuffix("_Setpoint")].append(database.decode_message(name, frame.data))
+            values = database.decode_message(name, frame.data)
+            if name.endswith("_Setpoint"):
+                found[name.removesuffix("_Setpoint")].append(values)
+            elif name.endswith("_FeedForward"):
+                found[name.removesuffix("_FeedForward")][-1] |= values
         motion = replay(
             written[".log"], target("bridge", "trolley 2", sign=sign, counts_per_si=20_000.0, **options)
         )
         for column, decoded in enumerate(found.values()):
             positions = [values[signal] for values in decoded]
             np.testing.assert_allclose(positions, motion.position[:, column], rtol=0, atol=1e-9)
-        if options.get("feed_forward") == "velocity":
+        if options.get("feed_forward") in {"velocity", "both"}:
             velocity = [values["VelocityOffset"] for values in found["bridge"]]
             np.testing.assert_allclose(velocity, MOVE(motion.times).velocity[:, 0], atol=5e-5)
             np.testing.assert_allclose(velocity, motion.velocity[:, 0], atol=1e-9)
-        if options == TORQUE:
+        if options in (TORQUE, BOTH):
             torque = [values["TorqueOffset"] for values in found["bridge"]]
             expected = sign * 8.0 * MOVE(motion.times).acceleration[:, 0]
             np.testing.assert_allclose(torque, expected, atol=0.051)
@@ -152,7 +156,7 @@ class TestOthersDecode:
 
     @given(
         st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=1, max_size=4),
-        st.sampled_from([{}, {"mode": "ip"}, {"feed_forward": "velocity"}, TORQUE]),
+        st.sampled_from([{}, {"mode": "ip"}, {"feed_forward": "velocity"}, TORQUE, BOTH]),
         st.integers(1, 120),
         st.sampled_from([-1, 1]),
         st.floats(100.0, 1e6),
@@ -172,11 +176,12 @@ class TestOthersDecode:
             if frame.cob_id == frames.SYNC:
                 cycle += 1
                 continue
-            column = frame.cob_id - frames.RPDO2 - node
-            exact = round(Fraction(planned[cycle, column]) * scaling.exact(sign * counts_per_si))
+            number, column = divmod(frame.cob_id - node - 0x100, 0x100)
             signals = database.decode_message(frame.cob_id, frame.data, scaling=False)
-            assert next(iter(signals.values())) == exact
-            mapped = nodes[node + column].rpdo[2]
+            if number == 2:
+                exact = round(Fraction(planned[cycle, column]) * scaling.exact(sign * counts_per_si))
+                assert next(iter(signals.values())) == exact
+            mapped = nodes[node + column].rpdo[number]
             assert mapped.cob_id == frame.cob_id
             mapped.data = bytearray(frame.data)
             assert [variable.raw for variable in mapped] == list(signals.values())
@@ -192,6 +197,7 @@ def set_up(number, concise_dcf):
             node.set_data(index, sub, data)
     node.associate_network(canopen.Network())
     node.rpdo[2].read()
+    node.rpdo[3].read()
     return node
 
 
@@ -208,6 +214,13 @@ class TestStartup:
         for (index, sub), value in values.items():
             variable = node.object_dictionary.get_variable(index, sub)
             assert variable.decode_raw(node.get_data(index, sub)) == value, f"{index:04X}h:{sub}"
+
+    @pytest.mark.parametrize(("options", "cob_id", "kind"), [(TORQUE, 0x8000_0401, 255), (BOTH, 0x401, 1)])
+    def test_a_third_rpdo_is_on_where_it_is_needed(self, options, cob_id, kind):
+        node = set_up(1, files(**options)[".node1.cdcf"])
+        parameters = [node.object_dictionary.get_variable(0x1402, sub) for sub in (1, 2)]
+        found = [variable.decode_raw(node.get_data(0x1402, variable.subindex)) for variable in parameters]
+        assert found == [cob_id, kind]
 
     def test_table_and_concise_dcf_say_the_same(self):
         written = files(**OPTIONS)
@@ -306,7 +319,11 @@ class TestScaling:
         assert startup.timeout_ms(found.can) == 20
 
 
-@given(st.integers(1, 30), st.sampled_from(["none", "velocity", "torque"]), st.sampled_from([125_000, 10**6]))
+@given(
+    st.integers(1, 30),
+    st.sampled_from(["none", "velocity", "torque", "both"]),
+    st.sampled_from([125_000, 10**6]),
+)
 def test_bus_load_is_that_of_the_longest_frames(axes, feed_forward, bitrate):
     bus = target(
         *[f"axis{n}" for n in range(axes)],
@@ -314,6 +331,6 @@ def test_bus_load_is_that_of_the_longest_frames(axes, feed_forward, bitrate):
         feed_forward=feed_forward,
         torque_per_acceleration=1.0,
     )
-    data = {"none": 4, "velocity": 8, "torque": 6}[feed_forward]
-    bits = 55 + axes * ((55 + 10 * data) + 115)  # (55 + 10 n) bits, and one SYNC of none
+    data = {"none": [4], "velocity": [8], "torque": [6], "both": [8, 2]}[feed_forward]
+    bits = 55 + axes * (sum(55 + 10 * n for n in data) + 115)  # (55 + 10 n) bits, and one SYNC of none
     assert frames.cycle_bits(bus) == bits

@@ -79,6 +79,21 @@ class TestWholeStream:
         assert record.phase is Phase.DONE
         assert len(find(sent(bench), exported(quintic((0.1, 0.4)), bench.target))) == 1
 
+    def test_velocity_and_torque_go_along_in_a_third_rpdo(self):
+        options = {"node": 5, "feed_forward": "both", "torque_per_acceleration": 50.0}
+        with Bench("bridge", "trolley", profile=quintic((0.1, 0.4), (1.2, -0.7)), **options) as bench:
+            held = []
+            bench.at_cycle(60, lambda: held.extend(bench.drive.value(index) for index in (0x60B1, 0x60B2)))
+            record = bench.run()
+            rest = [drive.value(index) for drive in bench.drives.drives for index in (0x60B1, 0x60B2)]
+        assert (record.reason, record.final) == ("", (400_000, -700_000))
+        at = 58 * PERIOD / 1e3  # the frames of the latest cycle are still on their way
+        velocity, acceleration = (quintic((0.1, 0.4)).derivative([at], order).item() for order in (1, 2))
+        assert held == pytest.approx([1e6 * velocity, 50.0 * acceleration], abs=0.51)
+        assert rest == [0, 0, 0, 0]
+        frames = sent(bench, (0x305, 0x306, 0x405, 0x406))
+        assert len(find(frames, exported(quintic((0.1, 0.4), (1.2, -0.7)), bench.target))) == 1
+
     def test_a_lagging_axis_is_waited_for(self):
         load = RigidLoad([0.1], lag=0.97)
         with Bench(load=load) as bench:
