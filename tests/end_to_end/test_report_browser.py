@@ -10,7 +10,7 @@ from command_line import run_here
 from headless import browser as start
 
 from gen_profile.report.content import Listing, Page, Row, Section, Share, Table, Terms, Verdict
-from gen_profile.report.figures import Figure, Line, Panel
+from gen_profile.report.figures import Figure, Line, Map, Panel
 from gen_profile.report.page import render
 from gen_profile.spec_reading import presets
 
@@ -181,6 +181,36 @@ def test_panels_zoom_together_and_a_legend_hides_a_curve_everywhere(browser, pap
     assert [old - new for old, new in zip(before, after, strict=True) if old != new] == [1, 1]
 
 
+def test_two_uncertain_parameters_have_a_map(browser, tmp_path):
+    """Every place on it is the share that the same machine takes of its limit, where it is checked alone."""
+    ranges = "robustness.uncertain={L1=0.2, m2=0.1}"
+    page = tmp_path / "page.html"
+    paper = ("--preset", "paper")
+    assert run_here("report", *paper, "--set", ranges, "--no-compare", "--out", page).code in {0, 4}
+    both = ("--parameter", "m2", "--parameter", "L1", "--method", "optimal-beta50")
+    found = run_here("robustness", *paper, "--set", ranges, *both, "--json").document
+    (method,) = found["methods"]
+    shares = np.array(
+        [np.array(peaks) / found["limits_m"][load] for load, peaks in method["residual_peaks_m"].items()]
+    ).max(axis=0)
+    for width, mobile in ((1280, False), (390, True)):
+        browser.open(page, width=width, mobile=mobile)
+        assert browser.run("return document.documentElement.scrollWidth") == width
+        assert browser.run(TITLES).count("optimal-beta50 over m2 and L1") == 1
+        drawn = browser.run(
+            """
+            const plot = [...document.querySelectorAll('.plot')].find((p) => p.querySelector('.contourfill'));
+            const [colours, limit] = plot.data;
+            return [colours.x, colours.y, colours.z, plot.querySelectorAll('.contourfill path').length,
+                    limit.contours.start, plot.querySelectorAll('.contourlevel path').length]"""
+        )
+        x, y = (100.0 * np.array(found["errors"][name]) for name in ("m2", "L1"))
+        np.testing.assert_allclose(drawn[0], x, atol=1e-3)
+        np.testing.assert_allclose(drawn[1], y, atol=1e-3)
+        np.testing.assert_allclose(np.array(drawn[2]).T, 100.0 * shares, rtol=1e-3, atol=1e-2)
+        assert drawn[3] > 5 and drawn[4] == 100.0 and drawn[5] >= 1
+
+
 def test_on_a_phone_nothing_is_wider_than_the_screen(browser, paper):
     browser.open(paper, width=360, mobile=True)
     assert browser.run("return document.documentElement.scrollWidth") == 360
@@ -245,10 +275,12 @@ def section(text):
     """Every kind of block, with a text in every place that there is."""
     lines = [Line(name=name, x=np.arange(3.0), y=np.arange(3.0)) for name in (text, f"{text} again")]
     panel = Panel(title=text, x_label=text, y_label=text, lines=lines)
+    grid = {"x": np.arange(3.0), "y": np.arange(3.0), "values": np.eye(3), "limit": 0.5, "frame": (1.0, 1.0)}
+    coloured = Map(title=text, x_label=text, y_label=text, unit=text, **grid)
     blocks = [
         Terms(rows=[(text, text)]),
         Table(head=(text, text), rows=[Row(cells=(text, Share(0.5)), mark="own")], code=True),
-        Figure(caption=text, panels=[panel]),
+        Figure(caption=text, panels=[panel, coloured]),
         Listing(title=text, text=text),
     ]
     return Section(title=text, words=(text,), blocks=blocks)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from html import escape
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import attrs
 import numpy as np
@@ -18,7 +18,9 @@ from gen_profile.profile import Array
 
 EVEN = 1e-12  # of the last time, by which even steps may differ
 DIGITS = 6  # of a curve's largest value: finer than any screen, and a third of the bytes
-SHADE, FRAME, LIMIT = "rgba(120,130,140,0.16)", "#6b7680", "#b3261e"
+SHADE, FRAME, LIMIT, INK, PAPER = "rgba(120,130,140,0.16)", "#6b7680", "#b3261e", "#17212b", "#fff"
+HEADROOM = 3.0  # limits up to which values are told apart, lest the worst ones hide the others
+SHADES = 12
 
 # told apart by the colour-blind: M. Okabe, K. Ito, Color universal design, 2008; black for what matters most
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5c3e", "#8c8c8c")
@@ -131,17 +133,80 @@ class Panel:
 
 
 @attrs.frozen(kw_only=True, eq=False)
+class Map:
+    """A quantity over two others, as colours.
+
+    Attributes
+    ----------
+    title : str
+    x_label, y_label : str
+    unit : str
+        Of the values, beside the scale of colours.
+    x : (n,) array
+    y : (m,) array
+    values : (m, n) array
+        Not negative.
+    limit : float
+        Above 0. Where the values pass it, there is a line; the colours end at `HEADROOM` times this.
+    frame : (float, float)
+        Half-width and half-height of a frame around the origin.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    unit: str
+    x: Array
+    y: Array
+    values: Array
+    limit: float
+    frame: tuple[float, float]
+    lines: ClassVar[Sequence[Line]] = ()
+
+    def to_plotly(self) -> dict[str, Any]:
+        """Write traces and layout; Plotly takes texts for markup, so they are escaped."""
+        grid = {"type": "contour", "x": rounded(self.x), "y": rounded(self.y)}
+        grid["z"] = [rounded(row) for row in self.values]
+        end = HEADROOM * self.limit
+        step = {"start": 0.0, "end": end, "size": end / SHADES}
+        bar = {"title": {"text": escape(self.unit)}, "thickness": 12, "outlinewidth": 0, "dtick": self.limit}
+        return {
+            "data": [
+                {
+                    **grid,
+                    "contours": step,
+                    "line": {"width": 0},
+                    **{"zmin": 0.0, "zmax": end, "colorscale": "Viridis", "reversescale": True},
+                    "colorbar": bar,
+                },
+                {
+                    **grid,
+                    "contours": {"start": self.limit, "end": self.limit, "size": end, "coloring": "none"},
+                    "line": {"color": LIMIT, "width": 2.2},
+                    **{"showscale": False, "hoverinfo": "skip"},
+                },
+            ],
+            "layout": {
+                "xaxis": {"title": {"text": escape(self.x_label)}},
+                "yaxis": {"title": {"text": escape(self.y_label)}},
+                "hovermode": "closest",
+                "shapes": [_frame(self.frame, PAPER, "solid"), _frame(self.frame, INK, "dot")],
+            },
+        }
+
+
+@attrs.frozen(kw_only=True, eq=False)
 class Figure:
-    """Panels under one legend.
+    """Panels under one legend, which names the curves.
 
     Attributes
     ----------
     caption : str
-    panels : sequence of Panel
+    panels : sequence of Panel or Map
     """
 
     caption: str
-    panels: Sequence[Panel]
+    panels: Sequence[Panel | Map]
     kind = "figure"
 
     def to_json(self) -> dict[str, Any]:
@@ -197,6 +262,18 @@ def _band(band: Band) -> dict[str, Any]:
         "y1": 1,
         "fillcolor": SHADE,
         "line": edge,
+    }
+
+
+def _frame(frame: tuple[float, float], colour: str, dash: Dash) -> dict[str, Any]:
+    width, height = frame
+    return {
+        "type": "rect",
+        "x0": -width,
+        "x1": width,
+        "y0": -height,
+        "y1": height,
+        "line": {"width": 1.2, "color": colour, "dash": dash},
     }
 
 

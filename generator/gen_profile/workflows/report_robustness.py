@@ -6,18 +6,20 @@ from collections.abc import Mapping
 
 from gen_profile.profile import Profile
 from gen_profile.report.content import Section
-from gen_profile.report.figures import Band, Figure, Level, Line, Panel, Style
+from gen_profile.report.figures import HEADROOM, Band, Figure, Level, Line, Map, Panel, Style
 from gen_profile.spec import Spec
 from gen_profile.workflows.robustness import Robustness, error_grid, robustness_of
 
 MOST = 4  # parameters that have a curve each
-HEADROOM = 3.0  # limits of residual sway that are shown, lest the worst method hide the others
+MAPPED = 4  # methods that have a map each
 
 
 def robustness_section(
     spec: Spec, own: str, motions: Mapping[str, Profile], styles: Mapping[str, Style]
 ) -> Section | None:
-    """Draw residual sway over the error of every uncertain parameter; None where the spec states none.
+    """Draw residual sway over the error of every uncertain parameter, and over the first two together.
+
+    None where the spec states none.
 
     Parameters
     ----------
@@ -27,6 +29,7 @@ def robustness_section(
     motions : mapping of str to Profile
         Of the axes, by method.
     styles : mapping of str to Style
+        Of the methods that are not shown at once there are no maps.
     """
     names = list(spec.robustness.uncertain)[:MOST]
     if not names:
@@ -35,10 +38,41 @@ def robustness_section(
     caption = "Shaded: the range that the spec states; dashed in red: what is allowed."
     if len(spec.robustness.uncertain) > MOST:
         caption += f" Of {len(spec.robustness.uncertain)} uncertain parameters the first {MOST}."
+    figures = [Figure(caption=caption, panels=[_panel(name, one, styles) for name, one in found.items()])]
+    if len(names) > 1:
+        shown = [own, *(method for method in motions if styles[method].shown and method != own)][:MAPPED]
+        both = {method: motions[method] for method in shown}
+        figures.append(_maps(robustness_of(spec, both, error_grid(spec, names[:2]))))
     return Section(
         title="Robustness",
         words=[" ".join(_reach(name, one, own) for name, one in found.items())],
-        blocks=[Figure(caption=caption, panels=[_panel(name, one, styles) for name, one in found.items()])],
+        blocks=figures,
+    )
+
+
+def _maps(found: Robustness) -> Figure:
+    """Draw a map of every method over two parameters."""
+    (across, x), (upwards, y) = found.errors.items()
+    stated = found.spec.robustness.uncertain
+    return Figure(
+        caption=(
+            f"How much of its allowed residual sway the load takes up that takes most, where {across} and "
+            f"{upwards} are off at once. Red: all of it; dotted: the ranges that the spec states."
+        ),
+        panels=[
+            Map(
+                title=f"{method} over {across} and {upwards}",
+                x_label=f"error of {across} (%)",
+                y_label=f"error of {upwards} (%)",
+                unit="%",
+                x=100.0 * x,
+                y=100.0 * y,
+                values=100.0 * found.share(method).T,
+                limit=100.0,
+                frame=(100.0 * stated[across], 100.0 * stated[upwards]),
+            )
+            for method in found.residual
+        ],
     )
 
 
