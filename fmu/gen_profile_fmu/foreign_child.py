@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from fmpy import instantiate_fmu, read_model_description
+from fmpy import instantiate_fmu, platform, platform_tuple, read_model_description
 from fmpy.fmi1 import FMICallException
 
 from gen_profile.errors import CosimulationError
@@ -41,6 +41,7 @@ def _simulate(job: Mapping[str, Any], times: Array, inputs: Array, unpacked: Pat
     unpacked.mkdir()
     unpack(archive, unpacked)
     description = _description(archive.name, unpacked)
+    _require_binary(archive.name, description, unpacked)
     references = _references(archive.name, description, job)
     try:
         return np.array(
@@ -73,16 +74,36 @@ def _description(name: str, unpacked: Path) -> Any:
 
 def _references(name: str, description: Any, job: Mapping[str, Any]) -> dict[str, int]:
     """Find the value references of all variables that a job names."""
-    parameters = (parameter for machine in job["machines"] for parameter in machine)
+    parameters = {parameter for machine in job["machines"] for parameter in machine}
     reals = {
-        variable.name: variable.valueReference
+        variable.name: variable
         for variable in description.modelVariables
         if variable.type in {"Real", "Float64"} and not variable.dimensions
     }
-    for variable in (*job["input_names"], *job["output_names"], *parameters):
+    for variable in (*job["input_names"], *job["output_names"], *sorted(parameters)):
         if variable not in reals:
             raise CosimulationError(f"{name}: there is no real scalar variable {variable!r} in the FMU.")
-    return reals
+    _require_settable(name, "input", [reals[key] for key in job["input_names"]], {"input"})
+    _require_settable(name, "parameter", [reals[key] for key in sorted(parameters)], {"input", "parameter"})
+    return {key: variable.valueReference for key, variable in reals.items()}
+
+
+def _require_settable(name: str, role: str, variables: Sequence[Any], causalities: Set[str]) -> None:
+    for variable in variables:
+        if variable.causality not in causalities or variable.variability == "constant":
+            raise CosimulationError(
+                f"{name}: {variable.name!r} cannot be set as {role}: it is {variable.variability} and of "
+                f"causality {variable.causality!r} in the FMU; name another variable in the spec's [check]."
+            )
+
+
+def _require_binary(name: str, description: Any, unpacked: Path) -> None:
+    here = platform if description.fmiVersion.startswith("2") else platform_tuple
+    if not (unpacked / "binaries" / here).is_dir():
+        others = ", ".join(sorted(folder.name for folder in unpacked.glob("binaries/*"))) or "sources only"
+        raise CosimulationError(
+            f"{name}: the FMU has no binary for this computer, {here} (it has {others}); export one for it."
+        )
 
 
 def _run(

@@ -214,9 +214,9 @@ class ForeignFmu:
     Attributes
     ----------
     name : str
-        File name as the spec has it.
+        File name, without folders: it lies beside whatever it judged.
     path : Path
-        Where the file lies.
+        Where the file lies now.
     sha256 : str
     input : str
         What its inputs are: ``"acceleration"``, ``"velocity"`` or ``"setpoint"`` of the axes.

@@ -14,6 +14,7 @@ from gen_profile.suggestion import suggestion
 
 KEYS = ("fmu", "fmu_sha256", "input", "output", "parameters", "time_limit")
 INPUTS = ("acceleration", "velocity", "setpoint")
+SUFFIX = ".fmu"
 TIME_LIMIT = 60.0  # s
 
 
@@ -37,15 +38,15 @@ def foreign_fmu(
     if not given or plant is None:
         return None
     name = given.get("fmu")
-    if not isinstance(name, str):
-        faults.add("check.fmu", f"must name an FMU, found {found(name)}")
+    if not isinstance(name, str) or Path(name).suffix.lower() != SUFFIX:
+        faults.add("check.fmu", f"must name an FMU, such as customer{SUFFIX}, found {found(name)}")
         return None
     kind, inputs = _inputs(given.get("input"), plant, faults)
     limit = finite(given.get("time_limit", TIME_LIMIT))
     if limit is None or limit <= 0.0:
         faults.add("check.time_limit", f"must be a positive time in s, found {found(given['time_limit'])}")
     return ForeignFmu(
-        name=name,
+        name=Path(name).name,
         path=folder / name,
         sha256=_sha256(folder / name, given.get("fmu_sha256"), faults),
         input=kind,

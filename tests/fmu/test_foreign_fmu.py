@@ -5,7 +5,6 @@ import json
 import stat
 import zipfile
 from contextlib import suppress
-from pathlib import Path
 
 import attrs
 import numpy as np
@@ -23,6 +22,7 @@ from gen_profile.workflows.check import check_artefact
 from gen_profile.workflows.design import design
 from gen_profile.workflows.foreign_check import _axis_inputs
 from gen_profile.workflows.many_machines import Feed
+from gen_profile.workflows.stream import verified
 from gen_profile_fmu import foreign_child, safe_archive
 from gen_profile_fmu.building import build_fmu
 from gen_profile_fmu.fmu_files import Version, sources
@@ -83,6 +83,16 @@ def test_judges_as_our_own_does(tmp_path, kind, version):
     assert str(tmp_path) not in json.dumps(manifest)
 
 
+def test_goes_along_with_what_it_judged(tmp_path):
+    (tmp_path / "models").mkdir()
+    write_fmu(tmp_path / "models" / "customer.fmu")
+    outcome = design(spec_with(tmp_path, fmu="models/customer.fmu"), ["can"], tmp_path / "elsewhere")
+    (tmp_path / "models" / "customer.fmu").unlink()
+    path = tmp_path / "elsewhere" / outcome.artefacts[0].path
+    assert check_artefact(path).check.findings == outcome.check.findings
+    assert verified(path).spec == outcome.spec
+
+
 def test_an_altered_fmu_is_noticed(tmp_path):
     path = write_fmu(tmp_path / "customer.fmu")
     document = spec_with(tmp_path).to_dict()
@@ -113,6 +123,7 @@ def test_a_plant_that_takes_velocities(tmp_path):
     ("change", "message"),
     [
         ({"fmu": 3}, "check.fmu: must name an FMU"),
+        ({"fmu": "paper.csv"}, "check.fmu: must name an FMU, such as customer.fmu, found text 'paper.csv'"),
         ({"fmu": "none.fmu"}, r"check.fmu: .*none.fmu cannot be read \(No such file"),
         ({"input": {"force": "u"}}, "check.input: must name the inputs by one of acceleration, velocity"),
         ({"input": {"setpoint": ["a", "b"]}}, r"check.input.setpoint: must name one .* per axis \(1\)"),
@@ -174,6 +185,38 @@ def test_whatever_native_code_does_is_a_sentence(tmp_path, code, changes, messag
     path = write_fmu(tmp_path / "customer.fmu", **{ADVANCE: f"    {code}\n{ADVANCE}"})
     with pytest.raises(CosimulationError, match=message):
         run_foreign(run_of(path, **changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"input_names": ["sway.hook"]},
+            "'sway.hook' cannot be set as input: it is continuous and of causal",
+        ),
+        ({"machines": [{"sway.hook": 0.1}]}, "'sway.hook' cannot be set as parameter: .* 'output'"),
+    ],
+)
+def test_variables_must_be_of_use(tmp_path, changes, message):
+    path = write_fmu(tmp_path / "customer.fmu")
+    with pytest.raises(CosimulationError, match=message):
+        run_foreign(run_of(path, **changes))
+    assert "name another variable" in done_here(run_of(path, **changes), tmp_path / "work")
+
+
+@pytest.mark.parametrize("version", Version)
+@pytest.mark.parametrize(("folders", "has"), [(["win99", "vax"], "vax, win99"), ([], "sources only")])
+def test_a_binary_for_this_computer_is_required(tmp_path, version, folders, has):
+    path = write_fmu(tmp_path / "customer.fmu", version=version)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(packed, "w") as new:
+        new.writestr("modelDescription.xml", old.read("modelDescription.xml"))
+        for folder in folders:
+            new.writestr(f"binaries/{folder}/customer.bin", b"")
+    path.write_bytes(packed.getvalue())
+    told = done_here(run_of(path), tmp_path / "work")
+    assert told.startswith("customer.fmu: the FMU has no binary for this computer")
+    assert f"(it has {has})" in told
 
 
 def with_description(path, change):
@@ -323,12 +366,20 @@ VALUES = st.recursive(
 )
 
 
+@pytest.fixture(scope="module")
+def folder_with_fmu(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("spec")
+    (folder / "customer.fmu").write_bytes(b"")
+    return folder
+
+
 @settings(max_examples=150)
-@given(st.dictionaries(st.sampled_from(["fmu", "input", "output", "parameters", "time_limit"]), VALUES))
-def test_any_variable_map_is_read_or_refused(changes):
-    folder = Path(__file__).parent
+@given(
+    changes=st.dictionaries(st.sampled_from(["fmu", "input", "output", "parameters", "time_limit"]), VALUES)
+)
+def test_any_variable_map_is_read_or_refused(folder_with_fmu, changes):
     with suppress(SpecError):
-        spec_with(folder, **{"fmu": "kinds.py", **changes})
+        spec_with(folder_with_fmu, **changes)
 
 
 def done_here(run, folder):

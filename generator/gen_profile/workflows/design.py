@@ -148,8 +148,7 @@ def design(
         progress("exporting")
         artefacts, replayed = _export(spec, planned.trial.command, exporters, staging)
         worst = _check(spec, planned, replayed, progress) if check else None
-        if spec.plant.file is not None:  # the spec in the manifest is nothing without it
-            staging.write(spec.plant.file.name, spec.plant.file.content)
+        _accompany(spec, staging)
         manifest = _manifest(spec, planned, artefacts, worst)
         staging.write(FILENAME, _after_earlier_ones(manifest, folder / FILENAME).to_json())
         delivered = worst is None or worst.passed or keep_failed
@@ -158,6 +157,15 @@ def design(
     return Design(
         spec=spec, plan=planned, check=worst, artefacts=artefacts if delivered else (), folder=folder
     )
+
+
+def _accompany(spec: Spec, staging: Staging) -> None:
+    """Put beside the manifest what the spec in it names: an own machine, a foreign judge."""
+    if spec.plant.file is not None:
+        staging.write(spec.plant.file.name, spec.plant.file.content)
+    judge = spec.check.foreign
+    if judge is not None:
+        staging.write(judge.name, judge.path.read_bytes())
 
 
 def _export(
