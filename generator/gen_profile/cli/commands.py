@@ -214,6 +214,13 @@ def compare(
 )
 @click.option("--scenario", metavar="N", type=int, help="Try only the scenario of this number (row).")
 @click.option("--strict", is_flag=True, help="Let faults in the timing of setpoints count as well.")
+@click.option(
+    "--csv",
+    "table_path",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write all scenarios as a table, one row each.",
+)
 @json_option
 @debug_option
 def check(
@@ -225,6 +232,7 @@ def check(
     samples: int | None,
     scenario: int | None,
     strict: bool,
+    table_path: Path | None,
     as_json: bool,
 ) -> None:
     """Replay, co-simulate and judge an artefact.
@@ -234,6 +242,8 @@ def check(
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.check import check_artefact
+    from gen_profile.workflows.delivery import deliver
+    from gen_profile.workflows.scenario_table import table
 
     given = spec_path is not None or preset is not None
     if overrides and not given:
@@ -250,6 +260,8 @@ def check(
             strict=strict,
             progress=lambda done, total: tell(f"checking by co-simulation, {done} of {total} scenarios"),
         )
+    if table_path is not None:
+        deliver(table_path, table(judgement.spec, judgement.check).encode("utf-8"))
     print_outcome(judgement.to_dict(), words.judgement(judgement), as_json)
     _warn(judgement.check)
     if not judgement.check.passed:
@@ -258,6 +270,7 @@ def check(
 
 @cli.command(epilog="Example: gen-profile formats")
 @json_option
+@debug_option
 def formats(as_json: bool) -> None:
     """List the export formats."""
     from gen_profile_exporters.registry import formats as known
@@ -270,6 +283,7 @@ def formats(as_json: bool) -> None:
 
 @cli.command(epilog="Example: gen-profile plants")
 @json_option
+@debug_option
 def plants(as_json: bool) -> None:
     """List the machines with their parameters."""
     from gen_profile.plants.registry import find_plant, plant_types
@@ -296,6 +310,7 @@ def plants(as_json: bool) -> None:
 
 @cli.command(epilog="Example: gen-profile presets")
 @json_option
+@debug_option
 def presets(as_json: bool) -> None:
     """List the built-in specs."""
     from gen_profile.spec_reading import presets as known

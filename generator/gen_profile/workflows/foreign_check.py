@@ -16,7 +16,7 @@ from gen_profile.workflows.monte_carlo import standstill
 from gen_profile.workflows.planning import STANDSTILL, watch_time
 from gen_profile.workflows.plausibility import implausibilities
 from gen_profile.workflows.scenarios import scenarios
-from gen_profile.workflows.transmission import follows_exactly, transmitted
+from gen_profile.workflows.transmission import follows_exactly, lag_of, transmitted
 from gen_profile.workflows.verification import ERROR_FLOOR, above_samples, arrival
 from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
 
@@ -83,8 +83,7 @@ def _judged(
     if feed.times.ndim == 2:
         feed = Feed(times=feed.times[0], position=feed.position[0])
     velocity = setpoints.velocity if exact else None
-    tau = (spec.actuator.tau or 0.0) if first.lag is None else first.lag
-    times, inputs = _axis_inputs(foreign.input, feed, velocity, tau)
+    times, inputs = _axis_inputs(foreign.input, feed, velocity, lag_of(spec, first))
     settle = max(since - times[-1], 0.0) + watch_time(spec, scenarios(spec))
     held = grid_times(grid_length(settle, SPACING), SPACING)[1:]
     rest = inputs[-1:] if foreign.input == "setpoint" else np.zeros_like(inputs[-1:])

@@ -13,7 +13,7 @@ from gen_profile.spec import Spec
 from gen_profile.workflows.many_machines import Feed, many_machines, parameter_rows, residual_peaks
 from gen_profile.workflows.planning import STANDSTILL, watch_time
 from gen_profile.workflows.scenarios import scenarios
-from gen_profile.workflows.transmission import delay, followed_up, transmitted
+from gen_profile.workflows.transmission import delay, followed_up, lag_of, transmitted
 from gen_profile.workflows.verification import STEP_PHASE, longest_step
 from gen_profile_fmu.many_runs import ManyRuns
 
@@ -91,7 +91,7 @@ def _batch(
     """Peaks of some rows, shape (rows, loads), and the error bound of them all in m."""
     plant, since, after = spec.machine(), standstill(spec, setpoints), _watched(spec, setpoints)
     max_step = np.array([longest_step(spec, row) for row in rows])
-    tau = np.array([(spec.actuator.tau or 0.0) if row.lag is None else row.lag for row in rows])
+    tau = np.array([lag_of(spec, row) for row in rows])
 
     def peaks(feed: Feed, steps: Array) -> Array:
         return residual_peaks(

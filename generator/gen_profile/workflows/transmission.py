@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import attrs
 import numpy as np
 
 from gen_profile.check import TIMING, Scenario
@@ -38,18 +39,30 @@ def transmitted(spec: Spec, setpoints: SampledProfile, rows: Sequence[Scenario])
     SpecError
         The jitter is too large for the artefact's cycle.
     """
-    path = spec.check.path
+    path = path_taken(spec, rows[0])
     times, position = setpoints.times, setpoints.position
-    if follows_exactly(rows[0]):
-        return Feed(times=times, position=position)
     if path.quantum > 0.0:
         position = path.quantum * np.round(position / path.quantum)
-    if rows[0].group == TIMING:
+    if path.faulty:
         feeds = [_mistimed(spec, times, position, row) for row in rows]
         times, position = (np.stack(arrays) for arrays in zip(*feeds, strict=True))
     if path.between == "hold":
         times, position = _held(times, position, setpoints.cycle_time)
     return Feed(times=times, position=position)
+
+
+def path_taken(spec: Spec, scenario: Scenario) -> PathSpec:
+    """Tell on which path setpoints come to the axes of one scenario."""
+    lag = lag_of(spec, scenario)
+    if follows_exactly(scenario):
+        return PathSpec(lag=(lag, lag))
+    path = attrs.evolve(spec.check.path, lag=(lag, lag))
+    return path if scenario.group == TIMING else attrs.evolve(path, latency=0.0, jitter=0.0, lost=0.0)
+
+
+def lag_of(spec: Spec, scenario: Scenario) -> float:
+    """Time constant in s of the drives in one scenario; 0 of those that follow at once."""
+    return (spec.actuator.tau or 0.0) if scenario.lag is None else scenario.lag
 
 
 def follows_exactly(scenario: Scenario) -> bool:
