@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping, Sequence, Set
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -15,10 +16,13 @@ from xml.etree import ElementTree
 import numpy as np
 from fmpy import instantiate_fmu, platform, platform_tuple, read_model_description
 from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import fmi2OK
 
 from gen_profile.errors import CosimulationError
 from gen_profile.profile import Array
 from gen_profile_fmu.safe_archive import unpack
+
+LONGEST_MESSAGE = 300  # characters, of what somebody else's FMU says
 
 
 def main(folder: Path) -> None:
@@ -41,18 +45,22 @@ def _simulate(job: Mapping[str, Any], times: Array, inputs: Array, unpacked: Pat
     unpacked.mkdir()
     unpack(archive, unpacked)
     description = _description(archive.name, unpacked)
-    _require_binary(archive.name, description, unpacked)
+    second = description.fmiVersion.startswith("2")
+    _require_binary(archive.name, unpacked, platform if second else platform_tuple)
     references = _references(archive.name, description, job)
+    said: list[str] = []
+    open_instance = partial(_instance, description, unpacked, said)
     try:
         return np.array(
             [
-                _run(description, unpacked, references, job, machine, times, inputs)
+                _run(open_instance(), second, references, job, machine, times, inputs)
                 for machine in job["machines"]
             ]
         )
     except FMICallException as error:
+        reason = f", saying: {said[-1][:LONGEST_MESSAGE]}" if said else "."
         raise CosimulationError(
-            f"{archive.name}: the FMU refused {error.function} (status {error.status})."
+            f"{archive.name}: the FMU refused {error.function} (status {error.status}){reason}"
         ) from error
     except Exception as error:  # FMPy raises nothing more special
         raise CosimulationError(f"{archive.name}: the FMU cannot be run: {error}") from error
@@ -97,8 +105,7 @@ def _require_settable(name: str, role: str, variables: Sequence[Any], causalitie
             )
 
 
-def _require_binary(name: str, description: Any, unpacked: Path) -> None:
-    here = platform if description.fmiVersion.startswith("2") else platform_tuple
+def _require_binary(name: str, unpacked: Path, here: str) -> None:
     if not (unpacked / "binaries" / here).is_dir():
         others = ", ".join(sorted(folder.name for folder in unpacked.glob("binaries/*"))) or "sources only"
         raise CosimulationError(
@@ -106,9 +113,19 @@ def _require_binary(name: str, description: Any, unpacked: Path) -> None:
         )
 
 
+def _instance(description: Any, unpacked: Path, said: list[str]) -> Any:
+    """Load the FMU; what it says of failures goes to `said`."""
+
+    def log(*call: Any) -> None:  # the last three of both versions: status, category, message
+        if call[-3] != fmi2OK:  # FMI 3 has the same numbers
+            said.append((call[-1] or b"").decode("utf-8", errors="replace"))
+
+    return instantiate_fmu(str(unpacked), description, fmi_type="CoSimulation", logger=log)
+
+
 def _run(
-    description: Any,
-    unpacked: Path,
+    fmu: Any,
+    second: bool,
     references: Mapping[str, int],
     job: Mapping[str, Any],
     machine: Mapping[str, float],
@@ -116,8 +133,6 @@ def _run(
 ) -> Array:
     """Simulate one machine under a motion (times, inputs); outputs at all times, shape (samples, outputs)."""
     times, inputs = motion
-    fmu = instantiate_fmu(str(unpacked), description, fmi_type="CoSimulation")
-    second = description.fmiVersion.startswith("2")
     write, read = (fmu.setReal, fmu.getReal) if second else (fmu.setFloat64, fmu.getFloat64)
     u = [references[name] for name in job["input_names"]]
     y = [references[name] for name in job["output_names"]]

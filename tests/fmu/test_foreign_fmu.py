@@ -171,13 +171,13 @@ ADVANCE = "    double reference[N_A][N_ORDERS];\n    reference_velocity(model, s
         ("abort();", {}, r"the FMU crashed \(SIGABRT\)"),
         ("exit(0);", {}, "the FMU ended its process before"),
         ("for (;;) model->samples++;", {"time_limit": 5.0}, "not done after 5 s; .* raise check.time_limit"),
-        ("model->values[THROWN] = 0.0 / 0.0;", {}, "refused fmi2DoStep"),
+        ("model->values[THROWN] = 0.0 / 0.0;", {}, r"refused fmi2DoStep \(status 2\), saying: \w+"),
         (
             "model->values[SWAY] = 1.0;",
             {"output_names": ["sway.boom"]},
             "no real scalar variable 'sway.boom'",
         ),
-        ("model->samples++;", {"machines": [{"L1": -1.0}]}, "refused fmi2SetReal"),
+        ("model->samples++;", {"machines": [{"L1": -1.0}]}, r"refused fmi2SetReal .*L1"),
     ],
 )
 def test_whatever_native_code_does_is_a_sentence(tmp_path, code, changes, message):
