@@ -90,6 +90,8 @@ def test_choices_are_those_of_the_workflow():
         (("fmu",), 2, "Missing argument"),
         (("fmu", "crane"), 2, "'crane' is not one of"),
         (("fmu", "plant", "--fmi", "1"), 2, "'1' is not one of"),
+        (("fmu", "profile", "--input", "velocity"), 2, "--input: a profile has no inputs but its trigger"),
+        (("fmu", "plant", "--source-only", "--platform", "all"), 2, "--source-only puts no binary in"),
         (("fmu", "plant", "--set", "plant.L1=-1"), 2, "plant.L1: must be a number"),
         (("fmu", "plant", "--out", "/proc/none/a.fmu"), 2, "Cannot write to the folder /proc/none"),
     ],

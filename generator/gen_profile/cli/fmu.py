@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
+from gen_profile.errors import SpecError
 
 # spelled out here because --help must not wait for CasADi; a test holds them against the workflow's
 KINDS = ("plant", "profile", "system")
@@ -24,13 +25,11 @@ PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86
     "--input",
     "input_name",
     type=click.Choice(INPUTS),
-    default="setpoint",
     help="What a plant's drives are asked for; setpoint (interpolated positions) by default.",
 )
 @click.option(
     "--platform",
     type=click.Choice(PLATFORMS),
-    default="host",
     help="What to compile for; this computer by default. The first time, Windows takes a minute.",
 )
 @click.option("--source-only", is_flag=True, help="Put no binary in, for TwinCAT and real-time targets.")
@@ -49,8 +48,8 @@ def fmu(
     preset: str | None,
     overrides: tuple[str, ...],
     version: str,
-    input_name: str,
-    platform: str,
+    input_name: str | None,
+    platform: str | None,
     source_only: bool,
     path: Path | None,
     as_json: bool,
@@ -61,14 +60,18 @@ def fmu(
     from gen_profile_fmu.fmu_files import Version
     from gen_profile_fmu.plant_variables import InputKind
 
+    if input_name is not None and kind != "plant":
+        raise SpecError(f"--input: a {kind} has no inputs but its trigger; leave it out, or write a plant.")
+    if source_only and platform is not None:
+        raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
     spec = chosen_spec(spec_path, preset, overrides)
-    platforms = () if source_only else platform_names(platform)
+    platforms = () if source_only else platform_names(platform or "host")
     with progress() as tell:
         made = export_fmu(
             spec,
             kind,
             version=Version(version),
-            input_kind=InputKind(input_name),
+            input_kind=InputKind(input_name or "setpoint"),
             platforms=platforms,
             path=path,
             progress=tell,
