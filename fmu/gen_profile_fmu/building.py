@@ -61,7 +61,7 @@ def build_fmu(
 def _cached_library(made: Sources, compiler: Compiler, name: str, on_build: Callable[[], None]) -> bytes:
     entry = cached(
         f"library-{sources_key(made, compiler)}",
-        lambda cache: {name: compile_sources(made, compiler, name, cache, on_build)},
+        lambda cache: {name: compile_texts(made.code, SOURCE_FILE, compiler, name, cache, on_build=on_build)},
     )
     return (entry / name).read_bytes()
 
@@ -71,14 +71,30 @@ def sources_key(made: Sources, compiler: Compiler) -> str:
     return digest(compiler.identity.encode("utf-8"), made.description, *flat(made.code))[:32]
 
 
-def compile_sources(
-    made: Sources,
+def compile_texts(
+    texts: Mapping[str, str],
+    source: str,
     compiler: Compiler,
     name: str,
     cache: Path,
+    *,
     on_build: Callable[[], None] | None = None,
 ) -> bytes:
-    """Compile a library of this name in a folder that is gone afterwards; its bytes.
+    """Compile a library in a folder that is gone afterwards; its bytes.
+
+    Parameters
+    ----------
+    texts : mapping of str to str
+        C files by name.
+    source : str
+        Which of them is compiled; it includes the others.
+    compiler : Compiler
+    name : str
+        Of the library.
+    cache : Path
+        Folder in which it is done, and in which Zig keeps what it needs again.
+    on_build : callable, optional
+        Called before it begins.
 
     Raises
     ------
@@ -88,7 +104,7 @@ def compile_sources(
     with tempfile.TemporaryDirectory(dir=cache, prefix="build-") as folder:
         if on_build is not None:
             on_build()
-        for file, text in made.code.items():
+        for file, text in texts.items():
             Path(folder, file).write_text(text, encoding="utf-8", newline="\n")
-        compile_library(compiler, Path(folder), SOURCE_FILE, name, zig_cache=cache / "zig")
+        compile_library(compiler, Path(folder), source, name, zig_cache=cache / "zig")
         return Path(folder, name).read_bytes()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from ctypes import byref, c_double, c_uint, sizeof
 from types import TracebackType
 from typing import Any, Self
@@ -33,10 +34,19 @@ _OBSERVED = {
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class _Steps:
-    """Communication steps of one run.
+class Steps:
+    """Communication steps, one after the other.
 
     Step k begins at ``times[k]``, lasts ``sizes[k]`` and leads to ``setpoints[k]`` at ``times[k + 1]``.
+
+    Attributes
+    ----------
+    times : (steps + 1,) array
+        s.
+    sizes : (steps,) array
+        s.
+    setpoints : (steps, axes) array
+        m (or rad).
     """
 
     times: Array
@@ -126,11 +136,42 @@ class PlantCosimulation:
         CosimulationError
             When a parameter is missing, unknown or out of range, or the FMU refuses a step.
         """
-        values = self._plant_values(parameters) | self._start_values(setpoints)
-        values |= {**initial, TAU: tau, MAX_STEP: max_step}
         steps = _steps(setpoints, settle, output_step, final_velocity)
-        samples = np.split(self._simulate(values, steps), self._output_blocks, axis=1)
-        return Response(times=steps.times, **dict(zip(_OBSERVED.values(), samples, strict=True)))
+        self._begin(setpoints, parameters, {**initial, TAU: tau, MAX_STEP: max_step})
+        return Response(times=steps.times, **self._observe(steps))
+
+    def _begin(
+        self, setpoints: SampledProfile, parameters: Mapping[str, float], values: Mapping[str, float]
+    ) -> None:
+        """Start anew, at the first setpoint."""
+        values = {**self._plant_values(parameters), **self._start_values(setpoints), **values}
+        table = {variable.name: reference for reference, variable in enumerate(self._fmu.variables.variables)}
+        if self._slave is None:
+            raise CosimulationError("This co-simulation has been closed; make a new one.")
+        with self._explained():
+            self._slave.reset()
+            self._slave.setupExperiment(startTime=0.0)
+            self._slave.setReal([table[name] for name in values], list(values.values()))
+            self._slave.enterInitializationMode()
+            self._slave.exitInitializationMode()
+
+    def _observe(self, steps: Steps) -> dict[str, Array]:
+        """Take steps from where the FMU is; what is observed before the first and after each, by name."""
+        with self._explained():
+            samples = np.split(self._march(steps), self._output_blocks, axis=1)
+        return dict(zip(_OBSERVED.values(), samples, strict=True))
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        """Make a sentence of a refusal, with the FMU's own words where it has some."""
+        self._messages.clear()
+        try:
+            yield
+        except FMICallException as error:
+            reason = " ".join(self._messages) or f"{error.function} returned status {error.status}."
+            raise CosimulationError(
+                f"The FMU of plant {self._plant.type} could not go on: {reason}"
+            ) from error
 
     def _plant_values(self, parameters: Mapping[str, float]) -> dict[str, float]:
         known = {parameter.name for parameter in self._plant.parameters}
@@ -157,29 +198,7 @@ class PlantCosimulation:
             for suffix in ("start", "setpoint")
         }
 
-    def _simulate(self, values: Mapping[str, float], steps: _Steps) -> Array:
-        """Run from the start; the observed outputs in blocks, shape (samples, outputs)."""
-        if self._slave is None:
-            raise CosimulationError("This co-simulation has been closed; make a new one.")
-        self._messages.clear()
-        try:
-            self._initialise(values)
-            return self._march(steps)
-        except FMICallException as error:
-            reason = " ".join(self._messages) or f"{error.function} returned status {error.status}."
-            raise CosimulationError(
-                f"The FMU of plant {self._plant.type} could not go on: {reason}"
-            ) from error
-
-    def _initialise(self, values: Mapping[str, float]) -> None:
-        table = {variable.name: reference for reference, variable in enumerate(self._fmu.variables.variables)}
-        self._slave.reset()
-        self._slave.setupExperiment(startTime=0.0)
-        self._slave.setReal([table[name] for name in values], list(values.values()))
-        self._slave.enterInitializationMode()
-        self._slave.exitInitializationMode()
-
-    def _march(self, steps: _Steps) -> Array:
+    def _march(self, steps: Steps) -> Array:
         """Take all steps, reading setpoints and writing samples in place; a step costs a few microseconds."""
         fmu, component = self._slave, self._slave.component
         set_real, do_step, get_real = fmu.fmi2SetReal, fmu.fmi2DoStep, fmu.fmi2GetReal
@@ -200,7 +219,7 @@ class PlantCosimulation:
 
 def _steps(
     setpoints: SampledProfile, settle: float, output_step: float | None, final_velocity: Sequence[float]
-) -> _Steps:
+) -> Steps:
     cycle = setpoints.cycle_time
     hold = cycle if output_step is None else min(output_step, cycle)
     if not (np.isfinite(hold) and hold > 0.0 and np.isfinite(settle) and settle >= 0.0):
@@ -211,7 +230,7 @@ def _steps(
     held = grid_times(grid_length(settle, hold), hold)[1:]
     onward = np.array(final_velocity) if len(final_velocity) else np.zeros(setpoints.position.shape[1])
     last = setpoints.position[-1] + held[:, None] * onward
-    return _Steps(
+    return Steps(
         times=np.concatenate((moving, moving[-1] + held)),
         sizes=np.concatenate((np.full(len(moving) - 1, cycle), np.full(len(held), hold))),
         setpoints=np.concatenate((setpoints.position[1:], last)),

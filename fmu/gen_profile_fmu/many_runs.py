@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint, c_void_p
@@ -18,9 +17,10 @@ import numpy as np
 
 from gen_profile.errors import CosimulationError
 from gen_profile.profile import Array
+from gen_profile_fmu.building import compile_texts
 from gen_profile_fmu.c_sources import FOLDER
 from gen_profile_fmu.cache import cached
-from gen_profile_fmu.compiler import compile_library, find_compiler
+from gen_profile_fmu.compiler import find_compiler
 from gen_profile_fmu.fmu_files import Version, digest, standard_headers
 from gen_profile_fmu.instances import slave
 from gen_profile_fmu.plant_fmu import PlantFmu
@@ -243,12 +243,8 @@ def _loop() -> Any:
     for version in Version:
         texts |= standard_headers(version)
 
-    def make(folder: Path) -> dict[str, bytes]:
-        with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as build:
-            for file, text in texts.items():
-                Path(build, file).write_text(text, encoding="utf-8", newline="\n")
-            compile_library(compiler, Path(build), _SOURCE, name, zig_cache=folder / "zig")
-            return {name: Path(build, name).read_bytes()}
+    def make(cache: Path) -> dict[str, bytes]:
+        return {name: compile_texts(texts, _SOURCE, compiler, name, cache)}
 
     parts = (part.encode("utf-8") for part in (compiler.identity, *texts.values()))
     function = ctypes.CDLL(str(cached(f"many-runs-{digest(*parts)[:32]}", make) / name)).many_runs

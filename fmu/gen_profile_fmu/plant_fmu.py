@@ -9,10 +9,10 @@ import attrs
 import fmpy
 
 from gen_profile.plants.plant import Plant
-from gen_profile_fmu.building import compile_sources, sources_key
+from gen_profile_fmu.building import compile_texts, sources_key
 from gen_profile_fmu.cache import cached
 from gen_profile_fmu.compiler import find_compiler
-from gen_profile_fmu.fmu_files import Version, archive, fmu_files, sources
+from gen_profile_fmu.fmu_files import SOURCE_FILE, Version, archive, fmu_files, sources
 from gen_profile_fmu.model import Model, plant_model
 from gen_profile_fmu.plant_variables import InputKind, Machine
 from gen_profile_fmu.variables import VariableTable
@@ -68,7 +68,7 @@ def cached_fmu(model: Model, version: Version, on_build: Callable[[], None] | No
     platform = fmpy.platform if version is Version.FMI2 else fmpy.platform_tuple
 
     def make(cache: Path) -> dict[str, bytes]:
-        binary = compile_sources(made, compiler, library, cache, on_build)
+        binary = compile_texts(made.code, SOURCE_FILE, compiler, library, cache, on_build=on_build)
         laid = fmu_files(made, {f"binaries/{platform}/{library}": binary}, with_extras=False)
         return {**laid, f"{model.identifier}.fmu": archive(laid)}
 

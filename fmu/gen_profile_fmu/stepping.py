@@ -6,12 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 import attrs
 import numpy as np
-from fmpy.fmi1 import FMICallException
 
-from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Plant
 from gen_profile.profile import Array, SampledProfile
-from gen_profile_fmu.cosimulation import PlantCosimulation, _Steps
+from gen_profile_fmu.cosimulation import PlantCosimulation, Steps
 from gen_profile_fmu.plant_variables import MAX_STEP, TAU
 
 
@@ -66,8 +64,7 @@ class SteppedPlant(PlantCosimulation):
     ) -> None:
         super().__init__(plant, on_build)
         rest = SampledProfile(cycle_time=1.0, position=[position, position])
-        values = self._plant_values(parameters) | self._start_values(rest)
-        self._initialise(values | {TAU: tau, MAX_STEP: max_step})
+        self._begin(rest, parameters, {TAU: tau, MAX_STEP: max_step})
         self._time = 0.0
 
     def advance(self, position: Sequence[float], duration: float) -> Instant:
@@ -79,17 +76,11 @@ class SteppedPlant(PlantCosimulation):
             The FMU refuses the step.
         """
         end = self._time + duration
-        step = _Steps(
+        step = Steps(
             times=np.array([self._time, end]),
             sizes=np.array([duration]),
             setpoints=np.array([position], dtype=np.float64),
         )
-        try:
-            found = np.split(self._march(step)[-1], self._output_blocks)
-        except FMICallException as error:
-            raise CosimulationError(
-                f"The FMU of plant {self._plant.type} could not go on at {self._time:g} s: "
-                f"{' '.join(self._messages)}"
-            ) from error
+        found = self._observe(step)
         self._time = end
-        return Instant(position=found[0], sway=found[4])
+        return Instant(position=found["position"][-1], sway=found["sway"][-1])
