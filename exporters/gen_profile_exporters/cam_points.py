@@ -74,16 +74,20 @@ def spline_cycles(motion: SampledProfile, most: int, error: float, place: str, *
         So many points are not enough; with the numbers.
     """
     last = len(motion.position) - 1
+    coarseness = spline_error(motion, np.arange(last + 1), single=single)
+    if coarseness > error:
+        raise ExportError(
+            f"{place}: its numbers are so coarse at these positions that {coarseness:.2g} m of error remain "
+            f"with any number of points, {error:g} m are allowed; put the origin nearer, or take another "
+            "format."
+        )
     stride = 1 << max(0, last.bit_length() - 2)
     while True:
         cycles = np.unique(np.append(np.arange(0, last, stride), last))
         found = spline_error(motion, cycles, single=single)
-        if len(cycles) > most or (found > error and stride == 1):
+        if len(cycles) > most:
             raise ExportError(
-                f"{place}: {most} points leave an error of {found:.2g} m, {error:g} m are allowed; "
-                "shorten the motion, put the origin nearer, or take another format."
-                if len(cycles) <= most
-                else f"{place}: {len(cycles)} points would be needed, it holds {most}; shorten the motion or "
+                f"{place}: {len(cycles)} points would be needed, it holds {most}; shorten the motion or "
                 "take another format."
             )
         if found <= error:

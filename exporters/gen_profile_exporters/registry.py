@@ -120,6 +120,7 @@ BUILT_IN: dict[str, Format] = {
         suffix=".TcPOU",
     ),
 }
+OTHER_NAMES = {"st": "plc"}
 GROUP = "gen_profile.exporters"
 
 
@@ -127,6 +128,11 @@ def formats() -> dict[str, Format]:
     """Every known format by name, sorted; the project's own win over others of the same name."""
     known = {entry.name: _format_of_plugin(entry) for entry in entry_points(group=GROUP)}
     return dict(sorted((known | BUILT_IN).items()))
+
+
+def format_named(name: str) -> str:
+    """Tell by which name a format is listed, whichever of its names this is."""
+    return OTHER_NAMES.get(name, name)
 
 
 def find_exporter(name: str) -> Exporter:
@@ -137,10 +143,11 @@ def find_exporter(name: str) -> Exporter:
     SpecError
         When no format has that name.
     """
-    known = BUILT_IN if name in BUILT_IN else formats()
-    if name not in known:
+    listed = format_named(name)
+    known = BUILT_IN if listed in BUILT_IN else formats()
+    if listed not in known:
         raise SpecError(f"--export: unknown format {name!r}{suggestion(name, known)}")
-    return cast("Exporter", import_module(known[name].module))
+    return cast("Exporter", import_module(known[listed].module))
 
 
 def require_end(names: Iterable[str], *, stops: bool) -> None:

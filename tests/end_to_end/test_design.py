@@ -53,6 +53,11 @@ def test_every_choice_of_formats_is_written_and_recorded(tmp_path, monkeypatch, 
         assert first == f"deploy/paper{SUFFIXES[format_]}"
 
 
+def test_other_names_of_a_format_are_recorded_as_the_listed_one(tmp_path):
+    outcome = run_here("--export", "st", "--export", "plc", "--out", tmp_path, "--no-check", "--json")
+    assert [row["format"] for row in outcome.document["artefacts"]] == ["plc"]
+
+
 def test_the_installed_program_keeps_the_json_contract(tmp_path):
     outcome = run_process("--export", "csv", "--json", cwd=tmp_path)
     assert (outcome.code, outcome.errors) == (0, [])

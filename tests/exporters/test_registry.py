@@ -34,6 +34,11 @@ def test_every_format_can_be_found_and_has_its_own_suffix():
     assert {"csv", "plc", "can"} <= formats().keys()
 
 
+def test_structured_text_goes_by_two_names():
+    assert find_exporter("st") is find_exporter("plc")
+    assert "st" not in formats()
+
+
 def test_the_longest_suffix_tells():
     assert format_of("bay.codesys.xml") == "codesys"
     assert format_of("bay.xml") == "plcopen-xml"

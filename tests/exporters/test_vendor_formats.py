@@ -279,7 +279,9 @@ class TestRockwell:
             rockwell_l5x.encode(bang_bang(), goal_of(MOVE))
 
     def test_positions_too_far_for_a_real_are_refused(self):
-        with pytest.raises(ExportError, match=r"points leave an error of .* m, 1e-05 m are allowed"):
+        with pytest.raises(
+            ExportError, match=r"CAM: its numbers are so coarse .* m of error remain .*, 1e-05 m are allowed"
+        ):
             rockwell_l5x.encode(quintic((1000.0, 1000.3)), goal_of(MOVE))
 
     @pytest.mark.parametrize(

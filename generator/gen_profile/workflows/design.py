@@ -24,7 +24,7 @@ from gen_profile.workflows.planning import Plan, plan, timed
 from gen_profile.workflows.scenarios import further_scenarios
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import Exporter, target_of
-from gen_profile_exporters.registry import find_exporter, require_end
+from gen_profile_exporters.registry import find_exporter, format_named, require_end
 
 Progress = Callable[[str], None]
 LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")
@@ -139,7 +139,7 @@ def design(
     GenProfileError
         Nothing was written.
     """
-    exporters = {name: find_exporter(name) for name in dict.fromkeys(formats)}
+    exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
     require_end(exporters, stops=spec.move.stops)
     progress("solving")
     spec = timed(spec)
