@@ -70,7 +70,11 @@ ARGUMENTS = {
     "name too long": ([300 * "x"], [r"Cannot read the spec x+: File name too long\."]),
     "folder as spec": (["."], [r"Cannot read the spec \.: Is a directory\."]),
     "both": (["spec.toml", "--preset", "paper"], [r"--preset: name either .*, not both\."]),
-    "mistyped command": (["compar"], [r".* compar: .*; did you mean 'compare'\?"]),
+    "mistyped command": (["compar"], [r".* compar; did you mean 'compare'\?"]),
+    "mistyped command with arguments": (
+        ["chekc", "paper.csv", "--strict"],
+        [r".* chekc; did you mean 'check'\?"],
+    ),
     "options first": (
         ["--json", "compare"],
         [r".*; a command comes before its options: .* compare …"],

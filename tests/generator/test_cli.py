@@ -6,6 +6,7 @@ import logging
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from click.shell_completion import ShellComplete
@@ -152,8 +153,20 @@ def test_a_terminal_sees_a_spinner_and_nothing_stays(monkeypatch):
     assert not terminal.getvalue().endswith("…\n")
 
 
-def test_a_closed_output_does_not_stop_the_work(tmp_path):
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_closed_output_does_not_stop_the_work(tmp_path, closed):
     """As in ``gen-profile >&-``."""
-    done = subprocess.run(["sh", "-c", f'"{PROGRAM}" --no-check --out out >&-'], cwd=tmp_path, check=False)
+    command = f'"{PROGRAM}" --no-check --out out {closed}'
+    done = subprocess.run(["sh", "-c", command], cwd=tmp_path, check=False)
     assert done.returncode == 0
     assert (tmp_path / "out" / "manifest.json").exists()
+
+
+@pytest.mark.parametrize("arguments", [["plants"], ["plants", "--json"]])
+def test_an_output_that_takes_nothing_is_told_in_a_sentence(arguments):
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [PROGRAM, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 2
+    assert done.stderr == "Error: Cannot print the outcome: No space left on device.\n"

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,7 +17,6 @@ from click.shell_completion import CompletionItem
 
 from gen_profile.cli.group import DefaultGroup
 from gen_profile.errors import CheckFailed, GenProfileError, OutputError, SpecError
-from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
     from gen_profile.check import Check
@@ -320,8 +321,9 @@ def presets(as_json: bool) -> None:
 
 def main() -> None:
     """Run the command line; the entry point."""
+    _open_streams()
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # and not closed by the caller
+        if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal may lack β
     interruptions = _interruptible()
     debug, as_json = "--debug" in sys.argv, "--json" in sys.argv
@@ -336,6 +338,15 @@ def main() -> None:
             raise
         # what is interrupted while compiled code runs may end in an error of that code's own
         sys.exit(_report(click.Abort() if interruptions else error, as_json))
+
+
+def _open_streams() -> None:
+    """Lead streams that the caller closed nowhere, lest a file that is opened gets their number."""
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(number)
+    sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8")
+    sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8")
 
 
 def _interruptible() -> list[int]:
@@ -377,20 +388,26 @@ def chosen_text(path: Path | None, preset: str | None) -> tuple[str, str, Path]:
     try:
         return read_text(path), str(path), path.parent
     except OutputError as error:
-        raise OutputError(f"{str(error).rstrip('.')}{_command_meant(str(path))}") from error
-
-
-def _command_meant(word: str) -> str:
-    """End the sentence on a spec that cannot be read: its name may have been meant as a command."""
-    if word in cli.commands:
-        return f"; a command comes before its options: gen-profile {word} …"
-    near = suggestion(word, cli.commands)
-    return near if "did you mean" in near else "."
+        if str(path) in cli.commands:
+            meant = f"a command comes before its options: gen-profile {path} …"
+            raise OutputError(f"{str(error).rstrip('.')}; {meant}") from error
+        raise
 
 
 def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
-    """Print an outcome for people, or for programs."""
-    click.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else text)
+    """Print an outcome for people, or for programs.
+
+    Raises
+    ------
+    OutputError
+        stdout does not take it, as on a full disk.
+    """
+    try:
+        click.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else text)
+    except BrokenPipeError:  # a reader that left early, which click knows
+        raise
+    except OSError as error:
+        raise OutputError(f"Cannot print the outcome: {error.strerror}.") from error
 
 
 def _definitions(rows: dict[str, str]) -> str:
@@ -425,7 +442,8 @@ def _report(error: Exception, as_json: bool) -> int:
             code, message = 1, f"Internal error ({type(error).__name__}: {error}). Run again with --debug."
     if as_json:
         document = {"error": {"type": type(error).__name__, "message": message, "exit_code": code}}
-        click.echo(json.dumps(document, indent=2))
+        with suppress(OSError):  # the error may be that stdout takes nothing
+            click.echo(json.dumps(document, indent=2))
     if isinstance(error, click.ClickException):
         error.show()
     else:

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 from click.shell_completion import CompletionItem
+
+from gen_profile.errors import SpecError
+from gen_profile.suggestion import suggestion
 
 DEFAULT = "design"
 
@@ -16,8 +21,16 @@ class DefaultGroup(click.Group):
         own = {option for parameter in self.get_params(ctx) for option in parameter.opts}
         completing_first_word = ctx.resilient_parsing and not args
         if not completing_first_word and (not args or (args[0] not in self.commands and args[0] not in own)):
+            self._refuse_mistyped(ctx, args)
             args = [DEFAULT, *args]
         return super().parse_args(ctx, args)
+
+    def _refuse_mistyped(self, ctx: click.Context, args: list[str]) -> None:
+        """Refuse a first word that is nearly a command: the default would complain of the rest."""
+        word = args[0] if args and not ctx.resilient_parsing else ""
+        near = suggestion(word, self.commands)
+        if word.isidentifier() and "did you mean" in near and not Path(word).exists():
+            raise SpecError(f"There is no command or spec {word}{near}")
 
     def format_usage(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Show both ways of calling."""
