@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from gen_profile.errors import ExportError
 from gen_profile.profile import Array, Profile, SampledProfile
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback_table import PlaybackTable, tabulate
+
+Indices = NDArray[np.int64]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -49,7 +52,7 @@ def segments_of(profile: Profile, target: Target) -> PlaybackTable:
     return tabulate(profile, attrs.evolve(target, export=attrs.evolve(target.export, plc_layout="segments")))
 
 
-def spline_cycles(motion: SampledProfile, most: int, error: float, place: str, *, single: bool) -> Array:
+def spline_cycles(motion: SampledProfile, most: int, error: float, place: str, *, single: bool) -> Indices:
     """Choose as few evenly spaced cycles as a cubic spline through them needs.
 
     Parameters
@@ -74,7 +77,7 @@ def spline_cycles(motion: SampledProfile, most: int, error: float, place: str, *
         So many points are not enough; with the numbers.
     """
     last = len(motion.position) - 1
-    coarseness = spline_error(motion, np.arange(last + 1), single=single)
+    coarseness = spline_error(motion, np.arange(last + 1, dtype=np.int64), single=single)
     if coarseness > error:
         raise ExportError(
             f"{place}: its numbers are so coarse at these positions that {coarseness:.2g} m of error remain "
@@ -83,7 +86,7 @@ def spline_cycles(motion: SampledProfile, most: int, error: float, place: str, *
         )
     stride = 1 << max(0, last.bit_length() - 2)
     while True:
-        cycles = np.unique(np.append(np.arange(0, last, stride), last))
+        cycles: Indices = np.unique(np.append(np.arange(0, last, stride), last))
         found = spline_error(motion, cycles, single=single)
         if len(cycles) > most:
             raise ExportError(
@@ -95,7 +98,7 @@ def spline_cycles(motion: SampledProfile, most: int, error: float, place: str, *
         stride //= 2
 
 
-def spline_error(motion: SampledProfile, cycles: Array, *, single: bool) -> float:
+def spline_error(motion: SampledProfile, cycles: Indices, *, single: bool) -> float:
     """Greatest distance in m between a spline through some cycles and all of them."""
     times, position = motion.times, motion.position
     played = play_spline(times[cycles], position[cycles], times, single=single)
