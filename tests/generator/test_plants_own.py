@@ -286,6 +286,17 @@ def test_equations_that_do_not_take_symbols():
         dynamics(branchy)
 
 
+@pytest.mark.parametrize("function", ["math.sin(phi)", "float(phi)"])
+@pytest.mark.parametrize("line", ["K_u=[-9.81 * np.sin(phi)]", "height=[-p.L * np.cos(phi)]"])
+def test_equations_that_lose_their_symbols(tmp_path, function, line):
+    """CasADi's symbols pass for floats, NaN, which would go into the design and the FMU without a word."""
+    text = "import math\n" + PENDULUM.replace(line, f"{line[:-1]} + {function}]")
+    (tmp_path / "machine.py").write_text(text, "utf-8")
+    machine = plant_of_file(read_machine_file(tmp_path / "machine.py"))
+    with pytest.raises(SpecError, match="lose their symbols; write them with functions of NumPy"):
+        dynamics(machine)
+
+
 def test_an_identified_spec_takes_its_machine_along(folder, tmp_path):
     found = run_here(
         "identify", folder / "own.toml", "--measured", "L=2.1±0.01", "--out", tmp_path / "new" / "spec.toml"

@@ -180,3 +180,7 @@ class Plant:
     def nominal(self) -> dict[str, float]:
         """Nominal value of every parameter, by name."""
         return {parameter.name: parameter.nominal for parameter in self.parameters}
+
+    def standing(self) -> list[float]:
+        """Where the axes can stand for a trial of the equations: off zero, where a radius may vanish."""
+        return [min(max(1.0, axis.lower), axis.upper) for axis in self.actuated]

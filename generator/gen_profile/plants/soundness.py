@@ -55,7 +55,7 @@ def _values(plant: Plant) -> Iterator[str]:
     """Evaluate the equations at rest, with the nominal parameters."""
     n_u, m, loads = len(plant.unactuated), len(plant.actuated), len(plant.loads)
     p = SimpleNamespace(**plant.nominal())
-    standing = [min(max(1.0, axis.lower), axis.upper) for axis in plant.actuated]
+    standing = plant.standing()
     try:
         with np.errstate(all="ignore"):
             terms = plant.equations([0.0] * n_u, [0.0] * n_u, standing, [0.0] * m, p)

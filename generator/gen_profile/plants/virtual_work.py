@@ -32,7 +32,7 @@ def contradictions(plant: Plant) -> Iterator[str]:
     p = SimpleNamespace(**plant.nominal())
     n_u, m = len(plant.unactuated), len(plant.actuated)
     random = np.random.default_rng(1)
-    standing = np.array([min(max(1.0, axis.lower), axis.upper) for axis in plant.actuated])
+    standing = np.array(plant.standing())
     wrong, gaining = False, False
     for _ in range(STATES):
         q = np.concatenate([random.uniform(-SWING, SWING, n_u), standing])

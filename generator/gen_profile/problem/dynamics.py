@@ -10,7 +10,7 @@ import numpy as np
 from gen_profile.errors import SpecError
 from gen_profile.plants.plant import Mechanics, Plant
 from gen_profile.problem import symbolic as sym
-from gen_profile.problem.symbolic import Array, Symbol
+from gen_profile.problem.symbolic import Array, Function, Symbol
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -87,7 +87,7 @@ def dynamics(plant: Plant) -> Dynamics:
     mass = sym.matrix(terms.M_uu)
     free = sym.solve(mass, sym.column(terms.K_u) + sym.column(terms.G_u))
     driven = -sym.solve(mass, sym.matrix(terms.M_au).T)
-    return Dynamics(
+    made = Dynamics(
         q_u=q_u,
         dq_u=dq_u,
         q_a=q_a,
@@ -103,6 +103,27 @@ def dynamics(plant: Plant) -> Dynamics:
         place=sym.column(place),
         energy=sym.column(energy),
     )
+    _require_symbols(plant, made)
+    return made
+
+
+def _require_symbols(plant: Plant, made: Dynamics) -> None:
+    """Find what Python's own ``math`` made of a symbol: it takes one for a float, NaN, silently.
+
+    Raises
+    ------
+    SpecError
+    """
+    inputs = {name: getattr(made, name) for name in ("q_u", "dq_u", "q_a", "dq_a", "ddq_a", "p")}
+    rest = {name: np.zeros((1, symbols.shape[0])) for name, symbols in inputs.items()}
+    rest["q_a"] = np.array([plant.standing()])
+    rest["p"] = parameter_column(plant, plant.nominal())
+    at_rest = Function("at_rest", inputs, sym.column([made.ddq_u, made.seen]))(*rest.values())
+    if np.isnan(at_rest).any():
+        raise SpecError(
+            f"plant.type: the equations of {plant.type!r} lose their symbols; write them with functions of "
+            "NumPy, not of math (np.sin, not math.sin), and without float()."
+        )
 
 
 def _energy(bodies: Mechanics, q: Symbol, dq: Symbol) -> Symbol:
