@@ -188,9 +188,11 @@ def log_of(text, columns=("1", "2"), unit="deg", after=0.0):
 ROWS = [(0.1 * k, 10.0 * (-1) ** k) for k in range(40)]
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t", " ; "])
-def test_logs_with_and_without_a_header(separator):
-    bare = "\n".join(f"{t:.1f}{separator}{v}" for t, v in ROWS)
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", "."), ("\t", "."), (" ; ", "."), (";", ","), ("\t", ",")]
+)
+def test_logs_with_and_without_a_header(separator, decimal):
+    bare = "\n".join(f"{t:.1f}~{v}".replace(".", decimal).replace("~", separator) for t, v in ROWS)
     headed = log_of(f'"t"{separator}angle\n\n{bare}\n', ("t", "angle"))
     for log in (headed, log_of(bare), log_of(f"t{separator}angle\n{bare}")):
         np.testing.assert_allclose(log.times, [t for t, _ in ROWS])

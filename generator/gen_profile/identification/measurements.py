@@ -5,12 +5,15 @@ Every uncertainty is one standard deviation.
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError, SpecError
+from gen_profile.log_table import read_table
 from gen_profile.profile import Array, read_only
 from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
@@ -113,7 +116,7 @@ def parse_period(text: str) -> Period:
 def parse_swing(
     text: str, source: str, *, columns: tuple[str, str], unit: str, after: float, quantity: str, load: str
 ) -> SwingLog:
-    """Read columns of a table whose columns are separated by commas, semicolons or tabs.
+    """Read columns of a table, in the forms that `gen_profile.log_table` knows.
 
     Parameters
     ----------
@@ -134,20 +137,17 @@ def parse_swing(
     OutputError
         The table cannot be read.
     """
-    lines = [re.split(r"[,;\t]", line) for line in text.splitlines() if line.strip()]
-    if not lines:
-        raise OutputError(f"{source}: the log is empty.")
-    names = [cell.strip().strip('"') for cell in lines[0]]
-    headed = not all(map(_is_number, names))
+    cells = read_table(text, source)
+    names = cells.rows[0]
+    headed = any(math.isnan(cells.number(0, place)) for place in range(len(names)))
     places = [_column(column, names if headed else [], len(names), source) for column in columns]
     rows = []
-    for number, line in enumerate(lines[headed:], start=1 + headed):
-        cells = [line[place].strip() if place < len(line) else "" for place in places]
-        if not all(map(_is_number, cells)):
-            raise OutputError(
-                f"{source}, row {number}: expected numbers, found {' and '.join(map(repr, cells))}."
-            )
-        rows.append([float(cell) for cell in cells])
+    for row in range(headed, len(cells.rows)):
+        values = [cells.number(row, place) for place in places]
+        if not np.isfinite(values).all():
+            held = " and ".join(repr(cells.cell(row, place)) for place in places)
+            raise OutputError(f"{source}, row {row + 1}: expected numbers, found {held}.")
+        rows.append(values)
     table = np.array(rows).reshape(-1, 2)
     table = table[table[:, 0] >= after]
     if len(table) < LEAST_SAMPLES:
@@ -159,17 +159,13 @@ def parse_swing(
     )
 
 
-def _column(column: str, names: list[str], count: int, source: str) -> int:
+def _column(column: str, names: Sequence[str], count: int, source: str) -> int:
     if column in names:
         return names.index(column)
     if column.isdecimal() and 1 <= int(column) <= count:
         return int(column) - 1
     known = suggestion(column, names) if names else f"; there are {count}, without names."
     raise OutputError(f"{source}: there is no column {column!r}{known}")
-
-
-def _is_number(text: str) -> bool:
-    return re.fullmatch(_NUMBER, text) is not None
 
 
 def _positive(where: str, what: str, value: float) -> float:

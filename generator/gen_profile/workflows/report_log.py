@@ -14,7 +14,6 @@ other names are left alone.
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -24,6 +23,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError
+from gen_profile.log_table import LogTable, read_table
 from gen_profile.profile import Array, read_only
 from gen_profile.spec import Spec
 from gen_profile.units import COUNTS, UNITS
@@ -106,13 +106,13 @@ def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
     OutputError
         It is no such table.
     """
-    rows, decimal_comma = _cells(text, source)
-    names = [cell.strip() for cell in rows[0]]
+    table = read_table(text, f"--measured {source}")
+    names = list(table.rows[0])
     columns = {name: _column(name, spec, source) for name in names}
     known = {name: column for name, column in columns.items() if column is not None}
     _require(known, names, spec, source)
     places = {name: names.index(name) for name in known}
-    numbers = _numbers(rows, places, source, decimal_comma=decimal_comma)
+    numbers = _numbers(table, places, source)
     signals = {
         (column.quantity, column.owner): numbers[:, place] / column.divisor
         for place, column in enumerate(known.values())
@@ -137,19 +137,6 @@ def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
         angles=by_quantity["angle"],
         ignored=tuple(name for name in names if name not in known),
     )
-
-
-def _cells(text: str, source: str) -> tuple[list[list[str]], bool]:
-    """Split a text into rows of cells, and tell whether a comma may be a decimal sign."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    if not lines:
-        raise OutputError(f"--measured {source}: the log is empty.")
-    separator = max(";\t,", key=lines[0].count)
-    try:
-        rows = list(csv.reader(lines, delimiter=separator))
-    except csv.Error as error:
-        raise OutputError(f"--measured {source}: it is no table ({error}).") from error
-    return rows, separator != ","
 
 
 def _column(name: str, spec: Spec, source: str) -> _Column | None:
@@ -220,19 +207,14 @@ def _require(known: Mapping[str, _Column], names: Sequence[str], spec: Spec, sou
         )
 
 
-def _numbers(
-    rows: Sequence[Sequence[str]], places: Mapping[str, int], source: str, *, decimal_comma: bool
-) -> Array:
-    table = np.empty((len(rows) - 1, len(places)))
-    for number, row in enumerate(rows[1:]):
+def _numbers(table: LogTable, places: Mapping[str, int], source: str) -> Array:
+    values = np.empty((len(table.rows) - 1, len(places)))
+    for row in range(1, len(table.rows)):
         for column, (name, place) in enumerate(places.items()):
-            cell = row[place].strip() if place < len(row) else ""
-            try:
-                table[number, column] = float(cell.replace(",", ".") if decimal_comma else cell)
-            except ValueError:
-                table[number, column] = math.nan
-            if not math.isfinite(table[number, column]):
+            value = values[row - 1, column] = table.number(row, place)
+            if math.isnan(value):
+                held = table.cell(row, place)[:40]
                 raise OutputError(
-                    f"--measured {source}, row {number + 2}: {name} holds {cell[:40]!r}, which is no number."
+                    f"--measured {source}, row {row + 1}: {name} holds {held!r}, which is no number."
                 )
-    return table
+    return values
