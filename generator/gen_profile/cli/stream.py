@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from gen_profile.errors import SpecError, StreamAborted
 
 if TYPE_CHECKING:
     from gen_profile.workflows.stream import Outcome, Source
+    from gen_profile_exporters.can.lateness import Lateness
 
 VIRTUAL = ("virtual", "gen-profile")
 _MISSES = ("extrapolate", "hold", "stop")
@@ -45,7 +46,7 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @spec_options
 @_bus_options
 @click.option("--mode", type=click.Choice(["csp", "ip", "csv"]), help="Mode of the drives, for a spec.")
-@click.option("--node", type=int, help="CANopen node of the first axis, for a spec.")
+@click.option("--node", metavar="N", type=int, help="CANopen node of the first axis, for a spec.")
 @click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
 @click.option("--reset-fault", is_flag=True, help="Reset drives in fault first; know why they were.")
 @click.option("--self-test", is_flag=True, help="First measure whether this machine can hold the cycle.")
@@ -83,6 +84,7 @@ def stream(
     """
     from gen_profile.cli.progress import progress
     from gen_profile.workflows import stream as run
+    from gen_profile.workflows.delivery import require_place
 
     run.require_extra()
     overrides += as_overrides({"can.mode": mode, "can.node": node})
@@ -90,13 +92,18 @@ def stream(
         source = _source(spec_path, preset, overrides, accept_unverified, tell)
         if dry_run:
             plan = run.summary(source)
-            print_outcome(plan, _plan_words(plan), as_json)
+            print_outcome(plan, _plan_words(plan, _units(source)), as_json)
             return
         port = run.Port(**_port(interface, channel, simulate_drive))
+        if table is not None:
+            require_place(table)  # the log of a motion that was made must not be lost
+        notes: tuple[str, ...] = ()
         if self_test:
             tell("measuring this machine")
-            run.self_test(source)
-        outcome = run.stream(source, port, simulate_drive=simulate_drive, reset_fault=reset_fault, tell=tell)
+            notes = (f"Self-test: {_lateness_words(run.self_test(source))}.",)
+        outcome = run.stream(
+            source, port, simulate_drive=simulate_drive, reset_fault=reset_fault, notes=notes, tell=tell
+        )
     _conclude(outcome, table, as_json)
 
 
@@ -133,6 +140,7 @@ def drive_sim(
     run.require_extra()
     from gen_profile.workflows.crane_load import CraneLoad
     from gen_profile.workflows.delivery import deliver
+    from gen_profile.workflows.wording import mm, number
     from gen_profile_exporters.can import drive_dictionary
 
     spec = chosen_spec(spec_path, preset, overrides)
@@ -151,12 +159,15 @@ def drive_sim(
         run.serve(bank, lambda: bank.finished)
         sway = load.residual_sway()
     scales = [axis.counts_per_si for axis in spec.axis_scales()]
+    places = [drive.actual / scale for drive, scale in zip(bank.drives, scales, strict=True)]
     document = {
-        "position_m": [drive.actual / scale for drive, scale in zip(bank.drives, scales, strict=True)],
+        "position_m": places,
         "states": [drive.state.words for drive in bank.drives],
         "sway_residual_peak_m": sway,
     }
-    print_outcome(document, f"axes at {document['position_m']} m, residual sway {1e3 * sway:.4g} mm", as_json)
+    axes = spec.machine().actuated
+    at = [f"{axis.name} at {number(place)} {axis.unit}" for axis, place in zip(axes, places, strict=True)]
+    print_outcome(document, f"{', '.join(at)}, residual sway {mm(sway)}", as_json)
 
 
 for parameter in stream.params:
@@ -211,13 +222,17 @@ def _port(interface: str | None, channel: str | None, simulated: bool) -> dict[s
     return {"interface": interface, "channel": channel}
 
 
-def _plan_words(plan: dict[str, Any]) -> str:
+def _units(source: Source) -> list[str]:
+    return [axis.unit for axis in source.spec.machine().actuated]
+
+
+def _plan_words(plan: dict[str, Any], units: Sequence[str]) -> str:
     axes = [
-        f"  {axis['name']}: node {axis['node']}, from {axis['start_m']:g} to {axis['target_m']:g}"
-        for axis in plan["axes"]
+        f"  {axis['name']}: node {axis['node']}, from {axis['start_m']:g} to {axis['target_m']:g} {unit}"
+        for axis, unit in zip(plan["axes"], units, strict=True)
     ]
     objects = [
-        f"  node {entry['node']}  {entry['object']} = {entry['value']}  {entry['meaning']}"
+        f"  node {entry['node']}  {entry['object']} = {_value_words(entry)}  {entry['meaning']}"
         for entry in plan["startup"]
     ]
     head = (
@@ -227,20 +242,32 @@ def _plan_words(plan: dict[str, Any]) -> str:
     return "\n".join([head, *axes, "Before anything moves, each drive is set to, and must hold:", *objects])
 
 
+def _value_words(entry: dict[str, Any]) -> str:
+    """Write what is put together from bits in hexadecimal: COB-IDs, mappings and the like."""
+    composed = entry["object"] < "6" and entry["value"] > 0xFFFF
+    return f"{entry['value']:08X}h" if composed else str(entry["value"])
+
+
+def _lateness_words(late: Lateness) -> str:
+    half, most, all_ = (f"{late.percentile(share):.0f} µs" for share in (50, 99, 100))
+    return f"half below {half}, 99 % below {most}, all below {all_}"
+
+
 def _outcome_words(outcome: Outcome) -> str:
+    from gen_profile.workflows.wording import mm, number
+
     told, late = outcome.to_dict(), outcome.record.lateness
-    lines = [
-        f"{told['state']}: {told['cycles_sent']} of {told['cycles_planned']} setpoints sent",
-        f"lateness: half below {late.percentile(50):.3g} µs, 99 % below {late.percentile(99):.3g} µs, all "
-        f"below {late.percentile(100):.3g} µs; drift {late.drift:.2g} s",
-        *outcome.notes,
-    ]
+    lines = [f"{told['state']}: {told['cycles_sent']} of {told['cycles_planned']} setpoints sent"]
+    if told["cycles_sent"]:
+        lines.append(f"lateness: {_lateness_words(late)}; drift {number(1e6 * late.drift)} µs")
+    lines += outcome.notes
     drive = told["drive"]
     if drive is not None:
+        unit = " or ".join(f"m{unit}" for unit in dict.fromkeys(_units(outcome.source)))
         lines.append(
-            f"axis: {1e3 * drive['position_error_m']:.3g} mm off the target, at most "
-            f"{1e3 * drive['following_error_max_m']:.3g} mm off the plan on the way"
+            f"axis: {number(1e3 * drive['position_error_m'])} {unit} off the target, at most "
+            f"{number(1e3 * drive['following_error_max_m'])} {unit} off the plan on the way"
         )
         if drive["sway_residual_peak_m"] is not None:
-            lines.append(f"residual sway of the simulated load: {1e3 * drive['sway_residual_peak_m']:.3g} mm")
+            lines.append(f"residual sway of the simulated load: {mm(drive['sway_residual_peak_m'])}")
     return "\n".join(lines)

@@ -65,11 +65,27 @@ def deliver(path: Path, content: bytes) -> None:
     OutputError
         It cannot be written, or a device or pipe stands in its place.
     """
-    if path.exists() and not path.is_file():  # root's rename would replace even /dev/null
-        raise OutputError(f"Cannot write {path}: it is no regular file; choose another one.")
+    _require_regular(path)
     with staged(path.parent) as staging:
         staging.write(path.name, content)
         staging.deliver()
+
+
+def require_place(path: Path) -> None:
+    """Refuse a file that `deliver` could not write, before there is anything to write.
+
+    Raises
+    ------
+    OutputError
+    """
+    _require_regular(path)
+    with staged(path.parent):
+        pass
+
+
+def _require_regular(path: Path) -> None:
+    if path.exists() and not path.is_file():  # root's rename would replace even /dev/null
+        raise OutputError(f"Cannot write {path}: it is no regular file; choose another one.")
 
 
 def _remove_empty(folders: list[Path]) -> None:

@@ -17,10 +17,11 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError, SpecError, StreamAborted
-from gen_profile.manifest import FILENAME, parse_manifest, sha256
+from gen_profile.manifest import FILENAME, sha256
 from gen_profile.profile import Array, grid_times
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import spec_from_dict
+from gen_profile.workflows.delivered import manifest_beside, read_artefact
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.clock import SystemClock
 from gen_profile_exporters.can.lateness import Lateness, rehearse
@@ -157,8 +158,8 @@ class Outcome:
 
     def table(self) -> bytes:
         """Render plan and reality side by side (RFC 4180)."""
-        axes = [axis.name for axis in self.source.plan.target.axes]
-        heads = [f"{axis}_{what}_m" for axis in axes for what in ("planned", "actual")]
+        axes = self.source.spec.machine().actuated
+        heads = [f"{axis.name}_{what}_{axis.unit}" for axis in axes for what in ("planned", "actual")]
         times = grid_times(len(self.planned) - 1, self.source.plan.motion.period)
         columns = np.stack([self.planned, self.actual], axis=2).reshape(len(times), -1)
         rows = [
@@ -211,9 +212,8 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
     """
     if format_of(path) != "can":
         raise SpecError(f"{path}: only the log of the format can is streamed; export with --export can.")
-    beside = path.parent / FILENAME
-    content = _read(path)
-    manifest = parse_manifest(_read(beside), str(beside)).covering(path.name, sha256(content))
+    content, beside = read_artefact(path), path.parent / FILENAME
+    manifest = manifest_beside(path, content)
     if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == "can"}:
         raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
     if manifest.check is None and not accept_unverified:
@@ -276,6 +276,7 @@ def stream(
     *,
     simulate_drive: bool = False,
     reset_fault: bool = False,
+    notes: tuple[str, ...] = (),
     tell: Tell = lambda _: None,
 ) -> Outcome:
     """Stream a motion, and stop the axes whatever happens.
@@ -288,6 +289,8 @@ def stream(
         Put simulated drives on the bus, which move the spec's nominal machine.
     reset_fault : bool
         Whether drives that are in fault are reset first.
+    notes : tuple of str
+        What there is to say beforehand.
     tell : callable
         Told each phase.
 
@@ -310,8 +313,8 @@ def stream(
         streamer = Streamer(bus, _clock(refused), source.plan, tell, reset_fault=reset_fault)
         stack.enter_context(_stopped_by_signals(streamer))
         record = streamer.run()
-    notes = (*refused, *remarks)
-    return Outcome(source=source, record=record, notes=notes, sway=load.sway if load else None)
+    said = (*notes, *refused, *remarks)
+    return Outcome(source=source, record=record, notes=said, sway=load.sway if load else None)
 
 
 def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
@@ -384,10 +387,3 @@ def _clock(refused: tuple[str, ...]) -> SystemClock:
     """Spin before each cycle where that takes the processor from nobody."""
     spare = not refused and len(os.sched_getaffinity(0)) > 1
     return SystemClock(SPIN if spare else 0)
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise OutputError(f"Cannot read {path}: {error.strerror or error}.") from error
