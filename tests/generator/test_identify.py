@@ -1,5 +1,7 @@
 """Identification against simulated machines whose parameters are known."""
 
+import re
+
 import numpy as np
 import pytest
 from command_line import run_here
@@ -214,6 +216,19 @@ def test_logs_with_and_without_a_header(separator, decimal):
 def test_faulty_logs(text, why):
     with pytest.raises(OutputError, match=why):
         log_of(text)
+
+
+def test_readings_that_cannot_all_be_right():
+    readings = "--measured=L1=0.47±0.005", "--period=17.3±0.2/10", "--period=2:2.1±0.02"
+    outcome = run_here("identify", *readings, "--free", "L2")
+    assert outcome.code == 3
+    assert re.search(r"contradict one another by \d+ times .* look for the wrong one", outcome.errors[-1])
+
+
+def test_readings_beyond_what_the_machine_can_have():
+    outcome = run_here("identify", "--measured=L1=-0.47±0.005", "--measured=m1=0.2±0.1")
+    assert outcome.code == 2
+    assert outcome.errors[-1] == "Error: --measured L1: must be from 0.01 to 200 m, found -0.47."
 
 
 @pytest.mark.parametrize("column", ["angel", "3", "0"])

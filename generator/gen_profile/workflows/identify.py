@@ -176,8 +176,15 @@ def write_spec(spec: Spec, path: Path) -> None:
 
 
 def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], asked: set[str]) -> None:
-    names = [q.name for q in plant.parameters]
-    faults = [f"{name}: unknown parameter{suggestion(name, names)}" for name in sorted(asked - set(names))]
+    known = {q.name: q for q in plant.parameters}
+    faults = [f"{name}: unknown parameter{suggestion(name, known)}" for name in sorted(asked - known.keys())]
+    for reading in (reading for reading in readings if isinstance(reading, DirectReading)):
+        parameter = known.get(reading.parameter)
+        if parameter and not parameter.lower <= reading.value <= parameter.upper:
+            faults.append(
+                f"--measured {parameter.name}: must be from {parameter.lower:g} to {parameter.upper:g} "
+                f"{parameter.unit}, found {reading.value:g}."
+            )
     modes = len(plant.unactuated)
     faults += [
         f"--period: the machine has {modes} modes, found mode {reading.mode}."
@@ -200,6 +207,11 @@ def _identified(spec: Spec, found: Estimate) -> Spec:
     wide = {name: share for name, share in shares.items() if share > WIDEST}
     if wide:
         words = " and ".join(f"{name} to ±{100.0 * share:.0f} % only" for name, share in wide.items())
+        if found.contradiction > 1.0:
+            raise InfeasibleProblem(
+                f"The measurements contradict one another by {found.contradiction:.2g} times their "
+                f"uncertainties, so they determine {words}; look for the wrong one."
+            )
         raise InfeasibleProblem(f"The measurements determine {words}; measure better, or take it as known.")
     values = {name: _rounded(value, found.standard_uncertainty[name]) for name, value in found.values.items()}
     robustness = spec.robustness
