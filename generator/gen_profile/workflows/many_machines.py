@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 
 import attrs
 import numpy as np
@@ -16,6 +18,8 @@ from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.many_runs import ManyRuns
 from gen_profile_fmu.plant_fmu import plant_fmu
 from gen_profile_fmu.plant_variables import MAX_STEP, TAU
+
+_most: ContextVar[int] = ContextVar("_most", default=sys.maxsize)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -35,9 +39,19 @@ class Feed:
 
 
 @contextmanager
+def on_processors(count: int) -> Iterator[None]:
+    """Take no more processors than this, such as one beside other processes of the same sweep."""
+    earlier = _most.set(count)
+    try:
+        yield
+    finally:
+        _most.reset(earlier)
+
+
+@contextmanager
 def many_machines(plant: Plant, on_build: Callable[[], None] | None = None) -> Iterator[ManyRuns]:
-    """Load the plant's FMU once for every processor."""
-    with ManyRuns(plant_fmu(plant, on_build), Version.FMI2, workers=os.cpu_count() or 1) as runs:
+    """Load the plant's FMU once for every processor that this process may use."""
+    with ManyRuns(plant_fmu(plant, on_build), Version.FMI2, workers=min(_present(), _most.get())) as runs:
         yield runs
 
 
@@ -92,6 +106,13 @@ def residual_peaks(
     }
     outputs = [f"sway.{load}" for load in plant.loads]
     return runs.peaks(feed.times, inputs, values, outputs, since=since)
+
+
+def _present() -> int:
+    """Count the processors that this process is let onto, where the system tells."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def parameter_rows(plant: Plant, machines: Sequence[Mapping[str, float]]) -> Array:

@@ -34,6 +34,7 @@ from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import parse_spec
 from gen_profile.workflows.design import LIBRARIES, Design, design
+from gen_profile.workflows.many_machines import on_processors
 from gen_profile.workflows.sweep_grid import overrides
 
 _ALONE = threading.Lock()  # FMUs are no guests for threads, and a Dask worker may have several
@@ -141,7 +142,12 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes 
             f"{_listed(recipe.versions)}; install the same there."
         )
     try:
-        with _ALONE, TemporaryDirectory(prefix="gen-profile-") as folder, threadpool_limits(1):
+        with (
+            _ALONE,
+            TemporaryDirectory(prefix="gen-profile-") as folder,
+            threadpool_limits(1),
+            on_processors(1),
+        ):
             near = None if start is None else _unpacked(start)
             outcome = design(recipe.spec(values), recipe.formats, Path(folder), near=near)
             files = {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
