@@ -133,8 +133,8 @@ def _interface() -> list[Variable]:
         ("bAbort", "BOOL", ""),
         ("bHold", "BOOL", ""),
         ("rOverride", "LREAL", "1.0"),
+        ("fCycleTime", "LREAL", ""),
     ]
-    inputs.append(("fCycleTime", "LREAL", ""))
     outputs = ("bBusy", "bDone", "bAborted", "bError", "bOffNominal")
     return [
         *(

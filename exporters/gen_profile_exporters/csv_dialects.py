@@ -23,6 +23,7 @@ from collections.abc import Iterator, Sequence
 import attrs
 
 from gen_profile.errors import ExportError
+from gen_profile_exporters.setpoints import MAX_SAMPLES
 
 Row = tuple[int, list[str]]
 """Line number and cells."""
@@ -53,7 +54,7 @@ class Dialect:
     closing: tuple[str, ...] = ()
     mark: str = ""
     least: int = 2
-    most: int = 1_000_001
+    most: int = MAX_SAMPLES
 
 
 DIALECTS = {

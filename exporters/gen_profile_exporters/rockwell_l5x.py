@@ -18,7 +18,7 @@ from gen_profile.profile import Array, Profile, SampledProfile, grid_times
 from gen_profile.units import AxisScale
 from gen_profile_exporters.cam_points import play_spline, spline_cycles, spline_error
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.setpoints import axis_table, in_si, sampled
+from gen_profile_exporters.setpoints import MAX_SAMPLES, axis_table, in_si, sampled
 from gen_profile_exporters.structured_text import block_name
 from gen_profile_exporters.xml_documents import attribute, child, parse_xml, write_xml
 
@@ -88,7 +88,7 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     if knots[0] != 0.0 or not (np.diff(knots) > 0.0).all():
         raise ExportError("The points' times must rise from 0; export the motion again.")
     cycles = round(knots[-1] / target.cycle_time)
-    if not 1 <= cycles <= 1_000_000 or abs(cycles * target.cycle_time - knots[-1]) > 1e-6 * knots[-1]:
+    if not 1 <= cycles < MAX_SAMPLES or abs(cycles * target.cycle_time - knots[-1]) > 1e-6 * knots[-1]:
         raise ExportError(
             f"The points end at {knots[-1]:g} s, which is no multiple of export.cycle_time; "
             "export them again."

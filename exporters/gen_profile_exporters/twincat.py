@@ -58,9 +58,9 @@ def replay(content: bytes, target: Target) -> SampledProfile:
 def _pou(source: BlockSource) -> File:
     root, pou = _object("POU", source.name)
     pou.set("SpecialFunc", "None")
-    etree.SubElement(pou, "Declaration").text = _cdata(source.header + source.declaration())
+    etree.SubElement(pou, "Declaration").text = etree.CDATA(source.header + source.declaration())
     implementation = etree.SubElement(pou, "Implementation")
-    etree.SubElement(implementation, "ST").text = _cdata(source.body)
+    etree.SubElement(implementation, "ST").text = etree.CDATA(source.body)
     return File(filename=f"{source.name}.TcPOU", content=write_xml(root))
 
 
@@ -69,7 +69,7 @@ def _variable_list(name: str, points: QuinticPoints) -> File:
     arrays = [_points(f"aCam{number + 1 if len(axes) > 1 else ''}", points, number) for number in axes]
     text = "\n".join(["{attribute 'qualified_only'}", "VAR_GLOBAL CONSTANT", *arrays, "END_VAR", ""])
     root, element = _object("GVL", name)
-    etree.SubElement(element, "Declaration").text = _cdata(text)
+    etree.SubElement(element, "Declaration").text = etree.CDATA(text)
     return File(filename=f"{name}.TcGVL", content=write_xml(root))
 
 
@@ -96,7 +96,3 @@ def _object(kind: str, name: str) -> tuple[etree._Element, etree._Element]:
     root = etree.Element("TcPlcObject", {"Version": "1.1.0.1", "ProductVersion": "3.1.4024.0"})
     identifier = uuid5(NAMESPACE_URL, f"gen-profile:{kind}:{name}")
     return root, etree.SubElement(root, kind, {"Name": name, "Id": f"{{{identifier}}}"})
-
-
-def _cdata(text: str) -> etree.CDATA:
-    return etree.CDATA(text)
