@@ -10,7 +10,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from gen_profile.workflows.wording import mm, number
+from gen_profile.workflows.wording import mm, named, number
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -206,8 +206,8 @@ def found_profile(found: Found) -> str:
     costs = [f"{key} {value:+g}" for key, value in found.costs.items() if value]
     costs.append(f"worst residual sway {mm(expected)}, {mm(designed)} where it was designed for")
     rows = [
-        ("asked for", _values(found.asked)),
-        ("nearest", f"{_values(found.used)} (case {found.row['case']})"),
+        ("asked for", ", ".join(named(found.asked))),
+        ("nearest", f"{', '.join(named(found.used))} (case {found.row['case']})"),
         ("costs", "; ".join(costs)),
         ("check", _verdict(found.judgement.check)),
         *(("passed over", f"case {case}: {reason}") for case, reason in found.passed_over.items()),
@@ -228,12 +228,6 @@ def library(written: Library) -> str:
         ("", f"{written.index} tells which is which"),
     ]
     return _block(written.path.stem, rows)
-
-
-def _values(values: Mapping[str, Any]) -> str:
-    return ", ".join(
-        f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in values.items()
-    )
 
 
 def _example(reason: str | None) -> str:

@@ -11,10 +11,11 @@ import numpy as np
 
 from gen_profile.check import Check, Scenario
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.manifest import FILENAME, Manifest, parse_manifest, sha256
+from gen_profile.manifest import FILENAME, Manifest, sha256
 from gen_profile.profile import SampledProfile
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import spec_from_dict
+from gen_profile.workflows.delivered import manifest_beside, read_artefact
 from gen_profile.workflows.foreign_check import judge_foreign
 from gen_profile.workflows.monte_carlo import Progress, with_further
 from gen_profile.workflows.scenarios import further_scenarios, scenarios
@@ -92,9 +93,9 @@ def check_artefact(
         The file is damaged.
     CosimulationError
     """
-    content = _read(path)
+    content = read_artefact(path)
     format_ = format_of(path)
-    manifest = _manifest_beside(path, content)
+    manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
     if spec is None:
         spec = _spec_of(manifest, path)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
@@ -102,16 +103,9 @@ def check_artefact(
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     check = _verdict(spec, setpoints, _rows(spec, row), on_build, progress)
-    check = attrs.evolve(check, strict=strict)
-    faults = check.faults
-    if standing == "differs":
-        faults += (
-            f"{path.name} is none of the files that {FILENAME} beside it lists: "
-            "it was altered after its export; export it again.",
-        )
-    return Judgement(
-        path=path, format=format_, spec=spec, check=attrs.evolve(check, faults=faults), manifest=standing
-    )
+    faults = (*check.faults, *_alterations(path, standing))
+    check = attrs.evolve(check, strict=strict, faults=faults)
+    return Judgement(path=path, format=format_, spec=spec, check=check, manifest=standing)
 
 
 def _rows(spec: Spec, row: int | None) -> tuple[Scenario, ...]:
@@ -174,20 +168,6 @@ def _every_other(setpoints: SampledProfile) -> SampledProfile:
     )
 
 
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise OutputError(f"Cannot read {path}: {error.strerror or error}.") from error
-
-
-def _manifest_beside(path: Path, content: bytes) -> Manifest | None:
-    beside = path.parent / FILENAME
-    if not beside.is_file():
-        return None
-    return parse_manifest(_read(beside), str(beside)).covering(path.name, sha256(content))
-
-
 def _spec_of(manifest: Manifest | None, path: Path) -> Spec:
     if manifest is None:
         raise OutputError(
@@ -206,3 +186,13 @@ def _provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
     if sha256(content) in {artefact.sha256 for artefact in manifest.artefacts}:
         return "matches"
     return "differs"
+
+
+def _alterations(path: Path, standing: str) -> tuple[str, ...]:
+    """Say that a file is none of those that were exported."""
+    if standing != "differs":
+        return ()
+    return (
+        f"{path.name} is none of the files that {FILENAME} beside it lists: it was altered after its export; "
+        "export it again.",
+    )

@@ -15,6 +15,7 @@ from gen_profile.workflows.delivery import staged
 from gen_profile.workflows.sweep_case import PASSED
 from gen_profile.workflows.sweep_store import grid_of, read_swept
 from gen_profile.workflows.sweep_table import Table, read_table
+from gen_profile.workflows.wording import named
 from gen_profile_exporters.exporter import Target, target_of
 from gen_profile_exporters.profile_library import LibraryEntry, library_text, read_library
 from gen_profile_exporters.structured_text import block_name
@@ -78,13 +79,11 @@ def write_library(folder: Path, path: Path) -> Library:
     profiles: list[dict[str, Any]] = []
     entries, target = [], None
     for row in _passed(read_table(folder)):
-        artefact = next((one for one in row["artefacts"] if one["format"] == FORMAT), None)
-        if artefact is None:
-            raise SpecError("A library needs the cases' PLC blocks: sweep again with --export plc.")
+        artefact = _block_of(row)
         content = read_swept(folder / row["folder"] / artefact["path"], artefact["sha256"])
         target = target or _target(folder / row["folder"])
         values = {key: row[key] for key in keys}
-        entries.append(LibraryEntry(text=content.decode("ascii"), label=_label(values)))
+        entries.append(LibraryEntry(text=content.decode("ascii"), label="  ".join(named(values))))
         profiles.append(
             {
                 "number": len(profiles),
@@ -100,8 +99,7 @@ def write_library(folder: Path, path: Path) -> Library:
             f"No case of the sweep in {folder} passed, so there is nothing to put into a library."
         )
     text = library_text(path.stem, entries)
-    index = path.with_suffix(".json")
-    block = block_name(path.stem)
+    index, block = path.with_suffix(".json"), block_name(path.stem)
     with staged(path.parent) as staging:
         written = staging.write(path.name, text.encode("ascii"))
         _require_same(written, target, profiles)
@@ -119,11 +117,11 @@ def _target(case: Path) -> Target:
     return target_of(spec_from_dict(parse_manifest(read_swept(path), str(path)).spec, case))
 
 
-def _label(values: dict[str, Any]) -> str:
-    """Write what a profile is for, as the block's comment takes it."""
-    return "  ".join(
-        f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in values.items()
-    )
+def _block_of(row: dict[str, Any]) -> dict[str, Any]:
+    found: list[dict[str, Any]] = [artefact for artefact in row["artefacts"] if artefact["format"] == FORMAT]
+    if not found:
+        raise SpecError("A library needs the cases' PLC blocks: sweep again with --export plc.")
+    return found[0]
 
 
 def _require_same(written: bytes, target: Target, profiles: list[dict[str, Any]]) -> None:

@@ -172,36 +172,31 @@ def compare_measured(
     plant, loads = spec.machine(), spec.machine().loads
     sways = {**_sways_of_angles(spec, move, q_a), **move.sways}
 
-    def signal(measured: Array, planned: Array, unit: str) -> Signal:
-        return Signal(times=move.times, measured=measured, planned=planned, unit=unit)
-
+    swung = _signals(move.times, sways, responses[0].sway, dict.fromkeys(loads, "m"))
+    units = {axis.name: axis.unit for axis in plant.actuated}
     return Measured(
         log=move,
         start=start,
         arrival=arrival,
-        positions={
-            axis.name: signal(move.positions[axis.name], q_a[:, column], axis.unit)
-            for column, axis in enumerate(plant.actuated)
-            if axis.name in move.positions
-        },
+        positions=_signals(move.times, move.positions, q_a, units),
         sways={
-            load: _sway(
-                spec,
-                load,
-                signal(sways[load], responses[0].sway[:, column], "m"),
-                arrival=arrival,
-                from_angles=load not in move.sways,
-            )
-            for column, load in enumerate(loads)
-            if load in sways
+            load: _sway(spec, load, signal, arrival=arrival, from_angles=load not in move.sways)
+            for load, signal in swung.items()
         },
-        angles={
-            load: signal(move.angles[load], responses[0].angle[:, column], "rad")
-            for column, load in enumerate(loads)
-            if load in move.angles
-        },
+        angles=_signals(move.times, move.angles, responses[0].angle, dict.fromkeys(loads, "rad")),
         nearest=_nearest(move, responses, loads),
     )
+
+
+def _signals(
+    times: Array, measured: Mapping[str, Array], planned: Array, units: Mapping[str, str]
+) -> dict[str, Signal]:
+    """Pair what was measured with its planned column, which has a name and a unit; leave out what was not."""
+    return {
+        name: Signal(times=times, measured=measured[name], planned=planned[:, column], unit=unit)
+        for column, (name, unit) in enumerate(units.items())
+        if name in measured
+    }
 
 
 def _the_move(trial: Trial, log: MeasuredLog, start: float) -> MeasuredLog:

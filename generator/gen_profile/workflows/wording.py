@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from gen_profile.spec import Spec
 
@@ -20,6 +21,14 @@ def number(value: float) -> str:
 def mm(metres: float) -> str:
     """Write a length in mm."""
     return f"{number(1e3 * metres)} mm"
+
+
+def named(values: Mapping[str, object]) -> list[str]:
+    """Write each value behind its name."""
+    return [
+        f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in values.items()
+    ]
 
 
 def bound(metres: float) -> str:
