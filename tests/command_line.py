@@ -15,8 +15,11 @@ from typing import Any
 from unittest.mock import patch
 
 import attrs
+from json_page import require_documented
 
 from gen_profile.cli import main
+from gen_profile.cli.commands import cli
+from gen_profile.cli.group import DEFAULT
 
 PROGRAM = Path(sysconfig.get_path("scripts")) / "gen-profile"
 
@@ -39,7 +42,7 @@ class Outcome:
 
 
 def run_here(*arguments: str | Path) -> Outcome:
-    """Call the entry point in this process, where coverage sees it."""
+    """Call the entry point in this process, where coverage sees it; hold its JSON to the documentation."""
     out, err = (TextIOWrapper(BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     code: Any = 0
@@ -55,7 +58,11 @@ def run_here(*arguments: str | Path) -> Outcome:
         finally:
             for number, handler in handlers.items():
                 signal.signal(number, handler)
-    return Outcome(code or 0, _text(out), _text(err))
+    outcome = Outcome(code or 0, _text(out), _text(err))
+    if "--json" in arguments and outcome.out:
+        command = str(arguments[0])
+        require_documented(command if command in cli.commands else DEFAULT, outcome.document)
+    return outcome
 
 
 def run_process(*arguments: str | Path, cwd: Path | None = None, **environment: str) -> Outcome:
