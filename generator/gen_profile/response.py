@@ -11,18 +11,20 @@ import attrs
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from gen_profile.errors import CosimulationError
+from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.metrics import length, peak
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_column
 from gen_profile.problem.initial_state import initial_state
+from gen_profile.problem.linearization import linearize
 from gen_profile.problem.symbolic import Function
 from gen_profile.profile import Array, Profile
 
 RELATIVE_TOLERANCE = 1e-10
 ABSOLUTE_TOLERANCE = 1e-13
 TRANSIENT_SAMPLES = 4001
+LONGEST = 1e6  # greatest rate of a machine times its time: some hundred thousand steps, and minutes
 AT_REST: Mapping[str, float] = MappingProxyType({})
 
 
@@ -70,6 +72,8 @@ class Swing:
     ------
     CosimulationError
         The integration fails, as when a load is thrown over.
+    InfeasibleProblem
+        It would take too many steps.
     """
 
     def __init__(
@@ -85,6 +89,8 @@ class Swing:
         self._p = p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
         self._shape = shape = (2, len(machines), len(plant.unactuated))
         motion = _motion(profile)
+        for values in machines:
+            _require_pace(plant, values, profile, until)
 
         def rate(t: float, state: Array) -> Array:
             q_u, dq_u = state.reshape(shape)
@@ -184,6 +190,16 @@ def free_swing(
     seen = np.stack([outputs(q, position, p[None])[:, :, 0] for q, p in zip(q_u, machines, strict=True)])
     loads = len(plant.loads)
     return seen[:, :, :loads], seen[:, :, loads:]
+
+
+def _require_pace(plant: Plant, parameters: Mapping[str, float], profile: Profile, until: float) -> None:
+    linear = linearize(plant, parameters, profile.target.tolist())
+    fastest = max(linear.frequencies[-1], np.abs(np.linalg.eigvals(linear.damping)).max())
+    if fastest * until > LONGEST:
+        raise InfeasibleProblem(
+            f"plant: a motion of the {plant.type} changes within {1.0 / fastest:.1g} s, too fast to be "
+            f"followed for {until:.3g} s; look at its stiffness, damping and masses."
+        )
 
 
 @cache
