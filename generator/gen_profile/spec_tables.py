@@ -28,6 +28,7 @@ FILE_KEYS = ("file", "file_sha256")
 DEFAULT_NAME = "profile"
 PLACEHOLDER_DURATION = 1.0  # s, until the shortest duration is found
 LARGEST_ANGLE = 1.4  # rad, of a load at the start
+SHORTEST_MOVE = 1e-12  # m (or rad); squares of what is smaller come near to what floats can hold
 SMALL_SWING = 1e-3  # m (or rad), to compare forces with
 
 
@@ -154,6 +155,8 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
     initial = _initial(table.pop("initial", {}), plant, faults)
     if start == target and not any(speed) and not any(initial.values()):
         faults.add("move.distance", "must not be zero on every axis")
+    if any(0.0 < abs(end - begin) < SHORTEST_MOVE for begin, end in zip(start, target, strict=True)):
+        faults.add("move.distance", f"must be zero, or at least {SHORTEST_MOVE:g} m (or rad)")
     for key, values in (("start", start), ("target", target)):
         for axis, value in zip(plant.actuated if plant else (), values, strict=False):
             if not axis.lower <= value <= axis.upper:
@@ -161,13 +164,21 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
                     f"move.{key}",
                     f"{axis.name} must be from {axis.lower:g} to {axis.upper:g} {axis.unit}, found {value:g}",
                 )
+    duration, shortest = _duration(table, faults)
+    ends = {"start": start, "target": target, "initial": initial, "final_velocity": speed}
+    return {**table, **duration, **ends, "shortest": shortest}
+
+
+def _duration(table: Table, faults: Faults) -> tuple[Table, bool]:
+    """Tell whether the duration is to be found; its place is then held by a number."""
     if "shortest" in table:
         faults.add("move.shortest", 'unknown key; write duration = "minimum"')
-    shortest = table.get("duration") == "minimum"
-    if shortest:
-        table = {**table, "duration": PLACEHOLDER_DURATION}
-    ends = {"start": start, "target": target, "initial": initial, "final_velocity": speed}
-    return {**table, **ends, "shortest": shortest}
+    duration = table.get("duration")
+    if not isinstance(duration, str):
+        return {}, False
+    if duration != "minimum":
+        faults.add("move.duration", f'must be a number of seconds, or "minimum", found {found(duration)}')
+    return {"duration": PLACEHOLDER_DURATION}, duration == "minimum"
 
 
 def _initial(table: Any, plant: Plant | None, faults: Faults) -> Table:

@@ -73,6 +73,7 @@ FAULTS = [
     ("axis.cart.sign", 0, r"axis\.cart\.sign: unknown value, found 0 .known: 1, -1.\."),
     ("axis.cart.sign", True, r"axis\.cart\.sign: unknown value, found true .*"),
     # numbers that are none, or too large, or too small
+    ("move.target", 1e-300, r"move\.distance: must be zero, or at least 1e-12 m .or rad.\."),
     ("plant.m1", -0.2, r"plant\.m1: must be a number from 0\.0001 to 1e\+06 kg, found -0\.2\."),
     ("plant.m1", 0, r"plant\.m1: must be a number .*, found 0\."),
     ("plant.L1", "0.47", r"plant\.L1: must be a number .*, found text '0\.47'\."),
@@ -97,7 +98,11 @@ FAULTS = [
     ("move.duration", 0, r"move\.duration: must be at least 0\.001 and at most 100000, found 0\.0\."),
     ("move.duration", -3.0, r"move\.duration: must be at least .*, found -3\.0\."),
     ("move.duration", float("nan"), r"move\.duration: must be a finite number, found nan\."),
-    ("move.duration", "3 s", r"move\.duration: must be a finite number, found text '3 s'\."),
+    (
+        "move.duration",
+        "3 s",
+        r"move\.duration: must be a number of seconds, or .minimum., found text '3 s'\.",
+    ),
     ("move.duration", [3.0], r"move\.duration: must be a finite number, found an array\."),
     (
         "move.duration",
