@@ -28,6 +28,11 @@ PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7
 Dash = Literal["solid", "dash", "dot"]
 
 
+def ceiling(highest: float, limit: float) -> float:
+    """Choose where an axis ends that shows values up to the highest beside their limit."""
+    return max(min(1.05 * highest, HEADROOM * limit), 1.2 * limit)
+
+
 @attrs.frozen(kw_only=True)
 class Style:
     """How a curve looks.

@@ -9,17 +9,15 @@ from typing import Any
 import numpy as np
 
 from gen_profile.errors import OutputError
-from gen_profile.problem.linearization import linearize
-from gen_profile.profile import Array, Profile
+from gen_profile.profile import Array
+from gen_profile.report.figures import HEADROOM
 from gen_profile.workflows.compare import Comparison, Row
 from gen_profile.workflows.picture import picture
+from gen_profile.workflows.spectrum import DECADES, natural_frequencies, spectrum
 
 SAMPLES = 1500
 AFTERMATH = 0.5  # of the move's duration, shown after its end
 FREQUENCIES = 600
-BEYOND = 1.6  # of the fastest mode's frequency, where the spectrum ends
-DECADES = 4.0  # of the spectrum that are shown
-HEADROOM = 3.0  # bars of residuals end at so many limits, lest the worst method hide the others
 ORDERS = ("position ({})", "velocity ({}/s)", "acceleration ({}/s²)", "jerk ({}/s³)")
 
 Styles = Mapping[str, Mapping[str, Any]]
@@ -82,50 +80,24 @@ def _reference(axes: Any, comparison: Comparison, styles: Styles) -> None:
 
 def _spectrum(axis: Any, comparison: Comparison, styles: Styles) -> None:
     """Draw the spectrum of the acceleration, and where the machines' natural frequencies lie (figure 3)."""
-    spec, (nominal, *others) = comparison.spec, comparison.rows[0].trial.machines
-    plant, target = spec.machine(), spec.move.target
-    natural = linearize(plant, nominal.parameters, target).distinct_frequencies
-    everywhere = np.array([linearize(plant, m.parameters, target).frequencies for m in (nominal, *others)])
-    frequencies = np.linspace(0.0, BEYOND * everywhere.max(), FREQUENCIES)
+    natural = natural_frequencies(comparison.spec, comparison.rows[0].trial.machines)
+    frequencies = natural.span(FREQUENCIES)
     highest = 0.0
     for row in comparison.rows:
         magnitude = spectrum(row.trial.motion, frequencies)
         highest = max(highest, float(magnitude.max()))
         axis.semilogy(frequencies, magnitude, **styles[row.method])
-    for low, high in zip(everywhere.min(axis=0), everywhere.max(axis=0), strict=True):
+    for low, high in zip(natural.lowest, natural.highest, strict=True):
         axis.axvspan(low, high, color="0.88", zorder=0)
-    for frequency in natural:
+    for frequency in natural.nominal:
         axis.axvline(frequency, color="0.4", linewidth=0.8, zorder=1)
-    first = plant.actuated[0]
+    first = comparison.spec.machine().actuated[0]
     axis.set(
         xlabel="frequency (rad/s); natural ones marked, with their ranges",
         ylabel=f"spectrum of the acceleration ({first.unit}/s)",
         ylim=(highest * 10.0**-DECADES, 1.5 * highest),
     )
     _dress(axis)
-
-
-def spectrum(motion: Profile, frequencies: Array) -> Array:
-    """Find |∫ ÿ exp(−jωt) dt| of the first axis, by a quadrature that is exact to rounding within segments.
-
-    Parameters
-    ----------
-    motion : Profile
-    frequencies : (k,) array
-        rad/s.
-
-    Returns
-    -------
-    (k,) array
-        m/s (or rad/s).
-    """
-    lengths = np.diff(motion.knots)
-    # Gauss points resolve the segment's polynomial, and half an oscillation with three each
-    points = motion.coefficients.shape[1] + 4 + int(3.0 * lengths.max() * frequencies.max() / np.pi)
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    times = (motion.knots[:-1, None] + lengths[:, None] * (nodes + 1.0) / 2.0).ravel()
-    weighted = motion.derivative(times, 2)[:, 0] * np.multiply.outer(lengths / 2.0, weights).ravel()
-    return np.asarray(np.abs(np.exp(-1j * np.multiply.outer(frequencies, times)) @ weighted))
 
 
 def _sway(axes: Any, comparison: Comparison, styles: Styles) -> None:

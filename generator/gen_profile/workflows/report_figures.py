@@ -8,14 +8,13 @@ import attrs
 import numpy as np
 
 from gen_profile.metrics import length, peak
-from gen_profile.problem.linearization import linearize
 from gen_profile.profile import Array, Profile
 from gen_profile.report.figures import PALETTE, PLAIN, Band, Dash, Figure, Level, Line, Panel, Style
 from gen_profile.response import Response
 from gen_profile.spec import Spec
 from gen_profile.workflows.compare import Comparison, Row
-from gen_profile.workflows.comparison_plot import BEYOND, DECADES, spectrum
 from gen_profile.workflows.planning import RESIDUAL_SAMPLES, Trial
+from gen_profile.workflows.spectrum import DECADES, natural_frequencies, spectrum
 from gen_profile.workflows.wording import machine
 
 SAMPLES = 800
@@ -227,22 +226,20 @@ def _limits(spec: Spec, column: int, order: int, near: float) -> Iterator[Level]
 
 
 def _spectrum(spec: Spec, trial: Trial, motions: Mapping[str, Profile], styles: Mapping[str, Style]) -> Panel:
-    plant, target = spec.machine(), spec.move.target
-    natural = linearize(plant, trial.machines[0].parameters, target).distinct_frequencies
-    everywhere = np.array([linearize(plant, m.parameters, target).frequencies for m in trial.machines])
-    frequencies = np.linspace(0.0, BEYOND * everywhere.max(), FREQUENCIES)
-    ranges = zip(everywhere.min(axis=0).tolist(), everywhere.max(axis=0).tolist(), strict=True)
+    first, natural = spec.machine().actuated[0], natural_frequencies(spec, trial.machines)
+    frequencies = natural.span(FREQUENCIES)
+    ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
     return Panel(
-        title=f"Spectrum of the acceleration of {plant.actuated[0].name}",
+        title=f"Spectrum of the acceleration of {first.name}",
         x_label="frequency (rad/s)",
-        y_label=f"magnitude ({plant.actuated[0].unit}/s)",
+        y_label=f"magnitude ({first.unit}/s)",
         lines=[
             Line(name=name, x=frequencies, y=spectrum(motion, frequencies), style=styles[name])
             for name, motion in motions.items()
         ],
         bands=[
             *(Band(low=low, high=high) for low, high in ranges if high > low),
-            *(Band(low=frequency, high=frequency) for frequency in natural.tolist()),
+            *(Band(low=frequency, high=frequency) for frequency in natural.nominal.tolist()),
         ],
         decades=DECADES,
     )

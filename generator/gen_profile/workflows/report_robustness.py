@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from gen_profile.profile import Profile
 from gen_profile.report.content import Section
-from gen_profile.report.figures import HEADROOM, Band, Figure, Level, Line, Map, Panel, Style
+from gen_profile.report.figures import Band, Figure, Level, Line, Map, Panel, Style, ceiling
 from gen_profile.spec import Spec
 from gen_profile.workflows.robustness import Robustness, error_grid, robustness_of
 
@@ -103,5 +103,5 @@ def _panel(name: str, found: Robustness, styles: Mapping[str, Style]) -> Panel:
         lines=lines,
         levels=[Level(value=limit)],
         bands=[Band(low=-stated, high=stated)],
-        ceiling=max(min(1.05 * max(float(line.y.max()) for line in lines), HEADROOM * limit), 1.2 * limit),
+        ceiling=ceiling(max(float(line.y.max()) for line in lines), limit),
     )

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from gen_profile.errors import OutputError
+from gen_profile.report.figures import HEADROOM, ceiling
 from gen_profile.workflows.comparison_plot import styles
 from gen_profile.workflows.picture import picture
 from gen_profile.workflows.robustness import Robustness
 
-HEADROOM = 3.0  # limits of residual sway that are shown, lest the worst method hide the others
 LEVELS = 13
 COLUMNS = 4  # of maps
 
@@ -60,7 +60,7 @@ def _curves(axis: Any, found: Robustness) -> None:
         xlabel=_label(found, name),
         ylabel=f"residual sway of the {found.spec.machine().loads[-1]} (mm)",
         xlim=(100.0 * errors[0], 100.0 * errors[-1]),
-        ylim=(0.0, max(min(1.05e3 * highest, HEADROOM * limit), 1.2 * limit)),
+        ylim=(0.0, ceiling(1e3 * highest, limit)),
     )
     axis.grid(alpha=0.3)
     axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize="small")
