@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from html import escape
 
 import numpy as np
@@ -15,6 +16,7 @@ from gen_profile_fmu.plant_variables import InputKind, Machine
 from gen_profile_fmu.variables import VariableTable
 
 _WIDTH, _HEIGHT, _SAMPLES = 640.0, 220.0, 321
+_FLAT = 1e-12  # what moves by less is drawn as a line
 _COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b")
 _INPUTS = {
     InputKind.ACCELERATION: "The axes have the accelerations of the inputs at once. In co-simulation, "
@@ -40,7 +42,7 @@ _BEGINNING = (
 def plant_page(name: str, machine: Machine, table: VariableTable, kind: InputKind) -> str:
     """Describe a plant with inputs, in HTML; its picture is the swing after a quick push."""
     parts = (
-        f"<p>{escape(machine.plant.summary)}.</p>",
+        f"<p>{_capital(machine.plant.summary)}.</p>",
         _equations(machine.plant),
         f"<h2>Drives</h2><p>{_INPUTS[kind]}</p>",
         _ERROR,
@@ -65,7 +67,7 @@ def motion_page(name: str, axes: Sequence[Coordinate], profile: Profile, table: 
 def system_page(name: str, machine: Machine, command: Profile, table: VariableTable) -> str:
     """Describe a plant that follows a motion, in HTML."""
     parts = (
-        f"<p>{escape(machine.plant.summary)}, whose drives follow a motion, behind a first-order lag where "
+        f"<p>{_capital(machine.plant.summary)}, whose drives follow a motion, behind a first-order lag where "
         f"τ &gt; 0. {_BEGINNING}</p>",
         _equations(machine.plant),
         _ERROR,
@@ -80,13 +82,18 @@ def system_page(name: str, machine: Machine, command: Profile, table: VariableTa
 
 def _page(title: str, parts: Iterable[str]) -> str:
     style = (
-        "body{font-family:sans-serif;max-width:50em;margin:2em auto} td,th{padding:0 1em 0 0;text-align:left}"
+        "body{font-family:sans-serif;max-width:60em;margin:2em auto} svg{display:block;margin:1em 0} "
+        "td,th{padding:0 1em 0 0;text-align:left;vertical-align:top}"
     )
     body = "\n".join(parts)
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{escape(title)}</title>'
         f"<style>{style}</style></head>\n<body>\n<h1>{escape(title)}</h1>\n{body}\n</body>\n</html>\n"
     )
+
+
+def _capital(words: str) -> str:
+    return escape(words[:1].upper() + words[1:])
 
 
 def _equations(plant: Plant) -> str:
@@ -127,29 +134,55 @@ def _sway_plot(machine: Machine, profile: Profile, until: float) -> str:
 
 
 def _motion_plots(axes: Sequence[Coordinate], profile: Profile) -> str:
+    """Draw position, velocity and acceleration; axes that are measured alike share a picture."""
     times = np.linspace(0.0, profile.duration, _SAMPLES)
-    names = [axis.name for axis in axes]
-    words = ("position", "velocity", "acceleration")
-    return "\n".join(
-        _plot(times, profile.derivative(times, order), names, word) for order, word in enumerate(words)
-    )
+    plots = []
+    for unit in dict.fromkeys(axis.unit for axis in axes):
+        alike = [index for index, axis in enumerate(axes) if axis.unit == unit]
+        for order, title in enumerate(
+            (f"position in {unit}", f"velocity in {unit}/s", f"acceleration in {unit}/s²")
+        ):
+            columns = profile.derivative(times, order)[:, alike]
+            plots.append(_plot(times, columns, [axes[index].name for index in alike], title))
+    return "\n".join(plots)
 
 
 def _plot(times: Array, columns: Array, names: Sequence[str], title: str) -> str:
     """Draw curves over time as SVG; coordinates are rounded, so that computers agree on the bytes."""
     low, high = float(columns.min()), float(columns.max())
-    span = (high - low) or 1.0
-    x = 10.0 + (_WIDTH - 20.0) * times / times[-1]
-    curves = []
+    if high - low < _FLAT:
+        low, high = low - 1.0, high + 1.0
+    left, right, top, bottom = 60.0, _WIDTH - 25.0, 25.0, _HEIGHT - 25.0
+
+    def x(time: Array) -> Array:
+        return left + (right - left) * time / float(times[-1])
+
+    def y(value: Array) -> Array:
+        return bottom - (bottom - top) * (value - low) / (high - low)
+
+    parts = [f'<text x="{left:g}" y="15">{escape(title)}</text>']
+    for value, at in _ticks(low, high, y):
+        parts.append(f'<path stroke="#ddd" d="M{left:g} {at}H{right:g}"/>')
+        parts.append(f'<text x="{left - 6:g}" y="{at}" dy="4" text-anchor="end">{value}</text>')
+    for value, at in _ticks(0.0, float(times[-1]), x):
+        parts.append(f'<path stroke="#ddd" d="M{at} {top:g}V{bottom:g}"/>')
+        parts.append(f'<text x="{at}" y="{bottom + 16:g}" text-anchor="middle">{value} s</text>')
     for index, (name, column) in enumerate(zip(names, columns.T, strict=True)):
-        y = _HEIGHT - 25.0 - (_HEIGHT - 50.0) * (column - low) / span
         colour = _COLOURS[index % len(_COLOURS)]
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-        curves.append(f'<polyline fill="none" stroke="{colour}" points="{points}"/>')
-        curves.append(f'<text x="{200 + 110 * index}" y="15" fill="{colour}">{escape(name)}</text>')
-    caption = f"{title}: {low:.3g} to {high:.3g}; 0 to {times[-1]:g} s"
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x(times), y(column), strict=True))
+        parts.append(f'<polyline fill="none" stroke="{colour}" stroke-width="1.5" points="{points}"/>')
+        parts.append(f'<text x="{left + 190 + 110 * index:g}" y="15" fill="{colour}">{escape(name)}</text>')
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_WIDTH:g}" height="{_HEIGHT:g}" font-size="12">'
-        f'<text x="10" y="15">{escape(title)}</text>{"".join(curves)}'
-        f'<text x="10" y="{_HEIGHT - 5:g}">{escape(caption)}</text></svg>'
+        f"{''.join(parts)}</svg>"
     )
+
+
+def _ticks(low: float, high: float, place: Callable[[Array], Array]) -> list[tuple[str, str]]:
+    """List round values between two ends, at most seven, and where they are."""
+    coarse = (high - low) / 6.0
+    power = 10.0 ** math.floor(math.log10(coarse))
+    step = next(power * factor for factor in (1.0, 2.0, 5.0, 10.0) if power * factor >= coarse * (1.0 - 1e-9))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    values = np.array([step * number for number in range(first, last + 1)])
+    return [(f"{value:.6g}", f"{at:.1f}") for value, at in zip(values, place(values), strict=True)]

@@ -3,6 +3,7 @@
 import html
 import importlib
 import io
+import re
 import subprocess
 import zipfile
 from pathlib import Path
@@ -201,6 +202,22 @@ def test_two_source_fmus_link_into_one_program(version, tmp_path):
 def _symbols(path):
     done = subprocess.run([program("nm", "binutils"), str(path)], capture_output=True, text=True, check=True)
     return done.stdout.splitlines()
+
+
+def test_pictures_have_one_unit_each_and_round_ticks():
+    model = model_of("system", find_plant("tower-crane"))
+    pictures = re.findall("<svg.*?</svg>", model.page())
+    assert [re.findall(">([a-z]+ in [^<]+)<", picture) for picture in pictures] == [
+        [f"{quantity} in {unit}{per}"]
+        for unit in ("rad", "m")
+        for quantity, per in (("position", ""), ("velocity", "/s"), ("acceleration", "/s²"))
+    ] + [["sway in m"]]
+    for picture in pictures:
+        axis = [float(tick) for tick in re.findall(r'anchor="end">([^<]+)<', picture)]
+        assert 2 <= len(axis) <= 7
+        step = np.diff(axis)
+        np.testing.assert_allclose(step, step[0], rtol=1e-6)
+        assert f"{step[0]:.0e}"[0] in "125"
 
 
 def test_fmus_are_complete_and_reproducible(version):
