@@ -6,7 +6,7 @@ import click
 import pytest
 from json_page import PAGE, documented, require_documented
 
-from gen_profile.cli import commands
+from gen_profile.cli import commands, outcome
 from gen_profile.errors import GenProfileError
 
 TEXT = PAGE.read_text("utf-8")
@@ -56,7 +56,7 @@ def test_shared_options_are_told_once():
 def test_every_exit_code_is_told():
     told = {int(code) for code in re.findall(r"^\| (\d+) \|", section("Exit codes"), flags=re.MULTILINE)}
     kinds = [GenProfileError, *GenProfileError.__subclasses__()]
-    assert told == {0, *(kind.exit_code for kind in kinds), commands.INTERRUPTED}
+    assert told == {0, *(kind.exit_code for kind in kinds), outcome.INTERRUPTED}
 
 
 def test_every_command_s_document_is_told():

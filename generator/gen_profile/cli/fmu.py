@@ -6,7 +6,9 @@ from pathlib import Path
 
 import click
 
-from gen_profile.cli.commands import chosen_spec, cli, debug_option, json_option, print_outcome, spec_options
+from gen_profile.cli.commands import cli
+from gen_profile.cli.options import chosen_spec, debug_option, json_option, spec_options
+from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
 # spelled out here because --help must not wait for CasADi; a test holds them against the workflow's

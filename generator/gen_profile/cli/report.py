@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import click
 
-from gen_profile.cli.commands import (
-    chosen_spec,
-    cli,
-    debug_option,
-    export_option,
-    json_option,
-    print_outcome,
-    spec_options,
-)
-from gen_profile.errors import CheckFailed
+from gen_profile.cli.commands import cli
+from gen_profile.cli.options import chosen_spec, debug_option, export_option, json_option, spec_options
+from gen_profile.cli.outcome import fail, print_outcome
 
 
 @cli.command(epilog="Example: gen-profile report crane.toml --out crane.html")
@@ -69,8 +61,5 @@ def report(
         made = run(spec, formats, log=log, log_start=log_start, compared=not no_compare, progress=tell)
         deliver(out, made.content)
     print_outcome(made.to_dict(out), words.report(made, out), as_json)
-    faults = made.faults()
-    for sentence in faults:
-        click.echo(f"Check failed: {sentence}", err=True)
-    if faults:
-        sys.exit(CheckFailed.exit_code)
+    if faults := made.faults():
+        fail(faults)

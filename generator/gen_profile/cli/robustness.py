@@ -6,15 +6,9 @@ from pathlib import Path
 
 import click
 
-from gen_profile.cli.commands import (
-    chosen_spec,
-    cli,
-    debug_option,
-    json_option,
-    plot_option,
-    print_outcome,
-    spec_options,
-)
+from gen_profile.cli.commands import cli
+from gen_profile.cli.options import chosen_spec, debug_option, json_option, plot_option, spec_options
+from gen_profile.cli.outcome import print_outcome
 
 
 @cli.command(epilog="Example: gen-profile robustness crane.toml --parameter L1 --plot robustness.png")

@@ -10,15 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gen_profile.cli.commands import (
-    as_overrides,
-    chosen_spec,
-    cli,
-    debug_option,
-    json_option,
-    print_outcome,
-    spec_options,
-)
+from gen_profile.cli.commands import cli
+from gen_profile.cli.options import as_overrides, chosen_spec, debug_option, json_option, spec_options
+from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError, StreamAborted
 
 if TYPE_CHECKING:

@@ -6,15 +6,9 @@ from pathlib import Path
 
 import click
 
-from gen_profile.cli.commands import (
-    chosen_text,
-    cli,
-    debug_option,
-    export_option,
-    json_option,
-    print_outcome,
-    spec_options,
-)
+from gen_profile.cli.commands import cli
+from gen_profile.cli.options import chosen_text, debug_option, export_option, json_option, spec_options
+from gen_profile.cli.outcome import print_outcome
 
 
 @cli.command(

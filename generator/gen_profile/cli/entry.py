@@ -1,0 +1,57 @@
+"""The entry point: streams, signals, and whatever a command ends in."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from io import TextIOWrapper
+
+import click
+
+from gen_profile.cli.commands import cli
+from gen_profile.cli.outcome import print_error
+
+
+def main() -> None:
+    """Run the command line; the entry point."""
+    _open_streams()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal may lack β
+    interruptions = _interruptible()
+    debug, as_json = "--debug" in sys.argv, "--json" in sys.argv
+    if debug:
+        import logging
+
+        logging.basicConfig(level=logging.DEBUG, format="%(name)s: %(message)s")
+    try:
+        sys.exit(cli.main(prog_name="gen-profile", standalone_mode=False))
+    except Exception as error:
+        if debug:
+            raise
+        # what is interrupted while compiled code runs may end in an error of that code's own
+        sys.exit(print_error(click.Abort() if interruptions else error, as_json))
+
+
+def _open_streams() -> None:
+    """Lead streams that the caller closed nowhere, lest a file that is opened gets their number."""
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(number)
+    sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8")
+    sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8")
+
+
+def _interruptible() -> list[int]:
+    """Clean up on SIGTERM as on Ctrl-C; list the signals that come."""
+    signals: list[int] = []
+
+    def interrupt(number: int, _frame: object) -> None:
+        signals.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # and not ignored, as in the background
+        signal.signal(signal.SIGINT, interrupt)
+    return signals

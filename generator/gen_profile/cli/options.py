@@ -1,0 +1,117 @@
+"""What several commands take, and the spec that comes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+from click.shell_completion import CompletionItem
+
+from gen_profile.errors import OutputError, SpecError
+
+if TYPE_CHECKING:
+    from gen_profile.spec import Spec
+
+DEFAULT_PRESET = "paper"
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def _complete_formats(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    from gen_profile_exporters.registry import formats
+
+    return [
+        CompletionItem(name, help=known.summary)
+        for name, known in formats().items()
+        if name.startswith(incomplete)
+    ]
+
+
+def _complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    from gen_profile.spec_reading import presets
+
+    return [
+        CompletionItem(name, help=text) for name, text in presets().items() if name.startswith(incomplete)
+    ]
+
+
+def spec_options(command: Command) -> Command:
+    """Add what every command that takes a spec takes."""
+    for decorate in (
+        click.option(
+            "--set",
+            "overrides",
+            metavar="KEY=VALUE",
+            multiple=True,
+            help="Override a key of the spec, such as plant.L1=0.5. Repeatable.",
+        ),
+        click.option(
+            "--preset",
+            metavar="NAME",
+            shell_complete=_complete_presets,
+            help="Use a built-in spec (see gen-profile presets).",
+        ),
+        click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=click.Path(path_type=Path)),
+    ):
+        command = decorate(command)
+    return command
+
+
+def export_option(what: str) -> Callable[[Command], Command]:
+    """Add the choice of formats, and say what becomes of each."""
+    return click.option(
+        "--export",
+        "formats",
+        metavar="FORMAT",
+        multiple=True,
+        default=("csv",),
+        shell_complete=_complete_formats,
+        help=f"{what} (see gen-profile formats). Repeatable; csv by default.",
+    )
+
+
+plot_option = click.option(
+    "--plot",
+    "picture",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Draw it (png, svg or pdf).",
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
+debug_option = click.option(
+    "--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."
+)
+
+
+def as_overrides(values: Mapping[str, object]) -> tuple[str, ...]:
+    """Write options that stand for keys of the spec as --set would; None is for one that was not given."""
+    return tuple(f"{key}={value}" for key, value in values.items() if value is not None)
+
+
+def chosen_spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
+    """Read the spec that the command line names, or the default preset."""
+    from gen_profile.spec_reading import parse_spec
+
+    text, source, folder = chosen_text(path, preset)
+    return parse_spec(text, overrides, source, folder)
+
+
+def chosen_text(path: Path | None, preset: str | None) -> tuple[str, str, Path]:
+    """Read the text of that spec; also give its source, and the folder that its files are relative to."""
+    from gen_profile.spec_reading import HERE, preset_text, read_text
+
+    if path is not None and preset is not None:
+        raise SpecError("--preset: name either a spec file or a preset, not both.")
+    if path is None:
+        name = preset or DEFAULT_PRESET
+        return preset_text(name), name, HERE
+    try:
+        return read_text(path), str(path), path.parent
+    except OutputError as error:
+        root = click.get_current_context().find_root().command
+        if isinstance(root, click.Group) and str(path) in root.commands:
+            meant = f"a command comes before its options: gen-profile {path} …"
+            raise OutputError(f"{str(error).rstrip('.')}; {meant}") from error
+        raise

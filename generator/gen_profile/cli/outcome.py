@@ -1,0 +1,73 @@
+"""Outcomes and errors, for people and for programs."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from gen_profile.errors import CheckFailed, GenProfileError, OutputError
+
+if TYPE_CHECKING:
+    from gen_profile.check import Check
+
+INTERRUPTED = 128 + signal.SIGINT  # as shells count it
+
+
+def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
+    """Print an outcome for people, or for programs.
+
+    Raises
+    ------
+    OutputError
+        stdout does not take it, as on a full disk.
+    """
+    try:
+        click.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else text)
+    except BrokenPipeError:  # a reader that left early, which click knows
+        raise
+    except OSError as error:
+        raise OutputError(f"Cannot print the outcome: {error.strerror}.") from error
+
+
+def warn(check: Check | None) -> None:
+    """Say what fails without counting."""
+    for sentence in () if check is None else check.warnings():
+        click.echo(f"Beware: {sentence}", err=True)
+
+
+def fail(reasons: Sequence[str], consequence: str = "") -> NoReturn:
+    """Say why a check failed and what follows from that, and end the program."""
+    for sentence in reasons:
+        click.echo(f"Check failed: {sentence}", err=True)
+    if consequence:
+        click.echo(consequence, err=True)
+    sys.exit(CheckFailed.exit_code)
+
+
+def print_error(error: Exception, as_json: bool) -> int:
+    """Tell an error in sentences, and in JSON where that was asked for; return its exit code."""
+    match error:
+        case GenProfileError():
+            code, message = error.exit_code, str(error)
+        case click.ClickException():
+            code, message = error.exit_code, error.format_message()
+        case click.Abort():
+            code, message = INTERRUPTED, "Interrupted."
+        case _:
+            code, message = 1, f"Internal error ({type(error).__name__}: {error}). Run again with --debug."
+    if as_json:
+        document = {"error": {"type": type(error).__name__, "message": message, "exit_code": code}}
+        with suppress(OSError):  # the error may be that stdout takes nothing
+            click.echo(json.dumps(document, indent=2))
+    if isinstance(error, click.ClickException):
+        error.show()
+    else:
+        for line in message.splitlines():
+            click.echo(f"Error: {line}", err=True)
+    return code
