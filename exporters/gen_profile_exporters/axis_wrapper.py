@@ -17,17 +17,13 @@ HEADER = """\
 """
 BODY = """\
 {prepare}
-fbMotion(bExecute := bExecute AND bReady, bAbort := bAbort, bHold := bHold, rOverride := rOverride,
-    fCycleTime := fCycleTime, fActPosition := {actual});
+fbMotion(
+    {arguments});
 bGuided := fbMotion.bBusy OR fbMotion.bDone OR fbMotion.bAborted;
 {feed}
-bBusy := fbMotion.bBusy;
-bDone := fbMotion.bDone;
-bAborted := fbMotion.bAborted;
-bError := fbMotion.bError;
-nErrorId := fbMotion.nErrorId;
-bOffNominal := fbMotion.bOffNominal;
+{results}
 """
+ACTUAL = "fActPosition"  # the only input of the playback block that comes from the axes
 
 
 @attrs.frozen(kw_only=True)
@@ -100,49 +96,38 @@ fbInPosition{n}(Axis := Axis{n}, Enable := bGuided, Position := fbMotion.fPositi
 )
 
 
-def axis_wrapper(block: str, axes: int, library: MotionLibrary) -> BlockSource:
-    """Write the block around a playback block of that name."""
+def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> BlockSource:
+    """Write the block around a playback block, with the same inputs and flags."""
+    inputs = [v for v in block.variables if v.section == "VAR_INPUT" and v.name != ACTUAL]
+    flags = [v for v in block.variables if v.section == "VAR_OUTPUT" and v.type in {"BOOL", "INT"}]
     numbers = [(str(n), f"[{n}]") for n in range(1, axes + 1)] if axes > 1 else [("", "")]
-    variables = [Variable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type) for n, _ in numbers]
-    variables += _interface()
-    variables.append(Variable(section="VAR", name="fbMotion", type=block))
-    variables += [
-        Variable(section="VAR", name=f"{name}{n}", type=type_)
-        for n, _ in numbers
-        for name, type_ in library.instances.items()
-    ]
+    own = {"bReady": "BOOL", "bGuided": "BOOL", "fbMotion": block.name}
+    own |= {f"{name}{n}": type_ for n, _ in numbers for name, type_ in library.instances.items()}
     prepare, feed = (
         "\n".join(text.format(n=n, i=i) for n, i in numbers) for text in (library.prepare, library.feed)
     )
     if axes > 1:
-        variables.append(Variable(section="VAR", name="fActual", type=f"ARRAY [1..{axes}] OF LREAL"))
+        own["fActual"] = f"ARRAY [1..{axes}] OF LREAL"
         prepare += "".join(f"\nfActual{i} := {library.actual.format(n=n)};" for n, i in numbers)
-    actual = library.actual.format(n="") if axes == 1 else "fActual"
-    name = f"{block}_Axis"
+    given = {v.name: v.name for v in inputs}
+    given |= {
+        "bExecute": "bExecute AND bReady",
+        ACTUAL: library.actual.format(n="") if axes == 1 else "fActual",
+    }
+    name = f"{block.name}_Axis"
     return BlockSource(
-        header=HEADER.format(name=name, block=block),
+        header=HEADER.format(name=name, block=block.name),
         name=name,
-        variables=tuple(variables),
-        body=BODY.format(prepare=f"bReady := TRUE;\n{prepare.lstrip()}".rstrip(), feed=feed, actual=actual),
-    )
-
-
-def _interface() -> list[Variable]:
-    inputs = [
-        ("bExecute", "BOOL", ""),
-        ("bAbort", "BOOL", ""),
-        ("bHold", "BOOL", ""),
-        ("rOverride", "LREAL", "1.0"),
-        ("fCycleTime", "LREAL", ""),
-    ]
-    outputs = ("bBusy", "bDone", "bAborted", "bError", "bOffNominal")
-    return [
-        *(
-            Variable(section="VAR_INPUT", name=name, type=type_, initial=initial)
-            for name, type_, initial in inputs
+        variables=(
+            *(Variable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type) for n, _ in numbers),
+            *inputs,
+            *flags,
+            *(Variable(section="VAR", name=key, type=type_) for key, type_ in own.items()),
         ),
-        *(Variable(section="VAR_OUTPUT", name=name, type="BOOL") for name in outputs),
-        Variable(section="VAR_OUTPUT", name="nErrorId", type="INT"),
-        Variable(section="VAR", name="bReady", type="BOOL"),
-        Variable(section="VAR", name="bGuided", type="BOOL"),
-    ]
+        body=BODY.format(
+            prepare=f"bReady := TRUE;\n{prepare.lstrip()}".rstrip(),
+            arguments=",\n    ".join(f"{key} := {value}" for key, value in given.items()),
+            feed=feed,
+            results="\n".join(f"{v.name} := fbMotion.{v.name};" for v in flags),
+        ),
+    )

@@ -30,7 +30,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         As for Structured Text.
     """
     source = take_apart(block_text(profile, target))
-    wrapper = axis_wrapper(source.name, len(target.axes), CODESYS)
+    wrapper = axis_wrapper(source, len(target.axes), CODESYS)
     points = quintic_points(profile, target)
     cams = [_cam(source.name, points, axis) for axis in range(len(target.axes))]
     pous = [plcopen_xml.pou(source), plcopen_xml.pou(wrapper), *cams]

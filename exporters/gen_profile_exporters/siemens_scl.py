@@ -54,7 +54,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
             f"{MOST_BYTES / 1000:g} kB; "
             'take "segments", or a longer export.cycle_time.'
         )
-    wrapper = axis_wrapper(source.name, len(target.axes), SIEMENS)
+    wrapper = axis_wrapper(source, len(target.axes), SIEMENS)
     text = "\n".join([_scl(source), _scl(wrapper)])
     return (
         File(filename=f"{target.name}.scl", content=text.encode("ascii")),

@@ -30,7 +30,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         As for Structured Text.
     """
     source = take_apart(block_text(profile, target))
-    wrapper = axis_wrapper(source.name, len(target.axes), TWINCAT)
+    wrapper = axis_wrapper(source, len(target.axes), TWINCAT)
     points = quintic_points(profile, target)
     return (
         _pou(source),

@@ -16,8 +16,10 @@ from system_parts import missing
 from gen_profile.errors import ExportError
 from gen_profile.profile import sample
 from gen_profile_exporters import codesys, plcopen_xml, rockwell_l5x, siemens_scl, structured_text, twincat
+from gen_profile_exporters.axis_wrapper import CODESYS, SIEMENS, TWINCAT, axis_wrapper
 from gen_profile_exporters.block_source import take_apart
 from gen_profile_exporters.cam_points import quintic_points
+from gen_profile_exporters.structured_text import block_text
 
 MOVE = quintic((0.1, 0.4))
 TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))
@@ -174,6 +176,24 @@ class TestCodesys:
                 assert [float(value.get("value")) for value in found] == values.tolist()
 
 
+@pytest.mark.parametrize("library", [TWINCAT, CODESYS, SIEMENS])
+@pytest.mark.parametrize("move", [MOVE, TWO_MOVES])
+def test_a_wrapper_takes_and_tells_all_but_positions(library, move):
+    block = take_apart(block_text(move, goal_of(move)))
+    wrapper = axis_wrapper(block, move.axes, library)
+    outer, inner = (
+        {v.name: v for v in source.variables if v.section in {"VAR_INPUT", "VAR_OUTPUT"}}
+        for source in (wrapper, block)
+    )
+    positions = {"fActPosition", "fPosition", "fVelocity", "fAcceleration"}
+    assert inner.keys() - outer.keys() == positions
+    assert all(outer[name] == inner[name] for name in outer)
+    call = re.search(r"fbMotion\((.*?)\);", wrapper.body, re.DOTALL)[1]
+    assert set(re.findall(r"(\w+) :=", call)) == {v.name for v in block.variables if v.section == "VAR_INPUT"}
+    told = [name for name in outer if outer[name].section == "VAR_OUTPUT"]
+    assert all(f"{name} := fbMotion.{name};" in wrapper.body for name in told)
+
+
 class TestTwincat:
     def test_blark_parses_block_and_wrapper(self, tmp_path):
         goal = goal_of(quintic((0.1, 0.4)), cycle_time=0.5)
@@ -209,7 +229,7 @@ class TestSiemens:
     def test_own_names_are_marked_and_others_not(self):
         text = siemens_scl.encode(TWO_MOVES, goal_of(TWO_MOVES))[0].content.decode()
         body = text[text.index("\nBEGIN") :]
-        assert "#fbMotion(bExecute := #bExecute AND #bReady" in body
+        assert "#fbMotion(\n    bExecute := #bExecute AND #bReady" in body
         assert "SHR(IN := #dwCrc, N := 4)" in body
         assert "#LREAL" not in body
         assert not re.search(
