@@ -331,8 +331,23 @@ def _axis(table: Table, plant: Plant | None, faults: Faults) -> Table:
             faults.add(
                 f"axis.{axis.name}.unit", f"{unit!r} does not measure an axis that moves in {axis.unit}"
             )
-        complete[axis.name] = {"unit": axis.unit, **given}
+        complete[axis.name] = {"unit": axis.unit, **_feed_constant(given, f"axis.{axis.name}", faults)}
     return complete
+
+
+def _feed_constant(table: Mapping[str, Any], where: str, faults: Faults) -> Table:
+    """Take counts and the metres that they make, as gears and encoders state them, for counts per metre."""
+    pair = table.get("counts_per_metre")
+    if not isinstance(pair, list | tuple):
+        return dict(table)
+    numbers = [finite(number) or 0.0 for number in pair]
+    if len(numbers) != 2 or min(numbers) <= 0.0:
+        problem = (
+            "must be a number, or two: counts and the metres (or rad) that they make, such as [65536, 0.04]"
+        )
+        faults.add(f"{where}.counts_per_metre", problem)
+        numbers = [1.0, 1.0]
+    return {**table, "counts_per_metre": numbers[0] / numbers[1]}
 
 
 def _can(table: Table, plant: Plant | None, faults: Faults) -> Table:

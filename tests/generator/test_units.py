@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gen_profile.errors import SpecError
 from gen_profile.spec_reading import preset_spec
 from gen_profile.units import AXIS_UNITS, COUNTS, UNITS, axis_factor
 
@@ -36,3 +37,18 @@ def test_an_axis_of_a_spec_is_scaled_with_its_sign(unit, factor, sign):
     assert (scale.name, scale.unit) == ("cart", unit)
     assert scale.factor == sign * factor
     assert scale.counts_per_si == sign * 2e5
+
+
+def test_a_feed_constant_may_be_counts_and_metres():
+    (axis,) = preset_spec("paper", ["axis.counts_per_metre=[65536, 0.04]", "axis.sign=-1"]).axis_scales()
+    assert axis.counts_per_si == -65536 / 0.04
+    (axis,) = preset_spec("paper", ["axis.counts_per_metre=[1000000, 3]"]).axis_scales()
+    assert axis.counts_per_si == 1000000 / 3
+
+
+@pytest.mark.parametrize(
+    "pair", ["[1]", "[1, 2, 3]", "[0, 1]", "[1, -1]", "[1, nan]", "[true, 1]", "[[1], 1]"]
+)
+def test_other_feed_constants_are_refused(pair):
+    with pytest.raises(SpecError, match=r"^axis.cart.counts_per_metre: must be a number, or two: counts and"):
+        preset_spec("paper", [f"axis.counts_per_metre={pair}"])
