@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 from gen_profile.errors import ExportError, SpecError
+from gen_profile.plugins import load_plugin
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
@@ -126,7 +127,9 @@ GROUP = "gen_profile.exporters"
 
 def formats() -> dict[str, Format]:
     """Every known format by name, sorted; the project's own win over others of the same name."""
-    known = {entry.name: _format_of_plugin(entry) for entry in entry_points(group=GROUP)}
+    known = {
+        entry.name: load_plugin(entry, Format, "--export: format") for entry in entry_points(group=GROUP)
+    }
     return dict(sorted((known | BUILT_IN).items()))
 
 
@@ -196,19 +199,3 @@ def _longest_suffix(path: PurePath | str, known: Mapping[str, Format]) -> str | 
     name = PurePath(path).name.lower()
     fitting = [key for key, form in known.items() if name.endswith(form.suffix.lower())]
     return max(fitting, key=lambda key: len(known[key].suffix), default=None)
-
-
-def _format_of_plugin(entry: EntryPoint) -> Format:
-    try:
-        form = entry.load()
-    except Exception as error:
-        raise SpecError(
-            f"--export: format {entry.name!r} cannot be loaded from {entry.value} ({error}); "
-            "update or uninstall the package that provides it."
-        ) from error
-    if not isinstance(form, Format):
-        raise SpecError(
-            f"--export: format {entry.name!r}: {entry.value} is no gen_profile_exporters.registry.Format; "
-            "update or uninstall the package that provides it."
-        )
-    return form

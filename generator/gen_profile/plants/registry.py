@@ -13,6 +13,7 @@ from typing import cast
 from gen_profile.errors import SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.soundness import faults_of
+from gen_profile.plugins import CURE, load_plugin
 
 # type → (module that holds PLANT, summary); modules load only when their machine is asked for
 BUILT_IN: dict[str, tuple[str, str]] = {
@@ -73,23 +74,13 @@ def find_plant(type_: str) -> Plant:
     if family in FAMILIES and re.fullmatch("[1-9][0-9]{0,3}", number):
         return cast(Plant, import_module(FAMILIES[family][0]).member(int(number)))
     for entry in entry_points(group=GROUP, name=type_):
-        return _plant_of_plugin(entry)
+        return _plant_of(entry)
     raise KeyError(type_)
 
 
-def _plant_of_plugin(entry: EntryPoint) -> Plant:
-    cure = "update or uninstall the package that provides it."
-    try:
-        plant = entry.load()
-    except Exception as error:
-        raise SpecError(
-            f"plant.type: {entry.name!r} cannot be loaded from {entry.value} ({error}); {cure}"
-        ) from error
-    if not isinstance(plant, Plant):
-        raise SpecError(
-            f"plant.type: {entry.name!r}: {entry.value} is no gen_profile.plants.plant.Plant; {cure}"
-        )
-    faults = faults_of(plant)
-    if faults:
-        raise SpecError(f"plant.type: {entry.name!r}: {entry.value}: {'; '.join(faults)}; {cure}")
+def _plant_of(entry: EntryPoint) -> Plant:
+    """Take another distribution's machine, if it is sound."""
+    plant = load_plugin(entry, Plant, "plant.type:")
+    if faults := faults_of(plant):
+        raise SpecError(f"plant.type: {entry.name!r}: {entry.value}: {'; '.join(faults)}; {CURE}")
     return plant
