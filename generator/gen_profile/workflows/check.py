@@ -93,11 +93,9 @@ def check_artefact(
         The file is damaged.
     CosimulationError
     """
-    content = read_artefact(path)
-    format_ = format_of(path)
+    content, format_ = read_artefact(path), format_of(path)
     manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
-    if spec is None:
-        spec = _spec_of(manifest, path)
+    spec = spec or _spec_of(manifest, path)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
     standing = _provenance(manifest, content, spec)
     if samples is not None:

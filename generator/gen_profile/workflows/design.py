@@ -154,9 +154,8 @@ def design(
         delivered = worst is None or worst.passed or keep_failed
         if delivered:
             staging.deliver()
-    return Design(
-        spec=spec, plan=planned, check=worst, artefacts=artefacts if delivered else (), folder=folder
-    )
+    kept = artefacts if delivered else ()
+    return Design(spec=spec, plan=planned, check=worst, artefacts=kept, folder=folder)
 
 
 def _accompany(spec: Spec, staging: Staging) -> None:

@@ -104,8 +104,7 @@ def residual_peaks(
     inputs = {
         f"{axis.name}.setpoint": feed.position[..., 1:, column] for column, axis in enumerate(plant.actuated)
     }
-    outputs = [f"sway.{load}" for load in plant.loads]
-    return runs.peaks(feed.times, inputs, values, outputs, since=since)
+    return runs.peaks(feed.times, inputs, values, [f"sway.{load}" for load in plant.loads], since=since)
 
 
 def _present() -> int:
