@@ -110,6 +110,7 @@ FAULTS = [
         r"move\.duration: \"minimum\" needs a limit: state limits\.acceleration, or velocity or jerk\.",
     ),
     ("limits.jerk", 0, r"limits\.jerk: must be greater than 0, found 0\.0\."),
+    ("limits.velocity", -1, r"limits\.velocity: must be greater than 0, found -1\.0\."),
     ("cost.sway_weight", -1, r"cost\.sway_weight: must be at least 0, found -1\.0\."),
     ("check.residual_sway", 0, r"check\.residual_sway: must be a finite number greater than 0, found 0\."),
     ("check.residual_sway", "3 mm", r"check\.residual_sway: must be a finite number .*, found text '3 mm'\."),
