@@ -1,0 +1,37 @@
+"""Pages for people: their links lead somewhere, and the options in their commands are options of these."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from gen_profile.cli.commands import cli
+from gen_profile.cli.group import DEFAULT
+
+ROOT = Path(__file__).parents[2]
+PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+OF_THE_GROUP = {"--help", "--version"}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    text = page.read_text("utf-8")
+    targets = re.findall(r"\]\((?!https?:)([^)#]+)", text)
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+def commands_on(page):
+    """List what follows ``gen-profile`` in code, continued lines joined, up to the command's end."""
+    text = page.read_text("utf-8").replace("\\\n", " ")
+    return [line.split() for line in re.findall(r"(?<![\w-])gen-profile ((?:[\w-]|\S*/)[^\n`#|&;]*)", text)]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_options_are_those_of_the_command(page):
+    wrong = []
+    for words in commands_on(page):
+        command = cli.commands.get(words[0], cli.commands[DEFAULT])
+        known = {option for parameter in command.params for option in parameter.opts} | OF_THE_GROUP
+        asked = {word.partition("=")[0] for word in words if re.match(r"--[a-z-]+(=|$)", word)}
+        wrong += [(words, option) for option in asked - known]
+    assert wrong == []
