@@ -31,7 +31,7 @@ def test_positions_alone_carry_the_motion(cosimulation, crane, quintic, cycle, b
     np.testing.assert_allclose(response.angle, angles, rtol=0.0, atol=100.0 * bound)
 
 
-@pytest.mark.parametrize("tau", [0.0, 0.1, 0.005])
+@pytest.mark.parametrize("tau", [0.0, 0.1, 0.005, 1e-3])
 @pytest.mark.parametrize("parameters", [None, OTHER_CRANE], ids=["nominal", "other"])
 def test_drives_interpolate_their_setpoints(cosimulation, crane, quintic, tau, parameters):
     parameters = parameters or crane.nominal()
@@ -45,6 +45,27 @@ def test_drives_interpolate_their_setpoints(cosimulation, crane, quintic, tau, p
     np.testing.assert_allclose(response.dq_u, rates @ relative.T, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(response.sway, oracle.sway(angles, parameters), rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(response.position[:, 0], carts, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("tau", [1e-3, 1e-4, 1e-5])
+def test_drives_of_little_lag_leap_after_setpoints(cosimulation, crane, tau):
+    """However short the lag is, steps of 5 ms see it through."""
+    parameters = crane.nominal()
+    positions = np.array([0.0, 1e-3, -2e-3, 3e-3, 3e-3, 3e-3, 0.0, -1e-3])
+    setpoints = SampledProfile(cycle_time=0.01, position=positions[:, None])
+    response = cosimulation.run(setpoints, parameters, tau=tau, max_step=5e-3, settle=0.0)
+    states, carts = oracle.swing_in_steps(positions, 0.01, tau, parameters)
+    np.testing.assert_allclose(response.angle, states[:, :2], rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(response.position[:, 0], carts, rtol=0.0, atol=1e-12)
+    assert np.abs(states[:, :2]).max() > 5e-3
+
+
+def test_a_lag_of_nearly_nothing_is_none(cosimulation, crane, quintic):
+    none, little = (
+        cosimulation.run(sample(quintic, 0.01), crane.nominal(), tau=tau, max_step=5e-3, settle=4.0)
+        for tau in (0.0, 1e-12)
+    )
+    np.testing.assert_allclose(little.sway, none.sway, rtol=0.0, atol=1e-8)
 
 
 def test_integration_is_of_fourth_order(cosimulation, crane, quintic):

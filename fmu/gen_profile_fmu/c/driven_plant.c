@@ -7,7 +7,9 @@
  *
  * Without lag v is r itself: the axis velocity jumps by dv at the beginning, and with it the unactuated rates by
  * -M_uu^-1 M_au^T dv. In both cases position + tau * velocity moves on by the integral of r.
- * The unactuated coordinates are integrated by the classical Runge-Kutta method of fourth order.
+ * The unactuated coordinates are integrated by the classical Runge-Kutta method of fourth order. While a lag fades,
+ * a step at the time t is e^(t / 5 tau) tau / 30 long: so all steps err alike, and however short the lag is, 155 of
+ * them see it through.
  */
 #include "driven_plant.h"
 
@@ -17,7 +19,10 @@
 #include "equations.h"
 
 enum { N_X = 2 * N_U };                /* q_u and dq_u lie side by side in the values */
-static const double SUBSTEPS_PER_LAG = 20.0;
+static const double STEPS_PER_LAG = 30.0;  /* at first */
+static const double GROWTH = 5.0;          /* lags in which steps become e times as long */
+static const double MOST_FADING = 155.0;   /* steps until they are as long as anybody likes */
+static const double NEGLIGIBLE = 1e-13;    /* m/s (or rad/s) by which a step may miss what is left of a lag */
 
 typedef struct {
     double tau;
@@ -133,10 +138,31 @@ static int plant_jump(Model *model, const double velocity[N_A]) {
     return 1;
 }
 
-static double plant_substeps(const Model *model, double tau, double step) {
-    double longest = model->values[MAX_STEP];
-    if (tau > 0.0 && tau < SUBSTEPS_PER_LAG * longest) longest = tau / SUBSTEPS_PER_LAG;
+static double evenly(double step, double longest) {
     return fmax(1.0, ceil(step / longest * (1.0 - 1e-12)));  /* 4 ms in steps of 1 ms are 4, not 5 */
+}
+
+static double plant_substeps(const Model *model, double tau, double step) {
+    const double while_fading = tau > 0.0 ? ceil(fmin(STEPS_PER_LAG * step / tau, MOST_FADING)) : 0.0;
+    return fmax(while_fading, evenly(step, model->values[MAX_STEP]));
+}
+
+/* Whether a step over which the drives come closer to what they follow has to be cut for that. */
+static int fading(const Drives *drives, double step) {
+    double most = 0.0;
+    for (int i = 0; i < N_A; i++) most = fmax(most, fabs(drives->lacking[i]));
+    return drives->tau > 0.0 && most * step > NEGLIGIBLE * drives->tau;
+}
+
+/* Integrate while a lag fades, as long as that takes shorter steps than elsewhere. Returns the time reached. */
+static double integrate_fading(double *x, const Drives *drives, double step, double longest, const double *parameters) {
+    double time = 0.0, size = drives->tau / STEPS_PER_LAG;
+    while (size < longest && time + size < step) {
+        runge_kutta_step(x, drives, time, size, parameters);
+        time += size;
+        size = drives->tau / STEPS_PER_LAG * exp(time / (GROWTH * drives->tau));
+    }
+    return time;
 }
 
 static void plant_drive(Model *model, double tau, double reference[N_A][N_ORDERS], double step) {
@@ -147,10 +173,14 @@ static void plant_drive(Model *model, double tau, double reference[N_A][N_ORDERS
         plant_jump(model, velocity);
     }
     const Drives drives = drives_along(model, tau, reference);
-    const long substeps = (long)plant_substeps(model, tau, step);
-    const double substep = step / (double)substeps;
+    const double longest = values[MAX_STEP];
+    const double faded = fading(&drives, fmin(step, longest))
+                             ? integrate_fading(values + Q_U, &drives, step, longest, values + P)
+                             : 0.0;
+    const long substeps = (long)evenly(step - faded, longest);
+    const double substep = (step - faded) / (double)substeps;
     for (long i = 0; i < substeps; i++) {
-        runge_kutta_step(values + Q_U, &drives, (double)i * substep, substep, values + P);
+        runge_kutta_step(values + Q_U, &drives, faded + (double)i * substep, substep, values + P);
     }
     const AxisMotion end = motion_after(&drives, step);
     memcpy(values + Q_A, end.position, sizeof end.position);

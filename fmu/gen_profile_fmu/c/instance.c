@@ -10,7 +10,7 @@ static const struct {
 } CATEGORIES[] = {{"logEvents", EVENTS}, {"logStatusWarning", WARNINGS}, {"logStatusError", ERRORS}};
 enum { N_CATEGORIES = sizeof CATEGORIES / sizeof *CATEGORIES };
 
-static const double MAX_SUBSTEPS = 1e7;      /* a longer step is a slip in max_step or tau */
+static const double MAX_SUBSTEPS = 1e7;      /* a longer step is a slip in max_step */
 static const double TIME_TOLERANCE = 1e-9;   /* masters add up their steps; relative beyond 1 s */
 
 /* ---- logging ------------------------------------------------------------------------------------------ */
@@ -344,7 +344,7 @@ static Status require_step(Instance *instance, double time, double step) {
         return fail(instance, "The step leads to %g s, beyond the stop time %g s.", time + step, state->stop_time);
     }
     if (model_substeps(&state->model, step) > MAX_SUBSTEPS) {
-        return fail(instance, "A step of %g s takes more than %g integration steps; raise max_step or tau.", step,
+        return fail(instance, "A step of %g s takes more than %g integration steps; raise max_step.", step,
                     MAX_SUBSTEPS);
     }
     return OK;
