@@ -37,6 +37,16 @@ def test_a_vector_picture_is_well_formed_and_names_what_it_shows(tmp_path):
     assert sum(len(path.get("d", "")) > 2000 for path in paths) >= 15  # three curves per method
 
 
+@pytest.mark.parametrize(("preset", "load"), [("paper-beta0", "payload"), ("gantry-crane", "load")])
+def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path, preset, load):
+    picture = tmp_path / "picture.svg"
+    assert run_here("compare", "--preset", preset, *FEW, "--plot", picture).code == 0
+    text = picture.read_text("utf-8")
+    assert f"<!-- worst residual sway of the {load} (mm) -->" in text
+    assert f"<!-- {load} sway (mm), nominal machine -->" in text
+    assert "payload-" not in text
+
+
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_pictures_of_one_comparison_are_alike_to_the_byte(tmp_path, suffix, monkeypatch):
     pictures = []

@@ -177,6 +177,11 @@ class Plant:
         """Which of the outputs are the end load's."""
         return slice(len(self.loads) - self.directions, len(self.loads))
 
+    @property
+    def end_load_name(self) -> str:
+        """What to call the end load as a whole: its directions have a name each."""
+        return self.loads[-1] if self.directions == 1 else "load"
+
     def nominal(self) -> dict[str, float]:
         """Nominal value of every parameter, by name."""
         return {parameter.name: parameter.nominal for parameter in self.parameters}

@@ -13,6 +13,7 @@ from gen_profile.profile import Array
 from gen_profile.report.figures import HEADROOM
 from gen_profile.workflows.compare import Comparison, Row
 from gen_profile.workflows.picture import picture
+from gen_profile.workflows.report_figures import end_load_sway
 from gen_profile.workflows.spectrum import DECADES, natural_frequencies, spectrum
 
 SAMPLES = 1500
@@ -102,14 +103,14 @@ def _spectrum(axis: Any, comparison: Comparison, styles: Styles) -> None:
 
 def _sway(axes: Any, comparison: Comparison, styles: Styles) -> None:
     """Draw the end load's sway on the nominal machine and on the worst one (figures 4 and 5)."""
-    load = comparison.spec.machine().loads[-1]
+    load = comparison.spec.machine().end_load_name
     for row in comparison.rows:
         times = _times(row)
-        responses = row.trial.swing.at(times)
+        sways = [end_load_sway(comparison.spec, response) for response in row.trial.swing.at(times)]
         standing = times >= row.trial.motion.duration
-        worst = max(responses, key=lambda response: np.abs(response.sway[standing, -1]).max())
-        for axis, response in zip(axes, (responses[0], worst), strict=True):
-            axis.plot(times, 1e3 * response.sway[:, -1], **styles[row.method])
+        worst = max(sways, key=lambda sway: np.abs(sway[standing]).max())
+        for axis, sway in zip(axes, (sways[0], worst), strict=True):
+            axis.plot(times, 1e3 * sway, **styles[row.method])
     for axis, machine in zip(axes, ("nominal machine", "each method's worst machine"), strict=True):
         for duration in {row.trial.motion.duration for row in comparison.rows}:
             axis.axvline(duration, color="0.7", linewidth=0.8, zorder=0)
@@ -129,7 +130,7 @@ def _residuals(axis: Any, comparison: Comparison, styles: Styles) -> None:
     axis.axvline(limit, color="k", linestyle=":", label=f"limit {limit:.3g} mm")
     axis.invert_yaxis()
     axis.legend(loc="lower right")
-    load = comparison.spec.machine().loads[-1]
+    load = comparison.spec.machine().end_load_name
     axis.set(xlabel=f"worst residual sway of the {load} (mm)", xlim=(0.0, end))
 
 

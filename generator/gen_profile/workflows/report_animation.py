@@ -46,6 +46,6 @@ def animation(spec: Spec, trial: Trial, shown: Sequence[Shown], arrival: float) 
         times=times,
         arrival=arrival,
         limit=spec.check.residual_sway[plant.loads[-1]],
-        load=plant.loads[-1] if plant.directions == 1 else "load",
+        load=plant.end_load_name,
         actors=actors,
     )

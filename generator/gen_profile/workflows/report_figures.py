@@ -13,6 +13,7 @@ from gen_profile.report.figures import PALETTE, PLAIN, Band, Dash, Figure, Level
 from gen_profile.response import Response
 from gen_profile.spec import Spec
 from gen_profile.workflows.compare import Comparison, Row
+from gen_profile.workflows.contenders import own_method
 from gen_profile.workflows.planning import RESIDUAL_SAMPLES, Trial
 from gen_profile.workflows.spectrum import DECADES, natural_frequencies, spectrum
 from gen_profile.workflows.wording import machine
@@ -149,25 +150,26 @@ def other_methods(comparison: Comparison) -> Figure:
 def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Panel]:
     """Draw the end load under every method, on the nominal machine and on that with all parameters up."""
     spec, rows = comparison.spec, comparison.rows
-    load, last = spec.machine().loads[-1], max(row.trial.motion.duration for row in rows)
+    plant, last = spec.machine(), max(row.trial.motion.duration for row in rows)
     seen = {row.method: row.trial.swing.at(_until(row)) for row in rows}
     for index, scenario in enumerate(rows[0].trial.machines[:2]):
         lines = [
             Line(
                 name=method,
                 x=responses[index].times,
-                y=1e3 * responses[index].sway[:, -1],
+                y=1e3 * end_load_sway(spec, responses[index]),
                 style=styles[method],
             )
             for method, responses in seen.items()
         ]
         end = max(float(line.x[-1]) for line in lines)
+        levels = sway_levels(spec, plant.loads[-1], last, end)
         yield Panel(
-            title=f"Sway of the {load}, {machine(scenario.name)}",
+            title=f"Sway of the {plant.end_load_name}, {machine(scenario.name)}",
             x_label=TIME,
             y_label="sway (mm)",
             lines=lines,
-            levels=[level for level in sway_levels(spec, load, last, end) if level.between == (last, end)],
+            levels=[level for level in levels if level.between == (last, end)],
             bands=[Band(low=last, high=last)],
         )
 
@@ -269,13 +271,6 @@ def method_styles(comparison: Comparison) -> dict[str, Style]:
         for group, first, dash in groups
         for place, method in enumerate(group)
     }
-
-
-def own_method(spec: Spec) -> str:
-    """Name the spec's own method as a comparison does."""
-    if spec.solver.shaper is not None:
-        return spec.solver.shaper
-    return "optimal" if spec.cost.sway_scale is None else f"optimal-beta{spec.cost.sway_weight:g}"
 
 
 def _until(row: Row) -> Array:

@@ -97,7 +97,7 @@ def _panel(name: str, found: Robustness, styles: Mapping[str, Style]) -> Panel:
         for method in found.residual
     ]
     return Panel(
-        title=f"Residual sway of the {spec.machine().loads[-1]} over {name}",
+        title=f"Residual sway of the {spec.machine().end_load_name} over {name}",
         x_label=f"error of {name} (%)",
         y_label="residual sway (mm)",
         lines=lines,

@@ -43,7 +43,7 @@ def draw(found: Robustness, path: Path) -> None:
 
 
 def _title(found: Robustness) -> str:
-    load = found.spec.machine().loads[-1]
+    load = found.spec.machine().end_load_name
     return f"{found.spec.name}: residual sway of the {load} on machines that are not as specified"
 
 
@@ -58,7 +58,7 @@ def _curves(axis: Any, found: Robustness) -> None:
     highest = max(float(found.end_load(method).max()) for method in found.residual)
     axis.set(
         xlabel=_label(found, name),
-        ylabel=f"residual sway of the {found.spec.machine().loads[-1]} (mm)",
+        ylabel=f"residual sway of the {found.spec.machine().end_load_name} (mm)",
         xlim=(100.0 * errors[0], 100.0 * errors[-1]),
         ylim=(0.0, ceiling(1e3 * highest, limit)),
     )
