@@ -47,6 +47,14 @@ class Contender:
     requirements: str = ""
 
 
+def own_method(spec: Spec) -> str:
+    """Name the spec's own method as a comparison does."""
+    if spec.solver.shaper is not None:
+        return spec.solver.shaper
+    # β means the same as in the paper only together with a γ
+    return "optimal" if spec.cost.sway_scale is None else f"optimal-beta{spec.cost.sway_weight:g}"
+
+
 def contenders(spec: Spec) -> Iterator[Contender]:
     """List shapers, then optimal motions.
 
@@ -62,10 +70,9 @@ def contenders(spec: Spec) -> Iterator[Contender]:
         spec = attrs.evolve(spec, solver=attrs.evolve(spec.solver, method="auto"))
     once = cache(partial(timed, spec))  # the shortest duration does not depend on β
     own = cache(partial(_attempt, once))
-    weight, stated = spec.cost.sway_weight, spec.cost.sway_scale is not None
+    weight = spec.cost.sway_weight
     for other in sorted({*SWAY_WEIGHTS, weight}):
-        # β means the same as in the paper only together with a γ
-        name = "optimal" if other == weight and not stated else f"optimal-beta{other:g}"
+        name = own_method(spec) if other == weight else f"optimal-beta{other:g}"
         design = partial(_result, own) if other == weight else partial(_weighed, once, other)
         yield Contender(method=name, design=design, requirements="the spec's own")
     for kind, keys in _other_robustness(spec).items():

@@ -14,6 +14,7 @@ from gen_profile.report.figures import PLAIN
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec import Spec
 from gen_profile.workflows.compare import Comparison
+from gen_profile.workflows.contenders import own_method
 from gen_profile.workflows.design import Design
 from gen_profile.workflows.planning import Trial
 from gen_profile.workflows.report_animation import animation
@@ -23,7 +24,6 @@ from gen_profile.workflows.report_figures import (
     method_styles,
     motion_figure,
     other_methods,
-    own_method,
     spectrum_figure,
     sway_figure,
 )
@@ -278,8 +278,8 @@ def _evidence(outcome: Design) -> Section:
 def _solver(solution: Solution) -> Iterator[tuple[str, str]]:
     optimum = solution.raise_for_status()
     yield "Method", f"{solution.method}: {solution.status.value[0].lower()}{solution.status.value[1:]}"
-    yield "Newton iterations", f"{solution.iterations} on {len(optimum.knots) - 1} intervals"
-    yield "Last Newton step", f"{solution.residual:.1e}, relative"
+    yield "Iterations", f"{solution.iterations} on {len(optimum.knots) - 1} intervals"
+    yield "Last step", f"{solution.residual:.1e}, relative"
     yield "Cost", f"{optimum.cost:.6g} with β = {optimum.sway_weight:.4g} and γ = {optimum.sway_scale:.4g}/m"
     if optimum.defect is not None:
         yield "Defect", f"{optimum.defect:.1e}: what the canonical equations miss between nodes, relative"
