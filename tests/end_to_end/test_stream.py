@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import signal
+import time
 from importlib import util
 from threading import Thread
 
@@ -87,6 +88,23 @@ def test_in_words(deployed):
     lateness = r"half below \d+ µs, 99 % below \d+ µs, all below \d+ µs"
     assert re.search(rf"^lateness: {lateness}; drift −?[\d.]+ µs$", outcome.out, re.MULTILINE)
     assert re.search(rf"^Self-test: {lateness}\.$", outcome.out, re.MULTILINE)
+
+
+def test_a_busy_machine_delays_a_simulation_as_a_whole(deployed, monkeypatch):
+    send = Streamer._send
+
+    def kept_from_it(self, messages):
+        if self.cycles_sent in {40, 80, 81}:
+            time.sleep(0.1)  # five cycles
+        send(self, messages)
+
+    monkeypatch.setattr(Streamer, "_send", kept_from_it)
+    told = run_here("stream", deployed / "paper.log", "--simulate-drive", "--json").document
+    assert (told["state"], told["cycles_sent"]) == ("done", 151)
+    assert told["drive"]["sway_residual_peak_m"] < 3e-4
+    assert told["lateness_us"]["max"] < 10_000
+    stall = re.fullmatch(r"This machine stalled for (\d+) ms in all, and the .* with it\.", told["notes"][-1])
+    assert int(stall[1]) >= 3 * (100 - 5)
 
 
 def test_turning_axes_are_told_in_radians(tmp_path):

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from threading import Event, Thread
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +22,7 @@ from gen_profile.spec import Spec
 from gen_profile.spec_reading import spec_from_dict
 from gen_profile.workflows.delivered import manifest_beside, read_artefact
 from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.clock import SystemClock
+from gen_profile_exporters.can.clock import NANOSECONDS, Clock, SharedClock, SystemClock
 from gen_profile_exporters.can.lateness import Lateness, rehearse
 from gen_profile_exporters.can.plan import StreamPlan, plan_of
 from gen_profile_exporters.can.realtime import PEER_PRIORITY, priority, real_time
@@ -41,7 +40,6 @@ if TYPE_CHECKING:
 
 Tell = Callable[[str], None]
 SPIN = 200_000  # ns before each cycle, where a processor can be spared for it
-SWITCH_INTERVAL = 1e-4  # s; threads of simulated drives must not hold up the streamer
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -81,14 +79,14 @@ class Port:
                 "python-can's documentation for its interfaces."
             ) from error
 
-    def open_for_streaming(self, bitrate: int) -> tuple[can.BusABC, tuple[str, ...]]:
-        """Open it with launch times where it keeps them; return what there is to say about that, too.
+    def open_for_streaming(self, bitrate: int, *, launch: bool) -> tuple[can.BusABC, tuple[str, ...]]:
+        """Open it, with launch times if they are wanted and kept; say what there is to say about that, too.
 
         Raises
         ------
         SpecError
         """
-        if self.interface != "socketcan" or sys.platform != "linux":
+        if not launch or self.interface != "socketcan" or sys.platform != "linux":
             return self.open(bitrate), ()
         from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # needs sockets of Linux
 
@@ -304,17 +302,18 @@ def stream(
     from gen_profile_exporters.can.streamer import Streamer  # noqa: PLC0415  # canopen is an extra
 
     with ExitStack() as stack:
-        bus, remarks = port.open_for_streaming(source.spec.can.bitrate)
+        simulation = stack.enter_context(_simulated(source, port, tell)) if simulate_drive else None
+        bus, remarks = port.open_for_streaming(source.spec.can.bitrate, launch=simulation is None)
         stack.enter_context(bus)
-        load = None
-        if simulate_drive:
-            load = stack.enter_context(_simulated(source, port, tell))
         refused = stack.enter_context(real_time())
-        streamer = Streamer(bus, _clock(refused), source.plan, tell, reset_fault=reset_fault)
+        clock = _clock(refused) if simulation is None else simulation.clock
+        streamer = Streamer(bus, clock, source.plan, tell, reset_fault=reset_fault)
         stack.enter_context(_stopped_by_signals(streamer))
+        before = 0 if simulation is None else simulation.clock.catch_up()
         record = streamer.run()
-    said = (*notes, *refused, *remarks)
-    return Outcome(source=source, record=record, notes=said, sway=load.sway if load else None)
+    stalls = () if simulation is None else _stalls(simulation.clock.stalled - before)
+    said = (*notes, *refused, *remarks, *stalls)
+    return Outcome(source=source, record=record, notes=said, sway=simulation.sway if simulation else None)
 
 
 def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
@@ -323,7 +322,9 @@ def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
         bank.run(stop)
 
 
-def drive_bank(source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make) -> DriveBank:
+def drive_bank(
+    source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make, clock: Clock | None = None
+) -> DriveBank:
     """Put a simulated drive on the bus for every axis, at rest at the start of the move."""
     from gen_profile_exporters.can.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
     from gen_profile_exporters.can.simulated_drive import SimulatedDrive  # noqa: PLC0415
@@ -334,37 +335,40 @@ def drive_bank(source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make) 
         SimulatedDrive(node, make, round(at * scale))
         for node, at, scale in zip(frames.nodes(target), source_spec.move.start, scales, strict=True)
     ]
-    return DriveBank(bus, SystemClock(), drives, scales, load)
+    return DriveBank(bus, clock or SystemClock(), drives, scales, load)
 
 
 @attrs.define
 class _Simulation:
-    """What simulated drives leave behind."""
+    """Simulated drives: the clock that they share with the streamer, and what they leave behind."""
 
+    clock: SharedClock
     sway: float | None = None
+
+
+def _stalls(stalled: int) -> tuple[str, ...]:
+    """Say how long a simulation stood still, in ns, if it did."""
+    milliseconds = round(1e3 * stalled / NANOSECONDS)
+    if milliseconds == 0:
+        return ()
+    return (f"This machine stalled for {milliseconds} ms in all, and the simulation with it.",)
 
 
 @contextmanager
 def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
-    """Serve the bus with simulated drives by a thread of their own."""
+    """Have simulated drives work on the bus whenever the streamer sleeps."""
     from gen_profile.workflows.crane_load import CraneLoad  # noqa: PLC0415  # FMPy and CasADi, 0.5 s
     from gen_profile_exporters.can.drive_dictionary import Make  # noqa: PLC0415  # canopen is an extra
 
-    found, over, interval = _Simulation(), Event(), sys.getswitchinterval()
+    period = frames.period_microseconds(source.spec.can) * 1000
     with (
         CraneLoad(source.spec, lambda: tell("compiling the plant's FMU, once")) as load,
         port.open(source.spec.can.bitrate) as bus,
     ):
-        bank = drive_bank(source.spec, bus, load, Make())
-        thread = Thread(target=serve, args=(bank, over.is_set), name="simulated drives")
-        sys.setswitchinterval(SWITCH_INTERVAL)
-        thread.start()
-        try:
-            yield found
-        finally:
-            over.set()
-            thread.join()
-            sys.setswitchinterval(interval)
+        clock = SharedClock(longest=period // 4)
+        clock.work = drive_bank(source.spec, bus, load, Make(), clock).poll
+        found = _Simulation(clock)
+        yield found
         found.sway = load.residual_sway()
 
 
