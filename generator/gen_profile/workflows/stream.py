@@ -79,7 +79,7 @@ class Port:
                 "python-can's documentation for its interfaces."
             ) from error
 
-    def open_for_streaming(self, bitrate: int, *, launch: bool) -> tuple[can.BusABC, tuple[str, ...]]:
+    def open_for_streaming(self, bitrate: int, *, launch: bool = True) -> tuple[can.BusABC, tuple[str, ...]]:
         """Open it, with launch times if they are wanted and kept; say what there is to say about that, too.
 
         Raises
