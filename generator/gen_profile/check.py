@@ -146,10 +146,11 @@ class Check:
         return (self._sentence(*self.worst_of(timing)) + " It counts with --strict.",)
 
     def _sentence(self, load: str, finding: Finding) -> str:
+        error = float(f"{1e6 * self.error_bound:.2g}")
         return (
             f"The {load} sways by {1e3 * finding.residual[load]:.4g} mm after the move "
             f"({finding.scenario.name}), and {1e3 * self.limit[load]:.4g} mm are allowed "
-            f"(check.residual_sway; numerical error up to {1e6 * self.error_bound:.2g} µm)."
+            f"(check.residual_sway; numerical error up to {error:g} µm)."
         )
 
     def to_dict(self) -> dict[str, Any]:

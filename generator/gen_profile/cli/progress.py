@@ -71,5 +71,5 @@ class _Lines:
             self._tenth = tenth
             left = ""
             if before < done < total:
-                left = f", {(now - began) / (done - before) * (total - done):.2g} s left"
+                left = f", {(now - began) / (done - before) * (total - done):.0f} s left"
             _print_line(f"{done} of {total} {self._things}{remark and f', {remark}'}{left}")
