@@ -55,7 +55,7 @@ def match(text: str, layout: str, axes: int) -> dict[str, Token]:
                 "only numbers and comments may be edited in it, export it again."
             )
     if len(found) != len(due):
-        line = found[len(due)].line if len(found) > len(due) else len(text.splitlines())
+        line = found[len(due)].line if len(found) > len(due) else max(1, len(text.splitlines()))
         raise ExportError(f"line {line}: the block breaks off or goes on after its end; export it again.")
     return values
 
