@@ -230,8 +230,8 @@ def require_load(target: Target) -> None:
     shortest = bits / (MOST_LOAD * can.bitrate)
     if Decimal(repr(can.sync_period)) < shortest:
         raise ExportError(
-            f"can.sync_period: {axes} {'axes' if axes > 1 else 'axis'} every {can.sync_period:g} s: the frames "
-            f"load a bus of {can.bitrate} bit/s by {bits / can.sync_period / can.bitrate:.0%} "
+            f"can.sync_period: {axes} {'axes' if axes > 1 else 'axis'} every {can.sync_period:g} s: their "
+            f"frames load a bus of {can.bitrate} bit/s by {bits / can.sync_period / can.bitrate:.0%} "
             f"(limit {MOST_LOAD:.0%}); "
             f"set {two_digits_up(shortest)} s or more, or raise can.bitrate."
         )
