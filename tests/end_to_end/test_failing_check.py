@@ -41,7 +41,9 @@ def test_a_failed_check_leaves_nothing_and_says_why(tmp_path, words):
 def test_earlier_outputs_stay_as_they_were(tmp_path):
     assert run_here("--export", "csv", "--export", "plc", "--out", tmp_path).code == 0
     before = tree(tmp_path)
-    assert run_here(*STRICT, "--export", "csv", "--export", "can", "--out", tmp_path).code == 4
+    outcome = run_here(*STRICT, "--export", "csv", "--export", "can", "--out", tmp_path)
+    assert outcome.code == 4
+    assert outcome.errors[-1] == f"Nothing was written; {tmp_path} still holds what an earlier run wrote."
     assert tree(tmp_path) == before
 
 

@@ -69,6 +69,7 @@ def design(
     """Design, export and verify (the default)."""
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
+    from gen_profile.manifest import FILENAME
     from gen_profile.workflows.design import design as run
 
     columns = None if csv_columns is None else [name.strip() for name in csv_columns.split(",")]
@@ -88,7 +89,9 @@ def design(
     print_outcome(outcome.to_dict(), words.design(outcome), as_json)
     warn(outcome.check)
     if not outcome.passed and outcome.check is not None:
-        fail(outcome.check.reasons(), "The files were kept." if outcome.artefacts else "Nothing was written.")
+        before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
+        kept = "The files were kept." if outcome.artefacts else f"Nothing was written{before}."
+        fail(outcome.check.reasons(), kept)
 
 
 @cli.command(epilog="Example: gen-profile compare --preset paper --plot comparison.png")
