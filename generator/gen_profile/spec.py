@@ -41,9 +41,10 @@ class Pattern:
 Name = Annotated[
     str,
     Pattern(
+        r"(?!(?i:con|prn|aux|nul|com[0-9]|lpt[0-9])(?:\.|$))"
         r"[A-Za-z0-9](?:[A-Za-z0-9._ -]{0,62}[A-Za-z0-9_-])?",
-        "1 to 64 letters, digits, dots, underscores, hyphens and spaces, "
-        "beginning with a letter or digit and not ending with a dot or space",
+        "1 to 64 letters, digits, dots, underscores, hyphens and spaces, beginning with a letter or digit, "
+        "not ending with a dot or space, and no device's name in Windows, as CON",
     ),
 ]
 Positive = Annotated[float, Bounds(above=0.0)]

@@ -186,6 +186,8 @@ NAMES += [
     "Brücke",
     "\x1b[31mred",
     "name\n",
+    "con",
+    "Lpt1.bay",
 ]
 
 
@@ -196,7 +198,7 @@ def test_names_that_could_break_out_of_a_comment_a_path_or_a_page(name):
     assert fault.isprintable()
 
 
-@pytest.mark.parametrize("name", ["a", "bay-3", "Bay 3.1_new", "7", "a" * 64])
+@pytest.mark.parametrize("name", ["a", "bay-3", "Bay 3.1_new", "7", "a" * 64, "console", "com-1"])
 def test_names_that_are_fine(name):
     assert spec_from_dict(with_value("name", name)).name == name
 
