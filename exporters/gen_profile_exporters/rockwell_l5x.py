@@ -15,7 +15,7 @@ from lxml import etree
 
 from gen_profile.errors import ExportError
 from gen_profile.profile import Array, Profile, SampledProfile, grid_times
-from gen_profile.units import AxisScale
+from gen_profile.units import COUNTS, AxisScale
 from gen_profile_exporters.cam_points import play_spline, spline_cycles, spline_error
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.setpoints import MAX_SAMPLES, axis_table, in_si, sampled
@@ -104,8 +104,9 @@ def replay(content: bytes, target: Target) -> SampledProfile:
 
 
 def _spacing(values: Array, axes: tuple[AxisScale, ...]) -> Array:
-    """Distance in m between the REALs around the greatest position."""
-    spacing = np.spacing(np.float32(np.abs(values).max(axis=0)))
+    """Distance in m between the REALs around the greatest position, or between whole counts."""
+    counts = [float(axis.unit == COUNTS) for axis in axes]
+    spacing = np.maximum(np.spacing(np.float32(np.abs(values).max(axis=0))), counts)
     return np.asarray(spacing / np.abs([axis.factor for axis in axes]), dtype=np.float64)
 
 

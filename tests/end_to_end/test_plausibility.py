@@ -40,6 +40,12 @@ MOVES = {
     "radians": ("flexible-joint",),
     "slow": ("double-pendulum-crane",),
     "two shots, far apart": ("paper", "solver.method=zv", "move.duration=2.0"),
+    "jerk leaps": (
+        "paper",
+        "solver={method='zvdd', base='jerk-limited'}",
+        "move.duration=4.6",
+        "limits={velocity=0.26, acceleration=1.5, jerk=21.5}",
+    ),
     "up and down": ("paper", "solver.method=umzvd"),
     "leading a lag": ("paper", "actuator={type='first-order', tau=0.2}"),
     "begins with a swing": ("paper", "move.initial={theta1=0.05}"),
@@ -136,6 +142,7 @@ def test_a_smooth_move_is_in_no_doubt_however_few_its_setpoints_are(distance, cy
         position = resolution * np.round(position / resolution)
     setpoints = SampledProfile(cycle_time=cycle_time, position=position, resolution=[resolution])
     assert implausibilities(spec, setpoints) == ()
+    assert implausibilities(spec, attrs.evolve(setpoints, velocity=motion.velocity)) == ()
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -225,10 +232,18 @@ def test_columns_that_belong_together_contradict_nothing(paper):
     assert implausibilities(paper[0], attrs.evolve(setpoints, acceleration=None)) == ()
 
 
+def test_an_altered_stretch_of_positions_contradicts_the_velocities(paper):
+    setpoints = sample(paper[1], 0.01)
+    position = setpoints.position.copy()
+    position[150:160] += MILLIMETRE
+    (fault,) = implausibilities(paper[0], attrs.evolve(setpoints, position=position))
+    assert re.match(r"The velocity at 1\.[456]9? s contradicts the positions around it by 0\.0", fault)
+
+
 def test_an_altered_velocity_contradicts_the_positions(paper):
     setpoints = sample(paper[1], 0.01)
     velocity = setpoints.velocity.copy()
-    velocity[150] *= 1.02
+    velocity[150] *= 1.05
     (fault,) = implausibilities(paper[0], attrs.evolve(setpoints, velocity=velocity))
     assert fault.startswith("The velocity at 1.5 s contradicts the positions around it by 0.00")
 
