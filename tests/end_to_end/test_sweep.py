@@ -160,7 +160,7 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was(swept, tmp_path):
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    wait_for(lambda: len(stamps(tmp_path)) >= 2)
+    wait_for(lambda: process.poll() is not None or len(stamps(tmp_path)) >= 2)
     process.kill()
     process.wait()
     finished = stamps(tmp_path)
