@@ -214,10 +214,11 @@ def test_an_axis_may_stand_still():
     np.testing.assert_allclose(profile(np.linspace(0.0, 4.0, 41)).position[:, 1], 3.0, rtol=1e-12)
 
 
-def test_a_cost_too_steep_for_any_mesh_is_blamed():
-    """exp((50/m · 86 mm)²) at the start: what follows is faster than any mesh."""
-    problem = crane_problem(initial={"theta1": 0.1}, target=(0.0,), desensitized=())
+def test_a_cost_that_is_too_steep_is_blamed():
+    """exp((50/m · 0.25 m)²) at the start: what follows is faster than any mesh."""
+    problem = crane_problem(initial={"theta1": 0.3}, target=(0.0,), desensitized=())
     solution = solve(problem)
     assert solution.status is Status.DIVERGED
-    assert solution.cure == 'Lower cost.sway_weight, or set cost.sway_scale = "auto".'
+    assert solution.cure.startswith("Lower cost.sway_weight")
+    assert solution.cure.endswith(', or set cost.sway_scale = "auto".')
     solve(attrs.evolve(problem, sway_scale=None)).raise_for_status()

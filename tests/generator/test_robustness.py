@@ -15,9 +15,8 @@ from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 
 FIFTY_DEGREES = np.radians(50.0)  # beyond, Newton may fail although a motion exists
-# beyond, the ropes' tension changes so much that the phase in which a fast second mode arrives turns by
-# radians from one Newton step to the next: some of these moves are refused, with more time as the cure
-TENSE_ENOUGH = np.radians(20.0)
+BARELY = 1.5  # periods
+LARGE = np.radians(25.0)  # beyond, moves that are barely possible may be refused; the cure is more time
 SLOW_ENOUGH = 1200.0  # rad; a faster second mode is followed by its own, exact linear equation
 
 
@@ -90,8 +89,8 @@ def test_every_crane_comes_to_rest(drawn):
     if solution.status is not Status.CONVERGED:
         quiet = solve(attrs.evolve(problem, sway_weight=0.0, target=(problem.target[0] * 1e-4,)))
         linear = quiet.raise_for_status().angle * 1e4
-        if phase > SLOW_ENOUGH and linear > TENSE_ENOUGH:
-            assert solution.status in {Status.DIVERGED, Status.SWINGS_TOO_FAR}
+        if problem.duration < BARELY * 2.0 * np.pi / frequencies(problem.parameters)[0] and linear > LARGE:
+            assert "Allow about" in solution.cure or "works" in solution.cure
             return
         assert solution.status is Status.SWINGS_TOO_FAR
         best = least_peak_angle(problem.parameters, problem.target[0], problem.duration)
@@ -129,8 +128,13 @@ def test_the_two_oracles_agree():
             27.0,
         ),  # sensitivities that are nearly dependent
         ({"m1": 1.8, "m2": 0.777, "L1": 0.278}, 4.07, 33.5, 181.0),  # 54° of swing
+        # shorter moves' solutions turn back before this one's
+        ({"m2": 0.1021564313333943, "L1": 4.4816890703380645}, 1.2, 4.4816890703380645, 0.0),
+        ({"m2": 1096.633, "L1": 1.0}, 1.25, 2.71828, 0.0),  # a light hook at 29°
+        # a sway so costly that absolute rounding errors drown Newton's steps
+        ({"m1": 11.0, "m2": 4.82, "L1": 12.68, "L2": 7.0}, 1.2, 0.51, 91.0),
     ],
-    ids=["fast", "fast-and-far", "nearly-dependent", "far"],
+    ids=["fast", "fast-and-far", "nearly-dependent", "far", "fold", "light-hook", "costly-sway"],
 )
 def test_moves_that_used_to_diverge(machine, periods, distance, beta):
     parameters = CRANE.nominal() | machine

@@ -6,7 +6,6 @@ import pytest
 
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import choice, indirect
-from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec_reading import preset_spec
 
 
@@ -51,7 +50,7 @@ def test_what_does_not_help_does_not_harm(neighbour, wrong):
     at = neighbour.trajectory
     near = {
         "far off": at.scaled(-30.0),
-        "of another size": Trajectory(mesh=at.mesh, nodes=at.nodes[:, :-2], stages=at.stages[:, :, :-2]),
+        "of another size": attrs.evolve(at, nodes=at.nodes[:, :-2], stages=at.stages[:, :, :-2]),
         "not a number": at.scaled(float("nan")),
     }[wrong]
     cold, warm = indirect.solve(problem()), indirect.solve(problem(), near)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import attrs
@@ -67,8 +68,15 @@ def require_limits(limits: LimitsSpec, command: Profile, transient_sway: float) 
     factors = [(breach.found / breach.allowed) ** (1.0 / breach.power) for breach in broken if breach.power]
     cure = "Widen the limits."
     if factors:
-        cure = f"Allow about {command.duration * max(factors):.2g} s (move.duration), or raise the limits."
+        enough = rounded_up(command.duration * max(factors))
+        cure = f"Allow about {enough} s (move.duration), or raise the limits."
     raise LimitViolation("\n".join([*(breach.sentence() for breach in broken), cure]))
+
+
+def rounded_up(value: float) -> str:
+    """Write three digits, rounded up: what is called enough must be enough."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return f"{math.ceil(value / unit) * unit:.3g}"
 
 
 def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Breach]:

@@ -19,7 +19,7 @@ plant's parameters and the weights are run-time data, so one derivation serves e
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import attrs
 import numpy as np
@@ -32,6 +32,15 @@ from gen_profile.problem.sensitivities import sensitivities
 from gen_profile.problem.symbolic import Array, Function, Symbol
 
 SNAP_TIME = 0.02  # s; weighs snap against jerk: ½ (j² + (0.02 s · snap)²)
+
+
+@attrs.frozen(kw_only=True)
+class Kind:
+    """States of one kind, and the unactuated coordinates that they belong to."""
+
+    states: list[int]
+    coordinates: list[int]
+    rates: bool
 
 
 @attrs.frozen(kw_only=True)
@@ -63,20 +72,18 @@ class StateLayout:
         first = 2 * self.n_u + order * self.m
         return slice(first, first + self.m)
 
-    @property
-    def kinds(self) -> list[tuple[list[int], list[int]]]:
-        """States of the unactuated side by kind: coordinates, rates, and each one's sensitivities.
-
-        Each kind as its states and the coordinates that they belong to.
-        """
+    @cached_property
+    def kinds(self) -> list[Kind]:
+        """States of the unactuated side by kind: coordinates, rates, and each one's sensitivities."""
         first = self.sensitivities.start
         rows: list[tuple[int, tuple[str, ...], int]] = [(row, (), row) for row in range(2 * self.n_u)]
         rows += [(first + i, names, row) for i, (names, row) in enumerate(self.sensitivity_rows)]
-        kinds: dict[tuple[tuple[str, ...], bool], tuple[list[int], list[int]]] = {}
+        kinds: dict[tuple[tuple[str, ...], bool], Kind] = {}
         for state, names, row in rows:
-            states, coordinates = kinds.setdefault((names, row < self.n_u), ([], []))
-            states.append(state)
-            coordinates.append(row % self.n_u)
+            rates = row >= self.n_u
+            kind = kinds.setdefault((names, rates), Kind(states=[], coordinates=[], rates=rates))
+            kind.states.append(state)
+            kind.coordinates.append(row % self.n_u)
         return list(kinds.values())
 
     @property
@@ -164,23 +171,34 @@ def optimality_system(
     g = axes.effort + beta * (sym.exp(gamma**2 * sym.dot(end_sway, end_sway)) - 1)
 
     n = x.shape[0]
-    z, offset, scale = sym.symbols("z", 2 * n), sym.symbols("offset", n), sym.symbols("scale", n)
-    costate = z[n:]
+    state, costate = sym.symbols("state", n), sym.symbols("costate", n)
+    offset, scale = sym.symbols("offset", n), sym.symbols("scale", n)
     # f is affine and g quadratic in u: ∂H/∂u = 0 is a linear equation, and its solution the minimum
     u_star = -cost_scale / axes.weight * sym.gradient(sym.dot(costate, duration * f / scale), axes.u)
 
     def optimal(expression: Symbol) -> Symbol:
-        return sym.substitute(sym.substitute(expression, axes.u, u_star), x, offset + scale * z[:n])
+        return sym.substitute(sym.substitute(expression, axes.u, u_star), x, offset + scale * state)
 
     hamiltonian = optimal(g / cost_scale + sym.dot(costate, duration * f / scale))
-    slope = sym.gradient(hamiltonian, z)
-    flow = sym.column([slope[n:], -slope[:n]])
+    forward, backward = sym.gradient(hamiltonian, costate), -sym.gradient(hamiltonian, state)
+    slopes = sym.column([forward, backward])
+    # the Jacobian of a Hamiltonian flow: half of it follows by symmetry, which halves the work
+    by_state, curvature = sym.jacobian(forward, state), sym.symmetric(sym.jacobian(backward, state))
+    jacobian = sym.column(
+        [
+            sym.beside(by_state, sym.jacobian(forward, costate)),
+            sym.beside(curvature, -by_state.T),
+        ]
+    )
     quantities = [hamiltonian * cost_scale, optimal(sym.column([g, axes.top, d.sway, d.angle]))]
-    inputs = {"z": z, "data": sym.column([d.p, weights, effort_weights, offset, scale])}
+    inputs = {
+        "z": sym.column([state, costate]),
+        "data": sym.column([d.p, weights, effort_weights, offset, scale]),
+    }
     return OptimalitySystem(
         plant=plant,
         layout=layout,
-        flow=Function("flow", inputs, sym.beside(flow, sym.jacobian(flow, z))),
+        flow=Function("flow", inputs, sym.beside(slopes, jacobian)),
         quantities=Function("quantities", inputs, sym.column(quantities)),
     )
 

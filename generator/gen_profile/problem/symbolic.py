@@ -80,6 +80,11 @@ def dot(a: Symbol, b: Symbol) -> Symbol:
     return casadi.dot(a, b)
 
 
+def symmetric(matrix: Symbol) -> Symbol:
+    """Take a matrix that is symmetric by its values from its lower triangle alone."""
+    return casadi.tril2symm(casadi.tril(matrix))
+
+
 def beside(left: Symbol, right: Symbol) -> Symbol:
     """Join two matrices side by side."""
     return casadi.horzcat(left, right)

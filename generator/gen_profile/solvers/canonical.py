@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.problem.axis_reach import axis_reach, effort_weights
 from gen_profile.problem.initial_state import initial_state
-from gen_profile.problem.linearization import Linearization, linearize
+from gen_profile.problem.linearization import Linearization
+from gen_profile.problem.linearization import linearize as linearized_machine
 from gen_profile.problem.pontryagin import Data, OptimalitySystem, StateLayout
 from gen_profile.problem.problem import Problem
 from gen_profile.problem.reachability import independent_states
 from gen_profile.profile import Array
-from gen_profile.solvers.collocation import Trajectory, newton_iterate
+from gen_profile.solvers.collocation import Trajectory, linearize
 
 # Shares of a state's response outside the span of the others', below which its end condition is implied.
 # What a sensitivity left at a thousandth of itself adds to the sway is far less than what second order does.
 DEPENDENT = 1e-8
 INSENSITIVE = 1e-3
 PROMINENT = 1e-4  # sway left by a mode, as a share of the sway that another may leave
-NEGLIGIBLE = 1e-8  # sway left by a mode, as a share of the move
+NEGLIGIBLE = 1e-7  # sway left by a mode, as a share of the move
 QUINTIC_JERK = 60.0  # with which a quintic move starts, in distances per cube of its duration
 
 
@@ -74,15 +77,12 @@ class Canonical:
         numpy.linalg.LinAlgError
             When they overflow.
         """
-        back, flow = self._inverse_transform, self.system.flow(self.unknowns(points), self.data.row())
+        flow = self.system.flow(self.unknowns(points), self.data.row())
         if not np.isfinite(flow).all():
             raise np.linalg.LinAlgError("the canonical equations overflow")
-        return np.concatenate([back @ flow[:, :, :1], back @ flow[:, :, 1:] @ self._transform], axis=2)
-
-    def slopes(self, points: Array) -> Array:
-        """Evaluate ζ', shape (points, 2 n)."""
-        flow = self.system.flow(self.unknowns(points), self.data.row())
-        return np.asarray(flow[:, :, 0] @ self._inverse_transform.T)
+        modal = self._inverse_transform @ flow
+        modal[:, :, 1:] = modal[:, :, 1:] @ self._transform
+        return np.asarray(modal)
 
     def solve_linear(self, flow: Array, trajectory: Trajectory) -> Trajectory:
         """Solve the equations linearised about a trajectory, at whose points `flow` was evaluated.
@@ -92,7 +92,7 @@ class Canonical:
         numpy.linalg.LinAlgError
             When they have no solution.
         """
-        return newton_iterate(flow, trajectory, self.initial, self.final)
+        return linearize(flow, trajectory).solve(self.initial, self.final)
 
     def quantities(self, points: Array) -> Array:
         """H, g, highest derivatives, sways and angles; see `OptimalitySystem`."""
@@ -116,6 +116,15 @@ class Canonical:
         """Pose the problem for a share of the move and of the initial swing."""
         return attrs.evolve(self, initial=share * self.initial, final=share * self.final)
 
+    @property
+    def resolved(self) -> bool:
+        """Whether no mode is too fast to be excited: such modes' costates fade in the last interval."""
+        return not np.isnan(self.final[: 2 * self.system.layout.n_u]).any()
+
+    def slower(self, factor: float) -> Canonical:
+        """Pose the problem for a longer duration."""
+        return attrs.evolve(self, data=attrs.evolve(self.data, duration=factor * self.data.duration))
+
     def weights(self, solution: Trajectory) -> Array:
         """Tell how much each coordinate counts, shape (n,).
 
@@ -124,9 +133,9 @@ class Canonical:
         """
         largest = self._greatest(solution)
         weights = 1.0 / largest
-        for states, _ in self.system.layout.kinds:
-            sway = (self.shown * largest)[states].max()
-            weights[states] = self.shown[states] / sway if sway > 0.0 else 0.0
+        for kind in self.system.layout.kinds:
+            sway = (self.shown * largest)[kind.states].max()
+            weights[kind.states] = self.shown[kind.states] / sway if sway > 0.0 else 0.0
         return weights
 
     def distance(self, one: Trajectory, other: Trajectory) -> float:
@@ -159,12 +168,12 @@ class Canonical:
         largest = np.abs(solution.nodes[:, : len(self.final)]).max(axis=0)
         return np.where(largest > 0.0, largest, 1.0)
 
-    @property
+    @cached_property
     def _transform(self) -> Array:
         """Matrix from ζ to states and costates: canonical, so that the equations keep their form."""
         return _blocks(self.basis, np.asarray(np.linalg.inv(self.basis)).T)
 
-    @property
+    @cached_property
     def _inverse_transform(self) -> Array:
         return _blocks(np.asarray(np.linalg.inv(self.basis)), self.basis.T)
 
@@ -178,7 +187,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     distance, reach = np.array(problem.distance), axis_reach(problem)
     weights = effort_weights(reach)
     middle = tuple((np.array(problem.start) + np.array(problem.target)) / 2.0)
-    linear = linearize(problem.plant, problem.parameters, middle)
+    linear = linearized_machine(problem.plant, problem.parameters, middle)
     static = np.abs(np.linalg.solve(linear.stiffness, linear.input @ (reach / duration**2))).max()
     scale = np.ones(layout.size)
     scale[: layout.n_u] = static
@@ -205,7 +214,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     )
     excited = _excited(linear, swung[: 2 * layout.n_u], reach, duration)
     basis, shown = _modal(layout, linear, _shown(linear, excited, reach))
-    final[[state for states, _ in layout.kinds for state in states if shown[state] == 0.0]] = np.nan
+    final[[state for kind in layout.kinds for state in kind.states if shown[state] == 0.0]] = np.nan
     initial = np.asarray(np.linalg.solve(basis, swung / scale), dtype=np.float64)
     return Canonical(
         system=system,
@@ -241,12 +250,12 @@ def independence(canonical: Canonical) -> tuple[NDArray[np.bool_], tuple[str, ..
 def _modal(layout: StateLayout, linear: Linearization, shown: Array) -> tuple[Array, Array]:
     """Basis in which everything that swings is written in modes, and the sway that each state shows."""
     basis, sway = np.eye(layout.size), np.zeros(layout.size)
-    for states, coordinates in layout.kinds:
-        if len(coordinates) == layout.n_u:
-            basis[np.ix_(states, states)] = linear.modes
-            sway[states] = shown
+    for kind in layout.kinds:
+        if len(kind.states) == layout.n_u:
+            basis[np.ix_(kind.states, kind.states)] = linear.modes
+            sway[kind.states] = shown
         else:  # a parameter that does not reach all coordinates
-            sway[states] = np.abs(linear.sway_gain).max(axis=0)[coordinates]
+            sway[kind.states] = np.abs(linear.sway_gain).max(axis=0)[kind.coordinates]
     return basis, sway
 
 
@@ -276,5 +285,7 @@ def _shown(linear: Linearization, excited: Array, reach: Array) -> Array:
 
 def _blocks(upper: Array, lower: Array) -> Array:
     """Write two square matrices into the diagonal of one."""
-    nothing = np.zeros_like(upper)
-    return np.block([[upper, nothing], [nothing, lower]])
+    n = len(upper)
+    blocks = np.zeros((2 * n, 2 * n))
+    blocks[:n, :n], blocks[n:, n:] = upper, lower
+    return blocks

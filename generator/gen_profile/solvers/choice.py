@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import attrs
 
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.problem.limits import breaches
+from gen_profile.problem.limits import breaches, rounded_up
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers import direct, indirect, worst_case
 from gen_profile.solvers.collocation import Trajectory
@@ -71,7 +69,9 @@ def _explained(solution: Solution) -> Solution:
     # with a limit on the sway the search would take too long for an explanation
     shortest = shortest_duration(problem, direct.solve) if problem.limits.sway is None else None
     if shortest is not None:
-        cures.append(f"With these limits it takes at least {_up(COMFORT * shortest)} s (move.duration)")
+        cures.append(
+            f"With these limits it takes at least {rounded_up(COMFORT * shortest)} s (move.duration)"
+        )
     for name in ("velocity", "acceleration", "jerk", "sway", "travel"):
         loosened = problem.limits.without(name)
         if loosened != problem.limits:
@@ -79,9 +79,3 @@ def _explained(solution: Solution) -> Solution:
             if direct.solve(without).optimum is not None:
                 cures.append(f"without limits.{name} it would do in {problem.duration:g} s")
     return attrs.evolve(solution, cure="; ".join(cures) + "." if cures else solution.cure)
-
-
-def _up(value: float) -> str:
-    """Write three digits, rounded up: what is called enough must be enough."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return f"{math.ceil(value / unit) * unit:.3g}"

@@ -1,20 +1,24 @@
-"""Gauss collocation of a two-point boundary value problem on a mesh, and its Newton step.
+"""Collocation of a two-point boundary value problem on a mesh, and its Newton step.
 
-On every interval the solution is a polynomial of degree `STAGES` that meets ``z' = F(z)`` at the Gauss
-points; at the nodes it is accurate to order 2 · `STAGES`. The stage values of an interval are eliminated
-first, all intervals in one batch; what is left couples neighbouring nodes only and is a banded system.
-(Ascher, Mattheij & Russell, Numerical Solution of Boundary Value Problems for ODEs, 1995, chapter 5 and 7.)
+On every interval the solution is a polynomial of degree `STAGES` that meets ``z' = F(z)`` at the collocation
+points; at the nodes it is accurate to about twice that order. Gauss's points are the most accurate ones.
+Radau's let what swings too fast for the mesh fade: states forward, and costates, whose method is the adjoint
+one, backward. The stage values of an interval are eliminated first, all intervals in one batch; what is left
+couples neighbouring nodes only and is a banded system. (Ascher, Mattheij & Russell, Numerical Solution of
+Boundary Value Problems for ODEs, 1995, chapter 5 and 7; Hairer & Wanner, Solving Ordinary Differential
+Equations II, 1996, section IV.5.)
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import attrs
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.linalg import lapack
+from scipy.special import roots_jacobi
 from threadpoolctl import ThreadpoolController
 
 from gen_profile.profile import Array
@@ -28,29 +32,48 @@ BLAS = ThreadpoolController()
 IntArray = NDArray[np.intp]
 
 
-@attrs.frozen(eq=False)
-class _Tableau:
-    """Gauss's method on [0, 1]: abscissae, integration matrix, weights, and bᵀ A⁻¹."""
+@attrs.frozen(kw_only=True, eq=False)
+class Scheme:
+    """Where and how to collocate, on [0, 1].
+
+    Attributes
+    ----------
+    c, b : (STAGES,) arrays
+        Collocation points, and weights for integrals.
+    A, adjoint : (STAGES, STAGES) arrays
+        Integrals from 0 to the points, for states and for costates.
+    end : (STAGES,) array
+        bᵀ A⁻¹: what is reached at 1 in terms of what is at the points.
+    interpolation : (STAGES + 1, STAGES + 1) array
+        From values at 0 and the points to coefficients of the polynomial through them, lowest power first.
+    """
 
     c: Array
-    A: Array
     b: Array
+    A: Array
+    adjoint: Array
     end: Array
+    interpolation: Array
 
 
-def _gauss(stages: int) -> _Tableau:
-    c = (legendre.leggauss(stages)[0] + 1.0) / 2.0
-    powers = np.arange(1, stages + 1)
+def _scheme(c: Array) -> Scheme:
+    powers = np.arange(1, STAGES + 1)
     vandermonde = c[:, None] ** (powers - 1)
     A = (c[:, None] ** powers / powers) @ np.linalg.inv(vandermonde)
     b = (1.0 / powers) @ np.linalg.inv(vandermonde)
-    return _Tableau(c, A, b, b @ np.linalg.inv(A))
+    return Scheme(
+        c=c,
+        b=b,
+        A=A,
+        # the costates that belong to discretised states (Hager, Numerische Mathematik 87, 2000)
+        adjoint=b - b * A.T / b[:, None],
+        end=b @ np.linalg.inv(A),
+        interpolation=np.linalg.inv(np.append(0.0, c)[:, None] ** np.arange(STAGES + 1)),
+    )
 
 
-GAUSS = _gauss(STAGES)
-
-# values at 0 and the Gauss points → coefficients of the polynomial through them, lowest power first
-INTERPOLATION = np.linalg.inv(np.concatenate([[0.0], GAUSS.c])[:, None] ** np.arange(STAGES + 1))
+GAUSS = _scheme((roots_jacobi(STAGES, 0.0, 0.0)[0] + 1.0) / 2.0)
+RADAU = _scheme(np.append((roots_jacobi(STAGES - 1, 1.0, 0.0)[0] + 1.0) / 2.0, 1.0))
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -59,14 +82,16 @@ class Trajectory:
 
     Attributes
     ----------
+    scheme : Scheme
     mesh : (intervals + 1,) array
         From 0 to 1.
     nodes : (intervals + 1, size) array
         Values on the mesh.
     stages : (intervals, STAGES, size) array
-        Values at the Gauss points.
+        Values at the collocation points.
     """
 
+    scheme: Scheme
     mesh: Array
     nodes: Array
     stages: Array
@@ -77,7 +102,7 @@ class Trajectory:
         Shape (intervals, STAGES + 1, size).
         """
         values = np.concatenate([self.nodes[:-1, None], self.stages], axis=1)
-        return np.asarray(np.einsum("pv,kvs->kps", INTERPOLATION, values))
+        return np.asarray(np.einsum("pv,kvs->kps", self.scheme.interpolation, values))
 
     def __call__(self, times: Array) -> Array:
         """Evaluate, shape (times, size)."""
@@ -88,25 +113,23 @@ class Trajectory:
 
     def on(self, mesh: Array) -> Trajectory:
         """Interpolate to another mesh."""
-        return Trajectory(
-            mesh=mesh, nodes=self(mesh), stages=self(stage_times(mesh)).reshape(-1, STAGES, self.size)
-        )
+        return sampled(self, self.scheme, mesh)
 
     def blend(self, other: Trajectory, weight: float) -> Trajectory:
         """``self + weight · (other − self)`` on the same mesh."""
-        return Trajectory(
-            mesh=self.mesh,
+        return attrs.evolve(
+            self,
             nodes=self.nodes + weight * (other.nodes - self.nodes),
             stages=self.stages + weight * (other.stages - self.stages),
         )
 
     def scaled(self, factors: Array | float) -> Trajectory:
         """Multiply every unknown by its factor."""
-        return Trajectory(mesh=self.mesh, nodes=self.nodes * factors, stages=self.stages * factors)
+        return attrs.evolve(self, nodes=self.nodes * factors, stages=self.stages * factors)
 
     def transformed(self, matrix: Array) -> Trajectory:
         """Multiply the unknowns by a matrix."""
-        return Trajectory(mesh=self.mesh, nodes=self.nodes @ matrix.T, stages=self.stages @ matrix.T)
+        return attrs.evolve(self, nodes=self.nodes @ matrix.T, stages=self.stages @ matrix.T)
 
     @property
     def size(self) -> int:
@@ -119,73 +142,125 @@ class Trajectory:
         return self.stages.reshape(-1, self.size)
 
 
-def stage_times(mesh: Array) -> Array:
-    """Place the Gauss points of all intervals, in a row."""
-    return np.asarray((mesh[:-1, None] + np.diff(mesh)[:, None] * GAUSS.c).ravel())
+def sampled(function: Callable[[Array], Array], scheme: Scheme, mesh: Array) -> Trajectory:
+    """Interpolate a function, times → (times, size) array, on a mesh."""
+    points = (mesh[:-1, None] + np.diff(mesh)[:, None] * scheme.c).ravel()
+    nodes = function(mesh)
+    stages = function(points).reshape(-1, STAGES, nodes.shape[1])
+    return Trajectory(scheme=scheme, mesh=mesh, nodes=nodes, stages=stages)
 
 
-def newton_iterate(flow: Array, current: Trajectory, initial: Array, final: Array) -> Trajectory:
-    """Solve the collocation equations linearised about a trajectory.
+@attrs.frozen(kw_only=True, eq=False)
+class Linearized:
+    """Collocation equations linearised about a trajectory, their stages eliminated.
+
+    Corrections are solved for, not trajectories: their rounding errors are as small as they are themselves.
+
+    Attributes
+    ----------
+    current : Trajectory
+    response : (intervals, STAGES, size, 1 + size) array
+        Corrections of the stages, and beside them their derivatives by the correction at the interval's
+        beginning.
+    transition, offset : (intervals, size, size) and (intervals, size) arrays
+        The corrections of neighbouring nodes obey ``δ_{k+1} = transition_k δ_k + offset_k``.
+    """
+
+    current: Trajectory
+    response: Array
+    transition: Array
+    offset: Array
+
+    def solve(self, initial: Array, final: Array) -> Trajectory:
+        """Find the trajectory between boundary values: a full Newton step.
+
+        Parameters
+        ----------
+        initial, final : (size / 2,) arrays
+            Of the first half of the unknowns (the states); entries of `final` that are NaN are free, and the
+            matching costate is zero instead.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When they do not determine it.
+        """
+        nodes, stages = self.current.nodes, self.current.stages
+        n, free = len(initial), np.isnan(final)
+        ends = np.where(free, np.arange(n) + n, np.arange(n))
+        missed = np.where(free, 0.0, final) - nodes[-1, ends]
+        correction = _solve_nodes(self.transition, self.offset, initial - nodes[0, :n], missed, ends)
+        answer = self.response[..., 0] + np.einsum("kiab,kb->kia", self.response[..., 1:], correction[:-1])
+        return attrs.evolve(self.current, nodes=nodes + correction, stages=stages + answer)
+
+
+def linearize(flow: Array, current: Trajectory) -> Linearized:
+    """Linearise the collocation equations.
 
     Parameters
     ----------
     flow : (points, size, 1 + size) array
         F, and beside it ∂F/∂z, at the trajectory's collocation points.
     current : Trajectory
-    initial, final : (size / 2,) arrays
-        Boundary values of the first half of the unknowns (the states) at both ends; entries of `final` that
-        are NaN are free, and the matching costate is zero instead.
-
-    Returns
-    -------
-    Trajectory
-        The full Newton iterate.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        When the linearised equations are singular.
+        When the equations of an interval are singular.
     """
-    intervals, _, size = current.stages.shape
-    integration = np.diff(current.mesh)[:, None, None] * GAUSS.A
+    nodes, stages, scheme = current.nodes, current.stages, current.scheme
+    intervals, _, size = stages.shape
+    lengths = np.diff(current.mesh)[:, None, None]
     values = flow.reshape(intervals, STAGES, size, 1 + size)
-    slope, jacobian = values[..., 0], values[..., 1:]
+    states, costates = slice(0, size // 2), slice(size // 2, size)
 
-    # (1 − h A ⊗ J) Z = z_k + h A (F − J Z₀), for the part of Z that does not depend on z_k and the part that
-    # does
-    inner = np.einsum("kij,kjab->kiajb", -integration, jacobian)
-    inner = inner.reshape(intervals, STAGES * size, STAGES * size)
-    diagonal = np.arange(STAGES * size)
-    inner[:, diagonal, diagonal] += 1.0
-    constant = slope - np.einsum("kiab,kib->kia", jacobian, current.stages)
+    # (1 − h A ⊗ J) ΔZ = δ_k + z_k + h A F − Z, for the part of ΔZ that does not depend on δ_k and the part
+    # that does
+    inner = np.empty((intervals, STAGES, size, STAGES, size))
     right = np.empty((intervals, STAGES, size, 1 + size))
-    right[..., 0] = integration @ constant
+    for half, A in ((states, scheme.A), (costates, scheme.adjoint)):
+        inner[:, :, half] = np.einsum("kij,kjab->kiajb", -lengths * A, values[:, :, half, 1:])
+        right[:, :, half, 0] = lengths * A @ values[:, :, half, 0] + (nodes[:-1, None] - stages)[:, :, half]
+    matrices = inner.reshape(intervals, STAGES * size, STAGES * size)
+    diagonal = np.arange(STAGES * size)
+    matrices[:, diagonal, diagonal] += 1.0
     right[..., 1:] = np.eye(size)
     with BLAS.limit(limits=1, user_api="blas"):
-        response = np.linalg.solve(inner, right.reshape(intervals, STAGES * size, 1 + size))
+        response = np.asarray(np.linalg.solve(matrices, right.reshape(intervals, STAGES * size, 1 + size)))
     response = response.reshape(intervals, STAGES, size, 1 + size)
 
-    # z_{k+1} = (1 − Σ w) z_k + Σ w_i Z_i
-    across = np.einsum("i,kiab->kab", GAUSS.end, response)
-    across[:, :, 1:] += (1.0 - GAUSS.end.sum()) * np.eye(size)
-    nodes = _solve_nodes(np.ascontiguousarray(across[:, :, 1:]), across[:, :, 0], initial, final)
-    stages = response[..., 0] + np.einsum("kiab,kb->kia", response[..., 1:], nodes[:-1])
-    return Trajectory(mesh=current.mesh, nodes=nodes, stages=stages)
+    # states: z_{k+1} = z_k + Σ w_i (Z_i − z_k)
+    # costates, whose A may be singular: z_{k+1} = z_k + h Σ b_i F_i
+    across = np.empty((intervals, size, 1 + size))
+    across[:, states] = np.einsum("i,kiab->kab", scheme.end, response[:, :, states])
+    across[:, states, 1:] += (1.0 - scheme.end.sum()) * np.eye(size)[states]
+    across[:, states, 0] += np.einsum("i,kia->ka", scheme.end, (stages - nodes[:-1, None])[:, :, states])
+    change = lengths[..., None] * scheme.b[:, None, None] * values[:, :, costates]
+    across[:, costates] = np.einsum("kiab,kibc->kac", change[..., 1:], response)
+    across[:, costates, 0] += change[..., 0].sum(axis=1)
+    across[:, costates, 1:] += np.eye(size)[costates]
+    return Linearized(
+        current=current,
+        response=response,
+        transition=np.ascontiguousarray(across[:, :, 1:]),
+        offset=across[:, :, 0] - np.diff(nodes, axis=0),
+    )
 
 
-def _solve_nodes(transition: Array, offset: Array, initial: Array, final: Array) -> Array:
-    """Solve ``z_{k+1} = transition_k z_k + offset_k``, states given at both ends: (intervals + 1, size)."""
+def _solve_nodes(transition: Array, offset: Array, initial: Array, final: Array, ends: IntArray) -> Array:
+    """Solve ``δ_{k+1} = transition_k δ_k + offset_k``: shape (intervals + 1, size).
+
+    Given are the states at the start, and the entries `ends` at the end.
+    """
     intervals, size, _ = transition.shape
     n = size // 2
     band = n + size - 1  # as many diagonals below as above the main one
     rows, columns, fixed = _band_pattern(intervals, size)
     matrix = np.zeros((3 * band + 1, (intervals + 1) * size))
-    free = np.isnan(final)
-    end = intervals * size + np.arange(n) + np.where(free, n, 0)
     data = np.concatenate([-transition.ravel(), np.ones(fixed), np.ones(n)])
-    columns = np.concatenate([columns, end])
+    columns = np.concatenate([columns, intervals * size + ends])
     matrix[2 * band + rows - columns, columns] = data
-    right = np.concatenate([initial, offset.ravel(), np.where(free, 0.0, final)])
+    right = np.concatenate([initial, offset.ravel(), final])
     *_, solution, info = lapack.dgbsv(band, band, matrix, right, overwrite_ab=True, overwrite_b=True)
     if info != 0 or not np.isfinite(solution).all():
         raise np.linalg.LinAlgError("the boundary conditions do not determine the solution")

@@ -15,7 +15,7 @@ from gen_profile.solvers.canonical import Canonical
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.newton import solve_newton
 
-SMALLEST_ADVANCE = 1.0 / 512.0
+SMALLEST_ADVANCE = 1.0 / 32.0
 QUICK = 5  # Newton iterations after which the next advance may be twice as long
 
 

@@ -1,38 +1,48 @@
 """Indirect method: Pontryagin's conditions solved as a two-point boundary value problem.
 
 1. With β = 0 the problem is nearly linear, and Newton's method converges from the linear model's optimum;
-   where angles are large it is led there through shorter moves.
-2. From there to the β asked for, at once where that converges, else through smaller ones.
-3. Mesh intervals on which the Hamiltonian drifts or the canonical equations are missed are split.
+   where angles are large it is led there through shorter or slower moves, or around folds.
+2. From there to the β asked for, at once where that converges, else through smaller ones, or around folds.
+3. All this on a coarse mesh, which smooths the way. What it gave is then refined: intervals on which the
+   Hamiltonian drifts or the canonical equations are missed are split.
 """
 
 from __future__ import annotations
+
+import math
+from collections.abc import Callable
 
 import attrs
 import numpy as np
 from numpy.polynomial import polynomial
 
 from gen_profile.metrics import peak
+from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.profile import Array
+from gen_profile.solvers.arclength import follow
 from gen_profile.solvers.canonical import Canonical, canonical_problem, independence
-from gen_profile.solvers.collocation import GAUSS, INTERPOLATION, STAGES, Trajectory, stage_times
+from gen_profile.solvers.collocation import GAUSS, RADAU, STAGES, Trajectory, sampled
 from gen_profile.solvers.continuation import Advance, advance
-from gen_profile.solvers.newton import solve_newton
+from gen_profile.solvers.newton import NewtonOutcome, solve_newton
 from gen_profile.solvers.refinement import defect, refine
 from gen_profile.solvers.solution import Optimum, Solution, Status
 
 METHOD = "indirect"
 INTERVALS = 30
+RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that matters, to judge a solution by
+COARSER = 2.5  # times as long are intervals to begin with
+LEVELS = 3  # of coarse meshes, each with half the intervals' length
+SLOWER = 1.5  # times the duration, to come from where the straight way fails
+LONGER = 1.1 ** np.arange(1, 60)  # times the duration, to look for one that is long enough
 MAX_INTERVALS = 480
-RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that matters, to begin with
 SWAY_SAMPLES = 1001
 BETA_DECADES = 8.0  # from share 0 to 1
 HORIZONTAL = np.pi / 2.0
 UNRESOLVED = 0.1  # defect, as a share of a state's size, of a mesh that does not follow the motion
 TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the linear model implies
-MODERATE_ANGLE = np.pi / 4.0  # that a cure aims at
+MODERATE_ANGLE = np.pi / 4.0  # up to which Newton's method hardly fails
 SMALL_ANGLE = np.radians(50.0)  # of the linear model; from there on nonlinearity is blamed where Newton fails
 
 
@@ -66,39 +76,61 @@ def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
 
 
 def _solve(problem: Problem, quiet: Canonical, near: Trajectory | None) -> Solution:
+    """Begin on a coarse mesh, which smooths the way; where it misleads, on finer ones."""
+    fine = float(np.clip(quiet.phase / RADIANS_PER_INTERVAL, INTERVALS, MAX_INTERVALS))
+    iterations = 0
+    for level in range(LEVELS):
+        intervals = min(MAX_INTERVALS, math.ceil(2**level * fine / COARSER))
+        try:
+            solution = _on_mesh(problem, quiet, near, intervals, math.ceil(fine))
+        except np.linalg.LinAlgError:
+            cure = "The end conditions contradict one another; allow more time."
+            solution = _failure(problem, Status.DIVERGED, 1, cure)
+        iterations += solution.iterations
+        if solution.status is not Status.DIVERGED:
+            break
+    return attrs.evolve(solution, iterations=iterations)
+
+
+def _on_mesh(problem: Problem, quiet: Canonical, near: Trajectory | None, coarse: int, fine: int) -> Solution:
     """Follow the solution from the linear model's to that with the β asked for."""
-    try:
-        guess = _guess(quiet)
-        quiet, guess = quiet.rescaled(quiet.solve_linear(quiet.flow(guess.points), guess))
-    except np.linalg.LinAlgError:
-        return _failure(
-            problem, Status.DIVERGED, 1, "The end conditions contradict one another; allow more time."
-        )
-    linear_angle = quiet.greatest_angle(guess)
-    approach = advance(quiet.towards, guess, guess.scaled(0.0))
+    guess = _guess(quiet, np.linspace(0.0, 1.0, coarse + 1))
+    quiet, linear = quiet.rescaled(quiet.solve_linear(quiet.flow(guess.points), guess))
+    approach = _approach(quiet, linear)
+    iterations = approach.iterations
     if approach.reached < 1.0 or quiet.greatest_angle(approach.solution) > HORIZONTAL:
-        return _too_hard(problem, approach.iterations, linear_angle)
-    quiet, guess = quiet.rescaled(approach.solution)
-    weighted = _with_sway_cost(problem, quiet, guess)
-    climb = _beside(weighted, guess, near) or _climb(weighted, guess)
-    climb = attrs.evolve(climb, iterations=approach.iterations + climb.iterations)
-    if climb.reached < 1.0 and linear_angle < SMALL_ANGLE:
-        return _too_heavy(problem, climb.iterations, climb.reached)
+        return _too_hard(problem, quiet, linear, iterations)
+    still, guess = quiet.rescaled(approach.solution)
+    measured, spent = _measured(problem, still, guess, fine)
+    iterations += spent
+    weighted = _with_sway_cost(problem, still, measured)
+    climb = _beside(weighted, near, fine) or advance(lambda share: _lighter(weighted, share), guess)
+    iterations += climb.iterations
     if climb.reached < 1.0:
-        return _too_hard(problem, climb.iterations, linear_angle)
-    return _resolved(problem, weighted, climb, linear_angle)
+        around = follow(weighted, guess, HORIZONTAL)
+        iterations += around.iterations
+        if around.reached < 1.0:
+            return _too_heavy(problem, iterations, climb.reached)
+        climb = around
+    refined = refine(weighted, climb.solution, fine)
+    iterations += refined.iterations
+    if refined.solution is None and problem.sway_weight > 0.0:
+        return _unresolved(problem, iterations)
+    if refined.solution is None:
+        return _too_hard(problem, quiet, linear, iterations)
+    if weighted.greatest_angle(refined.solution) > HORIZONTAL:
+        return _too_hard(problem, quiet, linear, iterations)
+    return _judged(problem, weighted, refined.solution, iterations, refined.residual or climb.residual)
 
 
-def _resolved(problem: Problem, weighted: Canonical, climb: Advance, linear_angle: float) -> Solution:
-    """Refine the mesh, and accept the solution where it stands up to a look between the mesh's points."""
-    refined = refine(weighted, climb.solution)
-    best, iterations = refined.solution or climb.solution, climb.iterations + refined.iterations
-    if weighted.greatest_angle(best) > HORIZONTAL:
-        return _too_hard(problem, iterations, linear_angle)
-    if weighted.missed(best) > TOLERATED_MISS:
+def _judged(
+    problem: Problem, weighted: Canonical, found: Trajectory, iterations: int, residual: float
+) -> Solution:
+    """Accept a solution where it stands up to a look between the mesh's points."""
+    if weighted.missed(found) > TOLERATED_MISS:
         cure = "Check the machine's equations and parameters."
         return _failure(problem, Status.NOT_CONTROLLABLE, iterations, cure)
-    optimum = _optimum(weighted, best)
+    optimum = _optimum(weighted, found)
     if optimum.defect is not None and optimum.defect > UNRESOLVED:
         return _unresolved(problem, iterations)
     return Solution(
@@ -107,26 +139,48 @@ def _resolved(problem: Problem, weighted: Canonical, climb: Advance, linear_angl
         problem=problem,
         optimum=optimum,
         iterations=iterations,
-        residual=refined.residual or climb.residual,
-        trajectory=weighted.dimensionless(best),
+        residual=residual,
+        trajectory=weighted.dimensionless(found),
     )
 
 
-def _climb(weighted: Canonical, guess: Trajectory) -> Advance:
-    """Raise β to what is asked for; on a coarser mesh, which smooths the way, where a fine one fails."""
-    fine = advance(lambda share: _lighter(weighted, share), guess)
-    if fine.reached == 1.0 or len(guess.mesh) <= INTERVALS + 1:
-        return fine
-    coarse = advance(lambda share: _lighter(weighted, share), guess.on(np.linspace(0.0, 1.0, INTERVALS + 1)))
-    better = max(fine, coarse, key=lambda climb: climb.reached)
-    return attrs.evolve(better, iterations=fine.iterations + coarse.iterations)
+def _approach(quiet: Canonical, linear: Trajectory) -> Advance:
+    """Solve the problem with β = 0: at once, else through shorter moves, slower ones, or around folds."""
+    ways: tuple[Callable[[], Advance], ...] = (
+        lambda: advance(quiet.towards, linear, linear.scaled(0.0)),
+        lambda: _from_slower(quiet, linear),
+        lambda: follow(quiet, linear, HORIZONTAL),
+    )
+    iterations = 0
+    for way in ways:
+        found = way()
+        iterations += found.iterations
+        if found.reached == 1.0:
+            break
+    return attrs.evolve(found, iterations=iterations)
 
 
-def _beside(weighted: Canonical, guess: Trajectory, near: Trajectory | None) -> Advance | None:
+def _from_slower(quiet: Canonical, linear: Trajectory) -> Advance:
+    """Begin at a longer duration, at which the load swings less."""
+    slowly = _slower(quiet, linear, SLOWER)
+    if slowly.solution is None:
+        return Advance(solution=linear, reached=0.0, iterations=slowly.iterations, residual=slowly.residual)
+    found = advance(lambda share: quiet.slower(SLOWER ** (1.0 - share)), slowly.solution)
+    return attrs.evolve(found, iterations=slowly.iterations + found.iterations)
+
+
+def _slower(quiet: Canonical, linear: Trajectory, factor: float) -> NewtonOutcome:
+    """Solve for a longer duration, from the linear model's solution for that."""
+    slower, rest = quiet.slower(factor), linear.scaled(0.0)
+    return solve_newton(slower, slower.solve_linear(slower.flow(rest.points), rest))
+
+
+def _beside(weighted: Canonical, near: Trajectory | None, intervals: int) -> Advance | None:
     """Find the solution from that of a similar problem, if that lies near enough."""
-    if near is None or near.size != guess.size or weighted.data.beta == 0.0:
+    if near is None or near.size != 2 * len(weighted.final) or weighted.data.beta == 0.0:
         return None
-    outcome = solve_newton(weighted, weighted.modal(near.on(guess.mesh)))
+    mesh = np.linspace(0.0, 1.0, intervals + 1)
+    outcome = solve_newton(weighted, weighted.modal(near.on(mesh)))
     if outcome.solution is None:
         return None
     return Advance(
@@ -134,7 +188,7 @@ def _beside(weighted: Canonical, guess: Trajectory, near: Trajectory | None) -> 
     )
 
 
-def _guess(canonical: Canonical) -> Trajectory:
+def _guess(canonical: Canonical, mesh: Array) -> Trajectory:
     """Move by a quintic, everything else at rest."""
     layout = canonical.system.layout
     quintic = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
@@ -146,10 +200,15 @@ def _guess(canonical: Canonical) -> Trajectory:
             z[:, layout.axis(order)] = values[:, None] * canonical.final[layout.axis(0)]
         return z
 
-    intervals = int(np.clip(np.ceil(canonical.phase / RADIANS_PER_INTERVAL), INTERVALS, MAX_INTERVALS))
-    mesh = np.linspace(0.0, 1.0, intervals + 1)
-    stages = states(stage_times(mesh)).reshape(intervals, STAGES, -1)
-    return Trajectory(mesh=mesh, nodes=states(mesh), stages=stages)
+    return sampled(states, GAUSS if canonical.resolved else RADAU, mesh)
+
+
+def _measured(problem: Problem, quiet: Canonical, coarse: Trajectory, fine: int) -> tuple[Trajectory, int]:
+    """Find the motion with β = 0 as exactly as what is measured by it needs; also count the iterations."""
+    if problem.sway_weight == 0.0 or problem.sway_scale is not None:
+        return coarse, 0
+    refined = refine(quiet, coarse, fine)
+    return refined.solution or coarse, refined.iterations
 
 
 def _with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) -> Canonical:
@@ -175,7 +234,7 @@ def _lighter(weighted: Canonical, share: float) -> Canonical:
 
 def _integral(solution: Trajectory, values: Array) -> float:
     """∫ over dimensionless time of values at the collocation points, shape (points,)."""
-    weights = np.diff(solution.mesh)[:, None] * GAUSS.b
+    weights = np.diff(solution.mesh)[:, None] * solution.scheme.b
     return float(weights.ravel() @ values)
 
 
@@ -190,7 +249,7 @@ def _optimum(canonical: Canonical, solution: Trajectory) -> Optimum:
     top = np.concatenate(
         [at_nodes[:-1, None, 2 : 2 + m], at_points[:, 2 : 2 + m].reshape(-1, STAGES, m)], axis=1
     )
-    unit_time = np.einsum("pv,kva->kpa", INTERPOLATION, top)
+    unit_time = np.einsum("pv,kva->kpa", solution.scheme.interpolation, top)
     hamiltonian = at_nodes[:, 0]
     return Optimum(
         knots=knots,
@@ -209,13 +268,17 @@ def _optimum(canonical: Canonical, solution: Trajectory) -> Optimum:
     )
 
 
-def _too_hard(problem: Problem, iterations: int, linear_angle: float) -> Solution:
-    """Blame the swing where the linear model leaves the small angles, else the solver."""
-    if linear_angle < SMALL_ANGLE:
-        return _failure(problem, Status.DIVERGED, iterations, "Allow more time: raise move.duration.")
-    enough = problem.duration * max(1.1, np.sqrt(linear_angle / MODERATE_ANGLE))
-    cure = f"Allow about {enough:.2g} s (move.duration), or shorten the move."
-    return _failure(problem, Status.SWINGS_TOO_FAR, iterations, cure)
+def _too_hard(problem: Problem, quiet: Canonical, linear: Trajectory, iterations: int) -> Solution:
+    """Blame the swing where the linear model leaves the small angles, else the solver; name a duration."""
+    small = quiet.greatest_angle(linear) < SMALL_ANGLE
+    status = Status.DIVERGED if small else Status.SWINGS_TOO_FAR
+    for factor in LONGER:
+        found = _slower(quiet, linear, factor).solution
+        if found is not None and quiet.slower(factor).greatest_angle(found) < MODERATE_ANGLE:
+            enough = rounded_up(factor * problem.duration)
+            cure = f"Allow about {enough} s (move.duration), or shorten the move."
+            return _failure(problem, status, iterations, cure)
+    return _failure(problem, status, iterations, "Allow more time: raise move.duration.")
 
 
 def _too_heavy(problem: Problem, iterations: int, reached: float) -> Solution:

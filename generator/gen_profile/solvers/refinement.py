@@ -2,41 +2,75 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.profile import Array
 from gen_profile.solvers.canonical import Canonical
-from gen_profile.solvers.collocation import GAUSS, STAGES, Trajectory
+from gen_profile.solvers.collocation import STAGES, Trajectory
 from gen_profile.solvers.newton import NewtonOutcome, solve_newton
 
 MAX_INTERVALS = 480
+MOST_PARTS = (4, 2)  # of an interval at once; the fewer, the nearer to the solution before
+MAX_ROUNDS = 6  # where a fast mode is not resolved, what is split in one place shows in another
 DRIFT_TOLERANCE = 1e-7  # of the Hamiltonian over an interval, relative to its size
 DEFECT_TOLERANCE = 3e-3  # see `defect`; what it costs in sway is of its square
 
 
-def refine(canonical: Canonical, solution: Trajectory) -> NewtonOutcome:
-    """Split intervals until the Hamiltonian is constant and the equations are met.
+def refine(canonical: Canonical, coarse: Trajectory, least: int) -> NewtonOutcome:
+    """Split intervals until the equations are met and the Hamiltonian is constant.
 
-    Where the mesh would grow beyond `MAX_INTERVALS`, the intervals that need it least are left alone.
+    Where the mesh would grow beyond `MAX_INTERVALS`, the intervals that need it least are left alone. No
+    solution comes of it where Newton's method fails on finer meshes.
+
+    Parameters
+    ----------
+    canonical : Canonical
+    coarse : Trajectory
+        Its solution on a mesh that may be too coarse to judge it by.
+    least : int
+        Intervals to begin with.
     """
-    iterations, residual = 0, 0.0
-    while (parts := _parts(canonical, solution)).max() > 1:
-        outcome = solve_newton(canonical, solution.on(_split(solution.mesh, parts)))
-        iterations += outcome.iterations
+    meshes = [np.linspace(0.0, 1.0, least + 1)] if least >= len(coarse.mesh) else []
+    solution, iterations, residual = coarse, 0, 0.0
+    for _ in range(MAX_ROUNDS):
+        if not meshes:
+            parts = _parts(canonical, solution)
+            if parts.max() == 1:
+                break
+            meshes = [_split(solution.mesh, np.minimum(parts, most)) for most in MOST_PARTS]
+        outcome, spent = _first_solved(canonical, solution, meshes)
+        iterations += spent
         if outcome.solution is None:
-            break
-        solution, residual = outcome.solution, outcome.residual
+            return attrs.evolve(outcome, iterations=iterations)
+        solution, residual, meshes = outcome.solution, outcome.residual, []
     return NewtonOutcome(solution=solution, iterations=iterations, residual=residual)
+
+
+def _first_solved(
+    canonical: Canonical, solution: Trajectory, meshes: Sequence[Array]
+) -> tuple[NewtonOutcome, int]:
+    """Try one mesh after the other; also count the iterations of all."""
+    spent = 0
+    for mesh in meshes:
+        outcome = solve_newton(canonical, solution.on(mesh))
+        spent += outcome.iterations
+        if outcome.solution is not None:
+            break
+    return outcome, spent
 
 
 def _parts(canonical: Canonical, solution: Trajectory) -> NDArray[np.intp]:
     """Tell into how many parts to divide every interval."""
-    wanted = np.maximum(
-        (_drift(canonical, solution) / DRIFT_TOLERANCE) ** (1.0 / (2 * STAGES)),
-        (defect(canonical, solution) / DEFECT_TOLERANCE) ** (1.0 / STAGES),
-    )
-    while (parts := np.clip(np.ceil(wanted), 1, 4).astype(np.intp)).sum() > max(MAX_INTERVALS, len(parts)):
+    wanted = (defect(canonical, solution) / DEFECT_TOLERANCE) ** (1.0 / STAGES)
+    if canonical.resolved:
+        drift = _drift(canonical, solution) / DRIFT_TOLERANCE
+        wanted = np.maximum(wanted, drift ** (1.0 / (2 * STAGES)))
+    most = max(MAX_INTERVALS, len(wanted))
+    while (parts := np.clip(np.ceil(wanted), 1, MOST_PARTS[0]).astype(np.intp)).sum() > most:
         wanted *= 0.9
     return parts
 
@@ -59,12 +93,17 @@ def defect(canonical: Canonical, solution: Trajectory) -> Array:
     """Greatest miss of the state equations between collocation points, on each interval.
 
     Per interval, as a share of each state's size. (What is missed of the costates' shows in the Hamiltonian.)
+    What fast modes make of a small displacement is filtered as stiff solvers do (Hairer and Wanner, Solving
+    Ordinary Differential Equations II, eq. IV.8.20).
     """
-    local = np.convolve(np.concatenate([[0.0], GAUSS.c, [1.0]]), [0.5, 0.5], "valid")[:, None]
+    local = np.convolve(np.concatenate([[0.0], solution.scheme.c, [1.0]]), [0.5, 0.5], "valid")[:, None]
     powers, coefficients = np.arange(STAGES + 1), solution.coefficients()
     values = np.einsum("tp,kps->kts", local**powers, coefficients)
     slopes = np.einsum("tp,kps->kts", powers[1:] * local ** powers[:-1], coefficients[:, 1:])
-    flow = canonical.slopes(values.reshape(-1, solution.size))
-    flow = np.diff(solution.mesh)[:, None, None] * flow.reshape(values.shape)
-    weights = canonical.weights(solution)
-    return np.asarray((np.abs(slopes - flow)[:, :, : len(weights)] * weights).max(axis=(1, 2)))
+    n, lengths = len(canonical.final), np.diff(solution.mesh)[:, None, None]
+    flow = canonical.flow(values.reshape(-1, solution.size)).reshape(*values.shape, -1)[:, :, :n]
+    missed = slopes[:, :, :n] - lengths * flow[..., 0]
+    filtered = np.linalg.solve(
+        np.eye(n) - lengths[..., None] / STAGES * flow[..., 1 : 1 + n], missed[..., None]
+    )
+    return np.asarray((np.abs(filtered[..., 0]) * canonical.weights(solution)).max(axis=(1, 2)))

@@ -77,6 +77,27 @@ def direct_cost(
 
     ``swung`` holds the angles and their rates at the start.
     """
+    solver, guess = direct_program(
+        problem, distance, duration, intervals, swung=swung, final_velocity=final_velocity
+    )
+    found = solver(x0=guess, lbg=0.0, ubg=0.0)
+    assert solver.stats()["success"], solver.stats()["return_status"]
+    return float(found["f"])
+
+
+def direct_program(
+    problem: CraneOptimalControl,
+    distance: float,
+    duration: float,
+    intervals: int,
+    *,
+    swung: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
+    final_velocity: float = 0.0,
+) -> tuple[ca.Function, np.ndarray]:
+    """IPOPT's program of `direct_cost`, and its first guess.
+
+    The first multipliers are the costates at the start.
+    """
     degree = 5
     points = np.array(ca.collocation_points(degree, "legendre"))
     C, D, B = _lagrange(points)
@@ -119,9 +140,7 @@ def direct_cost(
         {"x": ca.vertcat(*variables), "f": cost, "g": ca.vertcat(*equations)},
         {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-9},
     )
-    found = solver(x0=np.concatenate(guess), lbg=0.0, ubg=0.0)
-    assert solver.stats()["success"], solver.stats()["return_status"]
-    return float(found["f"])
+    return solver, np.concatenate(guess)
 
 
 def _lagrange(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
