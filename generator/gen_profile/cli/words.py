@@ -69,7 +69,7 @@ def design(outcome: Design) -> str:
         ("residual sway", residual),
         *([] if outcome.check is None else _groups(outcome.check)),
         ("check", _verdict(outcome.check)),
-        *_cost_of_lag(figures),
+        *_cost_of_lag(figures, outcome.spec.cost.effort),
     ]
     if outcome.spec.plant.defaults:
         rows.append(("defaults used", ", ".join(f"plant.{name}" for name in outcome.spec.plant.defaults)))
@@ -240,7 +240,7 @@ def report(made: Report, path: Path) -> str:
     return _block(made.design.spec.name, rows)
 
 
-def _cost_of_lag(figures: Mapping[str, float]) -> list[tuple[str, str]]:
+def _cost_of_lag(figures: Mapping[str, float], effort: str) -> list[tuple[str, str]]:
     """Warn where leading the drive's lag asks much more of it than the motion itself."""
     if "command_overshoot_m" not in figures:
         return []
@@ -249,7 +249,8 @@ def _cost_of_lag(figures: Mapping[str, float]) -> list[tuple[str, str]]:
     if times < COSTLY_LAG and over < COSTLY_OVERSHOOT * figures["sway_transient_peak_m"]:
         return []
     text = f"leading it takes {times:.1f} times the motion's acceleration and overshoots by {mm(over)}"
-    return [("drive lag", f'{text}; a longer move, or cost.effort = "snap", takes less')]
+    gentler = "" if effort == "snap" else ', or cost.effort = "snap",'
+    return [("drive lag", f"{text}; a longer move{gentler} takes less")]
 
 
 def _move(spec: Spec) -> str:

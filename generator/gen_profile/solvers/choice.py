@@ -78,4 +78,5 @@ def _explained(solution: Solution) -> Solution:
             without = attrs.evolve(problem, limits=loosened)
             if direct.solve(without).optimum is not None:
                 cures.append(f"without limits.{name} it would do in {problem.duration:g} s")
-    return attrs.evolve(solution, cure="; ".join(cures) + "." if cures else solution.cure)
+    told = "; ".join(cures)
+    return attrs.evolve(solution, cure=f"{told[0].upper()}{told[1:]}." if told else solution.cure)

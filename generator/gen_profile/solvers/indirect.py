@@ -115,7 +115,7 @@ def _on_mesh(problem: Problem, quiet: Canonical, near: Trajectory | None, coarse
     refined = refine(weighted, climb.solution, fine)
     iterations += refined.iterations
     if refined.solution is None and problem.sway_weight > 0.0:
-        return _unresolved(problem, iterations)
+        return _too_steep(problem, iterations)
     if refined.solution is None:
         return _too_hard(problem, quiet, linear, iterations)
     if weighted.greatest_angle(refined.solution) > HORIZONTAL:
@@ -132,7 +132,7 @@ def _judged(
         return _failure(problem, Status.NOT_CONTROLLABLE, iterations, cure)
     optimum = _optimum(weighted, found)
     if optimum.defect is not None and optimum.defect > UNRESOLVED:
-        return _unresolved(problem, iterations)
+        return _too_steep(problem, iterations)
     return Solution(
         status=Status.CONVERGED,
         method=METHOD,
@@ -282,18 +282,16 @@ def _too_hard(problem: Problem, quiet: Canonical, linear: Trajectory, iterations
 
 
 def _too_heavy(problem: Problem, iterations: int, reached: float) -> Solution:
-    """Blame the weight of the sway, and name one that works."""
+    """Blame the weight of the sway, and name one that works; there is none where nothing was reached."""
     share = 10.0 ** (BETA_DECADES * (reached - 1.0))
-    cure = f"Lower cost.sway_weight (about {problem.sway_weight * share:.2g} works)"
-    cure += "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
-    return _failure(problem, Status.DIVERGED, iterations, cure)
+    named = f" (about {problem.sway_weight * share:.2g} works)" if reached > 0.0 else ""
+    return _too_steep(problem, iterations, named)
 
 
-def _unresolved(problem: Problem, iterations: int) -> Solution:
+def _too_steep(problem: Problem, iterations: int, named: str = "") -> Solution:
     """Blame a cost so steep that the motion changes faster than any mesh."""
-    cure = "Lower cost.sway_weight"
-    cure += "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
-    return _failure(problem, Status.DIVERGED, iterations, cure)
+    other = "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
+    return _failure(problem, Status.DIVERGED, iterations, f"Lower cost.sway_weight{named}{other}")
 
 
 def _failure(problem: Problem, status: Status, iterations: int, cure: str) -> Solution:
