@@ -59,14 +59,14 @@ def test_finds_what_the_straight_way_finds():
 def test_gives_up_where_ropes_would_have_to_rise(folded):
     canonical, guess = folded
     found = follow(canonical, guess, np.radians(10.0))
-    assert found.reached < 1.0
+    assert found.reached == 0.0
     assert found.residual == np.inf
 
 
 def test_does_not_take_a_rest_for_a_solution():
     problem = crane_problem(target=(1e4,), sway_weight=0.0)
     canonical, guess = linear(problem)
-    assert follow(canonical, guess, HORIZONTAL).reached < 1.0
+    assert follow(canonical, guess, HORIZONTAL).reached == 0.0
     assert (
         follow(attrs.evolve(canonical, final=canonical.final * 1e-4), guess.scaled(1e-4), HORIZONTAL).reached
         == 1.0

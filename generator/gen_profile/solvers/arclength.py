@@ -48,6 +48,11 @@ def follow(problem: Canonical, guess: Trajectory, widest: float) -> Advance:
         Solution of the linearised problem, the direction in which the curve begins.
     widest : float
         Greatest angle of a rope in rad, beyond which there is nothing to be found.
+
+    Returns
+    -------
+    Advance
+        That reached 1, or nothing.
     """
     curve = _Curve(problem=problem, weights=problem.weights(guess))
     latest = _Point(share=0.0, solution=guess.scaled(0.0))
@@ -73,12 +78,7 @@ def follow(problem: Canonical, guess: Trajectory, widest: float) -> Advance:
         latest = point
         if spent <= QUICK:
             length *= 2.0
-    return Advance(
-        solution=latest.solution,
-        reached=min(latest.share, 0.999),
-        iterations=iterations,
-        residual=float("inf"),
-    )
+    return Advance(solution=latest.solution, reached=0.0, iterations=iterations, residual=float("inf"))
 
 
 @attrs.frozen(kw_only=True, eq=False)
