@@ -180,16 +180,6 @@ def optimality_system(
         return sym.substitute(sym.substitute(expression, axes.u, u_star), x, offset + scale * state)
 
     hamiltonian = optimal(g / cost_scale + sym.dot(costate, duration * f / scale))
-    forward, backward = sym.gradient(hamiltonian, costate), -sym.gradient(hamiltonian, state)
-    slopes = sym.column([forward, backward])
-    # the Jacobian of a Hamiltonian flow: half of it follows by symmetry, which halves the work
-    by_state, curvature = sym.jacobian(forward, state), sym.symmetric(sym.jacobian(backward, state))
-    jacobian = sym.column(
-        [
-            sym.beside(by_state, sym.jacobian(forward, costate)),
-            sym.beside(curvature, -by_state.T),
-        ]
-    )
     quantities = [hamiltonian * cost_scale, optimal(sym.column([g, axes.top, d.sway, d.angle]))]
     inputs = {
         "z": sym.column([state, costate]),
@@ -198,9 +188,18 @@ def optimality_system(
     return OptimalitySystem(
         plant=plant,
         layout=layout,
-        flow=Function("flow", inputs, sym.beside(slopes, jacobian)),
+        flow=Function("flow", inputs, _canonical_flow(hamiltonian, state, costate)),
         quantities=Function("quantities", inputs, sym.column(quantities)),
     )
+
+
+def _canonical_flow(hamiltonian: Symbol, state: Symbol, costate: Symbol) -> Symbol:
+    """Slopes (∂H/∂λ, −∂H/∂x), and beside them their Jacobian, half of which follows by symmetry."""
+    forward, backward = sym.gradient(hamiltonian, costate), -sym.gradient(hamiltonian, state)
+    by_state, curvature = sym.jacobian(forward, state), sym.symmetric(sym.jacobian(backward, state))
+    above = sym.beside(by_state, sym.jacobian(forward, costate))
+    below = sym.beside(curvature, -by_state.T)
+    return sym.beside(sym.column([forward, backward]), sym.column([above, below]))
 
 
 @attrs.frozen(kw_only=True, eq=False)

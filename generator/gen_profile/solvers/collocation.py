@@ -229,22 +229,33 @@ def linearize(flow: Array, current: Trajectory) -> Linearized:
         response = np.asarray(np.linalg.solve(matrices, right.reshape(intervals, STAGES * size, 1 + size)))
     response = response.reshape(intervals, STAGES, size, 1 + size)
 
-    # states: z_{k+1} = z_k + Σ w_i (Z_i − z_k)
-    # costates, whose A may be singular: z_{k+1} = z_k + h Σ b_i F_i
-    across = np.empty((intervals, size, 1 + size))
-    across[:, states] = np.einsum("i,kiab->kab", scheme.end, response[:, :, states])
-    across[:, states, 1:] += (1.0 - scheme.end.sum()) * np.eye(size)[states]
-    across[:, states, 0] += np.einsum("i,kia->ka", scheme.end, (stages - nodes[:-1, None])[:, :, states])
-    change = lengths[..., None] * scheme.b[:, None, None] * values[:, :, costates]
-    across[:, costates] = np.einsum("kiab,kibc->kac", change[..., 1:], response)
-    across[:, costates, 0] += change[..., 0].sum(axis=1)
-    across[:, costates, 1:] += np.eye(size)[costates]
+    across = _across(lengths, current, values, response)
     return Linearized(
         current=current,
         response=response,
         transition=np.ascontiguousarray(across[:, :, 1:]),
         offset=across[:, :, 0] - np.diff(nodes, axis=0),
     )
+
+
+def _across(lengths: Array, current: Trajectory, values: Array, response: Array) -> Array:
+    """Write what is reached at an interval's end, less z_k, as an affine function of δ_k: constant first.
+
+    States reach ``z_k + Σ w_i (Z_i − z_k)``, and costates, whose integration matrix may be singular,
+    ``z_k + h Σ b_i F_i``.
+    """
+    scheme, beyond = current.scheme, current.stages - current.nodes[:-1, None]
+    size = current.size
+    states, costates = slice(0, size // 2), slice(size // 2, size)
+    across = np.empty((len(lengths), size, 1 + size))
+    across[:, states] = np.einsum("i,kiab->kab", scheme.end, response[:, :, states])
+    across[:, states, 1:] += (1.0 - scheme.end.sum()) * np.eye(size)[states]
+    across[:, states, 0] += np.einsum("i,kia->ka", scheme.end, beyond[:, :, states])
+    change = lengths[..., None] * scheme.b[:, None, None] * values[:, :, costates]
+    across[:, costates] = np.einsum("kiab,kibc->kac", change[..., 1:], response)
+    across[:, costates, 0] += change[..., 0].sum(axis=1)
+    across[:, costates, 1:] += np.eye(size)[costates]
+    return across
 
 
 def _solve_nodes(transition: Array, offset: Array, initial: Array, final: Array, ends: IntArray) -> Array:
