@@ -15,8 +15,7 @@ from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 
 FIFTY_DEGREES = np.radians(50.0)  # beyond, Newton may fail although a motion exists
-BARELY = 1.5  # periods
-LARGE = np.radians(25.0)  # beyond, moves that are barely possible may be refused; the cure is more time
+LARGE = np.radians(25.0)  # beyond, moves that are barely possible may be refused, with a cure that works
 SLOW_ENOUGH = 1200.0  # rad; a faster second mode is followed by its own, exact linear equation
 
 
@@ -89,8 +88,9 @@ def test_every_crane_comes_to_rest(drawn):
     if solution.status is not Status.CONVERGED:
         quiet = solve(attrs.evolve(problem, sway_weight=0.0, target=(problem.target[0] * 1e-4,)))
         linear = quiet.raise_for_status().angle * 1e4
-        if problem.duration < BARELY * 2.0 * np.pi / frequencies(problem.parameters)[0] and linear > LARGE:
-            assert "Allow about" in solution.cure or "works" in solution.cure
+        if solution.status is Status.DIVERGED:
+            assert linear > LARGE
+            assert "Allow about" in solution.cure or "Lower cost.sway_weight" in solution.cure
             return
         assert solution.status is Status.SWINGS_TOO_FAR
         best = least_peak_angle(problem.parameters, problem.target[0], problem.duration)

@@ -116,8 +116,8 @@ def _on_mesh(problem: Problem, quiet: Canonical, near: Trajectory | None, coarse
     iterations += refined.iterations
     if refined.solution is None and problem.sway_weight > 0.0:
         return _too_steep(problem, iterations)
-    if refined.solution is None:
-        return _too_hard(problem, quiet, linear, iterations)
+    if refined.solution is None:  # a finer mesh may do
+        return attrs.evolve(_too_hard(problem, quiet, linear, iterations), status=Status.DIVERGED)
     if weighted.greatest_angle(refined.solution) > HORIZONTAL:
         return _too_hard(problem, quiet, linear, iterations)
     return _judged(problem, weighted, refined.solution, iterations, refined.residual or climb.residual)
