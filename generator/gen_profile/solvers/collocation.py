@@ -38,6 +38,7 @@ class Scheme:
 
     Attributes
     ----------
+    name : str
     c, b : (STAGES,) arrays
         Collocation points, and weights for integrals.
     A, adjoint : (STAGES, STAGES) arrays
@@ -48,6 +49,7 @@ class Scheme:
         From values at 0 and the points to coefficients of the polynomial through them, lowest power first.
     """
 
+    name: str
     c: Array
     b: Array
     A: Array
@@ -56,12 +58,13 @@ class Scheme:
     interpolation: Array
 
 
-def _scheme(c: Array) -> Scheme:
+def _scheme(name: str, c: Array) -> Scheme:
     powers = np.arange(1, STAGES + 1)
     vandermonde = c[:, None] ** (powers - 1)
     A = (c[:, None] ** powers / powers) @ np.linalg.inv(vandermonde)
     b = (1.0 / powers) @ np.linalg.inv(vandermonde)
     return Scheme(
+        name=name,
         c=c,
         b=b,
         A=A,
@@ -72,8 +75,9 @@ def _scheme(c: Array) -> Scheme:
     )
 
 
-GAUSS = _scheme((roots_jacobi(STAGES, 0.0, 0.0)[0] + 1.0) / 2.0)
-RADAU = _scheme(np.append((roots_jacobi(STAGES - 1, 1.0, 0.0)[0] + 1.0) / 2.0, 1.0))
+GAUSS = _scheme("Gauss", (roots_jacobi(STAGES, 0.0, 0.0)[0] + 1.0) / 2.0)
+RADAU = _scheme("Radau", np.append((roots_jacobi(STAGES - 1, 1.0, 0.0)[0] + 1.0) / 2.0, 1.0))
+SCHEMES = {scheme.name: scheme for scheme in (GAUSS, RADAU)}
 
 
 @attrs.frozen(kw_only=True, eq=False)

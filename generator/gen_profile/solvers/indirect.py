@@ -23,7 +23,7 @@ from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.profile import Array
 from gen_profile.solvers.arclength import follow
 from gen_profile.solvers.canonical import Canonical, canonical_problem, independence
-from gen_profile.solvers.collocation import GAUSS, RADAU, STAGES, Trajectory, sampled
+from gen_profile.solvers.collocation import GAUSS, RADAU, STAGES, Scheme, Trajectory, sampled
 from gen_profile.solvers.continuation import Advance, advance
 from gen_profile.solvers.newton import NewtonOutcome, solve_newton
 from gen_profile.solvers.refinement import defect, refine
@@ -180,12 +180,17 @@ def _beside(weighted: Canonical, near: Trajectory | None, intervals: int) -> Adv
     if near is None or near.size != 2 * len(weighted.final) or weighted.data.beta == 0.0:
         return None
     mesh = np.linspace(0.0, 1.0, intervals + 1)
-    outcome = solve_newton(weighted, weighted.modal(near.on(mesh)))
+    outcome = solve_newton(weighted, weighted.modal(sampled(near, _scheme(weighted), mesh)))
     if outcome.solution is None:
         return None
     return Advance(
         solution=outcome.solution, reached=1.0, iterations=outcome.iterations, residual=outcome.residual
     )
+
+
+def _scheme(canonical: Canonical) -> Scheme:
+    """Let modes fade that are too fast for any mesh."""
+    return GAUSS if canonical.resolved else RADAU
 
 
 def _guess(canonical: Canonical, mesh: Array) -> Trajectory:
@@ -200,7 +205,7 @@ def _guess(canonical: Canonical, mesh: Array) -> Trajectory:
             z[:, layout.axis(order)] = values[:, None] * canonical.final[layout.axis(0)]
         return z
 
-    return sampled(states, GAUSS if canonical.resolved else RADAU, mesh)
+    return sampled(states, _scheme(canonical), mesh)
 
 
 def _measured(problem: Problem, quiet: Canonical, coarse: Trajectory, fine: int) -> tuple[Trajectory, int]:

@@ -30,7 +30,7 @@ from gen_profile.errors import (
     SolverDiverged,
     SpecError,
 )
-from gen_profile.solvers.collocation import Trajectory
+from gen_profile.solvers.collocation import SCHEMES, Trajectory
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import parse_spec
 from gen_profile.workflows.design import LIBRARIES, Design, design
@@ -38,7 +38,7 @@ from gen_profile.workflows.many_machines import on_processors
 from gen_profile.workflows.sweep_grid import overrides
 
 _ALONE = threading.Lock()  # FMUs are no guests for threads, and a Dask worker may have several
-TRAJECTORY = tuple(field.name for field in attrs.fields(Trajectory))
+TRAJECTORY = ("mesh", "nodes", "stages")
 PASSED, CHECK_FAILED, CRASHED = "passed", "check failed", "crashed"
 STATUSES: dict[type[GenProfileError], str] = {
     SpecError: "faulty spec",
@@ -201,14 +201,15 @@ def _packed(outcome: Design) -> bytes | None:
     solution = outcome.plan.solution
     if solution is None or solution.trajectory is None:
         return None
-    buffer = BytesIO()
-    np.savez(buffer, **{name: getattr(solution.trajectory, name) for name in TRAJECTORY})
+    buffer, start = BytesIO(), solution.trajectory
+    np.savez(buffer, scheme=start.scheme.name, **{name: getattr(start, name) for name in TRAJECTORY})
     return buffer.getvalue()
 
 
 def _unpacked(start: bytes) -> Trajectory:
     with np.load(BytesIO(start)) as arrays:
-        return Trajectory(**{name: arrays[name] for name in TRAJECTORY})
+        scheme = SCHEMES[str(arrays["scheme"])]
+        return Trajectory(scheme=scheme, **{name: arrays[name] for name in TRAJECTORY})
 
 
 def _listed(installed: tuple[tuple[str, str], ...]) -> str:
