@@ -35,15 +35,6 @@ SNAP_TIME = 0.02  # s; weighs snap against jerk: ½ (j² + (0.02 s · snap)²)
 
 
 @attrs.frozen(kw_only=True)
-class Kind:
-    """States of one kind, and the unactuated coordinates that they belong to."""
-
-    states: list[int]
-    coordinates: list[int]
-    rates: bool
-
-
-@attrs.frozen(kw_only=True)
 class StateLayout:
     """Where things stand in the state.
 
@@ -73,17 +64,19 @@ class StateLayout:
         return slice(first, first + self.m)
 
     @cached_property
-    def kinds(self) -> list[Kind]:
-        """States of the unactuated side by kind: coordinates, rates, and each one's sensitivities."""
+    def kinds(self) -> list[tuple[list[int], list[int]]]:
+        """States of the unactuated side by kind: coordinates, rates, and each one's sensitivities.
+
+        Each kind as its states and the coordinates that they belong to.
+        """
         first = self.sensitivities.start
         rows: list[tuple[int, tuple[str, ...], int]] = [(row, (), row) for row in range(2 * self.n_u)]
         rows += [(first + i, names, row) for i, (names, row) in enumerate(self.sensitivity_rows)]
-        kinds: dict[tuple[tuple[str, ...], bool], Kind] = {}
+        kinds: dict[tuple[tuple[str, ...], bool], tuple[list[int], list[int]]] = {}
         for state, names, row in rows:
-            rates = row >= self.n_u
-            kind = kinds.setdefault((names, rates), Kind(states=[], coordinates=[], rates=rates))
-            kind.states.append(state)
-            kind.coordinates.append(row % self.n_u)
+            states, coordinates = kinds.setdefault((names, row < self.n_u), ([], []))
+            states.append(state)
+            coordinates.append(row % self.n_u)
         return list(kinds.values())
 
     @property

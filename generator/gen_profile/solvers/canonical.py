@@ -118,7 +118,7 @@ class Canonical:
 
     @property
     def resolved(self) -> bool:
-        """Whether no mode is too fast to be excited: such modes' costates fade in the last interval."""
+        """Whether every mode is asked to rest: none is so fast that no mesh could follow it."""
         return not np.isnan(self.final[: 2 * self.system.layout.n_u]).any()
 
     def slower(self, factor: float) -> Canonical:
@@ -133,9 +133,9 @@ class Canonical:
         """
         largest = self._greatest(solution)
         weights = 1.0 / largest
-        for kind in self.system.layout.kinds:
-            sway = (self.shown * largest)[kind.states].max()
-            weights[kind.states] = self.shown[kind.states] / sway if sway > 0.0 else 0.0
+        for states, _ in self.system.layout.kinds:
+            sway = (self.shown * largest)[states].max()
+            weights[states] = self.shown[states] / sway if sway > 0.0 else 0.0
         return weights
 
     def distance(self, one: Trajectory, other: Trajectory) -> float:
@@ -214,7 +214,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     )
     excited = _excited(linear, swung[: 2 * layout.n_u], reach, duration)
     basis, shown = _modal(layout, linear, _shown(linear, excited, reach))
-    final[[state for kind in layout.kinds for state in kind.states if shown[state] == 0.0]] = np.nan
+    final[[state for states, _ in layout.kinds for state in states if shown[state] == 0.0]] = np.nan
     initial = np.asarray(np.linalg.solve(basis, swung / scale), dtype=np.float64)
     return Canonical(
         system=system,
@@ -250,12 +250,12 @@ def independence(canonical: Canonical) -> tuple[NDArray[np.bool_], tuple[str, ..
 def _modal(layout: StateLayout, linear: Linearization, shown: Array) -> tuple[Array, Array]:
     """Basis in which everything that swings is written in modes, and the sway that each state shows."""
     basis, sway = np.eye(layout.size), np.zeros(layout.size)
-    for kind in layout.kinds:
-        if len(kind.states) == layout.n_u:
-            basis[np.ix_(kind.states, kind.states)] = linear.modes
-            sway[kind.states] = shown
+    for states, coordinates in layout.kinds:
+        if len(coordinates) == layout.n_u:
+            basis[np.ix_(states, states)] = linear.modes
+            sway[states] = shown
         else:  # a parameter that does not reach all coordinates
-            sway[kind.states] = np.abs(linear.sway_gain).max(axis=0)[kind.coordinates]
+            sway[states] = np.abs(linear.sway_gain).max(axis=0)[coordinates]
     return basis, sway
 
 

@@ -96,12 +96,13 @@ def _contradiction(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
     central = _central(spec, setpoints)
     size = max(float(np.abs(central).max()), float(np.abs(setpoints.velocity).max()))
     noise = float(setpoints.resolution.max()) / setpoints.cycle_time
-    apart: Array = np.abs(setpoints.velocity - central)[1:-1].max(axis=1)
-    worst = int(apart.argmax())
-    if apart[worst] > VELOCITY_TOLERANCE * size + noise + _missed_by_central(setpoints.velocity, central):
+    apart: Array = np.abs(setpoints.velocity - central)[1:-1]
+    worst, column = np.unravel_index(apart.argmax(), apart.shape)
+    found, axis = apart[worst, column], spec.machine().actuated[column]
+    if found > VELOCITY_TOLERANCE * size + noise + _missed_by_central(setpoints.velocity, central):
         yield (
             f"The velocity at {setpoints.times[worst + 1]:.6g} s contradicts the positions around it by "
-            f"{apart[worst]:.3g} m/s: the artefact was altered; export it again."
+            f"{found:.3g} {axis.unit}/s: the artefact was altered; export it again."
         )
 
 
