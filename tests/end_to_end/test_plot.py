@@ -1,17 +1,24 @@
 """The picture of a comparison."""
 
 import os
+from contextlib import contextmanager
+from functools import partial
+from itertools import combinations
+from pathlib import Path
+from unittest.mock import patch
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from command_line import run_here, run_process
-from matplotlib import image
+from matplotlib import image, pyplot
 
 from gen_profile.errors import OutputError
+from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.compare import Comparison
+from gen_profile.workflows.compare import Comparison, compare
 from gen_profile.workflows.comparison_plot import draw
+from gen_profile.workflows.method_styles import method_styles
 
 FEW = ("--set", "cost.sway_weight=0", "--set", "robustness={}")
 
@@ -42,8 +49,8 @@ def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path, preset, load):
     picture = tmp_path / "picture.svg"
     assert run_here("compare", "--preset", preset, *FEW, "--plot", picture).code == 0
     text = picture.read_text("utf-8")
-    assert f"<!-- worst residual sway of the {load} (mm) -->" in text
-    assert f"<!-- {load} sway (mm), nominal machine -->" in text
+    assert f"<!-- worst residual sway of the {load} over all machines (mm); dotted: " in text
+    assert f"<!-- {load} sway (mm) -->" in text and "<!-- nominal machine -->" in text
     assert "payload-" not in text
 
 
@@ -64,12 +71,93 @@ def test_a_picture_of_unknown_kind_is_refused_before_the_work(tmp_path, name):
     assert outcome.errors == [f"Error: --plot {tmp_path / name}: name a file that ends in .png, .svg, .pdf."]
 
 
-def test_a_picture_that_cannot_be_written_is_a_sentence(tmp_path):
-    outcome = run_here("compare", *FEW, "--plot", tmp_path / "no" / "picture.png")
-    assert outcome.code == 2
-    (error,) = outcome.errors
-    assert error.endswith("cannot write the picture: No such file or directory.")
-    assert list(tmp_path.iterdir()) == []
+def test_a_folder_that_is_not_there_is_made_for_a_picture(tmp_path):
+    assert run_here("compare", *FEW, "--plot", tmp_path / "new" / "picture.png").code == 0
+    assert [path.name for path in tmp_path.rglob("*.*")] == ["picture.png"]
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "name"),
+    [
+        ("compare", "--plot", "picture.png"),
+        ("robustness", "--plot", "picture.png"),
+        ("robustness", "--csv", "table.csv"),
+        ("report", "--out", "page.html"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_the_work(tmp_path, command, option, name):
+    (tmp_path / "file").write_text("no folder", "utf-8")
+    outcome = run_here(command, option, tmp_path / "file" / name)
+    assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
+    assert outcome.errors[0].startswith(f"Error: Cannot write to the folder {tmp_path / 'file'}: ")
+
+
+@contextmanager
+def kept(figures, path, salt, size):
+    figures.append(pyplot.figure(figsize=size, layout="constrained"))
+    yield figures[-1]
+
+
+@pytest.fixture(scope="module", params=["paper", "flexible-joint"])
+def drawn(request):
+    """The figure of a comparison, laid out as it would be in a file."""
+    comparison, figures = compare(preset_spec(request.param)), []
+    with patch("gen_profile.workflows.comparison_plot.picture", partial(kept, figures)):
+        draw(comparison, Path("picture.png"))
+    (figure,) = figures
+    figure.canvas.draw()
+    yield comparison, figure
+    pyplot.close(figure)
+
+
+def test_legends_and_panels_do_not_overlap(drawn):
+    _, figure = drawn
+    boxes = [axis.get_tightbbox() for axis in figure.axes]
+    (legend,) = figure.legends
+    assert not any(legend.get_window_extent().overlaps(box) for box in boxes)
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    assert not any(axis.get_legend() for axis in figure.axes)
+
+
+def test_every_bar_is_told_beside_it_and_not_on_it(drawn):
+    comparison, figure = drawn
+    axis = figure.axes[-1]
+    assert len(axis.texts) == len(axis.patches) == len(comparison.rows)
+    for text, bar, row in zip(axis.texts, axis.patches, comparison.rows, strict=True):
+        worst = 1e3 * row.figures["sway_residual_worst_m"]
+        assert text.get_text().endswith(f" {worst:.3g}")
+        assert ("▸" in text.get_text()) == (worst > axis.get_xlim()[1])
+        ends = min(bar.get_window_extent().x1, axis.bbox.x1)
+        assert text.get_window_extent().x0 >= ends - 1.0
+
+
+def test_sway_is_drawn_on_the_nominal_machine_and_at_both_ends_of_the_ranges(drawn):
+    """As the paper's figures 4 and 5, and with the sign that the paper leaves out."""
+    comparison, figure = drawn
+    name, share = next(iter(comparison.spec.robustness.uncertain.items()))
+    titles = [axis.get_title().replace("\N{NO-BREAK SPACE}", " ") for axis in figure.axes[3:8:2]]
+    ends = [f"{name} {sign}{100 * share:g} %" for sign in "+−"]
+    assert titles == ["nominal machine", *ends]
+    machines = [comparison.rows[0].trial.machines[index].parameters[name] for index in (0, 1, 2)]
+    assert machines[2] < machines[0] < machines[1]
+
+
+def test_one_method_s_spikes_do_not_flatten_the_others(drawn):
+    """3hump-ei leaves the flexible joint's base move so little time that it jerks 200 times as much."""
+    _, figure = drawn
+    for axis in figure.axes[2:8:2]:
+        peaks = [np.abs(line.get_ydata()).max() for line in axis.get_lines()]
+        assert max(np.abs(axis.get_ylim())) <= 10.0 * np.median(peaks)
+        assert sum(peak <= axis.get_ylim()[1] for peak in peaks) >= len(peaks) - 2
+
+
+def test_every_method_has_a_look_of_its_own_whoever_else_takes_part():
+    optimal = ("optimal", *(f"optimal-{kind}" for kind in ("beta0", "beta20", "beta50", "range", "order2")))
+    methods = [*SHAPERS, *optimal, "optimal-order1", "optimal-beta7"]
+    styles = method_styles(methods)
+    assert len({(style.colour, style.dash) for style in styles.values()}) == len(methods)
+    assert {style.dash for method, style in styles.items() if method.startswith("optimal")} == {"solid"}
+    assert all(method_styles([method])[method] == style for method, style in styles.items())
 
 
 HIDE = """

@@ -89,6 +89,29 @@ def test_the_robustness_it_states_is_where_the_check_begins_to_fail(paper):
         assert (code == 0) == inside
 
 
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ((), "The less the motion holds there, the less the loads swing on."),
+        (
+            ("--set", "move.initial={theta1=0.02}"),
+            "What the motion holds there takes the initial swing away.",
+        ),
+        (("--preset", "single-pendulum-crane"), "at the target, and others on the way: this does not tell"),
+    ],
+)
+def test_a_spectrum_is_said_to_tell_no_more_than_it_does(tmp_path, words, sentence):
+    _, _, text = report(tmp_path, "--no-compare", "--set", "robustness={}", *words)
+    assert sentence in text
+
+
+@pytest.mark.parametrize("name", ["page.pdf", "page"])
+def test_a_page_that_no_browser_would_open_is_refused(tmp_path, name):
+    outcome = run_here("report", "--out", tmp_path / name)
+    assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
+    assert outcome.errors == [f"Error: --out {tmp_path / name}: name a file that ends in .html."]
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _exported(paper):
     assert run_here("--preset", "paper", "--out", paper[0].parent).code == 0

@@ -170,9 +170,11 @@ def check(
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.check import check_artefact
-    from gen_profile.workflows.delivery import deliver
+    from gen_profile.workflows.delivery import deliver, require_place
     from gen_profile.workflows.scenario_table import table
 
+    if table_path is not None:
+        require_place(table_path)
     given = spec_path is not None or preset is not None
     if overrides and not given:
         raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")

@@ -9,6 +9,7 @@ import click
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import chosen_spec, debug_option, export_option, json_option, spec_options
 from gen_profile.cli.outcome import fail, print_outcome
+from gen_profile.errors import OutputError
 
 
 @cli.command(epilog="Example: gen-profile report crane.toml --out crane.html")
@@ -52,11 +53,14 @@ def report(
     """Write everything about a design into one HTML file."""
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.workflows.delivery import deliver
+    from gen_profile.workflows.delivery import deliver, require_place
     from gen_profile.workflows.report import report as run
 
     spec = chosen_spec(spec_path, preset, overrides)
     out = path or Path(f"{spec.name}.html")
+    if out.suffix.lower() not in {".html", ".htm"}:
+        raise OutputError(f"--out {out}: name a file that ends in .html.")
+    require_place(out)
     with progress() as tell:
         made = run(spec, formats, log=log, log_start=log_start, compared=not no_compare, progress=tell)
         deliver(out, made.content)

@@ -62,7 +62,7 @@ def robustness(
     """Show residual sway over one or two parameters, optimal motions beside shapers."""
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.workflows.delivery import deliver
+    from gen_profile.workflows.delivery import deliver, require_place
     from gen_profile.workflows.picture import require_drawable
     from gen_profile.workflows.robustness import robustness as run
     from gen_profile.workflows.robustness_table import table
@@ -70,6 +70,8 @@ def robustness(
     spec = chosen_spec(spec_path, preset, overrides)
     if picture is not None:
         require_drawable(picture)
+    if path is not None:
+        require_place(path)
     with progress() as tell:
         found = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
         if picture is not None:

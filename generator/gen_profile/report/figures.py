@@ -187,7 +187,7 @@ class Map:
                 {
                     **grid,
                     "contours": {"start": self.limit, "end": self.limit, "size": end, "coloring": "none"},
-                    "line": {"color": LIMIT, "width": 2.2},
+                    "line": {"color": INK, "width": 2.2},
                     **{"showscale": False, "hoverinfo": "skip"},
                 },
             ],

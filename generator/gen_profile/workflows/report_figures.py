@@ -9,12 +9,14 @@ import numpy as np
 
 from gen_profile.metrics import length, peak
 from gen_profile.profile import Array, Profile
-from gen_profile.report.figures import PALETTE, PLAIN, Band, Dash, Figure, Level, Line, Panel, Style
+from gen_profile.report.figures import PALETTE, PLAIN, Band, Figure, Level, Line, Panel, Style
 from gen_profile.response import Response
 from gen_profile.spec import Spec
 from gen_profile.workflows.compare import Comparison, Row
 from gen_profile.workflows.contenders import own_method
+from gen_profile.workflows.method_styles import method_styles
 from gen_profile.workflows.planning import RESIDUAL_SAMPLES, Trial
+from gen_profile.workflows.scenarios import extremes
 from gen_profile.workflows.spectrum import DECADES, natural_frequencies, spectrum
 from gen_profile.workflows.wording import machine
 
@@ -86,11 +88,15 @@ def motion_figure(spec: Spec, trial: Trial) -> Figure:
 
 def spectrum_figure(spec: Spec, trial: Trial) -> Figure:
     """Draw the spectrum of the acceleration over the natural frequencies of all machines."""
+    natural = natural_frequencies(spec, trial.machines)
+    if natural.varying:
+        meaning = "They are those at the target, and others on the way: this does not tell what is left."
+    elif any(spec.move.initial.values()):
+        meaning = "What the motion holds there takes the initial swing away."
+    else:
+        meaning = "The less the motion holds there, the less the loads swing on."
     return Figure(
-        caption=(
-            "Dotted: natural frequencies of the nominal machine; shaded: those of the others. The less the "
-            "motion holds there, the less the loads swing on."
-        ),
+        caption=f"Dotted: natural frequencies of the nominal machine; shaded: those of the others. {meaning}",
         panels=[_spectrum(spec, trial, {"motion": trial.motion}, {"motion": PLAIN})],
     )
 
@@ -125,7 +131,7 @@ def sway_figure(spec: Spec, trial: Trial, shown: Sequence[Shown], arrival: float
 def other_methods(comparison: Comparison) -> Figure:
     """Draw all methods: the motion, its spectrum, and the end load's sway (the paper's figures 2 to 5)."""
     spec, rows = comparison.spec, comparison.rows
-    styles = method_styles(comparison)
+    styles = compared_styles(comparison)
     first = spec.machine().actuated[0]
     panels = [
         Panel(
@@ -148,11 +154,11 @@ def other_methods(comparison: Comparison) -> Figure:
 
 
 def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Panel]:
-    """Draw the end load under every method, on the nominal machine and on that with all parameters up."""
+    """Draw the end load under every method, on the nominal machine and on those with all parameters off."""
     spec, rows = comparison.spec, comparison.rows
     plant, last = spec.machine(), max(row.trial.motion.duration for row in rows)
     seen = {row.method: row.trial.swing.at(_until(row)) for row in rows}
-    for index, scenario in enumerate(rows[0].trial.machines[:2]):
+    for index in extremes(spec):
         lines = [
             Line(
                 name=method,
@@ -165,7 +171,7 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
         end = max(float(line.x[-1]) for line in lines)
         levels = sway_levels(spec, plant.loads[-1], last, end)
         yield Panel(
-            title=f"Sway of the {plant.end_load_name}, {machine(scenario.name)}",
+            title=f"Sway of the {plant.end_load_name}, {machine(rows[0].trial.machines[index].name)}",
             x_label=TIME,
             y_label="sway (mm)",
             lines=lines,
@@ -247,30 +253,18 @@ def _spectrum(spec: Spec, trial: Trial, motions: Mapping[str, Profile], styles: 
     )
 
 
-def method_styles(comparison: Comparison) -> dict[str, Style]:
-    """Draw optimal motions solid, shapers dashed and the spec's own thick; show the most telling ones."""
+def compared_styles(comparison: Comparison) -> dict[str, Style]:
+    """Draw the spec's own method thick, and show the most telling ones."""
     own = own_method(comparison.spec)
-    advised = {advice.method for advice in comparison.recommended.values()}
     methods = [row.method for row in comparison.rows]
-    optimal = [method for method in methods if method.startswith("optimal")]
-    shapers = [method for method in methods if method not in optimal]
     shown = {
         own,
-        *advised,
+        *(advice.method for advice in comparison.recommended.values()),
         *PAPERS,
-        *(method for method in optimal if method == "optimal" or "beta" in method),
+        *(method for method in methods if method == "optimal" or method.startswith("optimal-beta")),
     }
-    groups: list[tuple[list[str], int, Dash]] = [(optimal, 0, "solid"), (shapers, 3, "dash")]
-    return {
-        method: Style(
-            colour=PALETTE[(first + place) % len(PALETTE)],
-            dash=dash,
-            width=2.6 if method == own else 1.4,
-            shown=method in shown,
-        )
-        for group, first, dash in groups
-        for place, method in enumerate(group)
-    }
+    styles = method_styles(methods, thick={own})
+    return {method: attrs.evolve(style, shown=method in shown) for method, style in styles.items()}
 
 
 def _until(row: Row) -> Array:

@@ -57,7 +57,7 @@ def _maps(found: Robustness) -> Figure:
     return Figure(
         caption=(
             f"How much of its allowed residual sway the load takes up that takes most, where {across} and "
-            f"{upwards} are off at once. Red: all of it; dotted: the ranges that the spec states."
+            f"{upwards} are off at once. Thick line: all of it; dotted: the ranges that the spec states."
         ),
         panels=[
             Map(

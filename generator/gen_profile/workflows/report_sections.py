@@ -20,8 +20,8 @@ from gen_profile.workflows.planning import Trial
 from gen_profile.workflows.report_animation import animation
 from gen_profile.workflows.report_figures import (
     cast,
+    compared_styles,
     hamiltonian_figure,
-    method_styles,
     motion_figure,
     other_methods,
     spectrum_figure,
@@ -217,7 +217,7 @@ def _robustness(spec: Spec, trial: Trial, comparison: Comparison | None) -> Sect
         return robustness_section(spec, own, {own: trial.motion}, {own: PLAIN})
     motions = {row.method: row.trial.motion for row in comparison.rows}
     return robustness_section(
-        spec, own, {**motions, own: trial.motion}, {own: PLAIN, **method_styles(comparison)}
+        spec, own, {**motions, own: trial.motion}, {own: PLAIN, **compared_styles(comparison)}
     )
 
 

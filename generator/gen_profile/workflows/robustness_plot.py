@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from gen_profile.errors import OutputError
-from gen_profile.report.figures import HEADROOM, ceiling
-from gen_profile.workflows.comparison_plot import styles
-from gen_profile.workflows.picture import picture
+from gen_profile.report.figures import HEADROOM, INK, ceiling
+from gen_profile.workflows.method_styles import method_styles
+from gen_profile.workflows.picture import in_ink, picture
 from gen_profile.workflows.robustness import Robustness
 
 LEVELS = 13
 COLUMNS = 4  # of maps
+EDGE: dict[str, Any] = {"colors": INK, "linewidths": 2.2}
 
 
 def draw(found: Robustness, path: Path) -> None:
@@ -28,16 +29,16 @@ def draw(found: Robustness, path: Path) -> None:
     if not found.residual:
         raise OutputError("--plot: no method has a motion for this move; leave --plot out to see why.")
     if len(found.errors) == 1:
-        with picture(path, found.spec.name, figsize=(9, 6)) as (figure, axis):
-            _curves(axis, found)
+        with picture(path, found.spec.name, (9.0, 6.0)) as figure:
+            _curves(figure.subplots(), found)
             figure.suptitle(_title(found))
         return
     count = len(found.residual)
     columns = min(COLUMNS, count)
     rows = -(-count // columns)
     size = (3.6 * columns + 1.2, 3.2 * rows + 0.8)
-    grid = {"nrows": rows, "ncols": columns, "sharex": True, "sharey": True, "squeeze": False}
-    with picture(path, found.spec.name, figsize=size, **grid) as (figure, axes):
+    with picture(path, found.spec.name, size) as figure:
+        axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         _maps(figure, axes, found)
         figure.suptitle(_title(found))
 
@@ -49,11 +50,11 @@ def _title(found: Robustness) -> str:
 
 def _curves(axis: Any, found: Robustness) -> None:
     ((name, errors),) = found.errors.items()
-    look = styles(list(found.residual))
+    styles = method_styles(found.residual)
     for method in found.residual:
-        axis.plot(100.0 * errors, 1e3 * found.end_load(method), label=method, **look[method])
+        axis.plot(100.0 * errors, 1e3 * found.end_load(method), label=method, **in_ink(styles[method]))
     limit = 1e3 * found.tolerance
-    axis.axhline(limit, color="black", linestyle=":", label="limit")
+    axis.axhline(limit, color=INK, linewidth=1.2, label="limit")
     _mark_stated(axis.axvspan, found, name)
     highest = max(float(found.end_load(method).max()) for method in found.residual)
     axis.set(
@@ -63,7 +64,7 @@ def _curves(axis: Any, found: Robustness) -> None:
         ylim=(0.0, ceiling(1e3 * highest, limit)),
     )
     axis.grid(alpha=0.3)
-    axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize="small")
+    axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize="small", handlelength=3.5)
 
 
 def _maps(figure: Any, axes: Any, found: Robustness) -> None:
@@ -74,9 +75,7 @@ def _maps(figure: Any, axes: Any, found: Robustness) -> None:
         sway = 1e3 * found.end_load(method).T
         filled = axis.contourf(100.0 * across, 100.0 * upwards, sway, levels, cmap="viridis_r", extend="max")
         if sway.min() < 1e3 * found.tolerance < sway.max():
-            axis.contour(
-                100.0 * across, 100.0 * upwards, sway, [1e3 * found.tolerance], colors="red", linewidths=1.8
-            )
+            axis.contour(100.0 * across, 100.0 * upwards, sway, [1e3 * found.tolerance], **EDGE)
         axis.set_title(method)
     for axis in flat[: len(found.residual)][-axes.shape[1] :]:  # the lowest of every column
         axis.set_xlabel(_label(found, x))
@@ -85,8 +84,8 @@ def _maps(figure: Any, axes: Any, found: Robustness) -> None:
         axis.set_ylabel(_label(found, y))
     for axis in flat[len(found.residual) :]:
         axis.set_visible(False)
-    bar = figure.colorbar(filled, ax=axes, label="residual sway (mm); red: the limit")
-    bar.ax.axhline(1e3 * found.tolerance, color="red", linewidth=1.8)
+    bar = figure.colorbar(filled, ax=axes, label="residual sway (mm); black: the limit")
+    bar.ax.axhline(1e3 * found.tolerance, color=INK, linewidth=2.2)
 
 
 def _mark_stated(span: Any, found: Robustness, name: str) -> None:

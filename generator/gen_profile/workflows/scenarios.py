@@ -34,6 +34,12 @@ def scenarios(spec: Spec) -> tuple[Scenario, ...]:
     return _numbered([nominal, *_off_nominal(spec, ends)])
 
 
+def extremes(spec: Spec) -> tuple[int, ...]:
+    """Tell which of `scenarios` are nominal, all parameters at upper ends, and all at lower ends."""
+    ranges = len(spec.checked_ranges())
+    return (0, 1, 2**ranges if ranges <= MOST_TRACED else 2) if ranges else (0,)
+
+
 def further_scenarios(spec: Spec, machines: Sequence[Scenario]) -> tuple[Scenario, ...]:
     """List what else `[check]` asks for: more corners, other drives, random draws, faults of timing.
 

@@ -26,11 +26,14 @@ class Natural:
         Of the nominal machine.
     lowest, highest : (modes,) array
         Of each mode, over all machines.
+    varying : bool
+        Whether they are others at the start, as those of a load that is hoisted.
     """
 
     nominal: Array
     lowest: Array
     highest: Array
+    varying: bool
 
     def span(self, points: int) -> Array:
         """List frequencies at which to draw a spectrum, shape (points,)."""
@@ -39,12 +42,15 @@ class Natural:
 
 def natural_frequencies(spec: Spec, machines: Sequence[Scenario]) -> Natural:
     """Find at which frequencies a spec's machines swing, the nominal one first."""
-    linear = [linearize(spec.machine(), machine.parameters, spec.move.target) for machine in machines]
+    plant, nominal = spec.machine(), machines[0].parameters
+    linear = [linearize(plant, machine.parameters, spec.move.target) for machine in machines]
     everywhere = np.array([one.frequencies for one in linear])
+    before = linearize(plant, nominal, spec.move.start).frequencies
     return Natural(
         nominal=np.asarray(linear[0].distinct_frequencies),
         lowest=everywhere.min(axis=0),
         highest=everywhere.max(axis=0),
+        varying=not np.allclose(before, everywhere[0]),
     )
 
 

@@ -5,7 +5,7 @@
   const coarse = matchMedia("(pointer: coarse)").matches; // a finger must be able to scroll the page
   const axis = {
     gridcolor: "#e6eaee", zerolinecolor: "#c3cbd2", linecolor: "#c3cbd2", showline: true,
-    ticks: "outside", tickcolor: "#c3cbd2", automargin: true,
+    ticks: "outside", tickcolor: "#c3cbd2", automargin: true, exponentformat: "power",
   };
   const MARGIN = { l: 56, r: 12, t: 28, b: 40 }; // the buttons stand above the curves
   const config = {
