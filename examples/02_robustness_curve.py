@@ -21,6 +21,8 @@ from gen_profile.spec_reading import preset_spec
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
+pyplot.style.use("tableau-colorblind10")
+
 spec = preset_spec("paper")
 plant, nominal, move = spec.machine(), spec.plant.parameters, spec.move
 problem = problem_of(spec)
@@ -48,9 +50,9 @@ figure, axis = pyplot.subplots(figsize=(8, 5), layout="constrained")
 for name, motion in motions.items():
     responses = Swing(plant, motion, machines, until=watch[-1]).at(watch)
     residual = [1e3 * peak(response.sway)[-1] for response in responses]
-    axis.plot(100.0 * errors, residual, label=name)
+    axis.plot(100.0 * errors, residual, "-" if name.startswith("β") else "--", label=name)
     print(f"{name:20} {max(residual):7.3f} mm at worst over L1 ±30 %")
-axis.axhline(1e3 * spec.check.residual_sway["payload"], color="k", linestyle="--", label="limit")
+axis.axhline(1e3 * spec.check.residual_sway["payload"], color="k", linewidth=1.0, label="limit")
 axis.set(xlabel="rope length L1 off by (%)", ylabel="residual sway of the payload (mm)", ylim=(0.0, 15.0))
 axis.grid(alpha=0.3)
 axis.legend()
