@@ -17,6 +17,7 @@ GROUPS = {
     TIMING: "setpoints late, at uneven times, or lost",
 }
 QUANTILES = (0.5, 0.9, 0.99)
+FINE = 1e3  # µm, up to which an error is told in these
 MOST_LISTED = 50  # rows of a group; of a larger one the worst are listed, lest a manifest hold thousands
 
 
@@ -146,11 +147,12 @@ class Check:
         return (self._sentence(*self.worst_of(timing)) + " It counts with --strict.",)
 
     def _sentence(self, load: str, finding: Finding) -> str:
-        error = float(f"{1e6 * self.error_bound:.2g}")
+        micrometres = float(f"{1e6 * self.error_bound:.2g}")
+        error = f"{micrometres:g} µm" if micrometres < FINE else f"{micrometres / 1e3:g} mm"
         return (
             f"The {load} sways by {1e3 * finding.residual[load]:.4g} mm after the move "
             f"({finding.scenario.name}), and {1e3 * self.limit[load]:.4g} mm are allowed "
-            f"(check.residual_sway; numerical error up to {error:g} µm)."
+            f"(check.residual_sway; numerical error up to {error})."
         )
 
     def to_dict(self) -> dict[str, Any]:

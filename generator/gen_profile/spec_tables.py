@@ -5,7 +5,8 @@ Here stands whatever needs to know the machine (its parameters, axes and loads),
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +15,7 @@ import attrs
 
 from gen_profile.errors import SpecError
 from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_machine_file
-from gen_profile.plants.plant import Plant
+from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.spec import Spec
 from gen_profile.spec_check import check_table
@@ -137,9 +138,10 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
     for key in [key for key in table if key not in (*MOVE_KEYS, "shortest")]:
         faults.add(place("move", key), f"unknown key{suggestion(key, MOVE_KEYS)}")
         del table[key]
-    axes = len(plant.actuated) if plant else None
+    axes = [axis.name for axis in plant.actuated] if plant else None
     start, target = table.pop("start", None), table.pop("target", None)
-    if "distance" in table:
+    end = "distance" if "distance" in table else "target"
+    if end == "distance":
         if start is not None or target is not None:
             faults.add("move.distance", "state either distance, or start and target, not both")
         start, target = None, _per_axis(table.pop("distance"), axes, "move.distance", faults)
@@ -147,26 +149,30 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
         target = _per_axis(target, axes, "move.target", faults)
     else:
         faults.add("move.distance", "required, but missing; state distance, or start and target")
-        target = [1.0] * (axes or 1)
-    count = len(target)
-    start = _per_axis([0.0] * count if start is None else start, count, "move.start", faults)
-    speed = table.pop("final_velocity", [0.0] * count)
-    speed = _per_axis(speed, count, "move.final_velocity", faults)
+        target = [1.0] * len(axes or "1")
+    axes = axes or [str(number) for number, _ in enumerate(target, start=1)]
+    still = [0.0] * len(axes)
+    start = _per_axis(still if start is None else start, axes, "move.start", faults)
+    speed = _per_axis(table.pop("final_velocity", still), axes, "move.final_velocity", faults)
     initial = _initial(table.pop("initial", {}), plant, faults)
     if start == target and not any(speed) and not any(initial.values()):
         faults.add("move.distance", "must not be zero on every axis")
     if any(0.0 < abs(end - begin) < SHORTEST_MOVE for begin, end in zip(start, target, strict=True)):
         faults.add("move.distance", f"must be zero, or at least {SHORTEST_MOVE:g} m (or rad)")
-    for key, values in (("start", start), ("target", target)):
+    for key, values in (("start", start), (end, target)):
         for axis, value in zip(plant.actuated if plant else (), values, strict=False):
             if not axis.lower <= value <= axis.upper:
-                faults.add(
-                    f"move.{key}",
-                    f"{axis.name} must be from {axis.lower:g} to {axis.upper:g} {axis.unit}, found {value:g}",
-                )
+                cure = "; a distance begins at 0, so state start and target" * (key == "distance")
+                faults.add(f"move.{key}", f"{axis.name} must be {_between(axis)}, found {value:g}{cure}")
     duration, shortest = _duration(table, faults)
     ends = {"start": start, "target": target, "initial": initial, "final_velocity": speed}
     return {**table, **duration, **ends, "shortest": shortest}
+
+
+def _between(axis: Coordinate) -> str:
+    """Say where an axis may be."""
+    limits = {"at least": axis.lower, "at most": axis.upper}
+    return " and ".join(f"{word} {at:g} {axis.unit}" for word, at in limits.items() if math.isfinite(at))
 
 
 def _duration(table: Table, faults: Faults) -> tuple[Table, bool]:
@@ -219,12 +225,12 @@ def _still_at_speed(move: Table, tables: Table, plant: Plant | None, faults: Fau
         faults.add("move.final_velocity", "the load does not hang still while the axes move so; end at rest")
 
 
-def _per_axis(value: Any, axes: int | None, where: str, faults: Faults) -> list[float]:
+def _per_axis(value: Any, axes: Sequence[str] | None, where: str, faults: Faults) -> list[float]:
     """One finite number per axis; a machine with one axis may leave the brackets out."""
     values = value if isinstance(value, list) else [value]
-    if axes is not None and len(values) != axes:
-        faults.add(where, f"must hold one number per axis ({axes}), found {len(values)}")
-        return [1.0] * axes
+    if axes is not None and len(values) != len(axes):
+        faults.add(where, f"must hold one number per axis ({', '.join(axes)}), found {len(values)}")
+        return [1.0] * len(axes)
     numbers = [finite(item) for item in values]
     for item, number in zip(values, numbers, strict=True):
         if number is None:

@@ -135,6 +135,12 @@ def test_a_machine_that_swings_too_much_fails(tmp_path, spec, motion):
     assert outcome.errors[0].startswith("Check failed: On the machine the ")
 
 
+def test_people_are_told_what_the_machine_did_without_opening_the_page(tmp_path, spec, motion):
+    log(tmp_path / "log.csv", motion, dict(spec.plant.parameters))
+    words = ("--no-compare", "--measured", tmp_path / "log.csv", "--out", tmp_path / "page.html")
+    assert "  measured  On the machine the payload swings by " in run_here("report", *words).out
+
+
 def test_a_log_that_ends_at_the_arrival_is_drawn_and_not_judged(tmp_path, spec, motion):
     log(tmp_path / "log.csv", motion, dict(spec.plant.parameters), until=3.5, columns=("position", "payload"))
     outcome, measured, page = report(tmp_path)

@@ -54,7 +54,7 @@ def test_the_reason_names_load_machine_figure_limit_key_and_error():
 
 def test_a_large_error_is_told_without_powers_of_ten():
     (reason,) = check(finding("nominal", 1.0, 0.0), error_bound=0.0228).reasons()
-    assert "numerical error up to 23000 µm" in reason
+    assert "numerical error up to 23 mm" in reason
 
 
 def test_faults_fail_it_whatever_the_sway():

@@ -67,6 +67,15 @@ def test_plants_tell_parameters_with_units_and_bounds():
     assert crane["parameters"]["L1"]["lower"] < crane["parameters"]["L1"]["nominal"]
 
 
+def test_plants_tell_every_name_that_a_spec_may_need():
+    """Axes for [axis] and [limits.axis], coordinates for move.initial, loads for [check]."""
+    for type_, plant in run_here("plants", "--json").document["plants"].items():
+        words = run_here("plants").out.partition(f"{type_}:")[2].partition("\n\n")[0]
+        assert plant["swinging"]
+        for name in (*plant["axes"], *plant["swinging"], *plant["loads"], *plant["parameters"]):
+            assert re.search(rf"(?<!\w){re.escape(name)}(?!\w)", words)
+
+
 @pytest.mark.parametrize(
     ("words", "incomplete", "offered"),
     [

@@ -24,14 +24,20 @@ def fault_of(preset, *overrides):
 @pytest.mark.parametrize(
     ("preset", "override", "sentence"),
     [
-        ("gantry-crane", "move.distance=3", "move.distance: must hold one number per axis (2), found 1."),
+        ("gantry-crane", "move.distance=3", "move.distance: must hold one number per axis (x, y), found 1."),
         ("gantry-crane", "move.distance=[0, 0]", "move.distance: must not be zero on every axis."),
         (
             "single-pendulum-crane",
             "move.target=[12.0, -1.0]",
-            "move.target: hoist must be from 0 to inf m, found -1.",
+            "move.target: hoist must be at least 0 m, found -1.",
         ),
-        ("tower-crane", "move.start=[0.0, -2.0]", "move.start: trolley must be from 0 to inf m, found -2."),
+        (
+            "single-pendulum-crane",
+            "move={distance=[40, -15], duration=16}",
+            "move.distance: hoist must be at least 0 m, found -15; a distance begins at 0, so state start "
+            "and target.",
+        ),
+        ("tower-crane", "move.start=[0.0, -2.0]", "move.start: trolley must be at least 0 m, found -2."),
         (
             "tower-crane",
             "axis.trolley.unit=deg",

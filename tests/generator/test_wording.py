@@ -18,6 +18,7 @@ from gen_profile.workflows.wording import bound, machine, mm, number
         (1.23456, "1.235"),
         (-12.5, "−12.5"),
         (12345.0, "12345"),
+        (259564.70775, "259565"),
     ],
 )
 def test_numbers_have_four_digits_and_none_below_a_hundred_thousandth(value, text):

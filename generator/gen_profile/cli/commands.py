@@ -215,7 +215,7 @@ def formats(as_json: bool) -> None:
 @json_option
 @debug_option
 def plants(as_json: bool) -> None:
-    """List the machines with their parameters."""
+    """List the machines with their axes, loads and parameters."""
     from gen_profile.plants.registry import find_plant, plant_types
 
     document, blocks = {}, []
@@ -224,6 +224,7 @@ def plants(as_json: bool) -> None:
         document[type_] = {
             "summary": plant.summary,
             "axes": {axis.name: axis.unit for axis in plant.actuated},
+            "swinging": {free.name: free.unit for free in plant.unactuated},
             "loads": list(plant.loads),
             "parameters": {
                 q.name: {"unit": q.unit, "nominal": q.nominal, "lower": q.lower, "upper": q.upper}
@@ -234,7 +235,13 @@ def plants(as_json: bool) -> None:
             q.name: f"{q.description}, {q.nominal:g} {q.unit} ({q.lower:g} to {q.upper:g})"
             for q in plant.parameters
         }
-        blocks.append(f"{type_}: {plant.summary}\n{_definitions(values)}")
+        named = {
+            "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in plant.actuated),
+            "swinging": ", ".join(f"{free.name} ({free.unit})" for free in plant.unactuated),
+            "loads": ", ".join(plant.loads),
+        }
+        names = "".join(f"  {kind}: {listed}\n" for kind, listed in named.items())
+        blocks.append(f"{type_}: {plant.summary}\n{names}{_definitions(values)}")
     print_outcome({"plants": document}, "\n\n".join(blocks), as_json)
 
 

@@ -236,7 +236,9 @@ def _example(reason: str | None) -> str:
 
 def report(made: Report, path: Path) -> str:
     """Tell how the design was judged, and where the page lies."""
-    rows = [("move", _move(made.design.spec)), ("check", _verdict(made.check)), ("wrote", str(path))]
+    rows = [("move", _move(made.design.spec)), ("check", _verdict(made.check))]
+    rows += [("measured", sentence) for sentence in made.observed()]
+    rows.append(("wrote", str(path)))
     return _block(made.design.spec.name, rows)
 
 

@@ -50,11 +50,14 @@ class Report:
         """The verdict."""
         return _checked(self.design)
 
+    def observed(self) -> tuple[str, ...]:
+        """Say how the machine swung that the log is of; nothing without a log."""
+        return () if self.measured is None else tuple(measured_verdict(self.measured).sentences)
+
     def faults(self) -> tuple[str, ...]:
         """Say why the design, or the machine, does not do what it should; a sentence each."""
-        measured = () if self.measured is None else tuple(measured_verdict(self.measured).sentences)
         exceeded = self.measured is not None and self.measured.passed is False
-        return (*self.check.reasons(), *(measured if exceeded else ()))
+        return (*self.check.reasons(), *(self.observed() if exceeded else ()))
 
     def to_dict(self, path: Path) -> dict[str, Any]:
         """Nest plain values for JSON."""

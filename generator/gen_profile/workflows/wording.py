@@ -13,8 +13,12 @@ SMALLEST, LARGEST = 1e-4, 1e4  # beyond, four digits would need a power of ten
 def number(value: float) -> str:
     """Write four digits, and none below a hundred-thousandth: of a millimetre, that is numerical error."""
     kept = round(value, 5) + 0.0
-    ordinary = kept == 0.0 or SMALLEST <= abs(kept) < LARGEST
-    text = f"{kept:.4g}" if ordinary else f"{kept:.5f}".rstrip("0").rstrip(".")
+    if abs(kept) >= LARGEST:
+        text = f"{kept:.0f}"
+    elif 0.0 < abs(kept) < SMALLEST:
+        text = f"{kept:.5f}"
+    else:
+        text = f"{kept:.4g}"
     return text.replace("-", "−")
 
 
