@@ -67,3 +67,15 @@ def test_every_sensitivity_is_a_finite_difference(type_):
             np.testing.assert_allclose(found / size, expected / size, atol=1e-6, err_msg=name)
             others = np.delete(weights @ states, rows)
             assert np.abs(others).max(initial=0.0) < 1e-6  # left out because they are zero
+
+
+@pytest.mark.parametrize("type_", MACHINES)
+def test_without_damping_sensitivities_are_numbers(type_):
+    """Roots of a viscosity, for one, have no slope at zero."""
+    plant = find_plant(type_)
+    values = {q.name: 0.0 if q.lower == 0.0 else q.nominal for q in plant.parameters}
+    uncertain = tuple(name for name, value in values.items() if value > 0.0)
+    equations = motion_equations(plant, uncertain, 2)
+    axes = np.ones((1, 3 * len(plant.actuated)))
+    rates = equations.rate(np.full((1, equations.size), 0.1), axes, np.array([list(values.values())]))
+    assert np.isfinite(rates).all()

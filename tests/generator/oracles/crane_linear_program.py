@@ -1,4 +1,4 @@
-"""The crane for small angles, as linear programs over a piecewise linear acceleration.
+"""Cranes for small angles, as linear programs over a piecewise linear acceleration.
 
 Modes from the absolute-angle equations; the quadratures of a mode after the move are ∫ cos(ω(T−t)) a dt and
 ∫ sin(ω(T−t)) a dt, and zero sensitivity to a frequency means that their derivatives by ω vanish, too. Nothing
@@ -75,15 +75,20 @@ class LinearCrane:
 
 
 def feasible(
-    p: Mapping[str, float], distance: float, duration: float, *, desensitized: bool, **limits: float
+    frequencies: Sequence[float],
+    distance: float,
+    duration: float,
+    *,
+    desensitized: Sequence[float],
+    **limits: float,
 ) -> bool:
-    """Whether a rest-to-rest move exists within limits on acceleration, velocity and jerk."""
+    """Whether a rest-to-rest move within limits leaves modes at rest, some even if they are a little off."""
     crane = LinearCrane(duration)
     rows, values = crane.ends()
-    for frequency in modes(p)[0]:
+    for frequency in frequencies:
         rows = np.vstack([rows, crane.quadratures(frequency)])
-        if desensitized:
-            rows = np.vstack([rows, crane.slopes(frequency)])
+    for frequency in desensitized:
+        rows = np.vstack([rows, crane.slopes(frequency)])
     values = np.concatenate([distance * values, np.zeros(len(rows) - len(values))])
     upper, sides = crane.limits(limits.get("velocity", 1e3), limits.get("jerk", 1e6))
     bound = limits.get("acceleration", 1e3)

@@ -1,0 +1,91 @@
+"""Shortest moves against bisections on linear programs, of several machines and axes."""
+
+import numpy as np
+import pytest
+from generator.crane_problems import CRANE, crane_problem
+from generator.oracles.crane_linear_program import feasible, modes
+from scipy.linalg import eigvalsh
+
+from gen_profile.problem.problem import problem_of
+from gen_profile.solvers import choice
+from gen_profile.spec import LimitsSpec
+from gen_profile.spec_reading import preset_spec
+
+
+def shortest(frequencies, distances, guess, desensitized, **limits):
+    """Bisect between half and twice a guess; all axes arrive together, each by an acceleration of its own."""
+    low, high = 0.5 * guess, 2.0 * guess
+    while high - low > 1e-3 * guess:
+        middle = (low + high) / 2.0
+        if all(
+            feasible(frequencies, distance, middle, desensitized=desensitized, **limits)
+            for distance in distances
+        ):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@pytest.mark.parametrize("desensitized", [(), ("L1",)])
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"acceleration": 0.3},
+        {"velocity": 0.15, "acceleration": 0.5, "jerk": 10.0},
+        {"jerk": 5.0},
+    ],
+)
+def test_of_the_papers_crane(limits, desensitized):
+    found = choice.minimum_time(crane_problem(desensitized=desensitized, limits=LimitsSpec(**limits)))
+    frequencies, _ = modes(CRANE.nominal())
+    best = shortest(frequencies, [0.3], found, frequencies if desensitized else [], **limits)
+    assert 0.998 * best < found < 1.02 * best
+
+
+def of_the_chain(p):
+    """Masses in a row, the first one tied to the axis."""
+    k = [p[f"k{i}"] for i in (1, 2, 3)]
+    stiffness = np.diag(np.add(k, [*k[1:], 0.0])) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
+    return np.sqrt(eigvalsh(stiffness, np.diag([p[f"m{i}"] for i in (1, 2, 3)])))
+
+
+def of_the_liquid(p):
+    waves = np.pi / p["a"] * np.array([1.0, 3.0])
+    return np.sqrt(p["g"] * waves * np.tanh(waves * p["h"]))
+
+
+# frequencies from textbooks; damping none; and limits for all axes
+MACHINES = {
+    "gantry-crane": (lambda p: [np.sqrt(p["g"] / p["L"])], ["plant.c=0"], {"acceleration": 0.4, "jerk": 0.5}),
+    "flexible-joint": (
+        lambda p: [np.sqrt(p["k"] / p["J"])],
+        ["plant.c=0"],
+        {"velocity": 6.0, "acceleration": 60.0},
+    ),
+    "mass-spring-chain": (
+        of_the_chain,
+        ["plant.c1=0", "plant.c2=0", "plant.c3=0"],
+        {"velocity": 0.8, "acceleration": 2.0},
+    ),
+    "slosh-tank": (of_the_liquid, ["plant.mu=0"], {"acceleration": 0.6, "jerk": 6.0}),
+}
+
+
+@pytest.mark.parametrize("method", ["none", "sensitivity"])
+@pytest.mark.parametrize("preset", MACHINES)
+def test_of_other_machines(preset, method):
+    frequencies, undamped, limits = MACHINES[preset]
+    spec = preset_spec(
+        preset,
+        [
+            *undamped,
+            f"robustness.method={method}",
+            *(f"limits.{name}={value}" for name, value in limits.items()),
+        ],
+    )
+    problem, found = problem_of(spec), frequencies(spec.plant.parameters)
+    duration = choice.minimum_time(problem)
+    uncertain = [] if method == "none" else found
+    best = shortest(found, np.abs(problem.distance), duration, uncertain, **limits)
+    assert 0.998 * best < duration < 1.02 * best
