@@ -202,7 +202,10 @@ def _column_order(found: Sequence[str], target: Target) -> list[int]:
                     )
     missing = [name for name in expected if name not in names]
     if missing:
-        raise ExportError(f"line 1: column {missing[0]} is missing; export the table again.")
+        raise ExportError(
+            f"line 1: column {missing[0]} is missing; export the table again, or name in export.csv_columns "
+            "what it holds."
+        )
     extra = [name for name in names if name not in expected]
     if extra or len(names) != len(expected):
         raise ExportError(f"line 1: {_unexpected(names, extra)}; remove it or export the table again.")
