@@ -105,6 +105,16 @@ def test_a_spectrum_is_said_to_tell_no_more_than_it_does(tmp_path, words, senten
     assert sentence in text
 
 
+def test_maps_are_over_the_parameters_that_matter(tmp_path):
+    """Masses, though they come first, change next to nothing; both ropes do. Of five, one has no curve."""
+    ranges = "robustness.uncertain={m1=0.01, m2=0.01, L1=0.2, L2=0.1, g=0.01}"
+    _, content, text = report(tmp_path, *QUICK, "--set", ranges)
+    assert "optimal-beta0 over L1 and L2" in content and "over m1 and" not in content
+    curves = re.findall(r"Residual sway of the payload over (\w+)", content)
+    assert {"L1", "L2"} < set(curves) and len(set(curves)) == 4
+    assert all(f"errors of {name} tried" in text for name in ("m1", "m2", "g"))
+
+
 @pytest.mark.parametrize("name", ["page.pdf", "page"])
 def test_a_page_that_no_browser_would_open_is_refused(tmp_path, name):
     outcome = run_here("report", "--out", tmp_path / name)

@@ -16,8 +16,8 @@ OPTIMAL = (
 # methods that share their dashes differ in colour, by their place, the first of which has this one
 GROUPS: tuple[tuple[Dash, int, tuple[str, ...]], ...] = (
     ("solid", 0, OPTIMAL),
-    ("dash", 3, tuple(name for name in SHAPERS if "ei" not in name)),
-    ("dot", 0, tuple(name for name in SHAPERS if "ei" in name)),
+    ("dash", 5, tuple(name for name in SHAPERS if "ei" not in name)),
+    ("dot", 3, tuple(name for name in SHAPERS if "ei" in name)),
 )
 
 

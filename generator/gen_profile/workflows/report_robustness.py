@@ -17,9 +17,9 @@ MAPPED = 4  # methods that have a map each
 def robustness_section(
     spec: Spec, own: str, motions: Mapping[str, Profile], styles: Mapping[str, Style]
 ) -> Section | None:
-    """Draw residual sway over the error of every uncertain parameter, and over the first two together.
+    """Draw residual sway over the error of every uncertain parameter, and over two of them together.
 
-    None where the spec states none.
+    None where the spec states none. Where there are many, those are drawn with which the design sways most.
 
     Parameters
     ----------
@@ -31,18 +31,21 @@ def robustness_section(
     styles : mapping of str to Style
         Of the methods that are not shown at once there are no maps.
     """
-    names = list(spec.robustness.uncertain)[:MOST]
+    names = list(spec.robustness.uncertain)
     if not names:
         return None
     found = {name: robustness_of(spec, motions, error_grid(spec, (name,))) for name in names}
+    telling = sorted(names, key=lambda name: float(found[name].share(own).max()), reverse=True)
     caption = "Shaded: the range that the spec states; dashed in red: what is allowed."
-    if len(spec.robustness.uncertain) > MOST:
-        caption += f" Of {len(spec.robustness.uncertain)} uncertain parameters the first {MOST}."
-    figures = [Figure(caption=caption, panels=[_panel(name, one, styles) for name, one in found.items()])]
+    if len(names) > MOST:
+        caption += f" Of {len(names)} uncertain parameters those {MOST} with which it sways most."
+    panels = [_panel(name, one, styles) for name, one in found.items() if name in telling[:MOST]]
+    figures = [Figure(caption=caption, panels=panels)]
     if len(names) > 1:
         shown = [own, *(method for method in motions if styles[method].shown and method != own)][:MAPPED]
         both = {method: motions[method] for method in shown}
-        figures.append(_maps(robustness_of(spec, both, error_grid(spec, names[:2]))))
+        pair = [name for name in names if name in telling[:2]]
+        figures.append(_maps(robustness_of(spec, both, error_grid(spec, pair))))
     return Section(
         title="Robustness",
         words=[" ".join(_reach(name, one, own) for name, one in found.items())],
