@@ -5,15 +5,12 @@ import re
 import numpy as np
 import pytest
 from command_line import run_here
-from generator.lagrangian_machines import Lagrange
-from scipy.integrate import solve_ivp
+from generator.free_swings import periods, swing
 
-from gen_profile.errors import CosimulationError, InfeasibleProblem, OutputError, SpecError
-from gen_profile.identification.estimation import Machine, estimate
+from gen_profile.errors import CosimulationError, OutputError, SpecError
 from gen_profile.identification.measurements import (
     DirectReading,
     Period,
-    SwingLog,
     parse_period,
     parse_reading,
     parse_swing,
@@ -24,138 +21,6 @@ from gen_profile.spec_reading import preset_spec, read_spec
 from gen_profile.workflows.identify import identify, write_spec
 
 CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
-
-
-def periods(m1, m2, L1, L2, g=9.81, **_):
-    """A textbook's two periods of a double pendulum."""
-    half = (m1 + m2) * g * (L1 + L2) / (2.0 * m1 * L1 * L2)
-    root = np.sqrt(half**2 - (m1 + m2) * g**2 / (m1 * L1 * L2))
-    return 2.0 * np.pi / np.sqrt([half - root, half + root])
-
-
-def swing(parameters, times, start, axes=(0.0, 4.0), type_="single-pendulum-crane"):
-    """Angle of a machine's first unactuated coordinate, by other equations and another integrator."""
-    lagrange, n = Lagrange(type_), len(start) // 2
-    still = np.zeros(len(axes))
-
-    def rates(_, x):
-        q, dq = np.concatenate([x[:n], axes]), np.concatenate([x[n:], still])
-        return np.concatenate([x[n:], lagrange.accelerations(q, dq, still, parameters)])
-
-    return solve_ivp(rates, (0.0, times[-1]), start, "LSODA", times, rtol=1e-9, atol=1e-11).y[0]
-
-
-def inside(found, true):
-    return all(abs(found.values[name] - true[name]) <= found.half_range[name] for name in found.values)
-
-
-# ── what is recovered, and how often ─────────────────────────────────────────────────────────────────────
-
-
-def test_tape_and_stopwatch_hold_the_machine_in_their_ranges():
-    """Read with stated noise, 300 times: the box of the ranges misses the machine in one of a hundred."""
-    true = CRANE.nominal() | {"L1": 0.52, "L2": 0.36, "m2": 0.25}
-    machine = Machine(plant=CRANE, parameters=CRANE.nominal() | {"m2": 0.25}, q_a=(0.0,))
-    slow, fast = periods(**true)
-    random, hits, errors = np.random.default_rng(7), 0, []
-    for _ in range(300):
-        readings = [
-            DirectReading(parameter="L1", value=random.normal(0.52, 0.005), uncertainty=0.005),
-            Period(mode=1, seconds=random.normal(slow, 0.01), uncertainty=0.01),
-            Period(mode=2, seconds=random.normal(fast, 0.004), uncertainty=0.004),
-        ]
-        found = estimate(machine, ["L1", "L2"], readings)
-        hits += inside(found, true)
-        errors.append([(found.values[n] - true[n]) / found.standard_uncertainty[n] for n in ("L1", "L2")])
-    assert hits >= 0.98 * 300
-    np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.12)  # neither too wide nor too narrow
-    np.testing.assert_allclose(np.mean(errors, axis=0), 0.0, atol=0.2)
-
-
-def test_a_logged_swing_holds_the_machine_in_its_ranges():
-    """Rope and damping from 25 noisy logs of a crane that is a fifth off, zero error included."""
-    true = HOIST.nominal() | {"L0": 2.3, "c": 300.0}
-    machine = Machine(plant=HOIST, parameters=HOIST.nominal() | {"c": 100.0}, q_a=(0.0, 4.0))
-    times = np.arange(0.0, 25.0, 0.1)
-    exact = swing(true, times, [0.15, -0.1])
-    random, errors, hits = np.random.default_rng(11), [], 0
-    for _ in range(25):
-        values = exact + 0.03 + random.normal(0.0, 3e-3, len(times))
-        log = SwingLog(times=times, values=values, quantity="angle", load="payload")
-        found = estimate(machine, ["L0", "c"], [], [log])
-        hits += inside(found, true)
-        errors.append([(found.values[n] - true[n]) / found.standard_uncertainty[n] for n in ("L0", "c")])
-        assert found.noise[0] == pytest.approx(3e-3, rel=0.25)
-    assert hits >= 24
-    np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.35)
-
-
-def test_a_log_and_a_tape_together_find_both_ropes_of_a_double_pendulum():
-    true = CRANE.nominal() | {"L1": 0.52, "L2": 0.36, "c1": 2e-3}
-    times = np.sort(np.random.default_rng(3).uniform(0.0, 12.0, 500))  # unevenly spaced
-    exact = swing(true, times, [0.1, -0.05, 0.2, 0.3], (0.0,), "double-pendulum-crane")
-    noisy = exact + np.random.default_rng(5).normal(0.0, 2e-3, len(times))
-    log = SwingLog(times=times, values=noisy, quantity="angle", load="hook")
-    machine = Machine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
-    tape = DirectReading(parameter="L1", value=0.523, uncertainty=0.005)
-    found = estimate(machine, ["L1", "L2", "c1"], [tape], [log])
-    assert inside(found, true)
-    assert found.half_range["L2"] < 0.005
-
-
-def test_noise_that_lasts_from_sample_to_sample_counts_for_less():
-    times = np.arange(0.0, 25.0, 0.05)
-    exact = swing(HOIST.nominal() | {"c": 300.0}, times, [0.15, 0.0])
-    machine = Machine(plant=HOIST, parameters=HOIST.nominal() | {"c": 300.0}, q_a=(0.0, 4.0))
-    white = np.random.default_rng(2).normal(0.0, 3e-3, len(times) + 9)
-    lasting = np.convolve(white, np.full(10, 10**-0.5), "valid")  # as strong, but alike over ten samples
-
-    def range_of(noise):
-        log = SwingLog(times=times, values=exact + noise, quantity="angle", load="payload")
-        return estimate(machine, ["L0"], [], [log]).half_range["L0"]
-
-    assert range_of(lasting) > 2.0 * range_of(white[: len(times)])
-
-
-def test_an_exact_log_is_identified_exactly():
-    times = np.arange(0.0, 20.0, 0.1)
-    log = SwingLog(
-        times=times, values=swing(HOIST.nominal(), times, [0.3, 0.0]), quantity="angle", load="payload"
-    )
-    machine = Machine(plant=HOIST, parameters=HOIST.nominal() | {"L0": 1.5}, q_a=(0.0, 4.0))
-    assert estimate(machine, ["L0"], [], [log]).values["L0"] == pytest.approx(2.0, abs=1e-6)
-
-
-def test_contradictory_readings_widen_the_ranges():
-    machine = Machine(plant=HOIST, parameters=HOIST.nominal(), q_a=(0.0, 0.0))
-
-    def read(*lengths):
-        tape = [DirectReading(parameter="L0", value=length, uncertainty=0.01) for length in lengths]
-        return estimate(machine, ["L0"], tape)
-
-    agreeing, torn = read(2.0, 2.01, 1.99), read(2.0, 2.2, 1.8)
-    assert agreeing.contradiction == 1.0
-    assert torn.contradiction == pytest.approx(20.0, rel=1e-6)
-    assert torn.standard_uncertainty["L0"] == pytest.approx(20.0 * 0.01 / np.sqrt(3.0), rel=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("names", "readings", "blamed"),
-    [
-        (["L1", "L2"], [Period(mode=1, seconds=1.7, uncertainty=0.01)], "L1 and L2"),
-        (["L1", "c1"], [Period(mode=1, seconds=1.7, uncertainty=0.01)], "L1 and c1"),
-        (
-            ["L1", "m1", "m2"],
-            [Period(mode=n, seconds=s, uncertainty=0.01) for n in (1, 2) for s in (1.7 / n, 1.71 / n)],
-            "m1 and m2",
-        ),
-        (["g"], [DirectReading(parameter="L1", value=0.5, uncertainty=0.1)], "g"),
-    ],
-)
-def test_what_is_not_determined_is_named(names, readings, blamed):
-    machine = Machine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
-    with pytest.raises(InfeasibleProblem, match=rf"do not determine {blamed};"):
-        estimate(machine, names, readings)
 
 
 # ── from text ────────────────────────────────────────────────────────────────────────────────────────────

@@ -69,6 +69,11 @@ class SwingLog:
     quantity: str
     load: str
 
+    @property
+    def resolution(self) -> float:
+        """Least step between different values, as of an encoder that counts; in rad or m."""
+        return float(np.diff(np.unique(self.values)).min(initial=np.inf))
+
 
 Measurement = DirectReading | Period | SwingLog
 

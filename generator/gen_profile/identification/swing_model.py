@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.identification.measurements import SwingLog
 from gen_profile.plants.plant import Plant
@@ -15,24 +16,36 @@ from gen_profile.profile import Array
 from gen_profile.response import free_swing
 
 STEP = 1e-6  # relative, of numerical slopes
+SHOWN = 1e-6  # relative size from which on a log shows a part of its start
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class SwingModel:
     """A log beside the machine that swings.
 
-    The unknowns of a log beside the machine's parameters, its *start*, are q_u and q̇_u at its first sample
-    and the sensor's zero: 2 n_u + 1 numbers.
+    The unknowns of a log beside the machine's parameters, its *start*, are those of q_u and q̇_u at its first
+    sample that it shows, and the sensor's zero. A log of one direction of a gantry's payload shows nothing
+    of the other.
+
+    Attributes
+    ----------
+    plant : Plant
+    q_a : (m,) tuple of float
+        Where the axes stood.
+    log : SwingLog
+    shown : (s,) array of int
+        Which of q_u and q̇_u, one after the other, are unknowns; all others are zero.
     """
 
     plant: Plant
     q_a: tuple[float, ...]
     log: SwingLog
+    shown: NDArray[np.intp]
 
     @property
     def unknowns(self) -> int:
         """Numbers in a start."""
-        return 2 * len(self.plant.unactuated) + 1
+        return len(self.shown) + 1
 
     def samples(self, until: float) -> int:
         """Count the samples before a time in s."""
@@ -40,13 +53,8 @@ class SwingModel:
 
     def guess(self, parameters: Mapping[str, float], until: float) -> Array:
         """Find the start that the linear model agrees with best, up to a time in s."""
-        linear = linearize(self.plant, parameters, self.q_a)
-        n_u, count = len(linear.frequencies), self.samples(until)
-        system = np.block([[np.zeros((n_u, n_u)), np.eye(n_u)], [-linear.stiffness, -linear.damping]])
-        rates, vectors = np.linalg.eig(system)
-        seen = np.concatenate([self._gain(parameters), np.zeros(n_u)])
-        decays = np.exp(self.log.times[:count, None] * rates)
-        columns = ((seen @ vectors) * decays @ np.linalg.inv(vectors)).real
+        count = self.samples(until)
+        columns = _linear_answers(self.plant, parameters, self.q_a, self.log)[:count, self.shown]
         design = np.column_stack([columns, np.ones(count)])
         size = np.linalg.norm(design, axis=0)
         start = np.linalg.lstsq(design / size, self.log.values[:count], rcond=1e-8)[0] / size
@@ -64,13 +72,13 @@ class SwingModel:
             Parameters to take slopes by.
         steps : (p,) array
             How far to step for them, in their units.
-        start : (2 n_u + 1,) array
+        start : (s + 1,) array
 
         Returns
         -------
         residuals : (samples,) array
             In rad or m.
-        slopes : (samples, p + 2 n_u + 1) array
+        slopes : (samples, p + s + 1) array
         """
         count, n = self.samples(until), len(start) - 1
         step = STEP * (np.abs(start[:n]).max() or 1.0)
@@ -78,8 +86,9 @@ class SwingModel:
         machines = np.tile([parameters[name] for name in order], (1 + len(names) + n, 1))
         for lane, (name, by) in enumerate(zip(names, steps, strict=True), start=1):
             machines[lane, order.index(name)] += by
-        starts = np.tile(start[:n], (len(machines), 1))
-        starts[1 + len(names) :] += step * np.eye(n)
+        starts = np.zeros((len(machines), 2 * len(self.plant.unactuated)))
+        starts[:, self.shown] = start[:n]
+        starts[1 + len(names) + np.arange(n), self.shown] += step
         sway, angle = free_swing(
             self.plant, machines, q_a=self.q_a, starts=starts, times=self.log.times[:count]
         )
@@ -88,9 +97,31 @@ class SwingModel:
         slopes = (seen[1:] - seen[0]).T / np.concatenate([steps, np.full(n, step)])
         return seen[0] + start[n] - self.log.values[:count], np.column_stack([slopes, np.ones(count)])
 
-    def _gain(self, parameters: Mapping[str, float]) -> Array:
-        """Slopes of the logged output by q_u, at rest."""
-        p, n_u = SimpleNamespace(**parameters), len(self.plant.unactuated)
-        load = self.plant.loads.index(self.log.load)
-        outputs = [self.plant.outputs(q_u, self.q_a, p) for q_u in STEP * np.eye(n_u)]
-        return np.array([getattr(output, self.log.quantity)[load] for output in outputs]) / STEP
+
+def swing_model(
+    plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog
+) -> SwingModel:
+    """Put a log beside a machine of about these parameters."""
+    size = np.linalg.norm(_linear_answers(plant, parameters, q_a, log), axis=0)
+    shown = np.flatnonzero(size > SHOWN * size.max())
+    return SwingModel(plant=plant, q_a=q_a, log=log, shown=shown)
+
+
+def _linear_answers(
+    plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog
+) -> Array:
+    """Say what the log would show of a unit of each of q_u and q̇_u in the linear model: (samples, 2 n_u)."""
+    linear = linearize(plant, parameters, q_a)
+    n_u = len(linear.frequencies)
+    system = np.block([[np.zeros((n_u, n_u)), np.eye(n_u)], [-linear.stiffness, -linear.damping]])
+    rates, vectors = np.linalg.eig(system)
+    seen = np.concatenate([_gain(plant, parameters, q_a, log), np.zeros(n_u)])
+    answers = (seen @ vectors) * np.exp(log.times[:, None] * rates) @ np.linalg.inv(vectors)
+    return np.asarray(answers.real)
+
+
+def _gain(plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog) -> Array:
+    """Slopes of the logged output by q_u, at rest."""
+    p, load = SimpleNamespace(**parameters), plant.loads.index(log.load)
+    outputs = [plant.outputs(q_u, q_a, p) for q_u in STEP * np.eye(len(plant.unactuated))]
+    return np.array([getattr(output, log.quantity)[load] for output in outputs]) / STEP

@@ -11,7 +11,8 @@ import attrs
 import tomli_w
 
 from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
-from gen_profile.identification.estimation import CONFIDENCE, Estimate, Machine, estimate
+from gen_profile.identification.estimation import CONFIDENCE, Estimate, estimate
+from gen_profile.identification.fit import Machine
 from gen_profile.identification.measurements import DirectReading, Measurement, Period, SwingLog, parse_swing
 from gen_profile.plants.plant import Plant
 from gen_profile.spec import Spec
