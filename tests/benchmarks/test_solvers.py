@@ -16,7 +16,7 @@ from scipy.integrate import solve_bvp
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers import direct, indirect
+from gen_profile.solvers import direct, homotopy, indirect
 from gen_profile.solvers.canonical import canonical_problem
 
 JERK_AT_START = 25.867416  # m/s³, β = 50
@@ -126,9 +126,10 @@ def test_beside_general_tools():
 @pytest.mark.parametrize("intervals", [20, 60, 200, 600, 2000])
 def test_growth_with_intervals(intervals, monkeypatch):
     problem = crane_problem()
-    for module in (indirect, direct):
-        monkeypatch.setattr(module, "INTERVALS", intervals)
-        monkeypatch.setattr(module, "MAX_INTERVALS", max(480, intervals))
+    for module, meshes in ((indirect, homotopy), (direct, direct)):
+        monkeypatch.setattr(meshes, "INTERVALS", intervals)
+        monkeypatch.setattr(meshes, "MAX_INTERVALS", max(480, intervals))
+        monkeypatch.setattr(indirect, "LONG_INTERVALS", intervals)  # so many that short ones are taken
         module.solve(problem)
         tracemalloc.start()
         module.solve(problem)

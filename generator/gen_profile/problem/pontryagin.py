@@ -93,8 +93,11 @@ class OptimalitySystem:
     ----------
     plant : Plant
     layout : StateLayout
-    flow : Function
-        Points ẑ (points, 2 n) and data (1, …) → (points, 2 n, 1 + 2 n): F, and beside it ∂F/∂ẑ.
+    slopes : Function
+        Points ẑ (points, 2 n) and data (1, …) → (points, 2 n + sways, 1): F, and the end load's sway in m.
+    linear : Function
+        The same → (points, n + sways + …, 2 n): derivatives by ẑ of x̂', of the end load's sway in m, and of
+        what else of the state is costed by half its square.
     quantities : Function
         The same → (points, 2 + m + 2 loads, 1) in SI units: H, g, the highest derivative of every axis that
         the state's chain of integrators ends in (jerk, or snap), sway and angle of every load.
@@ -102,8 +105,16 @@ class OptimalitySystem:
 
     plant: Plant
     layout: StateLayout
-    flow: Function
+    slopes: Function
+    linear: Function
     quantities: Function
+    _hamiltonian: Symbol
+    _inputs: dict[str, Symbol]
+
+    @cached_property
+    def flow(self) -> Function:
+        """The same → (points, 2 n, 1 + 2 n): F, and beside it ∂F/∂ẑ. Takes longest to derive."""
+        return Function("flow", self._inputs, _canonical_flow(self._hamiltonian, self._inputs["z"]))
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -173,22 +184,31 @@ def optimality_system(
         return sym.substitute(sym.substitute(expression, axes.u, u_star), x, offset + scale * state)
 
     hamiltonian = optimal(g / cost_scale + sym.dot(costate, duration * f / scale))
+    costed = [end_sway, axes.costed / sym.sqrt(cost_scale)]
     quantities = [hamiltonian * cost_scale, optimal(sym.column([g, axes.top, d.sway, d.angle]))]
-    inputs = {
-        "z": sym.column([state, costate]),
-        "data": sym.column([d.p, weights, effort_weights, offset, scale]),
-    }
+    z = sym.column([state, costate])
+    inputs = {"z": z, "data": sym.column([d.p, weights, effort_weights, offset, scale])}
+    forward, backward = _canonical_slopes(hamiltonian, state, costate)
     return OptimalitySystem(
         plant=plant,
         layout=layout,
-        flow=Function("flow", inputs, _canonical_flow(hamiltonian, state, costate)),
+        slopes=Function("slopes", inputs, sym.column([forward, backward, optimal(end_sway)])),
+        linear=Function("linear", inputs, sym.jacobian(sym.column([forward, *map(optimal, costed)]), z)),
         quantities=Function("quantities", inputs, sym.column(quantities)),
+        hamiltonian=hamiltonian,
+        inputs=inputs,
     )
 
 
-def _canonical_flow(hamiltonian: Symbol, state: Symbol, costate: Symbol) -> Symbol:
+def _canonical_slopes(hamiltonian: Symbol, state: Symbol, costate: Symbol) -> tuple[Symbol, Symbol]:
+    return sym.gradient(hamiltonian, costate), -sym.gradient(hamiltonian, state)
+
+
+def _canonical_flow(hamiltonian: Symbol, z: Symbol) -> Symbol:
     """Slopes (∂H/∂λ, −∂H/∂x), and beside them their Jacobian, half of which follows by symmetry."""
-    forward, backward = sym.gradient(hamiltonian, costate), -sym.gradient(hamiltonian, state)
+    unknowns = sym.split(z)
+    state, costate = sym.column(unknowns[: len(unknowns) // 2]), sym.column(unknowns[len(unknowns) // 2 :])
+    forward, backward = _canonical_slopes(hamiltonian, state, costate)
     by_state, curvature = sym.jacobian(forward, state), sym.symmetric(sym.jacobian(backward, state))
     above = sym.beside(by_state, sym.jacobian(forward, costate))
     below = sym.beside(curvature, -by_state.T)
@@ -204,15 +224,17 @@ class _AxisChain:
     top: Symbol
     effort: Symbol
     weight: Symbol  # ∂² effort / ∂u² of every axis; axes do not mix
+    costed: Symbol  # what of the chain the effort holds half the square of
 
 
 def _axis_chain(d: Dynamics, effort: Effort, tau: Symbol, weights: Symbol) -> _AxisChain:
-    u = sym.symbols("u", d.q_a.shape[0])
+    u, nothing = sym.symbols("u", d.q_a.shape[0]), sym.column([])
     chain, half_square = [d.q_a, d.dq_a, d.ddq_a], sym.dot(weights * u, u) / 2
     if effort == "jerk":
-        return _AxisChain(u=u, chain=chain, top=u, effort=half_square, weight=weights)
+        return _AxisChain(u=u, chain=chain, top=u, effort=half_square, weight=weights, costed=nothing)
     if effort == "reference":
-        return _AxisChain(u=u, chain=chain, top=(u - d.ddq_a) / tau, effort=half_square, weight=weights)
+        lagged = (u - d.ddq_a) / tau
+        return _AxisChain(u=u, chain=chain, top=lagged, effort=half_square, weight=weights, costed=nothing)
     jerk = sym.symbols("dddq_a", d.q_a.shape[0])
     return _AxisChain(
         u=u,
@@ -220,6 +242,7 @@ def _axis_chain(d: Dynamics, effort: Effort, tau: Symbol, weights: Symbol) -> _A
         top=u,
         effort=sym.dot(weights * jerk, jerk) / 2 + SNAP_TIME**2 * half_square,
         weight=SNAP_TIME**2 * weights,
+        costed=sym.sqrt(weights) * jerk,
     )
 
 

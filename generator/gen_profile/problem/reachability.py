@@ -35,11 +35,9 @@ def independent_states(A: Array, B: Array, order: NDArray[np.intp], shares: Arra
     -------
     (k,) array of bool
     """
-    step = expm(A / SAMPLES)
-    responses = np.empty((SAMPLES + 1, *B.shape))
-    responses[0] = B
-    for k in range(SAMPLES):
-        responses[k + 1] = step @ responses[k]
+    responses, step = B[None], expm(A / SAMPLES)
+    while len(responses) <= SAMPLES:
+        responses, step = np.concatenate([responses, step @ responses]), step @ step
     rows = responses.transpose(1, 0, 2).reshape(len(A), -1)
     basis = np.empty((0, rows.shape[1]))
     chosen = np.zeros(len(order), dtype=bool)

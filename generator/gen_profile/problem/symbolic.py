@@ -75,6 +75,11 @@ def exp(expression: Symbol) -> Symbol:
     return casadi.exp(expression)
 
 
+def sqrt(expression: Symbol) -> Symbol:
+    """Take the square root of every entry."""
+    return casadi.sqrt(expression)
+
+
 def dot(a: Symbol, b: Symbol) -> Symbol:
     """Inner product of two columns."""
     return casadi.dot(a, b)

@@ -6,17 +6,20 @@ from functools import cached_property
 
 import attrs
 import numpy as np
+from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
+from gen_profile.metrics import peak
 from gen_profile.problem.axis_reach import axis_reach, effort_weights
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import Linearization
 from gen_profile.problem.linearization import linearize as linearized_machine
 from gen_profile.problem.pontryagin import Data, OptimalitySystem, StateLayout
-from gen_profile.problem.problem import Problem
+from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.problem.reachability import independent_states
+from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.profile import Array
-from gen_profile.solvers.collocation import Trajectory, linearize
+from gen_profile.solvers.collocation import Scheme, Trajectory, linearize, sampled
 
 # Shares of a state's response outside the span of the others', below which its end condition is implied.
 # What a sensitivity left at a thousandth of itself adds to the sway is far less than what second order does.
@@ -24,6 +27,8 @@ DEPENDENT = 1e-8
 INSENSITIVE = 1e-3
 PROMINENT = 1e-4  # sway left by a mode, as a share of the sway that another may leave
 NEGLIGIBLE = 1e-7  # sway left by a mode, as a share of the move
+SWAY_SAMPLES = 1001
+QUINTIC = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 QUINTIC_JERK = 60.0  # with which a quintic move starts, in distances per cube of its duration
 
 
@@ -77,12 +82,36 @@ class Canonical:
         numpy.linalg.LinAlgError
             When they overflow.
         """
-        flow = self.system.flow(self.unknowns(points), self.data.row())
-        if not np.isfinite(flow).all():
-            raise np.linalg.LinAlgError("the canonical equations overflow")
+        flow = _finite(self.system.flow(self.unknowns(points), self.data.row()))
         modal = self._inverse_transform @ flow
         modal[:, :, 1:] = modal[:, :, 1:] @ self._transform
         return np.asarray(modal)
+
+    def slopes(self, points: Array) -> tuple[Array, Array]:
+        """Evaluate ζ' alone, and the end load's sway in m: (points, 2 n) and (points, sways).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When they overflow.
+        """
+        found = _finite(self.system.slopes(self.unknowns(points), self.data.row()))[:, :, 0]
+        size = points.shape[1]
+        return found[:, :size] @ self._inverse_transform.T, found[:, size:]
+
+    def linear(self, points: Array) -> tuple[Array, Array]:
+        """Differentiate ξ' by ζ, and by ξ the end load's sway in m and what else costs half its square.
+
+        Shapes (points, n, 2 n) and (points, sways + …, n).
+        """
+        n = len(self.final)
+        linear = self.system.linear(self.unknowns(points), self.data.row()) @ self._transform
+        return np.linalg.inv(self.basis) @ linear[:, :n], linear[:, n:, :n]
+
+    @property
+    def sway_cost(self) -> SwayCost:
+        """The same as `data` holds, in units of the cost's scale."""
+        return SwayCost(beta=self.data.beta / self.data.cost_scale, gamma=self.data.gamma)
 
     def solve_linear(self, flow: Array, trajectory: Trajectory) -> Trajectory:
         """Solve the equations linearised about a trajectory, at whose points `flow` was evaluated.
@@ -125,13 +154,13 @@ class Canonical:
         """Pose the problem for a longer duration."""
         return attrs.evolve(self, data=attrs.evolve(self.data, duration=factor * self.data.duration))
 
-    def weights(self, solution: Trajectory) -> Array:
+    def weights(self, *solutions: Trajectory) -> Array:
         """Tell how much each coordinate counts, shape (n,).
 
         An axis' motion counts relative to its own greatest value, a mode's relative to the sway of the modes
         that sways most, as much as it shows in that.
         """
-        largest = self._greatest(solution)
+        largest = self._greatest(*solutions)
         weights = 1.0 / largest
         for states, _ in self.system.layout.kinds:
             sway = (self.shown * largest)[states].max()
@@ -144,8 +173,7 @@ class Canonical:
         Costates are left out: those of hardly excited modes carry rounding noise that no state feels.
         """
         difference = (other.nodes - one.nodes)[:, : len(self.final)]
-        weights = np.minimum(self.weights(one), self.weights(other))
-        return float(np.sqrt(np.mean((weights * difference) ** 2)))
+        return float(np.sqrt(np.mean((self.weights(one, other) * difference) ** 2)))
 
     def missed(self, solution: Trajectory) -> float:
         """Greatest share by which an end condition fails that was not asked for, as others imply it."""
@@ -163,9 +191,10 @@ class Canonical:
         loads = len(self.system.plant.loads)
         return float(np.abs(self.quantities(solution.points)[:, -loads:]).max())
 
-    def _greatest(self, solution: Trajectory) -> Array:
+    def _greatest(self, *solutions: Trajectory) -> Array:
         """Greatest magnitude of each coordinate at the nodes, 1 where that is zero."""
-        largest = np.abs(solution.nodes[:, : len(self.final)]).max(axis=0)
+        nodes = np.concatenate([solution.nodes[:, : len(self.final)] for solution in solutions])
+        largest = np.abs(nodes).max(axis=0)
         return np.where(largest > 0.0, largest, 1.0)
 
     @cached_property
@@ -233,7 +262,7 @@ def independence(canonical: Canonical) -> tuple[NDArray[np.bool_], tuple[str, ..
     n, first = layout.size, layout.sensitivities.start
     rest = np.zeros((1, 2 * n))
     rest[:, layout.axis(0)] = canonical.final[layout.axis(0)] / 2.0
-    A = canonical.flow(rest)[0, :n, 1 : 1 + n]
+    A = canonical.linear(rest)[0][0, :, :n]
     B = np.eye(n)[:, layout.axis(layout.orders - 1)]
     # the axes' conditions first, the sensitivities', which are to give way, last
     order = np.concatenate([np.arange(2 * layout.n_u, first), np.arange(2 * layout.n_u), np.arange(first, n)])
@@ -245,6 +274,35 @@ def independence(canonical: Canonical) -> tuple[NDArray[np.bool_], tuple[str, ..
     useful = {name for (names, _), keep in kept if keep for name in names}
     every = dict.fromkeys(name for names, _ in layout.sensitivity_rows for name in names)
     return asked, tuple(name for name in every if name not in useful)
+
+
+def quintic(canonical: Canonical, mesh: Array, scheme: Scheme) -> Trajectory:
+    """Guess that the axes move by a quintic, and that everything else rests."""
+    layout = canonical.system.layout
+
+    def states(times: Array) -> Array:
+        z = np.zeros((len(times), 2 * layout.size))
+        for order in range(layout.orders):
+            values = polynomial.polyval(times, polynomial.polyder(QUINTIC, order))
+            z[:, layout.axis(order)] = values[:, None] * canonical.final[layout.axis(0)]
+        return z
+
+    return sampled(states, scheme, mesh)
+
+
+def with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) -> Canonical:
+    """Pose the same problem with the β asked for; an automatic γ is scaled by a solution without."""
+    beta, gamma = problem.sway_weight, problem.sway_scale
+    if beta == 0.0:
+        return quiet
+    if gamma is None:
+        _, sway = quiet.slopes(solution(np.linspace(0.0, 1.0, SWAY_SAMPLES)))
+        largest = float(peak(np.linalg.norm(sway, axis=1, keepdims=True))[0])
+        if largest == 0.0:  # a hoist alone swings nothing
+            return quiet
+        gamma = AUTO_SWAY / largest
+        beta *= 2.0 * solution.integral(quiet.quantities(solution.points)[:, 1]) / AUTO_EFFORT**2
+    return attrs.evolve(quiet, data=attrs.evolve(quiet.data, beta=beta, gamma=gamma))
 
 
 def _modal(layout: StateLayout, linear: Linearization, shown: Array) -> tuple[Array, Array]:
@@ -281,6 +339,12 @@ def _shown(linear: Linearization, excited: Array, reach: Array) -> Array:
     shown = np.abs(linear.sway_gain @ linear.modes).max(axis=0)
     # a mode that no axis drives is not too fast: whether it rests must be seen
     return np.where((drive > 0.0) & (excited < NEGLIGIBLE * reach.max()), 0.0, shown)
+
+
+def _finite(values: Array) -> Array:
+    if not np.isfinite(values).all():
+        raise np.linalg.LinAlgError("the canonical equations overflow")
+    return values
 
 
 def _blocks(upper: Array, lower: Array) -> Array:

@@ -1,7 +1,7 @@
 """Collocation of a two-point boundary value problem on a mesh, and its Newton step.
 
-On every interval the solution is a polynomial of degree `STAGES` that meets ``z' = F(z)`` at the collocation
-points; at the nodes it is accurate to about twice that order. Gauss's points are the most accurate ones.
+On every interval the solution is a polynomial that meets ``z' = F(z)`` at the scheme's collocation points; at
+the nodes it is accurate to about twice the polynomial's order. Gauss's points are the most accurate ones.
 Radau's let what swings too fast for the mesh fade: states forward, and costates, whose method is the adjoint
 one, backward. The stage values of an interval are eliminated first, all intervals in one batch; what is left
 couples neighbouring nodes only and is a banded system. (Ascher, Mattheij & Russell, Numerical Solution of
@@ -23,7 +23,7 @@ from threadpoolctl import ThreadpoolController
 
 from gen_profile.profile import Array
 
-STAGES = 4
+STAGES = 4  # of the schemes for fine meshes
 
 # Matrices of a hundred rows are too small to share: threads that wait for a busy machine's other core cost up
 # to a hundredfold, and how they share the work would show in the last bits.
@@ -39,13 +39,13 @@ class Scheme:
     Attributes
     ----------
     name : str
-    c, b : (STAGES,) arrays
+    c, b : (stages,) arrays
         Collocation points, and weights for integrals.
-    A, adjoint : (STAGES, STAGES) arrays
+    A, adjoint : (stages, stages) arrays
         Integrals from 0 to the points, for states and for costates.
-    end : (STAGES,) array
+    end : (stages,) array
         bᵀ A⁻¹: what is reached at 1 in terms of what is at the points.
-    interpolation : (STAGES + 1, STAGES + 1) array
+    interpolation : (stages + 1, stages + 1) array
         From values at 0 and the points to coefficients of the polynomial through them, lowest power first.
     """
 
@@ -57,9 +57,14 @@ class Scheme:
     end: Array
     interpolation: Array
 
+    @property
+    def stages(self) -> int:
+        """Collocation points on an interval, which is the polynomials' degree."""
+        return len(self.c)
+
 
 def _scheme(name: str, c: Array) -> Scheme:
-    powers = np.arange(1, STAGES + 1)
+    powers = np.arange(1, len(c) + 1)
     vandermonde = c[:, None] ** (powers - 1)
     A = (c[:, None] ** powers / powers) @ np.linalg.inv(vandermonde)
     b = (1.0 / powers) @ np.linalg.inv(vandermonde)
@@ -71,13 +76,18 @@ def _scheme(name: str, c: Array) -> Scheme:
         # the costates that belong to discretised states (Hager, Numerische Mathematik 87, 2000)
         adjoint=b - b * A.T / b[:, None],
         end=b @ np.linalg.inv(A),
-        interpolation=np.linalg.inv(np.append(0.0, c)[:, None] ** np.arange(STAGES + 1)),
+        interpolation=np.linalg.inv(np.append(0.0, c)[:, None] ** np.append(0, powers)),
     )
 
 
-GAUSS = _scheme("Gauss", (roots_jacobi(STAGES, 0.0, 0.0)[0] + 1.0) / 2.0)
+def _gauss(name: str, stages: int) -> Scheme:
+    return _scheme(name, (roots_jacobi(stages, 0.0, 0.0)[0] + 1.0) / 2.0)
+
+
+GAUSS = _gauss("Gauss", STAGES)
+LONG_GAUSS = _gauss("Gauss, long intervals", 2 * STAGES)
 RADAU = _scheme("Radau", np.append((roots_jacobi(STAGES - 1, 1.0, 0.0)[0] + 1.0) / 2.0, 1.0))
-SCHEMES = {scheme.name: scheme for scheme in (GAUSS, RADAU)}
+SCHEMES = {scheme.name: scheme for scheme in (GAUSS, LONG_GAUSS, RADAU)}
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -91,7 +101,7 @@ class Trajectory:
         From 0 to 1.
     nodes : (intervals + 1, size) array
         Values on the mesh.
-    stages : (intervals, STAGES, size) array
+    stages : (intervals, stages, size) array
         Values at the collocation points.
     """
 
@@ -103,7 +113,7 @@ class Trajectory:
     def coefficients(self) -> Array:
         """Write each interval's polynomial in its own time from 0 to 1, lowest power first.
 
-        Shape (intervals, STAGES + 1, size).
+        Shape (intervals, stages + 1, size).
         """
         values = np.concatenate([self.nodes[:-1, None], self.stages], axis=1)
         return np.asarray(np.einsum("pv,kvs->kps", self.scheme.interpolation, values))
@@ -112,7 +122,7 @@ class Trajectory:
         """Evaluate, shape (times, size)."""
         interval = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0, len(self.mesh) - 2)
         local = (times - self.mesh[interval]) / np.diff(self.mesh)[interval]
-        powers = local[:, None] ** np.arange(STAGES + 1)
+        powers = local[:, None] ** np.arange(self.scheme.stages + 1)
         return np.asarray(np.einsum("tp,tps->ts", powers, self.coefficients()[interval]))
 
     def on(self, mesh: Array) -> Trajectory:
@@ -135,6 +145,11 @@ class Trajectory:
         """Multiply the unknowns by a matrix."""
         return attrs.evolve(self, nodes=self.nodes @ matrix.T, stages=self.stages @ matrix.T)
 
+    def integral(self, values: Array) -> float:
+        """∫ over time of values at the collocation points, shape (points,)."""
+        weights = np.diff(self.mesh)[:, None] * self.scheme.b
+        return float(weights.ravel() @ values)
+
     @property
     def size(self) -> int:
         """Number of unknown functions."""
@@ -142,7 +157,7 @@ class Trajectory:
 
     @property
     def points(self) -> Array:
-        """Stage values in a row: (intervals · STAGES, size)."""
+        """Stage values in a row: (intervals · stages, size)."""
         return self.stages.reshape(-1, self.size)
 
 
@@ -150,7 +165,7 @@ def sampled(function: Callable[[Array], Array], scheme: Scheme, mesh: Array) -> 
     """Interpolate a function, times → (times, size) array, on a mesh."""
     points = (mesh[:-1, None] + np.diff(mesh)[:, None] * scheme.c).ravel()
     nodes = function(mesh)
-    stages = function(points).reshape(-1, STAGES, nodes.shape[1])
+    stages = function(points).reshape(-1, scheme.stages, nodes.shape[1])
     return Trajectory(scheme=scheme, mesh=mesh, nodes=nodes, stages=stages)
 
 
@@ -163,7 +178,7 @@ class Linearized:
     Attributes
     ----------
     current : Trajectory
-    response : (intervals, STAGES, size, 1 + size) array
+    response : (intervals, stages, size, 1 + size) array
         Corrections of the stages, and beside them their derivatives by the correction at the interval's
         beginning.
     transition, offset : (intervals, size, size) and (intervals, size) arrays
@@ -213,25 +228,25 @@ def linearize(flow: Array, current: Trajectory) -> Linearized:
         When the equations of an interval are singular.
     """
     nodes, stages, scheme = current.nodes, current.stages, current.scheme
-    intervals, _, size = stages.shape
+    intervals, count, size = stages.shape
     lengths = np.diff(current.mesh)[:, None, None]
-    values = flow.reshape(intervals, STAGES, size, 1 + size)
+    values = flow.reshape(intervals, count, size, 1 + size)
     states, costates = slice(0, size // 2), slice(size // 2, size)
 
     # (1 − h A ⊗ J) ΔZ = δ_k + z_k + h A F − Z, for the part of ΔZ that does not depend on δ_k and the part
     # that does
-    inner = np.empty((intervals, STAGES, size, STAGES, size))
-    right = np.empty((intervals, STAGES, size, 1 + size))
+    inner = np.empty((intervals, count, size, count, size))
+    right = np.empty((intervals, count, size, 1 + size))
     for half, A in ((states, scheme.A), (costates, scheme.adjoint)):
         inner[:, :, half] = np.einsum("kij,kjab->kiajb", -lengths * A, values[:, :, half, 1:])
         right[:, :, half, 0] = lengths * A @ values[:, :, half, 0] + (nodes[:-1, None] - stages)[:, :, half]
-    matrices = inner.reshape(intervals, STAGES * size, STAGES * size)
-    diagonal = np.arange(STAGES * size)
+    matrices = inner.reshape(intervals, count * size, count * size)
+    diagonal = np.arange(count * size)
     matrices[:, diagonal, diagonal] += 1.0
     right[..., 1:] = np.eye(size)
     with BLAS.limit(limits=1, user_api="blas"):
-        response = np.asarray(np.linalg.solve(matrices, right.reshape(intervals, STAGES * size, 1 + size)))
-    response = response.reshape(intervals, STAGES, size, 1 + size)
+        response = np.asarray(np.linalg.solve(matrices, right.reshape(intervals, count * size, 1 + size)))
+    response = response.reshape(intervals, count, size, 1 + size)
 
     across = _across(lengths, current, values, response)
     return Linearized(

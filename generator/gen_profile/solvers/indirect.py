@@ -1,49 +1,38 @@
 """Indirect method: Pontryagin's conditions solved as a two-point boundary value problem.
 
-1. With β = 0 the problem is nearly linear, and Newton's method converges from the linear model's optimum;
-   where angles are large it is led there through shorter or slower moves, or around folds.
-2. From there to the β asked for, at once where that converges, else through smaller ones, or around folds.
-3. All this on a coarse mesh, which smooths the way. What it gave is then refined: intervals on which the
-   Hamiltonian drifts or the canonical equations are missed are split.
+Most machines swing so little that one linear model leads to the solution, on few long intervals and within
+milliseconds (`solvers.simplified_newton`). Where it does not, the solution is sought by homotopy, on meshes
+as fine as it takes (`solvers.homotopy`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import attrs
 import numpy as np
-from numpy.polynomial import polynomial
 
-from gen_profile.metrics import peak
-from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.pontryagin import optimality_system
-from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
-from gen_profile.profile import Array
-from gen_profile.solvers.arclength import follow
-from gen_profile.solvers.canonical import Canonical, canonical_problem, independence
-from gen_profile.solvers.collocation import GAUSS, RADAU, STAGES, Scheme, Trajectory, sampled
-from gen_profile.solvers.continuation import Advance, advance
-from gen_profile.solvers.newton import NewtonOutcome, solve_newton
-from gen_profile.solvers.refinement import defect, refine
-from gen_profile.solvers.solution import Optimum, Solution, Status
+from gen_profile.problem.problem import Problem
+from gen_profile.solvers.canonical import (
+    Canonical,
+    canonical_problem,
+    independence,
+    quintic,
+    with_sway_cost,
+)
+from gen_profile.solvers.collocation import BLAS, LONG_GAUSS, Trajectory, sampled
+from gen_profile.solvers.extremal import METHOD, judged
+from gen_profile.solvers.homotopy import MODERATE_ANGLE, solve_by_homotopy
+from gen_profile.solvers.newton import NewtonOutcome
+from gen_profile.solvers.refinement import refine
+from gen_profile.solvers.simplified_newton import solve_simplified
+from gen_profile.solvers.solution import Solution
 
-METHOD = "indirect"
-INTERVALS = 30
-RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that matters, to judge a solution by
-COARSER = 2.5  # times as long are intervals to begin with
-LEVELS = 3  # of coarse meshes, each with half the intervals' length
-SLOWER = 1.5  # times the duration, to come from where the straight way fails
-LONGER = 1.1 ** np.arange(1, 60)  # times the duration, to look for one that is long enough
-MAX_INTERVALS = 480
-SWAY_SAMPLES = 1001
-BETA_DECADES = 8.0  # from share 0 to 1
-HORIZONTAL = np.pi / 2.0
-UNRESOLVED = 0.1  # defect, as a share of a state's size, of a mesh that does not follow the motion
-TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the linear model implies
-MODERATE_ANGLE = np.pi / 4.0  # up to which Newton's method hardly fails
-SMALL_ANGLE = np.radians(50.0)  # of the linear model; from there on nonlinearity is blamed where Newton fails
+__all__ = ["METHOD", "solve"]
+
+LONG_INTERVALS = 10  # at least
+RADIANS_PER_LONG_INTERVAL = 5.0  # of the fastest mode that matters
 
 
 def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
@@ -65,247 +54,59 @@ def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
     InfeasibleProblem
         The machine does not hang at rest, so that it has no natural frequencies.
     """
+    with BLAS.limit(limits=1, user_api="blas"):
+        return _solve(problem, near)
+
+
+def _solve(problem: Problem, near: Trajectory | None) -> Solution:
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     quiet = canonical_problem(problem, system)
     asked, redundant = independence(quiet)
     if redundant:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
-        solution = solve(attrs.evolve(problem, desensitized=kept), near)
+        solution = _solve(attrs.evolve(problem, desensitized=kept), near)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
-    return _solve(problem, attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan)), near)
-
-
-def _solve(problem: Problem, quiet: Canonical, near: Trajectory | None) -> Solution:
-    """Begin on a coarse mesh, which smooths the way; where it misleads, on finer ones."""
-    fine = float(np.clip(quiet.phase / RADIANS_PER_INTERVAL, INTERVALS, MAX_INTERVALS))
-    iterations = 0
-    for level in range(LEVELS):
-        intervals = min(MAX_INTERVALS, math.ceil(2**level * fine / COARSER))
+    quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
+    useful = near is not None and near.size == 2 * len(quiet.final) and problem.sway_weight > 0.0
+    near = near if useful else None
+    for start in dict.fromkeys((near, None)):
         try:
-            solution = _on_mesh(problem, quiet, near, intervals, math.ceil(fine))
+            found = _solve_simply(problem, quiet, start)
         except np.linalg.LinAlgError:
-            cure = "The end conditions contradict one another; allow more time."
-            solution = _failure(problem, Status.DIVERGED, 1, cure)
-        iterations += solution.iterations
-        if solution.status is not Status.DIVERGED:
-            break
-    return attrs.evolve(solution, iterations=iterations)
+            continue
+        if found is not None:
+            return found
+    return solve_by_homotopy(problem, quiet, near)
 
 
-def _on_mesh(problem: Problem, quiet: Canonical, near: Trajectory | None, coarse: int, fine: int) -> Solution:
-    """Follow the solution from the linear model's to that with the β asked for."""
-    guess = _guess(quiet, np.linspace(0.0, 1.0, coarse + 1))
-    quiet, linear = quiet.rescaled(quiet.solve_linear(quiet.flow(guess.points), guess))
-    approach = _approach(quiet, linear)
-    iterations = approach.iterations
-    if approach.reached < 1.0 or quiet.greatest_angle(approach.solution) > HORIZONTAL:
-        return _too_hard(problem, quiet, linear, iterations)
-    still, guess = quiet.rescaled(approach.solution)
-    measured, spent = _measured(problem, still, guess, fine)
-    iterations += spent
-    weighted = _with_sway_cost(problem, still, measured)
-    climb = _beside(weighted, near, fine) or advance(lambda share: _lighter(weighted, share), guess)
-    iterations += climb.iterations
-    if climb.reached < 1.0:
-        around = follow(weighted, guess, HORIZONTAL)
-        iterations += around.iterations
-        if around.reached < 1.0:
-            return _too_heavy(problem, iterations, climb.reached)
-        climb = around
-    refined = refine(weighted, climb.solution, fine)
-    iterations += refined.iterations
-    if refined.solution is None and problem.sway_weight > 0.0:
-        return _too_steep(problem, iterations)
-    if refined.solution is None:  # a finer mesh may do
-        return attrs.evolve(_too_hard(problem, quiet, linear, iterations), status=Status.DIVERGED)
-    if weighted.greatest_angle(refined.solution) > HORIZONTAL:
-        return _too_hard(problem, quiet, linear, iterations)
-    return _judged(problem, weighted, refined.solution, iterations, refined.residual or climb.residual)
+def _solve_simply(problem: Problem, quiet: Canonical, near: Trajectory | None) -> Solution | None:
+    """Solve with few long intervals and one linear model; there is none where the machine swings too far.
 
-
-def _judged(
-    problem: Problem, weighted: Canonical, found: Trajectory, iterations: int, residual: float
-) -> Solution:
-    """Accept a solution where it stands up to a look between the mesh's points."""
-    if weighted.missed(found) > TOLERATED_MISS:
-        cure = "Check the machine's equations and parameters."
-        return _failure(problem, Status.NOT_CONTROLLABLE, iterations, cure)
-    optimum = _optimum(weighted, found)
-    if optimum.defect is not None and optimum.defect > UNRESOLVED:
-        return _too_steep(problem, iterations)
-    return Solution(
-        status=Status.CONVERGED,
-        method=METHOD,
-        problem=problem,
-        optimum=optimum,
-        iterations=iterations,
-        residual=residual,
-        trajectory=weighted.dimensionless(found),
-    )
-
-
-def _approach(quiet: Canonical, linear: Trajectory) -> Advance:
-    """Solve the problem with β = 0: at once, else through shorter moves, slower ones, or around folds."""
-    ways: tuple[Callable[[], Advance], ...] = (
-        lambda: advance(quiet.towards, linear, linear.scaled(0.0)),
-        lambda: _from_slower(quiet, linear),
-        lambda: follow(quiet, linear, HORIZONTAL),
-    )
-    iterations = 0
-    for way in ways:
-        found = way()
-        iterations += found.iterations
-        if found.reached == 1.0:
-            break
-    return attrs.evolve(found, iterations=iterations)
-
-
-def _from_slower(quiet: Canonical, linear: Trajectory) -> Advance:
-    """Begin at a longer duration, at which the load swings less."""
-    slowly = _slower(quiet, linear, SLOWER)
-    if slowly.solution is None:
-        return Advance(solution=linear, reached=0.0, iterations=slowly.iterations, residual=slowly.residual)
-    found = advance(lambda share: quiet.slower(SLOWER ** (1.0 - share)), slowly.solution)
-    return attrs.evolve(found, iterations=slowly.iterations + found.iterations)
-
-
-def _slower(quiet: Canonical, linear: Trajectory, factor: float) -> NewtonOutcome:
-    """Solve for a longer duration, from the linear model's solution for that."""
-    slower, rest = quiet.slower(factor), linear.scaled(0.0)
-    return solve_newton(slower, slower.solve_linear(slower.flow(rest.points), rest))
-
-
-def _beside(weighted: Canonical, near: Trajectory | None, intervals: int) -> Advance | None:
-    """Find the solution from that of a similar problem, if that lies near enough."""
-    if near is None or near.size != 2 * len(weighted.final) or weighted.data.beta == 0.0:
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When it swings so far that equations overflow.
+    """
+    if not quiet.resolved:
         return None
+    intervals = max(LONG_INTERVALS, math.ceil(quiet.phase / RADIANS_PER_LONG_INTERVAL))
     mesh = np.linspace(0.0, 1.0, intervals + 1)
-    outcome = solve_newton(weighted, weighted.modal(sampled(near, _scheme(weighted), mesh)))
-    if outcome.solution is None:
+    start = quintic(quiet, mesh, LONG_GAUSS)
+    measured, weighted = NewtonOutcome(solution=start, iterations=0, residual=0.0), quiet
+    if problem.sway_weight > 0.0:
+        if problem.sway_scale is None:
+            measured = solve_simplified(quiet, start)
+        if measured.solution is None:
+            return None
+        weighted = with_sway_cost(problem, quiet, measured.solution)
+    if near is not None:
+        start = quiet.modal(sampled(near, LONG_GAUSS, mesh))
+    found = solve_simplified(weighted, start)
+    if found.solution is None:
         return None
-    return Advance(
-        solution=outcome.solution, reached=1.0, iterations=outcome.iterations, residual=outcome.residual
-    )
-
-
-def _scheme(canonical: Canonical) -> Scheme:
-    """Let modes fade that are too fast for any mesh."""
-    return GAUSS if canonical.resolved else RADAU
-
-
-def _guess(canonical: Canonical, mesh: Array) -> Trajectory:
-    """Move by a quintic, everything else at rest."""
-    layout = canonical.system.layout
-    quintic = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
-
-    def states(times: Array) -> Array:
-        z = np.zeros((len(times), 2 * layout.size))
-        for order in range(layout.orders):
-            values = polynomial.polyval(times, polynomial.polyder(quintic, order))
-            z[:, layout.axis(order)] = values[:, None] * canonical.final[layout.axis(0)]
-        return z
-
-    return sampled(states, _scheme(canonical), mesh)
-
-
-def _measured(problem: Problem, quiet: Canonical, coarse: Trajectory, fine: int) -> tuple[Trajectory, int]:
-    """Find the motion with β = 0 as exactly as what is measured by it needs; also count the iterations."""
-    if problem.sway_weight == 0.0 or problem.sway_scale is not None:
-        return coarse, 0
-    refined = refine(quiet, coarse, fine)
-    return refined.solution or coarse, refined.iterations
-
-
-def _with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) -> Canonical:
-    beta, gamma = problem.sway_weight, problem.sway_scale
-    if beta == 0.0:
-        return quiet
-    if gamma is None:
-        between = quiet.quantities(solution(np.linspace(0.0, 1.0, SWAY_SAMPLES)))
-        sway = between[:, 2 + quiet.system.layout.m :][:, problem.plant.end_load]
-        largest = float(peak(np.linalg.norm(sway, axis=1, keepdims=True))[0])
-        if largest == 0.0:  # a hoist alone swings nothing
-            return quiet
-        gamma = AUTO_SWAY / largest
-        beta *= 2.0 * _integral(solution, quiet.quantities(solution.points)[:, 1]) / AUTO_EFFORT**2
-    return attrs.evolve(quiet, data=attrs.evolve(quiet.data, beta=beta, gamma=gamma))
-
-
-def _lighter(weighted: Canonical, share: float) -> Canonical:
-    """Pose the same problem with a β that is smaller by decades."""
-    beta = weighted.data.beta * 10.0 ** (BETA_DECADES * (share - 1.0))
-    return attrs.evolve(weighted, data=attrs.evolve(weighted.data, beta=beta))
-
-
-def _integral(solution: Trajectory, values: Array) -> float:
-    """∫ over dimensionless time of values at the collocation points, shape (points,)."""
-    weights = np.diff(solution.mesh)[:, None] * solution.scheme.b
-    return float(weights.ravel() @ values)
-
-
-def _optimum(canonical: Canonical, solution: Trajectory) -> Optimum:
-    """Return to SI units."""
-    system, data = canonical.system, canonical.data
-    layout, n, m = system.layout, system.layout.size, system.layout.m
-    loads = len(system.plant.loads)
-    nodes = canonical.unknowns(solution.nodes)
-    at_nodes, at_points = canonical.quantities(solution.nodes), canonical.quantities(solution.points)
-    knots = data.duration * solution.mesh
-    top = np.concatenate(
-        [at_nodes[:-1, None, 2 : 2 + m], at_points[:, 2 : 2 + m].reshape(-1, STAGES, m)], axis=1
-    )
-    unit_time = np.einsum("pv,kva->kpa", solution.scheme.interpolation, top)
-    hamiltonian = at_nodes[:, 0]
-    return Optimum(
-        knots=knots,
-        states=data.offset + data.scale * nodes[:, :n],
-        costates=data.cost_scale * data.duration / data.scale * nodes[:, n:],
-        hamiltonian=hamiltonian,
-        top_derivative=unit_time / np.diff(knots)[:, None, None] ** np.arange(STAGES + 1)[:, None],
-        top_order=layout.orders,
-        sway=at_points[:, 2 + m : 2 + m + loads],
-        angle=canonical.greatest_angle(solution),
-        cost=data.duration * (_integral(solution, at_points[:, 1]) + data.beta),
-        sway_weight=data.beta,
-        sway_scale=data.gamma,
-        defect=float(defect(canonical, solution).max()),
-        hamiltonian_variation=float(np.ptp(hamiltonian) / np.abs(hamiltonian).max()),
-    )
-
-
-def _too_hard(problem: Problem, quiet: Canonical, linear: Trajectory, iterations: int) -> Solution:
-    """Blame the swing where the linear model leaves the small angles, else the solver; name a duration."""
-    small = quiet.greatest_angle(linear) < SMALL_ANGLE
-    status = Status.DIVERGED if small else Status.SWINGS_TOO_FAR
-    for factor in LONGER:
-        found = _slower(quiet, linear, factor).solution
-        if found is not None and quiet.slower(factor).greatest_angle(found) < MODERATE_ANGLE:
-            enough = rounded_up(factor * problem.duration)
-            cure = f"Allow about {enough} s (move.duration), or shorten the move."
-            return _failure(problem, status, iterations, cure)
-    return _failure(problem, status, iterations, "Allow more time: raise move.duration.")
-
-
-def _too_heavy(problem: Problem, iterations: int, reached: float) -> Solution:
-    """Blame the weight of the sway, and name one that works; there is none where nothing was reached."""
-    share = 10.0 ** (BETA_DECADES * (reached - 1.0))
-    named = f" (about {problem.sway_weight * share:.2g} works)" if reached > 0.0 else ""
-    return _too_steep(problem, iterations, named)
-
-
-def _too_steep(problem: Problem, iterations: int, named: str = "") -> Solution:
-    """Blame a cost so steep that the motion changes faster than any mesh."""
-    other = "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
-    return _failure(problem, Status.DIVERGED, iterations, f"Lower cost.sway_weight{named}{other}")
-
-
-def _failure(problem: Problem, status: Status, iterations: int, cure: str) -> Solution:
-    return Solution(
-        status=status,
-        method=METHOD,
-        problem=problem,
-        optimum=None,
-        iterations=iterations,
-        residual=float("inf"),
-        cure=cure,
-    )
+    refined = refine(weighted, found.solution, solve=solve_simplified)
+    if refined.solution is None:
+        return None
+    iterations = measured.iterations + found.iterations + refined.iterations
+    solution = judged(problem, weighted, refined.solution, iterations, refined.residual or found.residual)
+    return solution if solution.optimum is None or solution.optimum.angle < MODERATE_ANGLE else None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import attrs
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from gen_profile.profile import Array
 from gen_profile.solvers.canonical import Canonical
-from gen_profile.solvers.collocation import STAGES, Trajectory
+from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.newton import NewtonOutcome, solve_newton
 
 MAX_INTERVALS = 480
@@ -20,7 +21,12 @@ DRIFT_TOLERANCE = 1e-7  # of the Hamiltonian over an interval, relative to its s
 DEFECT_TOLERANCE = 3e-3  # see `defect`; what it costs in sway is of its square
 
 
-def refine(canonical: Canonical, coarse: Trajectory, least: int) -> NewtonOutcome:
+def refine(
+    canonical: Canonical,
+    coarse: Trajectory,
+    least: int = 0,
+    solve: Callable[[Canonical, Trajectory], NewtonOutcome] = solve_newton,
+) -> NewtonOutcome:
     """Split intervals until the equations are met and the Hamiltonian is constant.
 
     Where the mesh would grow beyond `MAX_INTERVALS`, the intervals that need it least are left alone. No
@@ -33,6 +39,8 @@ def refine(canonical: Canonical, coarse: Trajectory, least: int) -> NewtonOutcom
         Its solution on a mesh that may be too coarse to judge it by.
     least : int
         Intervals to begin with.
+    solve : callable
+        From a problem and a start to the solution on the same mesh.
     """
     meshes = [np.linspace(0.0, 1.0, least + 1)] if least >= len(coarse.mesh) else []
     solution, iterations, residual = coarse, 0, 0.0
@@ -42,7 +50,7 @@ def refine(canonical: Canonical, coarse: Trajectory, least: int) -> NewtonOutcom
             if parts.max() == 1:
                 break
             meshes = [_split(solution.mesh, np.minimum(parts, most)) for most in MOST_PARTS]
-        outcome, spent = _first_solved(canonical, solution, meshes)
+        outcome, spent = _first_solved(canonical, solution, meshes, solve)
         iterations += spent
         if outcome.solution is None:
             return attrs.evolve(outcome, iterations=iterations)
@@ -51,12 +59,15 @@ def refine(canonical: Canonical, coarse: Trajectory, least: int) -> NewtonOutcom
 
 
 def _first_solved(
-    canonical: Canonical, solution: Trajectory, meshes: Sequence[Array]
+    canonical: Canonical,
+    solution: Trajectory,
+    meshes: Sequence[Array],
+    solve: Callable[[Canonical, Trajectory], NewtonOutcome],
 ) -> tuple[NewtonOutcome, int]:
     """Try one mesh after the other; also count the iterations of all."""
     spent = 0
     for mesh in meshes:
-        outcome = solve_newton(canonical, solution.on(mesh))
+        outcome = solve(canonical, solution.on(mesh))
         spent += outcome.iterations
         if outcome.solution is not None:
             break
@@ -65,10 +76,11 @@ def _first_solved(
 
 def _parts(canonical: Canonical, solution: Trajectory) -> NDArray[np.intp]:
     """Tell into how many parts to divide every interval."""
-    wanted = (defect(canonical, solution) / DEFECT_TOLERANCE) ** (1.0 / STAGES)
+    stages = solution.scheme.stages
+    wanted = (defect(canonical, solution) / DEFECT_TOLERANCE) ** (1.0 / stages)
     if canonical.resolved:
         drift = _drift(canonical, solution) / DRIFT_TOLERANCE
-        wanted = np.maximum(wanted, drift ** (1.0 / (2 * STAGES)))
+        wanted = np.maximum(wanted, drift ** (1.0 / (2 * stages)))
     most = max(MAX_INTERVALS, len(wanted))
     while (parts := np.clip(np.ceil(wanted), 1, MOST_PARTS[0]).astype(np.intp)).sum() > most:
         wanted *= 0.9
@@ -89,6 +101,7 @@ def _split(mesh: Array, parts: NDArray[np.intp]) -> Array:
     return np.concatenate([*pieces, mesh[-1:]])
 
 
+@lru_cache(maxsize=1)  # who refined is asked again for what was reached
 def defect(canonical: Canonical, solution: Trajectory) -> Array:
     """Greatest miss of the state equations between collocation points, on each interval.
 
@@ -96,14 +109,13 @@ def defect(canonical: Canonical, solution: Trajectory) -> Array:
     What fast modes make of a small displacement is filtered as stiff solvers do (Hairer and Wanner, Solving
     Ordinary Differential Equations II, eq. IV.8.20).
     """
-    local = np.convolve(np.concatenate([[0.0], solution.scheme.c, [1.0]]), [0.5, 0.5], "valid")[:, None]
-    powers, coefficients = np.arange(STAGES + 1), solution.coefficients()
-    values = np.einsum("tp,kps->kts", local**powers, coefficients)
-    slopes = np.einsum("tp,kps->kts", powers[1:] * local ** powers[:-1], coefficients[:, 1:])
-    n, lengths = len(canonical.final), np.diff(solution.mesh)[:, None, None]
-    flow = canonical.flow(values.reshape(-1, solution.size)).reshape(*values.shape, -1)[:, :, :n]
-    missed = slopes[:, :, :n] - lengths * flow[..., 0]
-    filtered = np.linalg.solve(
-        np.eye(n) - lengths[..., None] / STAGES * flow[..., 1 : 1 + n], missed[..., None]
-    )
-    return np.asarray((np.abs(filtered[..., 0]) * canonical.weights(solution)).max(axis=(1, 2)))
+    scheme, n, lengths = solution.scheme, len(canonical.final), np.diff(solution.mesh)[:, None, None]
+    local = np.convolve(np.concatenate([[0.0], scheme.c, [1.0]]), [0.5, 0.5], "valid")[:, None]
+    powers, coefficients = np.arange(scheme.stages + 1), solution.coefficients()
+    values = local**powers @ coefficients
+    slopes = (powers[1:] * local ** powers[:-1]) @ coefficients[:, 1:, :n]
+    asked = canonical.slopes(values.reshape(-1, solution.size))[0].reshape(values.shape)
+    by_state = canonical.linear(solution.nodes[:-1])[0][:, :, :n]
+    fading = np.eye(n) - lengths / scheme.stages * by_state
+    missed = np.linalg.solve(fading, (slopes - lengths * asked[:, :, :n]).swapaxes(1, 2))
+    return np.asarray((np.abs(missed) * canonical.weights(solution)[:, None]).max(axis=(1, 2)))

@@ -1,0 +1,31 @@
+"""What sway costs on the way: β exp((γ d)²) of eq. (26), and its derivatives by the sway."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+
+from gen_profile.profile import Array
+
+STEEPEST = 50.0  # exponent beyond which the cost is steep enough
+
+
+@attrs.frozen(kw_only=True)
+class SwayCost:
+    """β and γ, resolved; sways are arrays (points, directions) in m."""
+
+    beta: float
+    gamma: float
+
+    def values(self, sway: Array) -> Array:
+        """Evaluate the cost, shape (points,)."""
+        return np.asarray(self.beta * np.exp(np.minimum(self.gamma**2 * (sway**2).sum(axis=1), STEEPEST)))
+
+    def slopes(self, sway: Array) -> Array:
+        """Differentiate it by every direction, shape (points, directions)."""
+        return 2.0 * self.gamma**2 * self.values(sway)[:, None] * sway
+
+    def curvatures(self, sway: Array) -> Array:
+        """Differentiate it twice, shape (points, directions, directions)."""
+        square = np.eye(sway.shape[1]) + 2.0 * self.gamma**2 * sway[:, :, None] * sway[:, None]
+        return np.asarray(2.0 * self.gamma**2 * self.values(sway)[:, None, None] * square)

@@ -1,0 +1,201 @@
+"""Simplified Newton's method on Pontryagin's conditions, for machines that swing little.
+
+The conditions are evaluated exactly. What corrects them is a linear-quadratic problem: the machine linearised
+as it hangs at rest along the way, and the curvature of the sway's cost where the iteration stands. Its states
+are eliminated, so that only the controls are left to solve for. The less the machine swings, the faster it
+converges (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 2.1). A machine that differs from
+place to place, as a crane that hoists, is linearised anew in every iteration.
+"""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+
+from gen_profile.profile import Array
+from gen_profile.solvers.canonical import Canonical
+from gen_profile.solvers.collocation import IntArray, Trajectory
+from gen_profile.solvers.linear_response import LinearResponse, linear_response
+from gen_profile.solvers.newton import NewtonOutcome
+
+TOLERANCE = 1e-7  # distance to the solution, as the last steps let it be foreseen
+GROWTH = 2.0  # of a step over the one before it, as only the cost's steepness may cause at the start
+BELIEVED = 0.01  # least quotient of steps that is taken for the rate of convergence
+SLOW = 0.5  # share of the step before beyond which another method is the better one
+MAX_ITERATIONS = 20
+MOST_CONTROLS = 800  # up to which to solve for all of them at once
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Iterate:
+    """A trajectory, and its slopes at the collocation points."""
+
+    trajectory: Trajectory
+    slopes: Array
+
+    @property
+    def final_costates(self) -> Array:
+        """λ(1)."""
+        size = self.trajectory.size
+        return self.trajectory.nodes[-1, size // 2 :]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Model:
+    """The linear-quadratic problem, but for its sway's cost.
+
+    Attributes
+    ----------
+    response : LinearResponse
+    driven : (m,) array of int
+        States that the controls drive.
+    effort : (m,) array
+        Second derivative of the effort by each of these states' slopes.
+    costed : (intervals, stages, outputs, n) array
+        Derivative by the states of the end load's sway, and of what else is costed by half its square.
+    gain : (points, outputs, points · m) array
+        Derivative of the same by all controls.
+    final_gain : (n, points · m) array
+        Derivative of the final states.
+    """
+
+    response: LinearResponse
+    driven: IntArray
+    effort: Array
+    costed: Array
+    gain: Array
+    final_gain: Array
+
+
+def solve_simplified(problem: Canonical, start: Trajectory) -> NewtonOutcome:
+    """Iterate from a start until the solution is near, as `Canonical.distance` measures it.
+
+    There is no solution where the iteration does not converge well, or has too many controls.
+
+    Parameters
+    ----------
+    problem : Canonical
+    start : Trajectory
+        Of a scheme of Gauss's.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When equations are singular or overflow.
+    """
+    iteration, step = 0, 1.0  # of the motion's size
+    if len(start.points) * problem.system.layout.m > MOST_CONTROLS:
+        return NewtonOutcome(solution=None, iterations=iteration, residual=step)
+    model, current = _model(problem, start, _hanging(problem, start)), _consistent(problem, start)
+    for iteration in range(1, MAX_ITERATIONS + 1):
+        following = _corrected(problem, model, current)
+        before, step = step, problem.distance(current.trajectory, following.trajectory)
+        current, shrinkage = following, step / before
+        if shrinkage < SLOW and step * max(shrinkage, BELIEVED) < TOLERANCE:
+            return NewtonOutcome(solution=current.trajectory, iterations=iteration, residual=step)
+        if not shrinkage < (GROWTH if iteration <= 2 else 1.0):
+            break
+        if model.response.varies:
+            model = _model(problem, current.trajectory, current.trajectory.points)
+    return NewtonOutcome(solution=None, iterations=iteration, residual=step)
+
+
+def _hanging(problem: Canonical, trajectory: Trajectory) -> Array:
+    """Take the axes' motion of a trajectory; everything else rests."""
+    layout = problem.system.layout
+    points = np.zeros_like(trajectory.points)
+    for order in range(layout.orders):
+        points[:, layout.axis(order)] = trajectory.points[:, layout.axis(order)]
+    return points
+
+
+def _model(problem: Canonical, like: Trajectory, points: Array) -> _Model:
+    """Linearise at given states and costates, at a trajectory's points in time."""
+    layout, times = problem.system.layout, like.stages.shape[:2]
+    n = layout.size
+    by_unknowns, costed = problem.linear(points)
+    A = by_unknowns[:, :, :n].reshape(*times, n, n)
+    driven = np.arange(n)[layout.axis(layout.orders - 1)]
+    response = linear_response(A, like.scheme, np.diff(like.mesh))
+    costed = costed.reshape(*times, -1, n)
+    gain, final_gain = response.gains(driven, costed)
+    return _Model(
+        response=response,
+        driven=driven,
+        effort=-1.0 / by_unknowns[0, driven, n + driven],  # the controls are −λ / effort
+        costed=costed,
+        gain=gain,
+        final_gain=final_gain,
+    )
+
+
+def _corrected(problem: Canonical, model: _Model, current: _Iterate) -> _Iterate:
+    """Solve the linear-quadratic problem for what the conditions miss."""
+    n, response, weights = len(problem.final), model.response, model.response.weights
+    slopes, sway = problem.slopes(current.trajectory.points)
+    missed = slopes.reshape(current.slopes.shape) - current.slopes
+    force, load = missed[..., :n], -weights * missed[..., n:]
+    stiffness = np.zeros((len(sway), *model.gain.shape[1:2] * 2))
+    stiffness[:] = np.eye(stiffness.shape[1])
+    stiffness[:, : sway.shape[1], : sway.shape[1]] = problem.sway_cost.curvatures(sway)
+    stiffness = weights[..., None] * stiffness.reshape(*weights.shape[:2], *stiffness.shape[1:])
+
+    def loaded(states: Array) -> Array:
+        back = model.costed.swapaxes(2, 3) @ (stiffness @ (model.costed @ states[..., None]))
+        return np.asarray(load + back[..., 0])
+
+    _, states, final = response.states(force)
+    slope, _ = response.costates(loaded(states), np.zeros(n))
+    asked = ~np.isnan(problem.final)
+    controls, final_costates = _least(
+        _hessian(model, stiffness),
+        slope[..., model.driven].ravel(),
+        model.final_gain[asked],
+        (problem.final - current.trajectory.nodes[-1, :n] - final)[asked],
+    )
+    force[..., model.driven] += controls.reshape(*force.shape[:2], -1)
+    rises, states, _ = response.states(force)
+    end = np.zeros(n)
+    end[asked] = final_costates
+    _, falls = response.costates(loaded(states), end)
+    slopes = current.slopes + np.concatenate([rises, -falls / weights], axis=-1)
+    return _integrated(current.trajectory, slopes, problem.initial, current.final_costates + end)
+
+
+def _hessian(model: _Model, stiffness: Array) -> Array:
+    """Second derivative of the cost by the controls."""
+    points, outputs, controls = model.gain.shape
+    pulled = stiffness.reshape(points, outputs, outputs) @ model.gain
+    hessian = model.gain.reshape(-1, controls).T @ pulled.reshape(-1, controls)
+    hessian[np.diag_indices(controls)] += (model.response.weights * model.effort).ravel()
+    return np.asarray(hessian)
+
+
+def _least(hessian: Array, slope: Array, constraints: Array, sides: Array) -> tuple[Array, Array]:
+    """Minimise ``½ vᵀ H v + sᵀ v`` where ``C v = c``: v and the multipliers."""
+    size, count = len(hessian), len(constraints)
+    matrix = np.zeros((size + count, size + count))
+    matrix[:size, :size] = hessian
+    matrix[size:, :size], matrix[:size, size:] = constraints, constraints.T
+    solution = np.linalg.solve(matrix, np.concatenate([-slope, sides]))
+    return solution[:size], solution[size:]
+
+
+def _consistent(problem: Canonical, start: Trajectory) -> _Iterate:
+    """Begin at the initial state; costates of free final states end at zero."""
+    lengths = np.diff(start.mesh)[:, None, None]
+    slopes = np.linalg.solve(start.scheme.A, start.stages - start.nodes[:-1, None]) / lengths
+    n = len(problem.final)
+    final_costates = np.where(np.isnan(problem.final), 0.0, start.nodes[-1, n:])
+    return _integrated(start, slopes, problem.initial, final_costates)
+
+
+def _integrated(like: Trajectory, slopes: Array, initial: Array, final_costates: Array) -> _Iterate:
+    """Integrate slopes from the initial state, and backward from the final costates, on the same mesh."""
+    n, scheme, lengths = len(initial), like.scheme, np.diff(like.mesh)[:, None, None]
+    nodes = np.zeros_like(like.nodes)
+    np.cumsum(lengths[:, 0] * (scheme.b @ slopes), axis=0, out=nodes[1:])
+    nodes[:, :n] += initial
+    nodes[:, n:] += final_costates - nodes[-1, n:]
+    stages = nodes[:-1, None] + lengths * (scheme.A @ slopes)
+    return _Iterate(trajectory=attrs.evolve(like, nodes=nodes, stages=stages), slopes=slopes)
