@@ -23,11 +23,12 @@ from gen_profile.units import AxisScale, axis_factor
 
 @attrs.frozen
 class Bounds:
-    """Allowed values of a number; `above` and `below` are themselves excluded."""
+    """Allowed values of a number, `above` itself excluded, and what they are: a unit, or words."""
 
     above: float = -float("inf")
     least: float = -float("inf")
     most: float = float("inf")
+    meaning: str = ""
 
 
 @attrs.frozen
@@ -49,11 +50,11 @@ Name = Annotated[
 ]
 Positive = Annotated[float, Bounds(above=0.0)]
 NotNegative = Annotated[float, Bounds(least=0.0)]
-RelativeRange = Annotated[float, Bounds(above=0.0, most=0.9)]
-CycleTime = Annotated[float, Bounds(least=1e-5, most=10.0)]
-Duration = Annotated[float, Bounds(least=1e-3, most=1e5)]
+RelativeRange = Annotated[float, Bounds(above=0.0, most=0.9, meaning="(0.1 is 10 %)")]
+CycleTime = Annotated[float, Bounds(least=1e-5, most=1.0, meaning="s")]
+Duration = Annotated[float, Bounds(least=1e-3, most=1e5, meaning="s")]
 Column = Literal["position", "velocity", "acceleration", "jerk"]
-Distance = Annotated[float, Bounds(least=-1e5, most=1e5)]
+Distance = Annotated[float, Bounds(least=-1e5, most=1e5, meaning="m (or rad)")]
 SolverName = Literal["auto", "indirect", "direct"]
 ShaperName = Literal["nzv", "zv", "zvd", "zvdd", "umzvd", "ei", "2hump-ei", "3hump-ei", "mzv"]
 Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]

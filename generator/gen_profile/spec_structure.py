@@ -187,7 +187,8 @@ def _enforce(value: Any, constraint: Bounds | Pattern) -> None:
             "at most": constraint.most,
         }
         stated = [f"{word} {bound:g}" for word, bound in words.items() if math.isfinite(bound)]
-        raise ValueError(f"must be {' and '.join(stated)}, found {found(value)}")
+        meaning = constraint.meaning and f" {constraint.meaning}"
+        raise ValueError(f"must be {' and '.join(stated)}{meaning}, found {found(value)}")
 
 
 def _is_fixed_tuple(annotation: Any) -> bool:

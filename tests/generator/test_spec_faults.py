@@ -90,12 +90,12 @@ FAULTS = [
     (
         "move.target",
         [1e6],
-        r"move\.target\.0: must be at least -100000 and at most 100000, found 1000000\.0\.",
+        r"move\.target\.0: must be at least -100000 and at most 100000 m .or rad., found 1000000\.0\.",
     ),
     ("move.start", {}, r"move\.start: must be a finite number, found a table\."),
     ("move.target", [0.0], r"move\.distance: must not be zero on every axis\."),
     ("move.distance", 0.3, r"move\.distance: state either distance, or start and target, not both\."),
-    ("move.duration", 0, r"move\.duration: must be at least 0\.001 and at most 100000, found 0\.0\."),
+    ("move.duration", 0, r"move\.duration: must be at least 0\.001 and at most 100000 s, found 0\.0\."),
     ("move.duration", -3.0, r"move\.duration: must be at least .*, found -3\.0\."),
     ("move.duration", float("nan"), r"move\.duration: must be a finite number, found nan\."),
     (
@@ -118,14 +118,15 @@ FAULTS = [
     (
         "robustness.uncertain.L1",
         1.5,
-        r"robustness\.uncertain\.L1: must be greater than 0 and at most 0\.9, found 1\.5\.",
+        r"robustness\.uncertain\.L1: must be greater than 0 and at most 0\.9 .0\.1 is 10 %., found 1\.5\.",
     ),
     (
         "robustness.uncertain.c1",
         0.1,
         r"robustness\.uncertain\.c1: its value is 0, so a relative range is empty\.",
     ),
-    ("export.cycle_time", 0, r"export\.cycle_time: must be at least 1e-05 and at most 10, found 0\.0\."),
+    ("export.cycle_time", 0, r"export\.cycle_time: must be at least 1e-05 and at most 1 s, found 0\.0\."),
+    ("export.cycle_time", 4, r"export\.cycle_time: must be .* at most 1 s, found 4\.0\."),  # meant as ms
     ("can.node", 128, r"can\.node: must be at least 1 and at most 127, found 128\."),
     ("can.node", 1.5, r"can\.node: must be a whole number, found 1\.5\."),
     ("can.node", 10**400, r"can\.node: must be at least 1 .*, found a whole number of more than 18 digits\."),
