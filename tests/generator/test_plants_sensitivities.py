@@ -1,5 +1,7 @@
 """Sensitivities of both orders of every machine to every parameter, against finite differences."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from generator.lagrangian_machines import MACHINES
@@ -38,12 +40,12 @@ def swung(plant, names, order, machines):
     return swing.y[:, -1].reshape(count, -1)
 
 
-def places(plant, name):
-    """Rows of the machine's states that the sensitivities of first and second order belong to."""
+def places(plant, *names):
+    """Rows of the machine's states that the sensitivities of first and second order belong to, in order."""
     d = dynamics(plant)
     parameters = dict(zip((q.name for q in plant.parameters), sym.split(d.p), strict=True))
     state = sym.column([d.q_u, d.dq_u])
-    found = sensitivities(sym.column([d.dq_u, d.ddq_u]), state, parameters, (name,), 2)
+    found = sensitivities(sym.column([d.dq_u, d.ddq_u]), state, parameters, names, 2)
     return [list(one.rows) for one in found]
 
 
@@ -67,6 +69,24 @@ def test_every_sensitivity_is_a_finite_difference(type_):
             np.testing.assert_allclose(found / size, expected / size, atol=1e-6, err_msg=name)
             others = np.delete(weights @ states, rows)
             assert np.abs(others).max(initial=0.0) < 1e-6  # left out because they are zero
+
+
+@pytest.mark.parametrize("type_", MACHINES)
+def test_mixed_sensitivities_are_finite_differences_too(type_):
+    plant = find_plant(type_)
+    values = {q.name: q.nominal or 0.1 * plant.nominal().get("m", 1.0) for q in plant.parameters}
+    for pair in combinations(list(values)[:3], 2):
+        lanes = np.tile(list(values.values()), (5, 5, 1))
+        for k, name in enumerate(pair):
+            lanes[..., list(values).index(name)] *= np.expand_dims(STENCIL, 1 - k)
+        states = swung(plant, (), 1, lanes.reshape(25, -1)).reshape(5, 5, -1)
+        augmented = swung(plant, pair, 2, lanes[2, 2:3])[0, states.shape[2] :]
+        ends = np.cumsum([len(rows) for rows in places(plant, *pair)])
+        rows, found = places(plant, *pair)[3], augmented[ends[2] : ends[3]]  # one, other; twice one, mixed
+        expected = np.einsum("a,b,abs->s", FIRST, FIRST, states)
+        size = np.abs(expected).max(initial=1e-9)
+        np.testing.assert_allclose(found / size, expected[rows] / size, atol=1e-6, err_msg=str(pair))
+        assert np.abs(np.delete(expected, rows)).max(initial=0.0) < 1e-6
 
 
 @pytest.mark.parametrize("type_", MACHINES)
