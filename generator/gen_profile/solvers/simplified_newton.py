@@ -135,10 +135,7 @@ def _corrected(problem: Canonical, model: _Model, current: _Iterate) -> _Iterate
     slopes, sway = problem.slopes(current.trajectory.points)
     missed = slopes.reshape(current.slopes.shape) - current.slopes
     force, load = missed[..., :n], -weights * missed[..., n:]
-    stiffness = np.zeros((len(sway), *model.gain.shape[1:2] * 2))
-    stiffness[:] = np.eye(stiffness.shape[1])
-    stiffness[:, : sway.shape[1], : sway.shape[1]] = problem.sway_cost.curvatures(sway)
-    stiffness = weights[..., None] * stiffness.reshape(*weights.shape[:2], *stiffness.shape[1:])
+    stiffness = _stiffness(problem, model, sway)
 
     def loaded(states: Array) -> Array:
         back = model.costed.swapaxes(2, 3) @ (stiffness @ (model.costed @ states[..., None]))
@@ -160,6 +157,18 @@ def _corrected(problem: Canonical, model: _Model, current: _Iterate) -> _Iterate
     _, falls = response.costates(loaded(states), end)
     slopes = current.slopes + np.concatenate([rises, -falls / weights], axis=-1)
     return _integrated(current.trajectory, slopes, problem.initial, current.final_costates + end)
+
+
+def _stiffness(problem: Canonical, model: _Model, sway: Array) -> Array:
+    """Second derivative of the cost by what is costed, times the points' weights.
+
+    Shape (intervals, stages, outputs, outputs).
+    """
+    outputs, sways = model.gain.shape[1], sway.shape[1]
+    stiffness = np.broadcast_to(np.eye(outputs), (len(sway), outputs, outputs)).copy()
+    stiffness[:, :sways, :sways] = problem.sway_cost.curvatures(sway)
+    weights = model.response.weights[..., None]
+    return np.asarray(weights * stiffness.reshape(*weights.shape[:2], outputs, outputs))
 
 
 def _hessian(model: _Model, stiffness: Array) -> Array:
