@@ -7,20 +7,31 @@ from numpy.polynomial import legendre, polynomial
 
 from gen_profile.profile import Array, Profile
 
-POINTS_PER_SEGMENT = 33
+POINTS_PER_SEGMENT = 65  # between which a derivative is taken to change its sign once at most
+
+
+def extremes(profile: Profile, order: int, axis: int = 0) -> tuple[float, float]:
+    """Least and greatest value of an axis' derivative of the given order, jumps included."""
+    times, values = profile.within_segments(POINTS_PER_SEGMENT, order)
+    _, slopes = profile.within_segments(POINTS_PER_SEGMENT, order + 1)
+    slope, time = slopes[:, axis].reshape(-1, POINTS_PER_SEGMENT), times.reshape(-1, POINTS_PER_SEGMENT)
+    before, after = slope[:, :-1], slope[:, 1:]
+    turns = before * after < 0.0
+    share = before[turns] / (before - after)[turns]
+    turning = profile.derivative(time[:, :-1][turns] + share * np.diff(time)[turns], order)
+    found = np.concatenate([values[:, axis], turning[:, axis]])
+    return float(found.min()), float(found.max())
 
 
 def greatest(profile: Profile, order: int, axis: int = 0) -> float:
     """Greatest magnitude of an axis' derivative of the given order; of the first axis by default."""
-    _, values = profile.within_segments(POINTS_PER_SEGMENT, order)
-    return float(np.abs(values[:, axis]).max())
+    return max(map(abs, extremes(profile, order, axis)))
 
 
 def overshoot(profile: Profile) -> float:
     """Find how far the first axis leaves the way between its start and its target."""
-    _, values = profile.within_segments(POINTS_PER_SEGMENT, 0)
-    ends = (profile.start[0], profile.target[0])
-    return float(max(values[:, 0].max() - max(ends), min(ends) - values[:, 0].min(), 0.0))
+    (lowest, highest), ends = extremes(profile, 0), (profile.start[0], profile.target[0])
+    return float(max(highest - max(ends), min(ends) - lowest, 0.0))
 
 
 def root_mean_square(profile: Profile, order: int) -> float:

@@ -6,10 +6,9 @@ import math
 from collections.abc import Iterator
 
 import attrs
-import numpy as np
 
 from gen_profile.errors import LimitViolation
-from gen_profile.metrics import POINTS_PER_SEGMENT
+from gen_profile.metrics import extremes, greatest
 from gen_profile.profile import Profile
 from gen_profile.spec import LimitsSpec
 
@@ -86,14 +85,12 @@ def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Brea
         for order, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
             allowed = getattr(allowed_here, name)
             if allowed is not None:
-                _, values = command.within_segments(POINTS_PER_SEGMENT, order)
-                found = float(np.abs(values[:, column]).max())
+                found = greatest(command, order, column)
                 yield Breach(limit=limits.place(column, name), found=found, allowed=allowed, power=order)
         if allowed_here.travel is not None:
             (low, high), travel = allowed_here.travel, limits.place(column, "travel")
-            _, values = command.within_segments(POINTS_PER_SEGMENT, 0)
             rounding = 1e-12 * max(abs(low), abs(high))
-            top, bottom = float(values[:, column].max()), float(values[:, column].min())
+            bottom, top = extremes(command, 0, column)
             yield Breach(limit=travel, found=top - rounding, allowed=high, power=0)
             yield Breach(limit=travel, found=-bottom - rounding, allowed=-low, power=0)
     if limits.sway is not None:

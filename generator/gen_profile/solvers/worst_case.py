@@ -14,7 +14,7 @@ from itertools import product
 import attrs
 import numpy as np
 
-from gen_profile.metrics import POINTS_PER_SEGMENT, peak
+from gen_profile.metrics import greatest, peak
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem, WorstCase
 from gen_profile.profile import Array, Profile
@@ -68,8 +68,9 @@ def _held_back(problem: Problem) -> Problem | None:
     exact = direct.solve(attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0))
     if exact.optimum is None:
         return None
-    _, acceleration = optimal_profile(exact).within_segments(POINTS_PER_SEGMENT, 2)
-    return attrs.evolve(problem, limits=LimitsSpec(acceleration=float(np.abs(acceleration).max())))
+    motion = optimal_profile(exact)
+    acceleration = max(greatest(motion, 2, axis) for axis in range(motion.axes))
+    return attrs.evolve(problem, limits=LimitsSpec(acceleration=acceleration))
 
 
 def solve_within_limits(problem: Problem) -> Solution:

@@ -8,7 +8,7 @@ from typing import Any
 import tomli_w
 
 from gen_profile.check import Check
-from gen_profile.metrics import POINTS_PER_SEGMENT, greatest
+from gen_profile.metrics import extremes, greatest
 from gen_profile.report.content import Block, Listing, Row, Section, Share, Table, Terms, Verdict
 from gen_profile.report.figures import PLAIN
 from gen_profile.solvers.solution import Solution
@@ -147,8 +147,7 @@ def _axis_limits(spec: Spec, trial: Trial) -> Iterator[Row]:
                 yield _limit(name, taken, allowed, unit)
         if limits.travel is not None:
             low, high = limits.travel
-            _, values = trial.command.within_segments(POINTS_PER_SEGMENT, 0)
-            least, most = float(values[:, column].min()), float(values[:, column].max())
+            least, most = extremes(trial.command, 0, column)
             margin = min(least - low, high - most)
             yield Row(
                 cells=(
