@@ -8,6 +8,7 @@ from scipy.linalg import eigvalsh
 
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import choice
+from gen_profile.solvers.minimum_time import PRECISION, least_beyond
 from gen_profile.spec import LimitsSpec
 from gen_profile.spec_reading import preset_spec
 
@@ -89,3 +90,21 @@ def test_of_other_machines(preset, method):
     uncertain = [] if method == "none" else found
     best = shortest(found, np.abs(problem.distance), duration, uncertain, **limits)
     assert 0.998 * best < duration < 1.02 * best
+
+
+@pytest.mark.parametrize(("enough", "tries"), [(10.001, 1), (10.03, 5), (10.5, 10), (13.0, 14)])
+def test_a_duration_next_to_one_that_is_too_short_is_found_at_once(enough, tries):
+    """Every try is a design of seconds."""
+    tried = []
+
+    def feasible(duration):
+        tried.append(duration)
+        return duration >= enough
+
+    found = least_beyond(feasible, 10.0, 100.0)
+    assert enough <= found <= enough * (1.0 + PRECISION) + 0.01
+    assert len(tried) <= tries and len(set(tried)) == len(tried)
+
+
+def test_no_duration_is_looked_for_without_end():
+    assert least_beyond(lambda _: False, 10.0, 100.0) is None

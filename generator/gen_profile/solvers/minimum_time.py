@@ -14,6 +14,7 @@ from gen_profile.solvers.solution import Solution
 PRECISION = 1e-3  # relative, of the duration; what is returned is the feasible end
 LONGEST = 1e3  # slowest periods, after which the search gives up
 STRIDE = 1.5
+LONGER = 8.0  # from stride to stride away from a duration that is too short
 
 
 def shortest_duration(problem: Problem, solve: Callable[[Problem], Solution]) -> float | None:
@@ -66,6 +67,35 @@ def least(feasible: Callable[[float], bool], guess: float, most: float) -> float
             enough, short = STRIDE * enough, enough
             if enough > most:
                 return None
+    return _between(feasible, short, enough)
+
+
+def least_beyond(feasible: Callable[[float], bool], short: float, most: float) -> float | None:
+    """Find the least duration that will do beyond one that will not, which is often next to it.
+
+    Parameters
+    ----------
+    feasible : float → bool
+    short : float
+        Too short, in s.
+    most : float
+        Where to give up, in s.
+
+    Returns
+    -------
+    float or None
+        s; None where none up to `most` was found to do.
+    """
+    start, stride = short, PRECISION
+    while not feasible(enough := (1.0 + stride) * start):
+        if enough > most:
+            return None
+        short, stride = enough, LONGER * stride
+    return _between(feasible, short, enough)
+
+
+def _between(feasible: Callable[[float], bool], short: float, enough: float) -> float:
+    """Bisect, and return the feasible end."""
     while enough - short > PRECISION * enough:
         middle = (enough + short) / 2.0
         enough, short = (middle, short) if feasible(middle) else (enough, middle)

@@ -20,7 +20,7 @@ from gen_profile.profile import Array, Profile, grid_length, grid_times
 from gen_profile.response import TRANSIENT_SAMPLES, Response, Swing
 from gen_profile.solvers import choice
 from gen_profile.solvers.collocation import Trajectory
-from gen_profile.solvers.minimum_time import STRIDE, least
+from gen_profile.solvers.minimum_time import least_beyond
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec import Spec
@@ -103,7 +103,7 @@ def timed(spec: Spec) -> Spec:
     quickest = _lasting(spec, shortest)
     if _calms(quickest):
         return quickest
-    calm = least(lambda time: _calms(_lasting(spec, time)), STRIDE * shortest, LONGEST * shortest)
+    calm = least_beyond(lambda time: _calms(_lasting(spec, time)), shortest, LONGEST * shortest)
     if calm is None:
         raise InfeasibleProblem(
             "check.residual_sway: no duration leaves so little sway on every machine of "
