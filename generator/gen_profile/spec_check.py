@@ -40,6 +40,8 @@ def check_table(tables: Table, plant: Plant | None, folder: Path, faults: Faults
         return limits
     parameters = tables["plant"]["parameters"]
     uncertain = _uncertain(table.get("uncertain"), parameters, faults)
+    for where, shares in (("robustness", tables["robustness"]["uncertain"]), ("check", uncertain or {})):
+        _within_bounds(f"{where}.uncertain", shares, plant, parameters, faults)
     spans = _spans(table.get("spans", {}), plant, parameters, faults)
     changed = {*(tables["robustness"]["uncertain"] if uncertain is None else uncertain), *spans}
     if len(changed) > MOST_CORNERS:
@@ -74,6 +76,20 @@ def _uncertain(table: Any, parameters: Mapping[str, float], faults: Faults) -> T
         if parameters.get(name) == 0.0:
             faults.add(place(where, name), "its value is 0, so a relative range is empty; state check.spans")
     return {name: table[name] for name in parameters if name in table}
+
+
+def _within_bounds(
+    where: str, shares: Mapping[str, Any], plant: Plant, parameters: Mapping[str, float], faults: Faults
+) -> None:
+    """Refuse relative ranges that reach beyond what the machine takes."""
+    for parameter in plant.parameters:
+        share = finite(shares.get(parameter.name))
+        if share is None or not 0.0 < share < 1.0:
+            continue  # or told elsewhere
+        for end in (parameters[parameter.name] * (1.0 + sign * share) for sign in (-1.0, 1.0)):
+            if not parameter.lower <= end <= parameter.upper:
+                bounds = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
+                faults.add(place(where, parameter.name), f"reaches {end:.6g}, and the machine takes {bounds}")
 
 
 def _spans(table: Any, plant: Plant, parameters: Mapping[str, float], faults: Faults) -> Table:

@@ -94,6 +94,15 @@ def test_more_corners_than_a_thousand_are_refused():
         spec_from_dict({**document, "check": {"uncertain": ranges}})
 
 
+@pytest.mark.parametrize("table", ["robustness", "check"])
+@pytest.mark.parametrize(("value", "share", "end"), [(0.02, 0.9, "0.002"), (190.0, 0.1, "209")])
+def test_ranges_that_the_machine_cannot_have_are_refused(table, value, share, end):
+    overrides = [f"plant.L1={value}", "robustness={}", f"{table}.uncertain={{L1={share}}}"]
+    sentence = rf"^{table}\.uncertain\.L1: reaches {end}, and the machine takes 0\.01 to 200 m\.$"
+    with pytest.raises(SpecError, match=sentence):
+        preset_spec("paper", overrides)
+
+
 def test_names_tell_values_where_a_share_says_nothing():
     spec = preset_spec("paper", ["check.spans={c2=[0.0, 0.01]}", "check.path={lag=[0.0, 0.02]}"])
     machines = scenarios(spec)
