@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import math
 from collections.abc import Sequence
+from datetime import UTC, datetime
 
 import attrs
 
 from gen_profile.errors import OutputError
 
-SEPARATORS = ";\t,"  # the first that a table's first line holds: where it is no comma, that is a decimal sign
+SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
 
 
 @attrs.frozen(kw_only=True)
@@ -42,6 +44,27 @@ class LogTable:
             return math.nan
         return value if math.isfinite(value) else math.nan
 
+    def seconds(self, row: int, place: int) -> float:
+        """Time of a cell: a number, or a date and time as of ISO 8601, which is told in s; else NaN."""
+        value = self.number(row, place)
+        if not math.isnan(value):
+            return value
+        try:
+            moment = datetime.fromisoformat(self.cell(row, place).replace(",", "."))
+        except ValueError:
+            return math.nan
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+def decoded(content: bytes) -> str:
+    """Decode what a logger wrote: UTF-16 or UTF-8 if it is, else Windows' Western European."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16", errors="replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
+
 
 def read_table(text: str, source: str) -> LogTable:
     """Split a text into cells.
@@ -60,7 +83,9 @@ def read_table(text: str, source: str) -> LogTable:
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         raise OutputError(f"{source}: the log is empty.")
-    separator = next((known for known in SEPARATORS if known in lines[0]), ",")
+    separator = next(
+        (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines)), ","
+    )
     try:
         rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)]
     except csv.Error as error:

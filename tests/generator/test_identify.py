@@ -46,9 +46,16 @@ def test_faulty_periods(text):
         parse_period(text)
 
 
-def log_of(text, columns=("1", "2"), unit="deg", after=0.0):
+def log_of(text, columns=("1", "2"), after=0.0):
     return parse_swing(
-        text, "swing.csv", columns=columns, unit=unit, after=after, quantity="angle", load="hook"
+        text,
+        "swing.csv",
+        columns=columns,
+        per_second=1.0,
+        per_unit=180.0 / np.pi,
+        after=after,
+        quantity="angle",
+        load="hook",
     )
 
 
@@ -74,13 +81,42 @@ def test_logs_with_and_without_a_header(separator, decimal):
         ("", "the log is empty"),
         ("t;a\n1;2\n", "needs at least 16 samples, found 1"),
         ("t;a\n1;x\n", "row 2: expected numbers, found '1' and 'x'"),
-        ("1;2\n1\n", "row 2: expected numbers, found '1' and ''"),
+        ("1;2\n1;\n", "needs at least 16 samples, found 1"),
         ("\n".join("0;1" for _ in range(20)), "the times must rise"),
     ],
 )
 def test_faulty_logs(text, why):
     with pytest.raises(OutputError, match=why):
         log_of(text)
+
+
+HEADS = {
+    "units": ["t;angle", "s;deg"],
+    "remarks": ["Logger 3, 2026-05-01", "station=bay 3", "t;angle", "[s];[deg]"],
+    "numbers among the remarks": ["12;34;logger", "t;angle;remark"],
+}
+
+
+@pytest.mark.parametrize("head", HEADS.values(), ids=HEADS)
+def test_what_loggers_write_above_the_numbers_is_passed_over(head):
+    rows = [f"{t:.1f};{v}" for t, v in ROWS]
+    log = log_of("\n".join([*head, *rows]), ("t", "angle"))
+    np.testing.assert_allclose(log.times, [t for t, _ in ROWS])
+    np.testing.assert_allclose(log.values, np.radians([v for _, v in ROWS]))
+
+
+def test_rows_without_a_value_are_left_out():
+    rows = [f"{t:.1f};{v if k % 3 else ''}" for k, (t, v) in enumerate(ROWS)]
+    log = log_of("\n".join(["t;angle", *rows]))
+    np.testing.assert_allclose(log.times, [t - ROWS[1][0] for k, (t, _) in enumerate(ROWS) if k % 3])
+
+
+@pytest.mark.parametrize("mark", ["2026-03-29T01:59:58.{:03d}Z", "2026-03-29 01:59:58,{:03d}"])
+def test_dates_count_from_the_first(mark):
+    """In the night in which clocks are put forward in Europe, too."""
+    rows = [f"{mark.format(40 * k)};{v}" for k, (_, v) in enumerate(ROWS[:25])]
+    log = log_of("\n".join(["t;angle", *rows]), after=0.1)
+    np.testing.assert_allclose(log.times, 0.04 * np.arange(22), atol=1e-6)
 
 
 def test_readings_that_cannot_all_be_right():
@@ -146,6 +182,33 @@ def test_a_log_is_read_and_told_of(tmp_path):
     assert read_spec(tmp_path / "new.toml").plant.parameters["L0"] == pytest.approx(3.0, abs=0.02)
 
 
+@pytest.mark.parametrize(
+    ("encoding", "unit", "size"),
+    [("utf-16", "deg", 1.0), ("cp1252", "deg", 1.0), ("utf-8", "0.25deg", 0.25), ("utf-8", "0.25 deg", 0.25)],
+)
+def test_logs_of_other_computers_and_encoders(tmp_path, encoding, unit, size):
+    times = np.arange(0.0, 20.0, 0.1)
+    exact = np.degrees(swing(HOIST.nominal() | {"L0": 2.3, "m": 2000.0}, times, [0.15, 0.0], (12.0, 2.0)))
+    counts = np.round((exact + 7.0) / 0.25) * 0.25 / size
+    rows = "".join(f"{1e3 * t:.0f};{v}\n" for t, v in zip(times, counts, strict=True))
+    (tmp_path / "log.csv").write_text(f"Zeit;Winkel °\n{rows}", encoding)
+    found = run_here(
+        "identify", "--preset", "single-pendulum-crane", "--set", "plant.c=0", "--free", "L0", "--at", "12,2",
+        "--swing", tmp_path / "log.csv", "--columns", "Zeit,Winkel °", "--unit", unit, "--time-unit", "ms",
+        "--out", tmp_path / "new.toml", "--json",
+    )  # fmt: skip
+    assert (found.code, found.errors) == (0, [])
+    row = found.document["parameters"]["L0"]
+    assert abs(row["value"] - 2.3) < row["half_range"] < 0.02
+
+
+def test_degrees_that_are_taken_for_radians(tmp_path):
+    (tmp_path / "log.csv").write_text("".join(f"{t};{v}\n" for t, v in ROWS), "utf-8")
+    outcome = run_here("identify", "--preset", "paper", "--free", "L1", "--swing", tmp_path / "log.csv")
+    assert outcome.code == 2
+    assert "the log's angle goes over 20 rad, more than half a turn; is it in deg?" in outcome.err
+
+
 def test_a_contradiction_is_told(tmp_path):
     found = run_here(
         "identify", "--measured", "L1=0.5±0.001", "--measured", "L1=0.6±0.001", "--out", tmp_path / "x.toml"
@@ -165,7 +228,13 @@ def test_a_contradiction_is_told(tmp_path):
         (["--free", "L1", "--swing", "none.csv"], 2, "Cannot read the log none.csv"),
         (["--free", "L1", "--swing", "none.csv", "--signal", "speed"], 2, "unknown signal 'speed'"),
         (["--free", "L1", "--swing", "none.csv", "--signal", "angle:crate"], 2, "unknown load 'crate'"),
-        (["--free", "L1", "--swing", "none.csv", "--unit", "mm"], 2, "'mm' does not measure an angle"),
+        (["--free", "L1", "--swing", "none.csv", "--unit", "mm"], 2, "'mm' does not measure angle"),
+        (
+            ["--free", "L1", "--swing", "none.csv", "--unit", "1.2.3 deg"],
+            2,
+            "size of a count, as in 0.0879 deg",
+        ),
+        (["--free", "L1", "--swing", "none.csv", "--unit", "0 deg"], 2, "size of a count"),
         (["--free", "L1", "--swing", "none.csv", "--columns", "1"], 2, "write TIME,VALUE"),
         (["--free", "L1"], 3, "do not determine L1"),
         (["--measured", "L1=0.5±0.4"], 3, "determine L1 to ±206 % only"),

@@ -201,3 +201,14 @@ def test_what_is_not_determined_is_named(names, readings, blamed):
     machine = Machine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
     with pytest.raises(InfeasibleProblem, match=rf"do not determine {blamed};"):
         estimate(machine, names, readings)
+
+
+@pytest.mark.parametrize("pace", [0.001, 1000.0])
+def test_a_log_in_another_unit_of_time_is_refused(pace):
+    times = np.arange(0.0, 25.0, 0.1)
+    log = SwingLog(times=pace * times, values=np.sin(times), quantity="angle", load="payload")
+    machine = Machine(plant=HOIST, parameters=HOIST.nominal(), q_a=(0.0, 4.0))
+    with pytest.raises(
+        InfeasibleProblem, match=r"swings once in 4\.9\d s: look at the unit of the log's times"
+    ):
+        estimate(machine, ["L0"], [], [log])

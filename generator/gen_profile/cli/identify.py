@@ -42,13 +42,20 @@ from gen_profile.errors import SpecError
     default="angle",
     help="What the log's values are: angle or sway, of the first load or, as in angle:hook, of another.",
 )
-@click.option("--unit", metavar="UNIT", help="Unit of the log's values: rad, deg, m, mm or um.")
+@click.option(
+    "--unit",
+    metavar="UNIT",
+    help="Unit of the log's values: rad, deg, m, mm or um; for counts the size of one, as in '0.09 deg'.",
+)
+@click.option(
+    "--time-unit", type=click.Choice(["s", "ms", "us"]), default="s", help="Unit of its times; s by default."
+)
 @click.option(
     "--after",
     metavar="SECONDS",
     type=float,
     default=0.0,
-    help="Leave out what the log holds before this time.",
+    help="Leave out what the log holds before this time; of dates, so long after the first.",
 )
 @click.option(
     "--free",
@@ -79,6 +86,7 @@ def identify(
     columns: str,
     signal: str,
     unit: str | None,
+    time_unit: str,
     after: float,
     free: tuple[str, ...],
     at: str | None,
@@ -100,7 +108,15 @@ def identify(
             time, comma, value = columns.partition(",")
             if not comma:
                 raise SpecError(f"--columns {columns!r}: write TIME,VALUE, such as 1,2 or time,angle.")
-            read = read_swing(log, spec, columns=(time, value), signal=signal, unit=unit, after=after)
+            read = read_swing(
+                log,
+                spec,
+                columns=(time, value),
+                signal=signal,
+                unit=unit,
+                time_unit=time_unit,
+                after=after,
+            )
             measurements.append(read)
         found = run(spec, measurements, free, None if at is None else _positions(at))
         write_spec(found.spec, out)

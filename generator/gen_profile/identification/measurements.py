@@ -13,10 +13,9 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.log_table import read_table
+from gen_profile.log_table import LogTable, read_table
 from gen_profile.profile import Array, read_only
 from gen_profile.suggestion import suggestion
-from gen_profile.units import UNITS
 
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
 _VALUE = rf"({_NUMBER})\s*(?:±|\+-|\+/-)\s*({_NUMBER})"
@@ -119,9 +118,19 @@ def parse_period(text: str) -> Period:
 
 
 def parse_swing(
-    text: str, source: str, *, columns: tuple[str, str], unit: str, after: float, quantity: str, load: str
+    text: str,
+    source: str,
+    *,
+    columns: tuple[str, str],
+    per_second: float,
+    per_unit: float,
+    after: float,
+    quantity: str,
+    load: str,
 ) -> SwingLog:
-    """Read columns of a table, in the forms that `gen_profile.log_table` knows.
+    """Read a log: two columns of a table, below their names and whatever else stands there.
+
+    Rows in which the logger left one of the two empty are left out.
 
     Parameters
     ----------
@@ -129,9 +138,11 @@ def parse_swing(
     source : str
         Where it comes from, for errors.
     columns : (str, str)
-        Of time in s and of the value: names in the first line, or numbers from 1.
-    unit : str
-        Of the value: rad, deg, m, mm or um.
+        Of time, and of the value: names, or numbers from 1. Dates and times are told in s from the first.
+    per_second : float
+        How many of the time's unit make a second.
+    per_unit : float
+        How many of the value's unit make a radian or metre.
     after : float
         Time in s from which on the axes stood still; earlier rows are left out.
     quantity, load : str
@@ -142,26 +153,38 @@ def parse_swing(
     OutputError
         The table cannot be read.
     """
-    cells = read_table(text, source)
-    names = cells.rows[0]
-    headed = any(math.isnan(cells.number(0, place)) for place in range(len(names)))
-    places = [_column(column, names if headed else [], len(names), source) for column in columns]
-    rows = []
-    for row in range(headed, len(cells.rows)):
-        values = [cells.number(row, place) for place in places]
-        if not np.isfinite(values).all():
-            held = " and ".join(repr(cells.cell(row, place)) for place in places)
-            raise OutputError(f"{source}, row {row + 1}: expected numbers, found {held}.")
-        rows.append(values)
-    table = np.array(rows).reshape(-1, 2)
+    table = _numbers(read_table(text, source), columns, source) / (per_second, per_unit)
     table = table[table[:, 0] >= after]
     if len(table) < LEAST_SAMPLES:
         raise OutputError(f"{source}: a swing needs at least {LEAST_SAMPLES} samples, found {len(table)}.")
     if not (np.diff(table[:, 0]) > 0.0).all():
         raise OutputError(f"{source}: the times must rise from row to row.")
-    return SwingLog(
-        times=table[:, 0] - table[0, 0], values=table[:, 1] / UNITS[unit][1], quantity=quantity, load=load
-    )
+    return SwingLog(times=table[:, 0] - table[0, 0], values=table[:, 1], quantity=quantity, load=load)
+
+
+def _numbers(cells: LogTable, columns: tuple[str, str], source: str) -> Array:
+    """Read two columns as they stand, (rows, 2)."""
+    count = len(cells.rows)
+    named = {column for column in columns if not column.isdecimal()}
+    head = next((row for row in range(count) if named & set(cells.rows[row])), 0)
+    names = cells.rows[head]
+    headed = any(math.isnan(cells.number(head, place)) for place in range(len(names)))
+    time, value = (_column(column, names if headed else [], len(names), source) for column in columns)
+    below = range(head + headed, count)
+    first = next((row for row in below if not math.isnan(cells.seconds(row, time))), below.start)
+    rows = []
+    for row in range(first, count):
+        if not (cells.cell(row, time) and cells.cell(row, value)):
+            continue
+        numbers = cells.seconds(row, time), cells.number(row, value)
+        if not np.isfinite(numbers).all():
+            held = f"{cells.cell(row, time)!r} and {cells.cell(row, value)!r}"
+            raise OutputError(f"{source}, row {row + 1}: expected numbers, found {held}.")
+        rows.append(numbers)
+    table = np.array(rows).reshape(-1, 2)
+    if rows and math.isnan(cells.number(first, time)):  # a date
+        table[:, 0] -= table[0, 0]
+    return table
 
 
 def _column(column: str, names: Sequence[str], count: int, source: str) -> int:

@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.measurements import SwingLog
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.linearization import linearize
@@ -101,7 +102,20 @@ class SwingModel:
 def swing_model(
     plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog
 ) -> SwingModel:
-    """Put a log beside a machine of about these parameters."""
+    """Put a log beside a machine of about these parameters.
+
+    Raises
+    ------
+    InfeasibleProblem
+        The log is too short or too sparse to show the machine's swing.
+    """
+    period = 2.0 * np.pi / float(linearize(plant, parameters, q_a).frequencies[0])
+    lasts, between = float(log.times[-1]), float(np.median(np.diff(log.times)))
+    if lasts < period / 2.0 or between > period / 4.0:
+        raise InfeasibleProblem(
+            f"The log lasts {lasts:.3g} s with a sample every {between:.3g} s, and this machine swings once "
+            f"in {period:.3g} s: look at the unit of the log's times, log more of it, or mend the spec."
+        )
     size = np.linalg.norm(_linear_answers(plant, parameters, q_a, log), axis=0)
     shown = np.flatnonzero(size > SHOWN * size.max())
     return SwingModel(plant=plant, q_a=q_a, log=log, shown=shown)

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import attrs
+import numpy as np
 import tomli_w
 
 from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
 from gen_profile.identification.estimation import CONFIDENCE, Estimate, estimate
 from gen_profile.identification.fit import Machine
 from gen_profile.identification.measurements import DirectReading, Measurement, Period, SwingLog, parse_swing
+from gen_profile.log_table import decoded
 from gen_profile.plants.plant import Plant
 from gen_profile.spec import Spec
 from gen_profile.suggestion import suggestion
@@ -21,6 +23,7 @@ from gen_profile.units import UNITS
 from gen_profile.workflows.delivery import staged
 
 WIDEST = 0.9  # relative half-range that a spec can state
+TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}  # how many of them make a second
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -72,20 +75,29 @@ class Identification:
 
 
 def read_swing(
-    path: Path, spec: Spec, *, columns: tuple[str, str], signal: str, unit: str | None, after: float
+    path: Path,
+    spec: Spec,
+    *,
+    columns: tuple[str, str],
+    signal: str,
+    unit: str | None,
+    time_unit: str,
+    after: float,
 ) -> SwingLog:
     """Read a logged swing of a spec's machine.
 
     Parameters
     ----------
     path : Path
-        Table with a column of times in s and one of values.
+        Table with a column of times and one of values.
     columns : (str, str)
-        Their names in the first line, or their numbers from 1.
+        Their names, or their numbers from 1.
     signal : str
         What the values are: ``angle`` or ``sway`` of the first load, or of a named one, ``angle:hook``.
     unit : str or None
-        Of the values; rad or m by default.
+        Of the values; rad or m by default. A number before it is the size of one count, ``0.09 deg``.
+    time_unit : str
+        One of `TIME_UNITS`.
     after : float
         Time in s from which on the axes stood still.
 
@@ -104,17 +116,42 @@ def read_swing(
         raise SpecError(f"--signal: unknown signal {quantity!r}{suggestion(quantity, si_units)}")
     if load not in loads:
         raise SpecError(f"--signal: unknown load {load!r}{suggestion(load, loads)}")
-    unit = unit or si_units[quantity]
-    if unit not in UNITS or UNITS[unit][0] != si_units[quantity]:
-        fitting = [name for name, (si, _) in UNITS.items() if si == si_units[quantity]]
-        raise SpecError(f"--unit: {unit!r} does not measure an {quantity}{suggestion(unit, fitting)}")
+    per_unit = _per_unit(unit or si_units[quantity], quantity, si_units[quantity])
     try:
-        text = path.read_text("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise OutputError(
-            f"Cannot read the log {path}: {getattr(error, 'strerror', None) or error}."
-        ) from error
-    return parse_swing(text, str(path), columns=columns, unit=unit, after=after, quantity=quantity, load=load)
+        text = decoded(path.read_bytes())
+    except OSError as error:
+        raise OutputError(f"Cannot read the log {path}: {error.strerror}.") from error
+    log = parse_swing(
+        text,
+        str(path),
+        columns=columns,
+        per_second=TIME_UNITS[time_unit],
+        per_unit=per_unit,
+        after=after,
+        quantity=quantity,
+        load=load,
+    )
+    if quantity == "angle" and (span := float(np.ptp(log.values))) > math.pi:
+        raise SpecError(
+            f"--unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?"
+        )
+    return log
+
+
+def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
+    """Say how many of a log's steps make a radian or metre."""
+    name = unit.lstrip("0123456789. ").rstrip()
+    size = unit.rstrip().removesuffix(name).strip()
+    fitting = [known for known, (si, _) in UNITS.items() if si == si_unit]
+    if name not in fitting:
+        raise SpecError(f"--unit: {unit!r} does not measure {quantity}{suggestion(name, fitting)}")
+    try:
+        step = float(size or 1.0)
+    except ValueError:
+        step = 0.0
+    if step <= 0.0:
+        raise SpecError(f"--unit: {unit!r} shall begin with the size of a count, as in 0.0879 {name}.")
+    return UNITS[name][1] / step
 
 
 def identify(

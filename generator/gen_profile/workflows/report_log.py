@@ -23,7 +23,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError
-from gen_profile.log_table import LogTable, read_table
+from gen_profile.log_table import LogTable, decoded, read_table
 from gen_profile.profile import Array, read_only
 from gen_profile.spec import Spec
 from gen_profile.units import COUNTS, UNITS
@@ -84,10 +84,9 @@ def read_log(path: Path, spec: Spec) -> MeasuredLog:
             raise OutputError(
                 f"--measured {path}: more than {MOST_BYTES // 10**6} MB; cut the move out of it."
             )
-        text = path.read_text("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise OutputError(f"--measured: cannot read {path}: {reason}.") from error
+        text = decoded(path.read_bytes())
+    except OSError as error:
+        raise OutputError(f"--measured: cannot read {path}: {error.strerror}.") from error
     return parse_log(text, path.name, spec)
 
 
