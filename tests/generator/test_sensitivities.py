@@ -52,6 +52,31 @@ def test_all_sensitivities_vanish_at_both_ends():
     assert (np.abs(optimum.states[-1, 7:]) < 1e-12 * sizes[7:]).all()
 
 
+def residual(profile, parameters):
+    """Payload's greatest sway after the move, in m."""
+    acceleration, end = (
+        PPoly(profile.coefficients[:, ::-1, 0].T, profile.knots).derivative(2),
+        profile.duration,
+    )
+    times = np.linspace(end, end + 4.0, 2001)
+    angles = oracle.swing(lambda t: float(acceleration(t)) if t < end else 0.0, np.r_[0.0, times], parameters)
+    return np.abs(oracle.sway(angles[1:], parameters)[:, 1]).max()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("shares", [{"L1": 1.0}, {"L1": 1.0, "m2": -1.0}])
+def test_residual_sway_grows_with_the_power_above_the_order(shares, order):
+    """Of the sensitivities to m2, too, which those to L1 imply: leaving them out loses nothing."""
+    problem = crane_problem(desensitized=tuple(shares), order=order, duration=5.0, sway_weight=0.0)
+    profile, nominal = optimal_profile(solve(problem)), problem.parameters
+    machines = [
+        nominal | {name: nominal[name] * (1.0 + share * off) for name, share in shares.items()}
+        for off in (0.02, 0.04)
+    ]
+    near, far = (residual(profile, machine) for machine in machines)
+    assert np.log2(far / near) == pytest.approx(order + 1, abs=0.15)
+
+
 @pytest.mark.parametrize(("effort", "tau"), EFFORTS)
 def test_one_length_adds_four_states(effort, tau):
     del tau
