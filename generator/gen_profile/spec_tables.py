@@ -148,8 +148,11 @@ def _move(table: Table, plant: Plant | None, faults: Faults) -> Table:
     elif target is not None:
         target = _per_axis(target, axes, "move.target", faults)
     else:
-        faults.add("move.distance", "required, but missing; state distance, or start and target")
-        target = [1.0] * len(axes or "1")
+        if start is None:
+            faults.add("move.distance", "required, but missing; state distance, or start and target")
+        else:
+            faults.add("move.target", "required beside start, but missing")
+        start, target = None, [1.0] * len(axes or "1")
     axes = axes or [str(number) for number, _ in enumerate(target, start=1)]
     still = [0.0] * len(axes)
     start = _per_axis(still if start is None else start, axes, "move.start", faults)
@@ -320,9 +323,8 @@ def _axis(table: Table, plant: Plant | None, faults: Faults) -> Table:
     if plant is None:
         return {}
     names = [axis.name for axis in plant.actuated]
-    nameless = not any(key in names or isinstance(value, Mapping) for key, value in table.items())
-    if len(names) == 1 and nameless:
-        table = {names[0]: table}
+    if len(names) == 1:
+        table = _named(names[0], table, faults)
     for key in table:
         if key not in names:
             faults.add(place("axis", key), f"unknown axis{suggestion(key, names)}")
@@ -339,6 +341,17 @@ def _axis(table: Table, plant: Plant | None, faults: Faults) -> Table:
             )
         complete[axis.name] = {"unit": axis.unit, **_feed_constant(given, f"axis.{axis.name}", faults)}
     return complete
+
+
+def _named(axis: str, table: Table, faults: Faults) -> Table:
+    """Put what stands there without a name into the table of the only axis."""
+    bare = {key: value for key, value in table.items() if key != axis and not isinstance(value, Mapping)}
+    own = table.get(axis, {})
+    if not bare or not isinstance(own, Mapping):
+        return table
+    for key in bare.keys() & own.keys():
+        faults.add(place("axis", key), f"stands in axis.{axis}, too; state one of them")
+    return {**{key: value for key, value in table.items() if key not in bare}, axis: {**bare, **own}}
 
 
 def _feed_constant(table: Mapping[str, Any], where: str, faults: Faults) -> Table:

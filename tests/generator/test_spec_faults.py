@@ -46,6 +46,7 @@ FAULTS = [
         {"duration": 3.0},
         r"move\.distance: required, but missing; state distance, or start and target\.",
     ),
+    ("move", {"start": 1.0, "duration": 3.0}, r"move\.target: required beside start, but missing\."),
     ("move.duration", MISSING, r"move\.duration: required, but missing\."),
     # unknown words
     ("pants", {}, r"pants: unknown key; did you mean 'plant'\?"),
@@ -62,6 +63,7 @@ FAULTS = [
     ("check.default", True, r"check\.default: unknown key .*\."),
     ("check.residual_sway.hok", 1.0, r"check\.residual_sway\.hok: unknown load; did you mean 'hook'\?"),
     ("axis.crat", {}, r"axis\.crat: unknown axis; did you mean 'cart'\?"),
+    ("axis.unit", "mm", r"axis\.unit: stands in axis\.cart, too; state one of them\."),
     ("axis.cart.units", "mm", r"axis\.cart\.units: unknown key; did you mean 'unit'\?"),
     (
         "robustness.uncertain.L3",
