@@ -201,12 +201,30 @@ class LimitsSpec:
         axis, own = self.own(column)
         return f"limits.{name}" if getattr(own, name) is None else f"limits.axis.{axis}.{name}"
 
-    def without(self, name: str) -> LimitsSpec:
-        """Leave one kind of limit out, such as ``"jerk"``, for all axes."""
-        if name == "sway":
-            return attrs.evolve(self, sway=None)
-        axis = {key: attrs.evolve(own, **{name: None}) for key, own in self.axis.items()}
-        return attrs.evolve(self, axis=axis, **{name: None})
+    def stated(self) -> dict[str, Any]:
+        """Every limit that is stated, by its place in the spec, such as ``limits.axis.x.jerk``."""
+        tables: dict[str, LimitsSpec | AxisLimitsSpec] = {
+            "limits": self,
+            **{f"limits.axis.{axis}": own for axis, own in self.axis.items()},
+        }
+        values = {
+            f"{table}.{field.name}": getattr(own, field.name)
+            for table, own in tables.items()
+            for field in attrs.fields(type(own))
+        }
+        return {
+            place: value for place, value in values.items() if value is not None and place != "limits.axis"
+        }
+
+    def changed(self, values: Mapping[str, Any]) -> LimitsSpec:
+        """Put other values in their places."""
+        limits = self
+        for place, value in values.items():
+            table, _, name = place.rpartition(".")
+            axis = table.removeprefix("limits").removeprefix(".axis.")
+            own = {axis: attrs.evolve(limits.axis[axis], **{name: value})} if axis else {}
+            limits = attrs.evolve(limits, **({"axis": {**limits.axis, **own}} if own else {name: value}))
+        return limits
 
 
 @attrs.frozen(kw_only=True)

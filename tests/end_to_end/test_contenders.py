@@ -53,7 +53,7 @@ def test_a_limit_that_a_shaper_breaks_is_named_with_a_duration_that_keeps_it():
     assert "limits.acceleration: 0.5 is allowed" in sentence
     assert "limits.jerk: 8 is allowed" in sentence
     (needed,) = re.findall(r"With this shaper the move takes at least ([\d.]+) s\.", sentence)
-    motion = designs(limited(TIGHT, duration=float(needed) + 1e-3))["zvd"]()
+    motion = designs(limited(TIGHT, duration=float(needed)))["zvd"]()
     assert breaches(TIGHT, motion, 0.0) == ()
 
 
@@ -62,7 +62,7 @@ def test_the_sway_on_the_way_is_a_limit_too():
     with pytest.raises(InfeasibleProblem, match=r"^limits\.sway: 0\.03 is allowed") as refusal:
         designs(limited(limits))["zv"]()
     (needed,) = re.findall(r"at least ([\d.]+) s", str(refusal.value))
-    spec = limited(limits, duration=float(needed) + 1e-3)
+    spec = limited(limits, duration=float(needed))
     found = figures(try_motion(spec, designs(spec)["zv"]()))
     assert 0.0299 < found["sway_transient_peak_m"] <= 0.03
 

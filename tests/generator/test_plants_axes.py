@@ -166,8 +166,9 @@ def test_an_axis_may_have_limits_of_its_own():
     cart, hoist = limits.of(0), limits.of(1)
     assert (cart.velocity, cart.acceleration) == (1.3, 0.5)
     assert (hoist.velocity, hoist.acceleration) == (0.45, 0.5)
-    assert limits.without("velocity").of(1).velocity is None
-    assert limits.without("sway") == limits
+    changed = limits.changed({"limits.acceleration": 0.6, "limits.axis.hoist.velocity": 0.5})
+    assert (changed.of(0).acceleration, changed.of(1).acceleration, changed.of(1).velocity) == (0.6, 0.6, 0.5)
+    assert changed.changed(limits.stated()) == limits
     again = preset_spec("single-pendulum-crane", [*HOISTING, "limits.acceleration=0.5"])
     assert spec_from_dict(again.to_dict()) == again
 

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 
 import attrs
 
-from gen_profile.errors import LimitViolation
 from gen_profile.metrics import extremes, greatest
 from gen_profile.profile import Profile
 from gen_profile.spec import LimitsSpec
+
+ROUNDING = 1e-6  # share of its width by which travel may be left: a move may begin and end at its edges
 
 
 @attrs.frozen(kw_only=True)
@@ -23,14 +24,11 @@ class Breach:
         Its place in the spec, such as ``limits.velocity``.
     found, allowed : float
         What the motion needs, and what it may have.
-    power : int
-        The need goes by 1 / durationᵖ; 0 where more time does not help.
     """
 
     limit: str
     found: float
     allowed: float
-    power: int
 
     def sentence(self) -> str:
         """Say it."""
@@ -53,29 +51,10 @@ def breaches(limits: LimitsSpec, command: Profile, transient_sway: float) -> tup
     )
 
 
-def require_limits(limits: LimitsSpec, command: Profile, transient_sway: float) -> None:
-    """Hold a motion to its limits.
-
-    Raises
-    ------
-    LimitViolation
-        Naming every limit that is broken, and a duration that would keep them all.
-    """
-    broken = breaches(limits, command, transient_sway)
-    if not broken:
-        return
-    factors = [(breach.found / breach.allowed) ** (1.0 / breach.power) for breach in broken if breach.power]
-    cure = "Widen the limits."
-    if factors:
-        enough = rounded_up(command.duration * max(factors))
-        cure = f"Allow about {enough} s (move.duration), or raise the limits."
-    raise LimitViolation("\n".join([*(breach.sentence() for breach in broken), cure]))
-
-
-def rounded_up(value: float) -> str:
-    """Write three digits, rounded up: what is called enough must be enough."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return f"{math.ceil(value / unit) * unit:.3g}"
+def rounded_up(value: float, digits: int = 3) -> str:
+    """Write some digits, rounded up: what is called enough must be enough."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return f"{math.ceil(value / unit) * unit:.{digits}g}"
 
 
 def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Breach]:
@@ -86,12 +65,12 @@ def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Brea
             allowed = getattr(allowed_here, name)
             if allowed is not None:
                 found = greatest(command, order, column)
-                yield Breach(limit=limits.place(column, name), found=found, allowed=allowed, power=order)
+                yield Breach(limit=limits.place(column, name), found=found, allowed=allowed)
         if allowed_here.travel is not None:
             (low, high), travel = allowed_here.travel, limits.place(column, "travel")
-            rounding = 1e-12 * max(abs(low), abs(high))
+            rounding = ROUNDING * (high - low)
             bottom, top = extremes(command, 0, column)
-            yield Breach(limit=travel, found=top - rounding, allowed=high, power=0)
-            yield Breach(limit=travel, found=-bottom - rounding, allowed=-low, power=0)
+            yield Breach(limit=travel, found=top - rounding, allowed=high)
+            yield Breach(limit=travel, found=-bottom - rounding, allowed=-low)
     if limits.sway is not None:
-        yield Breach(limit="limits.sway", found=sway, allowed=limits.sway, power=2)
+        yield Breach(limit="limits.sway", found=sway, allowed=limits.sway)

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import attrs
 
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.problem.limits import breaches, rounded_up
+from gen_profile.problem.limits import breaches
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers import direct, indirect, worst_case
 from gen_profile.solvers.collocation import Trajectory
+from gen_profile.solvers.cures import Trial, cures
 from gen_profile.solvers.direct import sway_on_the_way
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Solution, Status
+from gen_profile.solvers.relaxation import relaxed
+from gen_profile.solvers.solution import Solution
 from gen_profile.spec import LimitsSpec, SolverName
 
-COMFORT = 1.01  # of the shortest duration, in which there is but one motion
+Judge = Callable[[Solution], bool]
 
 
 def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
-    """Solve a problem by the method that suits it.
+    """Solve a problem by the method that suits it; where that fails, find out what would help.
 
     Parameters
     ----------
@@ -29,16 +33,59 @@ def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None
     near : Trajectory, optional
         Of the solution of a similar problem: the indirect method begins there.
     """
+    return explained(attempt(problem, method, near), method)
+
+
+def explained(solution: Solution, method: SolverName = "auto", welcome: Judge = lambda _: True) -> Solution:
+    """Find out what would help where a solve failed.
+
+    Parameters
+    ----------
+    solution : Solution
+    method : str
+        By which it was looked for.
+    welcome : Solution → bool
+        Whether a value is better named than others near by, by its solution.
+    """
+    # the indirect method, which knows the linear angle, tells by itself what helps where there are no limits
+    told = solution.method == indirect.METHOD and (
+        method == "indirect" or not solution.problem.limits.stated()
+    )
+    if solution.optimum is not None or told:
+        return solution
+    # where the direct method finds a motion, so does "auto", and the direct method is the quicker to fail
+    return attrs.evolve(solution, cure=remedy(solution.problem, "direct", welcome) or solution.cure)
+
+
+def remedy(problem: Problem, method: SolverName = "auto", welcome: Judge = lambda _: True) -> str:
+    """Say which other values would let a method find a motion within the limits; nothing where none will."""
+    trial = Trial(solve=lambda other: attempt(other, method), keeps=keeps_limits, welcome=welcome)
+    found = cures(problem, trial)
+    if method == "indirect" and keeps_limits(attempt(problem)):
+        return f'With solver.method = "auto" the limits are kept. {found}'.strip()
+    return found
+
+
+def attempt(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
+    """Solve a problem without finding out what would help where that fails."""
     if problem.worst_case is not None:
-        return _explained(worst_case.solve(problem))
+        return worst_case.solve(problem)
     if method == "direct":
-        return _explained(direct.solve(problem))
+        return _direct(problem)
     solution = indirect.solve(problem, near)
     if method == "indirect" or keeps_limits(solution):
         return solution
-    other = direct.solve(problem)
-    # where both fail, the indirect method, which knows the linear angle, has more to say
-    return solution if other.optimum is None and solution.optimum is None else _explained(other)
+    other = _direct(problem)
+    return solution if other.optimum is None and solution.optimum is None else other
+
+
+def _direct(problem: Problem) -> Solution:
+    """Begin at rest, and where that misleads, at the motion that is most easily within the limits."""
+    solution = direct.solve(problem)
+    if keeps_limits(solution) or not problem.limits.stated():
+        return solution
+    easiest = relaxed(problem, tuple(problem.limits.stated()))
+    return solution if easiest is None or easiest.share > 1.0 else direct.solve(problem, easiest.iterate)
 
 
 def minimum_time(problem: Problem) -> float | None:
@@ -58,25 +105,3 @@ def keeps_limits(solution: Solution) -> bool:
     sway = sway_on_the_way(solution) if problem.limits.sway is not None else 0.0
     command = lag_compensated(optimal_profile(solution), problem.tau)
     return not breaches(problem.limits, command, sway)
-
-
-def _explained(solution: Solution) -> Solution:
-    """Say what would make an infeasible problem feasible."""
-    if solution.status is not Status.INFEASIBLE:
-        return solution
-    problem = attrs.evolve(solution.problem, worst_case=None)
-    cures = []
-    # with a limit on the sway the search would take too long for an explanation
-    shortest = shortest_duration(problem, direct.solve) if problem.limits.sway is None else None
-    if shortest is not None:
-        cures.append(
-            f"With these limits it takes at least {rounded_up(COMFORT * shortest)} s (move.duration)"
-        )
-    for name in ("velocity", "acceleration", "jerk", "sway", "travel"):
-        loosened = problem.limits.without(name)
-        if loosened != problem.limits:
-            without = attrs.evolve(problem, limits=loosened)
-            if direct.solve(without).optimum is not None:
-                cures.append(f"without limits.{name} it would do in {problem.duration:g} s")
-    told = "; ".join(cures)
-    return attrs.evolve(solution, cure=f"{told[0].upper()}{told[1:]}." if told else solution.cure)

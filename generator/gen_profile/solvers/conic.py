@@ -15,6 +15,7 @@ from gen_profile.profile import Array
 
 Matrix = Any  # scipy.sparse matrix or array
 TOLERANCE = 1e-10
+MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
 
 
 class Verdict(Enum):
@@ -40,12 +41,15 @@ class ConicSolution:
     Attributes
     ----------
     verdict : Verdict
+    exact : bool
+        Whether it was solved as exactly as asked for.
     x : (variables,) array
     multipliers : list of (rows,) arrays
         One per constraint, in the order in which they were added.
     """
 
     verdict: Verdict
+    exact: bool
     x: Array
     multipliers: list[Array]
 
@@ -70,18 +74,23 @@ class ConicProgram:
         """Require ``matrix x = side``."""
         self._add(matrix, side, clarabel.ZeroConeT(len(side)))
 
-    def at_most(self, matrix: Matrix, side: Array) -> None:
-        """Require ``matrix x ≤ side``."""
-        self._add(matrix, side, clarabel.NonnegativeConeT(len(side)))
+    def at_most(self, matrix: Matrix, side: Array, give: float = 0.0) -> None:
+        """Require ``matrix x ≤ side``, or ``side + give (s − 1)`` with the last variable s."""
+        self._add(*self._giving(matrix, side, np.full(len(side), give)), clarabel.NonnegativeConeT(len(side)))
 
-    def within_cone(self, matrix: Matrix, side: Array) -> None:
-        """Require that ``side − matrix x`` has a first entry no smaller than the length of the rest."""
-        self._add(matrix, side, clarabel.SecondOrderConeT(len(side)))
+    def within_cone(self, matrix: Matrix, side: Array, give: float = 0.0) -> None:
+        """Require that ``side − matrix x`` has a first entry no smaller than the length of the rest.
+
+        The first entry is greater by ``give (s − 1)`` with the last variable s.
+        """
+        gives = np.pad([give], (0, len(side) - 1))
+        self._add(*self._giving(matrix, side, gives), clarabel.SecondOrderConeT(len(side)))
 
     def solve(self, quadratic: Matrix, linear: Array) -> ConicSolution:
         """Solve for a cost, P given whole and symmetric."""
         settings = clarabel.DefaultSettings()
         settings.verbose = False
+        settings.max_iter = MAX_ITERATIONS
         settings.max_threads = 1  # the same bits whatever the machine
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
         units = sparse.diags(self._units)
@@ -99,9 +108,20 @@ class ConicProgram:
         ends = np.cumsum([len(side) for side in self._sides])[:-1]
         return ConicSolution(
             verdict=_VERDICTS.get(str(solution.status), Verdict.FAILED),
+            exact=str(solution.status) == "Solved",
             x=self._units * np.array(solution.x),
             multipliers=np.split(size * np.array(solution.z), ends),
         )
+
+    def _giving(self, matrix: Matrix, side: Array, gives: Array) -> tuple[Matrix, Array]:
+        """Let the last variable widen rows."""
+        if not gives.any():
+            return matrix, side
+        column = sparse.csc_matrix(
+            (gives, (np.arange(len(gives)), np.full(len(gives), self.variables - 1))),
+            shape=(len(gives), self.variables),
+        )
+        return matrix - column, side - gives
 
     def _add(self, matrix: Matrix, side: Array, cone: Any) -> None:
         self._rows.append(sparse.csc_matrix(matrix, shape=(len(side), self.variables)))

@@ -44,9 +44,9 @@ MAX_INTERVALS = 480
 RADIANS_PER_INTERVAL = 1.5  # of the fastest mode, which Gauss collocation then follows to 1e-7 of the cost
 STEP_TOLERANCE = 1e-8  # of the motion's coordinates, relative
 STALLED = 1e-5  # step that is still taken for the programs' own tolerance when it ceases to shrink
+ROUGH = 2e-4  # step that is taken for it where a program was solved less exactly than asked for
 SLOW = 0.3  # share of the step before from which on steps are combined
 MAX_ITERATIONS = 50
-TRACE = 1e-11  # of effort, in the least worst case
 WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
 LEAST_SHARE = 0.01  # of a load's limit, of which a change is still measured
 SWAY_ROUNDS = 4  # to account for what the sway does between collocation points
@@ -75,6 +75,11 @@ class Setup:
     cost_scale: float
     tried: tuple[goals.Amplitudes, ...] = ()
 
+    @property
+    def extra(self) -> int:
+        """Number of variables that bounding the worst machine takes."""
+        return goals.worst_case_variables(self.tried) if self.tried else 0
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class Found:
@@ -94,10 +99,15 @@ class Found:
 class Goal(Protocol):
     """What programs shall achieve."""
 
+    @property
+    def extra(self) -> int:
+        """Number of variables of its own, the program's last."""
+        ...
+
     def pose(
         self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
     ) -> tuple[Matrix, Array]:
-        """Add constraints of its own to a program, and give its cost: P and q."""
+        """Add limits and constraints of its own to a program, and give its cost: P and q."""
         ...
 
     def step(self, solutions: Sequence[ConicSolution]) -> float:
@@ -105,8 +115,14 @@ class Goal(Protocol):
         ...
 
 
-def solve(problem: Problem) -> Solution:
+def solve(problem: Problem, near: Iterate | None = None) -> Solution:
     """Find the motion that minimises eq. (26) within the limits and leaves neither sway nor sensitivity.
+
+    Parameters
+    ----------
+    problem : Problem
+    near : Iterate, optional
+        A motion to begin at, in place of standing still.
 
     Returns
     -------
@@ -116,14 +132,14 @@ def solve(problem: Problem) -> Solution:
     setup, redundant = set_up(problem)
     if redundant:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
-        solution = solve(attrs.evolve(problem, desensitized=kept))
+        solution = solve(attrs.evolve(problem, desensitized=kept), near)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     weights, iterations = resolve_weights(problem)
     allowed = asked = problem.limits.sway
+    start = near or setup.transcription.rest()
     for _ in range(SWAY_ROUNDS):
-        found = sequence(
-            setup, setup.transcription.rest(), LeastCost(setup=setup, weights=weights, sway_limit=asked)
-        )
+        goal = LeastCost(setup=setup, weights=weights, sway_limit=asked)
+        found = sequence(setup, start, goal)
         iterations += found.iterations
         solution = conclude(setup, found, weights, iterations)
         if allowed is None or asked is None or solution.optimum is None:
@@ -132,6 +148,7 @@ def solve(problem: Problem) -> Solution:
         if sway <= allowed:
             break
         asked *= goals.WITHIN * allowed / sway
+        start = found.iterate
     return solution
 
 
@@ -246,15 +263,13 @@ def _intervals(problem: Problem) -> int:
 def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
     """Solve programs linearised about one another's motion until what counts stays."""
     transcription, iterate = setup.transcription, start
-    extra = goals.worst_case_variables(setup.tried) if setup.tried else 0
     solutions: list[ConicSolution] = []
     points: list[Array] = []
     images: list[Array] = []
     step, verdict = float("inf"), Verdict.FAILED
     while verdict is Verdict.FAILED and len(solutions) < MAX_ITERATIONS:
         maps = transcription.maps(iterate)
-        program = transcription.program(maps, extra)
-        goals.keep_limits(program, setup.problem, transcription)
+        program = transcription.program(maps, goal.extra)
         solutions.append(program.solve(*goal.pose(program, iterate, maps)))
         if solutions[-1].verdict is not Verdict.SOLVED:
             verdict = solutions[-1].verdict
@@ -263,7 +278,8 @@ def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
         points.append(iterate.flat())
         iterate = transcription.iterate(solutions[-1].x, maps)
         images.append(iterate.flat())
-        if step < STEP_TOLERANCE or (step < STALLED and step > 0.5 * before):
+        stalled = step < STALLED and step > 0.5 * before
+        if step < STEP_TOLERANCE or stalled or (step < ROUGH and not solutions[-1].exact):
             verdict = Verdict.SOLVED
         elif step > SLOW * before:
             iterate = iterate.of_flat(accelerate(points, images, transcription.importance))
@@ -289,11 +305,17 @@ class LeastCost:
     sway_limit: float | None
     worst: float | None = None
 
+    @property
+    def extra(self) -> int:
+        """Number of variables of its own."""
+        return self.setup.extra
+
     def pose(
         self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
     ) -> tuple[Matrix, Array]:
         """Add the bounds to a program and expand the cost: P and q."""
         transcription = self.setup.transcription
+        goals.keep_limits(program, self.setup.problem, transcription)
         if self.sway_limit is not None:
             goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0])
         if self.worst is not None:
@@ -317,18 +339,25 @@ class LeastWorst:
     """Minimise the worst share of a load's limit; a trace of effort makes the motion unique."""
 
     setup: Setup
+    trace: float
+
+    @property
+    def extra(self) -> int:
+        """Number of variables of its own."""
+        return self.setup.extra
 
     def pose(
         self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
     ) -> tuple[Matrix, Array]:
         """Add the bounds to a program: P and q."""
         transcription, sway_limit = self.setup.transcription, self.setup.problem.limits.sway
+        goals.keep_limits(program, self.setup.problem, transcription)
         if sway_limit is not None:
             goals.keep_sway(program, transcription, sway_limit, iterate, maps[0])
         column = goals.bound_worst(program, transcription, self.setup.tried)
         linear = np.zeros(program.variables)
         linear[column] = 1.0
-        return TRACE * transcription.effort(self.setup.forms, program.variables), linear
+        return self.trace * transcription.effort(self.setup.forms, program.variables), linear
 
     def step(self, solutions: Sequence[ConicSolution]) -> float:
         """Measure by how much the worst share changed last, in units of what would be noticed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import attrs
 import numpy as np
@@ -20,6 +20,8 @@ from gen_profile.solvers.transcription import Iterate, Transcription
 
 STEEPEST = 50.0  # exponent beyond which the sway's cost is steep enough
 WITHIN = 1.0 - 1e-6  # share of a limit that a program may use: its own tolerance must not break the limit
+
+DERIVATIVES = {1: "velocity", 2: "acceleration", 3: "jerk", 0: "travel"}  # of the position, that have limits
 
 
 @attrs.frozen(kw_only=True)
@@ -85,31 +87,60 @@ def cost(
     return quadratic, linear
 
 
-def keep_limits(program: ConicProgram, problem: Problem, transcription: Transcription) -> None:
-    """Bound the command of every axis, and its travel, at every instant."""
+def keep_limits(
+    program: ConicProgram, problem: Problem, transcription: Transcription, loosened: Container[str] = ()
+) -> None:
+    """Bound the command of every axis, and its travel, at every instant.
+
+    Parameters
+    ----------
+    loosened : container of str
+        Places of limits that the program's last variable widens so many times, such as ``limits.jerk``;
+        travel at either end by so many times its width, less one.
+    """
     duration = problem.duration
     lag = (problem.tau or 0.0) / duration
     for axis, reach in enumerate(axis_reach(problem)):
         limits = problem.limits.of(axis)
-        bounds = {1: limits.velocity, 2: limits.acceleration, 3: limits.jerk}
-        for order, limit in bounds.items():
-            if limit is not None:
-                most = WITHIN * limit * duration**order / reach
-                transcription.bound(program, transcription.piece.leading(order, lag), -most, most, axis)
-        if limits.travel is not None:
-            low, high = ((edge - problem.start[axis]) / reach for edge in limits.travel)
-            transcription.bound(program, transcription.piece.leading(0, lag), low, high, axis)
+        for order, name in DERIVATIVES.items():
+            limit = getattr(limits, name)
+            if limit is None:
+                continue
+            if order == 0:
+                low, high = ((edge - problem.start[axis]) / reach for edge in limit)
+                give = high - low
+            else:
+                give = high = WITHIN * limit * duration**order / reach
+                low = -high
+            loose = problem.limits.place(axis, name) in loosened
+            rows = transcription.piece.leading(order, lag)
+            transcription.bound(program, rows, (low, high), axis, give if loose else 0.0)
 
 
 def keep_sway(
-    program: ConicProgram, transcription: Transcription, limit: float, iterate: Iterate, maps: IntervalMaps
+    program: ConicProgram,
+    transcription: Transcription,
+    limit: float,
+    iterate: Iterate,
+    maps: IntervalMaps,
+    *,
+    loosened: bool = False,
 ) -> None:
-    """Bound the end load's sway of the nominal machine at the collocation points."""
+    """Bound the end load's sway of the nominal machine at the collocation points.
+
+    Parameters
+    ----------
+    limit : float
+        m.
+    loosened : bool
+        Let the program's last variable widen it so many times.
+    """
     sway, matrix, offset = transcription.end_sway(iterate, maps, program.variables)
     points, directions = sway.shape
+    give = float(loosened)
     if directions == 1:
-        program.at_most(matrix / limit, 1.0 - offset / limit)
-        program.at_most(-matrix / limit, 1.0 + offset / limit)
+        program.at_most(matrix / limit, 1.0 - offset / limit, give)
+        program.at_most(-matrix / limit, 1.0 + offset / limit, give)
         return
     rows = matrix.tocsr()
     for point in range(points):
@@ -117,6 +148,7 @@ def keep_sway(
         program.within_cone(
             sparse.vstack([sparse.csr_matrix((1, program.variables)), -rows[here] / limit]),
             np.concatenate([[1.0], offset[here] / limit]),
+            give,
         )
 
 

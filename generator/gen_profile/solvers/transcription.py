@@ -198,21 +198,25 @@ class Transcription:
             program.equal(place(machine.end[None], nodes[-1:], width), np.zeros(len(machine.end)))
         return program
 
-    def bound(self, program: ConicProgram, rows: Array, lower: float, upper: float, axis: int) -> None:
+    def bound(
+        self, program: ConicProgram, rows: Array, bounds: tuple[float, float], axis: int, give: float = 0.0
+    ) -> None:
         """Keep Bézier coefficients of one axis between bounds, on every interval.
 
         Parameters
         ----------
         rows : (coefficients, size) array
+        bounds : (float, float)
+            Lower and upper one.
+        give : float
+            By how much either bound is wider for every 1 by which the program's last variable exceeds 1.
         """
         wide = np.zeros((len(rows), len(self.target), self.piece.size))
         wide[:, axis] = rows
         matrix = self._repeat(wide.reshape(len(rows), -1), self.local_columns, program.variables)
-        count = matrix.shape[0]
-        if np.isfinite(upper):
-            program.at_most(matrix, np.full(count, upper))
-        if np.isfinite(lower):
-            program.at_most(-matrix, np.full(count, -lower))
+        lower, upper = (np.full(matrix.shape[0], bound) for bound in bounds)
+        program.at_most(matrix, upper, give)
+        program.at_most(-matrix, -lower, give)
 
     def effort(self, blocks: Sequence[Array], width: int) -> Matrix:
         """Join one quadratic form per axis, each of the local coordinates, into one of all variables."""

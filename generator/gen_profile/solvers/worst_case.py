@@ -21,11 +21,20 @@ from gen_profile.profile import Array, Profile
 from gen_profile.response import Swing
 from gen_profile.solvers import direct
 from gen_profile.solvers.conic import Verdict
-from gen_profile.solvers.direct import LeastCost, LeastWorst, conclude, resolve_weights, sequence, set_up
+from gen_profile.solvers.direct import (
+    Found,
+    LeastCost,
+    LeastWorst,
+    Setup,
+    conclude,
+    resolve_weights,
+    sequence,
+    set_up,
+)
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
-from gen_profile.spec import LimitsSpec
 
+TRACES = (1e-11, 1e-9, 1e-7)  # of effort, in the least worst case
 MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
 SLACK = 1.003  # what the least cost may give away of the least worst case
 GOOD_ENOUGH = 0.01  # share of a load's limit below which nobody need seek less
@@ -52,17 +61,24 @@ def solve(problem: Problem) -> Solution:
     Solution
         Its `worst_case_bound` is what no motion on the same intervals goes below where angles are small.
     """
-    solution = _solve(problem)
-    if solution.optimum is not None or problem.limits != LimitsSpec():
+    bounded = _bounded(problem)
+    solution = _solve(problem, TRACES if bounded else TRACES[:1])
+    if solution.optimum is not None or bounded:
         return solution
     held = _held_back(problem)
-    return solution if held is None else attrs.evolve(_solve(held), problem=problem)
+    return attrs.evolve(_solve(held or problem, TRACES), problem=problem)
+
+
+def _bounded(problem: Problem) -> bool:
+    """Whether limits bound how much effort less sway may take: on every axis its acceleration or jerk."""
+    limits = [problem.limits.of(axis) for axis in range(len(problem.target))]
+    return all(own.acceleration is not None or own.jerk is not None for own in limits)
 
 
 def _held_back(problem: Problem) -> Problem | None:
     """Allow no more acceleration than the motion takes that is exact and insensitive.
 
-    Without any limit, ever less sway would ask for ever more acceleration.
+    Without such a limit, ever less sway would ask for ever more acceleration.
     """
     names = tuple(problem.worst_case.uncertain) if problem.worst_case is not None else ()
     exact = direct.solve(attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0))
@@ -70,7 +86,7 @@ def _held_back(problem: Problem) -> Problem | None:
         return None
     motion = optimal_profile(exact)
     acceleration = max(greatest(motion, 2, axis) for axis in range(motion.axes))
-    return attrs.evolve(problem, limits=LimitsSpec(acceleration=acceleration))
+    return attrs.evolve(problem, limits=attrs.evolve(problem.limits, acceleration=acceleration))
 
 
 def solve_within_limits(problem: Problem) -> Solution:
@@ -99,7 +115,7 @@ def solve_within_limits(problem: Problem) -> Solution:
     return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
 
 
-def _solve(problem: Problem) -> Solution:
+def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
     worst_case, problem = _taken_apart(problem)
     weights, iterations = resolve_weights(problem)
     tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
@@ -108,7 +124,7 @@ def _solve(problem: Problem) -> Solution:
         goal = LeastCost(setup=setup, weights=weights, sway_limit=problem.limits.sway, worst=GOOD_ENOUGH)
         bound, found = 0.0, sequence(setup, setup.transcription.rest(), goal)
         if found.verdict is not Verdict.SOLVED:
-            best = sequence(setup, setup.transcription.rest(), LeastWorst(setup=setup))
+            best = _least_worst(setup, traces)
             iterations += best.iterations
             bound = float(best.solutions[0].x[-1])
             if best.verdict is not Verdict.SOLVED:
@@ -124,6 +140,15 @@ def _solve(problem: Problem) -> Solution:
             break
         tried = [*tried, everywhere[int(shares.argmax())]]
     return attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
+
+
+def _least_worst(setup: Setup, traces: Sequence[float]) -> Found:
+    """Minimise the worst share, for as little effort besides as the programs can tell from none."""
+    for trace in traces:
+        best = sequence(setup, setup.transcription.rest(), LeastWorst(setup=setup, trace=trace))
+        if best.verdict is not Verdict.FAILED:
+            break
+    return best
 
 
 def _taken_apart(problem: Problem) -> tuple[WorstCase, Problem]:

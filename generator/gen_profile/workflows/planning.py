@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import partial
 
 import attrs
 import numpy as np
 
 from gen_profile.check import Scenario
-from gen_profile.errors import InfeasibleProblem
+from gen_profile.errors import InfeasibleProblem, LimitViolation
 from gen_profile.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.problem.limits import require_limits
+from gen_profile.problem.limits import breaches
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.profile import Array, Profile, grid_length, grid_times
@@ -121,9 +122,12 @@ def _lasting(spec: Spec, duration: float) -> Spec:
 
 def _calms(spec: Spec) -> bool:
     """Whether the optimal motion of a spec leaves little enough sway on every machine."""
-    solution = choice.solve(problem_of(spec), spec.solver.solver)
-    if solution.optimum is None:
-        return False
+    solution = choice.attempt(problem_of(spec), spec.solver.solver)
+    return solution.optimum is not None and _is_calm(spec, solution)
+
+
+def _is_calm(spec: Spec, solution: Solution) -> bool:
+    """Whether a solution leaves little enough sway on every machine of a spec."""
     return keeps_residual_sway(spec, try_motion(spec, optimal_profile(solution)), CALM)
 
 
@@ -151,12 +155,17 @@ def plan(spec: Spec, near: Trajectory | None = None) -> Plan:
     if spec.solver.shaper is not None:
         solution, motion = None, shaped_motion(spec, spec.solver.shaper)
     else:
-        solution = choice.solve(problem_of(spec), spec.solver.solver, near)
+        attempt = choice.attempt(problem_of(spec), spec.solver.solver, near)
+        solution = choice.explained(attempt, spec.solver.solver, partial(_is_calm, spec))
         motion = optimal_profile(solution)
     solver_time = time.perf_counter() - began
     trial = try_motion(spec, motion)
     found = figures(trial)
-    require_limits(spec.limits, trial.command, found["sway_transient_peak_m"])
+    broken = breaches(spec.limits, trial.command, found["sway_transient_peak_m"])
+    if broken:
+        sentences = [breach.sentence() for breach in broken]
+        cure = choice.remedy(problem_of(spec), spec.solver.solver, partial(_is_calm, spec))
+        raise LimitViolation("\n".join([*sentences, cure]).strip())
     return Plan(solution=solution, solver_time=solver_time, trial=trial, figures=found)
 
 

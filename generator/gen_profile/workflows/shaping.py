@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import attrs
+
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.problem.limits import Breach, breaches
+from gen_profile.problem.limits import Breach, breaches, rounded_up
 from gen_profile.problem.linearization import linearize
 from gen_profile.profile import Profile, grid_length, grid_times
 from gen_profile.response import greatest_sway
@@ -51,8 +53,10 @@ def shaped_motion(spec: Spec, name: str) -> Profile:
     broken = _breaches(spec, motion)
     if broken:
         shortest = shaped.shortest(lambda trial: not _breaches(spec, trial))
-        cure = "" if shortest is None else f" With this shaper the move takes at least {shortest:.4g} s."
-        raise InfeasibleProblem(" ".join(breach.sentence() for breach in broken) + cure)
+        sentences = [breach.sentence() for breach in broken]
+        if shortest is not None:
+            sentences.append(f"With this shaper the move takes at least {rounded_up(shortest, digits=4)} s.")
+        raise InfeasibleProblem(" ".join(sentences))
     return motion
 
 
@@ -71,7 +75,7 @@ def _shortest(spec: Spec, shaped: ShapedMove) -> Profile:
 def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
     """Find the limits that a motion breaks; the sway's last, for it must be integrated."""
     command = lag_compensated(motion, spec.actuator.tau)
-    broken = breaches(spec.limits.without("sway"), command, 0.0)
+    broken = breaches(attrs.evolve(spec.limits, sway=None), command, 0.0)
     if broken or spec.limits.sway is None:
         return broken
     return breaches(spec.limits, command, greatest_sway(spec.machine(), motion, spec.plant.parameters))
