@@ -6,6 +6,7 @@ import re
 from html.parser import HTMLParser
 
 import attrs
+import numpy as np
 import pytest
 import tomli_w
 from command_line import run_here, run_process
@@ -13,7 +14,9 @@ from command_line import run_here, run_process
 from gen_profile.errors import OutputError
 from gen_profile.report.page import NEEDED, require_pages
 from gen_profile.spec_reading import preset_spec
+from gen_profile.workflows.compare import compare
 from gen_profile.workflows.design import design
+from gen_profile.workflows.report_figures import other_methods
 from gen_profile.workflows.report_sections import sections
 
 QUICK = ("--set", "cost.sway_weight=0", "--no-compare")
@@ -103,6 +106,14 @@ def test_the_robustness_it_states_is_where_the_check_begins_to_fail(paper):
 def test_a_spectrum_is_said_to_tell_no_more_than_it_does(tmp_path, words, sentence):
     _, _, text = report(tmp_path, "--no-compare", "--set", "robustness={}", *words)
     assert sentence in text
+
+
+@pytest.mark.parametrize(("preset", "signs"), [("paper-beta0", {1, -1}), ("gantry-crane", {1})])
+def test_the_length_of_a_sway_has_no_negative_limit(preset, signs):
+    spec = preset_spec(preset, ["robustness={}", "solver.method=zv"])
+    *_, panel = other_methods(compare(spec)).panels
+    assert panel.title.startswith("Sway of the ")
+    assert {np.sign(level.value) for level in panel.levels} == signs
 
 
 def test_maps_are_over_the_parameters_that_matter(tmp_path):

@@ -148,7 +148,10 @@ def other_methods(comparison: Comparison) -> Figure:
     motions = {row.method: row.trial.motion for row in rows}
     panels.append(_spectrum(spec, rows[0].trial, motions, styles))
     return Figure(
-        caption="Optimal motions solid, shapers dashed. Click on a method's name to show or hide its curves.",
+        caption=(
+            "Optimal motions solid, shapers dashed, extra-insensitive ones dotted. "
+            "Click on a method's name to show or hide its curves."
+        ),
         panels=[*panels, *_sways(comparison, styles)],
     )
 
@@ -158,6 +161,8 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
     spec, rows = comparison.spec, comparison.rows
     plant, last = spec.machine(), max(row.trial.motion.duration for row in rows)
     seen = {row.method: row.trial.swing.at(_until(row)) for row in rows}
+    allowed = 1e3 * spec.check.residual_sway[plant.loads[-1]]
+    signs = (1.0, -1.0) if plant.directions == 1 else (1.0,)  # the sway in two directions is a length
     for index in extremes(spec):
         lines = [
             Line(
@@ -169,13 +174,12 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
             for method, responses in seen.items()
         ]
         end = max(float(line.x[-1]) for line in lines)
-        levels = sway_levels(spec, plant.loads[-1], last, end)
         yield Panel(
             title=f"Sway of the {plant.end_load_name}, {machine(rows[0].trial.machines[index].name)}",
             x_label=TIME,
             y_label="sway (mm)",
             lines=lines,
-            levels=[level for level in levels if level.between == (last, end)],
+            levels=[Level(value=sign * allowed, between=(last, end)) for sign in signs],
             bands=[Band(low=last, high=last)],
         )
 
