@@ -7,6 +7,7 @@ import pytest
 
 from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DEFAULT
+from gen_profile.plants.registry import find_plant, plant_types
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
@@ -35,3 +36,16 @@ def test_options_are_those_of_the_command(page):
         asked = {word.partition("=")[0] for word in words if re.match(r"--[a-z-]+(=|$)", word)}
         wrong += [(words, option) for option in asked - known]
     assert wrong == []
+
+
+def test_every_coordinate_that_swings_is_explained():
+    """Their signs and what they count from decide whether a swinging start is taken away or doubled."""
+    section = (
+        (ROOT / "docs" / "machines.md").read_text("utf-8").partition("**Signs.**")[2].partition("\n\n**")[0]
+    )
+    rows = dict(re.findall(r"^\| `(.+?)` \| (.+) \|$", section, re.MULTILINE))
+    for type_ in plant_types():
+        row = rows[re.sub(r"-\d+$", "-N", type_)].replace("`dN`", "`d2`")
+        assert [name for name in re.findall(r"`(\w+)`", row)] == [
+            q.name for q in find_plant(type_).unactuated
+        ]
