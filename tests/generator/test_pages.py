@@ -40,12 +40,9 @@ def test_options_are_those_of_the_command(page):
 
 def test_every_coordinate_that_swings_is_explained():
     """Their signs and what they count from decide whether a swinging start is taken away or doubled."""
-    section = (
-        (ROOT / "docs" / "machines.md").read_text("utf-8").partition("**Signs.**")[2].partition("\n\n**")[0]
-    )
+    page = (ROOT / "docs" / "machines.md").read_text("utf-8")
+    section = page.partition("**Signs.**")[2].partition("\n\n**")[0]
     rows = dict(re.findall(r"^\| `(.+?)` \| (.+) \|$", section, re.MULTILINE))
     for type_ in plant_types():
         row = rows[re.sub(r"-\d+$", "-N", type_)].replace("`dN`", "`d2`")
-        assert [name for name in re.findall(r"`(\w+)`", row)] == [
-            q.name for q in find_plant(type_).unactuated
-        ]
+        assert re.findall(r"`(\w+)`", row) == [free.name for free in find_plant(type_).unactuated]
