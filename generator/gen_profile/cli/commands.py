@@ -10,6 +10,7 @@ from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import (
     as_overrides,
     chosen_spec,
+    complete_presets,
     debug_option,
     export_option,
     json_option,
@@ -17,7 +18,7 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome, warn
-from gen_profile.errors import SpecError
+from gen_profile.errors import OutputError, SpecError
 
 
 @click.group(cls=DefaultGroup, epilog="Example: gen-profile crane.toml --export plc --out deploy")
@@ -245,14 +246,40 @@ def plants(as_json: bool) -> None:
     print_outcome({"plants": document}, "\n\n".join(blocks), as_json)
 
 
-@cli.command(epilog="Example: gen-profile presets")
+@cli.command(epilog="Example: gen-profile presets double-pendulum-crane --out bay-4.toml")
+@click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_presets)
+@click.option(
+    "--out",
+    "path",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write it to a new file, in place of stdout.",
+)
 @json_option
 @debug_option
-def presets(as_json: bool) -> None:
-    """List the built-in specs."""
+def presets(name: str | None, path: Path | None, as_json: bool) -> None:
+    """List the built-in specs, or print one to begin your own with."""
+    from gen_profile.spec_reading import preset_text
     from gen_profile.spec_reading import presets as known
 
-    print_outcome({"presets": known()}, _definitions(known()), as_json)
+    if name is None:
+        if path is not None:
+            raise SpecError("--out: name the preset to write, as gen-profile presets paper does.")
+        print_outcome({"presets": known()}, _definitions(known()), as_json)
+        return
+    text = words = preset_text(name)
+    if path is not None:
+        _write_new(path, text)
+        words = f"{path} is a copy of the preset {name}. Change it, then: gen-profile {path}"
+    print_outcome({"preset": name, "toml": text}, words.rstrip("\n"), as_json)
+
+
+def _write_new(path: Path, text: str) -> None:
+    from gen_profile.workflows.delivery import deliver
+
+    if path.exists():
+        raise OutputError(f"Cannot write {path}: it exists already; choose another name.")
+    deliver(path, text.encode("utf-8"))
 
 
 def _definitions(rows: dict[str, str]) -> str:

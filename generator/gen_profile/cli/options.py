@@ -29,7 +29,8 @@ def _complete_formats(_: click.Context, __: click.Parameter, incomplete: str) ->
     ]
 
 
-def _complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+def complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Offer presets with their summaries."""
     from gen_profile.spec_reading import presets
 
     return [
@@ -50,7 +51,7 @@ def spec_options(command: Command) -> Command:
         click.option(
             "--preset",
             metavar="NAME",
-            shell_complete=_complete_presets,
+            shell_complete=complete_presets,
             help="Use a built-in spec (see gen-profile presets).",
         ),
         click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=click.Path(path_type=Path)),
