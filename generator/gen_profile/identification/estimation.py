@@ -70,24 +70,28 @@ def estimate(
     InfeasibleProblem
         The measurements do not determine the parameters.
     """
+    table = {q.name: q for q in machine.plant.parameters}
+    scale = np.array([abs(machine.parameters[name]) or 1.0 for name in names])
     fit = Fit(
         machine=machine,
         names=tuple(names),
-        scale=np.array([abs(machine.parameters[name]) or 1.0 for name in names]),
+        scale=scale,
+        bounds=np.array([(table[name].lower, table[name].upper) for name in names]).T / scale,
         readings=tuple(readings),
         models=tuple(swing_model(machine.plant, machine.parameters, machine.q_a, log) for log in logs),
     )
     unknowns, noise = fit.solve()
     around = uncertainty(fit, unknowns, noise)
     factor = float(norm.ppf((1.0 + CONFIDENCE ** (1.0 / len(names))) / 2.0))
+    half_ranges = around.half_ranges(factor)
 
     def by_name(relative: Array) -> dict[str, float]:
         return dict(zip(names, map(float, relative * fit.scale), strict=True))
 
     return Estimate(
         values=by_name(unknowns[: len(names)]),
-        standard_uncertainty=by_name(around.standard),
-        half_range=by_name(around.half_ranges(factor)),
+        standard_uncertainty=by_name(half_ranges / factor),
+        half_range=by_name(half_ranges),
         model=tuple(map(float, fit.predicted(unknowns))),
         noise=tuple(map(float, noise)),
         contradiction=around.contradiction,

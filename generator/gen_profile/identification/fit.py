@@ -22,7 +22,7 @@ from gen_profile.profile import Array
 
 NOISE_ROUNDS = 2
 HELD = 0.3  # relative, by which a parameter may leave the spec's while only a part of a log is looked at
-TOLERANCE = 1e-8  # relative, of the unknowns and of the sum of squares
+TOLERANCE = 1e-6  # relative, of the sum of squares: it has as many terms as the logs have samples
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -45,6 +45,8 @@ class Fit:
         Parameters to identify.
     scale : (p,) array
         Their units.
+    bounds : (2, p) array
+        Least and greatest parameters, over `scale`.
     readings : tuple of DirectReading or Period
     models : tuple of SwingModel
         One per log.
@@ -53,6 +55,7 @@ class Fit:
     machine: Machine
     names: tuple[str, ...]
     scale: Array
+    bounds: Array
     readings: tuple[DirectReading | Period, ...]
     models: tuple[SwingModel, ...]
 
@@ -60,12 +63,6 @@ class Fit:
     def expected(self) -> Array:
         """Parameters of the spec, over `scale`, shape (p,)."""
         return np.array([self.machine.parameters[name] for name in self.names]) / self.scale
-
-    @property
-    def bounds(self) -> Array:
-        """Least and greatest parameters, over `scale`, shape (2, p)."""
-        table = {q.name: q for q in self.machine.plant.parameters}
-        return np.array([(table[name].lower, table[name].upper) for name in self.names]).T / self.scale
 
     def solve(self) -> tuple[Array, Array]:
         """Find the unknowns, and the noise of every log.
@@ -91,9 +88,7 @@ class Fit:
             noise = self._noise(unknowns, np.inf, len(names))
         return unknowns, noise
 
-    def improved(
-        self, guess: Array, noise: Array, until: float = np.inf, tolerance: float = TOLERANCE
-    ) -> Array:
+    def improved(self, guess: Array, noise: Array, until: float = np.inf) -> Array:
         """Find the unknowns that agree best up to a time in s, near a guess."""
         free = np.full(len(guess) - len(self.names), np.inf)
         lower, upper = self.bounds
@@ -110,8 +105,7 @@ class Fit:
             jac=lambda z: at(z.tobytes())[1],
             bounds=bounds,
             x_scale="jac",
-            xtol=tolerance,
-            ftol=tolerance,
+            ftol=TOLERANCE,
         )
         return np.asarray(solution.x)
 

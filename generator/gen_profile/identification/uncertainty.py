@@ -25,13 +25,13 @@ from gen_profile.identification.fit import Fit
 from gen_profile.identification.measurements import DirectReading
 from gen_profile.profile import Array
 
+WIDEST = 0.9  # relative half-range beyond which it is of no use: a spec cannot state it
 CHANCE = 1e-3  # how rarely good readings may look contradictory
 INDISTINCT = 1e-6  # relative size of a combination of parameters that no measurement depends on
 ZEROS = 32  # of a sensor that are tried, all over one step of its resolution
 STRAIGHT = 0.1  # how far residuals may be from straight lines, in shares of a range
 ENOUGH = 0.95  # of how much worse the fit shall be at a range's ends
 WIDENINGS = 6
-ROUGH = 1e-5  # relative, of the sum of squares there: it has as many terms as the logs have samples
 PINNED = 1e-3  # of a standard deviation, by which a parameter may leave its place
 
 
@@ -116,22 +116,29 @@ class Uncertainty:
             half = abs(place - self.unknowns[index])
             worse = self._best_at(index, place) - best
             deviations = math.sqrt(max(worse, 0.0)) / widening
-            if deviations >= ENOUGH * factor or place in (lower, upper):
+            useless = half > WIDEST * abs(self.unknowns[index]) > 0.0
+            if deviations >= ENOUGH * factor or place in (lower, upper) or useless:
                 break
             half *= min(factor / max(deviations, 1e-9), 2.0)
         return half
 
     def _best_at(self, index: int, place: float) -> float:
-        """Fit everything but one parameter, which stays at a place: the sum of squares."""
+        """Fit everything but one parameter, which stays at a place: the sum of squares.
+
+        Where another one leaves what is of use, its own range will say so; machines are too wild there.
+        """
         fit = self.fit
         pin = DirectReading(
             parameter=fit.names[index],
             value=place * fit.scale[index],
             uncertainty=PINNED * float(self.standard[index]) * fit.scale[index],
         )
-        pinned = attrs.evolve(fit, readings=(*fit.readings, pin))
+        values = self.unknowns[: len(fit.names)]
+        ends = np.sort([values * (1.0 - WIDEST), values * (1.0 + WIDEST)], axis=0)
+        near = np.where(values == 0.0, fit.bounds, np.clip(ends, *fit.bounds))
+        pinned = attrs.evolve(fit, readings=(*fit.readings, pin), bounds=near)
         guess = self.unknowns + (place - self.unknowns[index]) * self._direction(index)
-        best = pinned.improved(guess, self.noise, tolerance=ROUGH)
+        best = pinned.improved(guess, self.noise)
         found, _ = fit.residuals(best, self.noise)
         return float(found @ found)
 

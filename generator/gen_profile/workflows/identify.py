@@ -15,6 +15,7 @@ from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
 from gen_profile.identification.estimation import CONFIDENCE, Estimate, estimate
 from gen_profile.identification.fit import Machine
 from gen_profile.identification.measurements import DirectReading, Measurement, Period, SwingLog, parse_swing
+from gen_profile.identification.uncertainty import WIDEST
 from gen_profile.log_table import decoded
 from gen_profile.plants.plant import Plant
 from gen_profile.spec import Spec
@@ -22,7 +23,6 @@ from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
 from gen_profile.workflows.delivery import staged
 
-WIDEST = 0.9  # relative half-range that a spec can state
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}  # how many of them make a second
 
 
