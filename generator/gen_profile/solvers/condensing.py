@@ -8,7 +8,7 @@ import numpy as np
 from gen_profile.problem.motion_equations import MotionEquations
 from gen_profile.profile import Array
 from gen_profile.solvers.bezier import Piece
-from gen_profile.solvers.collocation import GAUSS, STAGES
+from gen_profile.solvers.collocation import BLAS, GAUSS, STAGES
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -132,7 +132,8 @@ def _eliminated(constant: Array, by_state: Array, driven: Array, integration: Ar
         ],
         axis=-1,
     )
-    solved = np.linalg.solve(inner, right.reshape(intervals, STAGES * n, -1)).reshape(right.shape)
+    with BLAS.limit(limits=1, user_api="blas"):
+        solved = np.linalg.solve(inner, right.reshape(intervals, STAGES * n, -1)).reshape(right.shape)
     across = np.einsum("i,kial->kal", GAUSS.end, solved)
     across[:, :, 1 : 1 + n] += (1.0 - GAUSS.end.sum()) * np.eye(n)
     return IntervalMaps(

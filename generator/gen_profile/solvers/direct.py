@@ -25,6 +25,7 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.problem.motion_equations import motion_equations
 from gen_profile.problem.pontryagin import SNAP_TIME, optimality_system
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
+from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.profile import Array
 from gen_profile.response import greatest_sway
 from gen_profile.solvers import goals
@@ -134,14 +135,14 @@ def solve(problem: Problem, near: Iterate | None = None) -> Solution:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
         solution = solve(attrs.evolve(problem, desensitized=kept), near)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
-    weights, iterations = resolve_weights(problem)
+    sway_cost, iterations = resolve_sway_cost(problem)
     allowed = asked = problem.limits.sway
     start = near or setup.transcription.rest()
     for _ in range(SWAY_ROUNDS):
-        goal = LeastCost(setup=setup, weights=weights, sway_limit=asked)
+        goal = LeastCost(setup=setup, sway_cost=sway_cost, sway_limit=asked)
         found = sequence(setup, start, goal)
         iterations += found.iterations
-        solution = conclude(setup, found, weights, iterations)
+        solution = conclude(setup, found, sway_cost, iterations)
         if allowed is None or asked is None or solution.optimum is None:
             break
         sway = sway_on_the_way(solution)
@@ -152,18 +153,18 @@ def solve(problem: Problem, near: Iterate | None = None) -> Solution:
     return solution
 
 
-def resolve_weights(problem: Problem) -> tuple[goals.Weights, int]:
+def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
     """Give β and γ their values, and count the iterations that it took."""
     if problem.sway_weight == 0.0 or problem.sway_scale is not None:
-        return goals.Weights(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
+        return SwayCost(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
     quiet = attrs.evolve(problem, sway_weight=0.0, sway_scale=1.0, limits=LimitsSpec(), worst_case=None)
     solution = solve(quiet)
     if solution.optimum is None:
-        return goals.Weights(beta=0.0, gamma=1.0), solution.iterations
+        return SwayCost(beta=0.0, gamma=1.0), solution.iterations
     effort, sway = solution.optimum.cost / problem.duration, sway_on_the_way(solution)
     if sway == 0.0:  # a hoist alone swings nothing
-        return goals.Weights(beta=0.0, gamma=1.0), solution.iterations
-    return goals.Weights(
+        return SwayCost(beta=0.0, gamma=1.0), solution.iterations
+    return SwayCost(
         beta=problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2, gamma=AUTO_SWAY / sway
     ), solution.iterations
 
@@ -293,7 +294,7 @@ class LeastCost:
     Attributes
     ----------
     setup : Setup
-    weights : Weights
+    sway_cost : SwayCost
     sway_limit : float or None
         m, on the way.
     worst : float or None
@@ -301,7 +302,7 @@ class LeastCost:
     """
 
     setup: Setup
-    weights: goals.Weights
+    sway_cost: SwayCost
     sway_limit: float | None
     worst: float | None = None
 
@@ -322,7 +323,7 @@ class LeastCost:
             column = goals.bound_worst(program, transcription, self.setup.tried)
             row = sparse.csc_matrix(([1.0], ([0], [column])), shape=(1, program.variables))
             program.at_most(row, np.array([self.worst]))
-        scaled = attrs.evolve(self.weights, beta=self.weights.beta / self.setup.cost_scale)
+        scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / self.setup.cost_scale)
         quadratic, linear = goals.cost(transcription, self.setup.forms, scaled, iterate, maps[0])
         return _widen(quadratic, program.variables), np.pad(linear, (0, program.variables - len(linear)))
 
@@ -372,7 +373,7 @@ def _widen(matrix: Matrix, width: int) -> Matrix:
     return widened
 
 
-def conclude(setup: Setup, found: Found, weights: goals.Weights, iterations: int) -> Solution:
+def conclude(setup: Setup, found: Found, sway_cost: SwayCost, iterations: int) -> Solution:
     """Turn the outcome of programs into a solution."""
     problem = setup.problem
     status, cure = Status.CONVERGED, ""
@@ -386,14 +387,14 @@ def conclude(setup: Setup, found: Found, weights: goals.Weights, iterations: int
         status=status,
         method=METHOD,
         problem=problem,
-        optimum=_optimum(setup, found, weights) if status is Status.CONVERGED else None,
+        optimum=_optimum(setup, found, sway_cost) if status is Status.CONVERGED else None,
         iterations=iterations,
         residual=found.step,
         cure=cure,
     )
 
 
-def _optimum(setup: Setup, found: Found, weights: goals.Weights) -> Optimum:
+def _optimum(setup: Setup, found: Found, sway_cost: SwayCost) -> Optimum:
     """Return to SI units."""
     problem, transcription = setup.problem, setup.transcription
     piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
@@ -416,9 +417,9 @@ def _optimum(setup: Setup, found: Found, weights: goals.Weights) -> Optimum:
         top_order=piece.order,
         sway=machine.equations.sway(points, felt, machine.parameters)[:, :, 0],
         angle=greatest_angle(setup, found.iterate),
-        cost=_cost(setup, found.iterate, weights),
-        sway_weight=weights.beta,
-        sway_scale=weights.gamma,
+        cost=_cost(setup, found.iterate, sway_cost),
+        sway_weight=sway_cost.beta,
+        sway_scale=sway_cost.gamma,
         defect=None,
         hamiltonian_variation=None,
     )
@@ -466,7 +467,7 @@ def greatest_angle(setup: Setup, iterate: Iterate) -> float:
     return float(np.abs(machine.equations.angle(points, felt, machine.parameters)).max())
 
 
-def _cost(setup: Setup, iterate: Iterate, weights: goals.Weights) -> float:
+def _cost(setup: Setup, iterate: Iterate, sway_cost: SwayCost) -> float:
     """Evaluate eq. (26) in SI units."""
     transcription, duration = setup.transcription, setup.problem.duration
     local = iterate.local.reshape(transcription.intervals, len(setup.forms), -1)
@@ -475,8 +476,8 @@ def _cost(setup: Setup, iterate: Iterate, weights: goals.Weights) -> float:
         for axis, form in enumerate(setup.forms)
     )
     sway = transcription.end_sway_found(iterate)
-    growth = np.exp(np.minimum(weights.gamma**2 * (sway**2).sum(axis=1), goals.STEEPEST))
-    return duration * (setup.cost_scale * effort + weights.beta * float(transcription.quadrature() @ growth))
+    swayed = float(transcription.quadrature() @ sway_cost.values(sway))
+    return duration * (setup.cost_scale * effort + swayed)
 
 
 def sway_on_the_way(solution: Solution) -> float:

@@ -12,24 +12,16 @@ from gen_profile.problem.axis_reach import axis_reach
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.pontryagin import SNAP_TIME
 from gen_profile.problem.problem import Problem
+from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.profile import Array
 from gen_profile.solvers.bezier import Piece, elevation, gram
 from gen_profile.solvers.condensing import IntervalMaps
 from gen_profile.solvers.conic import ConicProgram, Matrix, place
 from gen_profile.solvers.transcription import Iterate, Transcription
 
-STEEPEST = 50.0  # exponent beyond which the sway's cost is steep enough
 WITHIN = 1.0 - 1e-6  # share of a limit that a program may use: its own tolerance must not break the limit
 
 DERIVATIVES = {1: "velocity", 2: "acceleration", 3: "jerk", 0: "travel"}  # of the position, that have limits
-
-
-@attrs.frozen(kw_only=True)
-class Weights:
-    """β and γ of eq. (26), resolved."""
-
-    beta: float
-    gamma: float
 
 
 def effort_form(problem: Problem, piece: Piece) -> Array:
@@ -54,7 +46,7 @@ def effort_form(problem: Problem, piece: Piece) -> Array:
 def cost(
     transcription: Transcription,
     forms: Sequence[Array],
-    weights: Weights,
+    sway_cost: SwayCost,
     iterate: Iterate,
     maps: IntervalMaps,
 ) -> tuple[Matrix, Array]:
@@ -64,23 +56,17 @@ def cost(
     ----------
     forms : sequence of (size, size) arrays
         Twice the effort of every axis, dimensionless.
-    weights : Weights
-        β divided by the cost's scale.
+    sway_cost : SwayCost
+        Divided by the cost's scale.
     """
     width = transcription.variables
     quadratic, linear = transcription.effort(forms, width), np.zeros(width)
-    if weights.beta > 0.0:
+    if sway_cost.beta > 0.0:
         sway, matrix, offset = transcription.end_sway(iterate, maps, width)
         points, directions = sway.shape
-        exponent = np.minimum(weights.gamma**2 * (sway**2).sum(axis=1), STEEPEST)
-        share = weights.beta * transcription.quadrature() * np.exp(exponent)
-        slope = 2.0 * weights.gamma**2 * share[:, None] * sway
-        curvature = (
-            2.0
-            * weights.gamma**2
-            * share[:, None, None]
-            * (np.eye(directions) + 2.0 * weights.gamma**2 * sway[:, :, None] * sway[:, None])
-        )
+        shares = transcription.quadrature()
+        slope = shares[:, None] * sway_cost.slopes(sway)
+        curvature = shares[:, None, None] * sway_cost.curvatures(sway)
         hessian = place(curvature, np.arange(points) * directions, points * directions)
         quadratic = quadratic + matrix.T @ hessian @ matrix
         linear = matrix.T @ (slope.ravel() + hessian @ (offset - sway.ravel()))

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from gen_profile.problem.problem import Problem
+from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.profile import Array
 from gen_profile.solvers import goals
 from gen_profile.solvers.condensing import IntervalMaps
@@ -113,7 +114,7 @@ def relaxed(problem: Problem, loosened: Sequence[str]) -> Relaxed | None:
     setup = attrs.evolve(set_up(problem)[0], tried=())
     free = LeastCost(
         setup=attrs.evolve(setup, problem=attrs.evolve(problem, limits=LimitsSpec())),
-        weights=goals.Weights(beta=0.0, gamma=1.0),
+        sway_cost=SwayCost(beta=0.0, gamma=1.0),
         sway_limit=None,
     )
     unlimited = sequence(setup, setup.transcription.rest(), free)

@@ -27,7 +27,7 @@ from gen_profile.solvers.direct import (
     LeastWorst,
     Setup,
     conclude,
-    resolve_weights,
+    resolve_sway_cost,
     sequence,
     set_up,
 )
@@ -98,14 +98,14 @@ def solve_within_limits(problem: Problem) -> Solution:
         Infeasible where there is none.
     """
     worst_case, problem = _taken_apart(problem)
-    weights, iterations = resolve_weights(problem)
+    sway_cost, iterations = resolve_sway_cost(problem)
     tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
-        goal = LeastCost(setup=setup, weights=weights, sway_limit=problem.limits.sway, worst=1.0 - MARGIN)
+        goal = LeastCost(setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=1.0 - MARGIN)
         found = sequence(setup, setup.transcription.rest(), goal)
         iterations += found.iterations
-        solution = conclude(setup, found, weights, iterations)
+        solution = conclude(setup, found, sway_cost, iterations)
         if solution.optimum is None:
             return solution
         shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
@@ -117,22 +117,22 @@ def solve_within_limits(problem: Problem) -> Solution:
 
 def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
     worst_case, problem = _taken_apart(problem)
-    weights, iterations = resolve_weights(problem)
+    sway_cost, iterations = resolve_sway_cost(problem)
     tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
-        goal = LeastCost(setup=setup, weights=weights, sway_limit=problem.limits.sway, worst=GOOD_ENOUGH)
+        goal = LeastCost(setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=GOOD_ENOUGH)
         bound, found = 0.0, sequence(setup, setup.transcription.rest(), goal)
         if found.verdict is not Verdict.SOLVED:
             best = _least_worst(setup, traces)
             iterations += best.iterations
             bound = float(best.solutions[0].x[-1])
             if best.verdict is not Verdict.SOLVED:
-                return conclude(setup, best, weights, iterations)
+                return conclude(setup, best, sway_cost, iterations)
             goal = attrs.evolve(goal, worst=SLACK * float(best.solutions[-1].x[-1]) + MARGIN)
             found = sequence(setup, best.iterate, goal)
         iterations += found.iterations
-        solution = conclude(setup, found, weights, iterations)
+        solution = conclude(setup, found, sway_cost, iterations)
         if solution.optimum is None:
             return solution
         shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
