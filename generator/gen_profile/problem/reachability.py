@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from gen_profile.one_thread import one_thread
 from gen_profile.profile import Array
 
 SAMPLES = 256
@@ -35,7 +36,8 @@ def independent_states(A: Array, B: Array, order: NDArray[np.intp], shares: Arra
     -------
     (k,) array of bool
     """
-    responses, step = B[None], expm(A / SAMPLES)
+    with one_thread():
+        responses, step = B[None], expm(A / SAMPLES)
     while len(responses) <= SAMPLES:
         responses, step = np.concatenate([responses, step @ responses]), step @ step
     rows = responses.transpose(1, 0, 2).reshape(len(A), -1)

@@ -19,15 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.special import roots_jacobi
-from threadpoolctl import ThreadpoolController
 
+from gen_profile.one_thread import one_thread
 from gen_profile.profile import Array
 
 STAGES = 4  # of the schemes for fine meshes
-
-# Matrices of a hundred rows are too small to share: threads that wait for a busy machine's other core cost up
-# to a hundredfold, and how they share the work would show in the last bits.
-BLAS = ThreadpoolController()
 
 IntArray = NDArray[np.intp]
 
@@ -244,7 +240,7 @@ def linearize(flow: Array, current: Trajectory) -> Linearized:
     diagonal = np.arange(count * size)
     matrices[:, diagonal, diagonal] += 1.0
     right[..., 1:] = np.eye(size)
-    with BLAS.limit(limits=1, user_api="blas"):
+    with one_thread():
         response = np.asarray(np.linalg.solve(matrices, right.reshape(intervals, count * size, 1 + size)))
     response = response.reshape(intervals, count, size, 1 + size)
 

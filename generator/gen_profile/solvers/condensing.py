@@ -5,10 +5,11 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
+from gen_profile.one_thread import one_thread
 from gen_profile.problem.motion_equations import MotionEquations
 from gen_profile.profile import Array
 from gen_profile.solvers.bezier import Piece
-from gen_profile.solvers.collocation import BLAS, GAUSS, STAGES
+from gen_profile.solvers.collocation import GAUSS, STAGES
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -132,7 +133,7 @@ def _eliminated(constant: Array, by_state: Array, driven: Array, integration: Ar
         ],
         axis=-1,
     )
-    with BLAS.limit(limits=1, user_api="blas"):
+    with one_thread():
         solved = np.linalg.solve(inner, right.reshape(intervals, STAGES * n, -1)).reshape(right.shape)
     across = np.einsum("i,kial->kal", GAUSS.end, solved)
     across[:, :, 1 : 1 + n] += (1.0 - GAUSS.end.sum()) * np.eye(n)

@@ -12,6 +12,7 @@ import math
 import attrs
 import numpy as np
 
+from gen_profile.one_thread import one_thread
 from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.canonical import (
@@ -21,7 +22,7 @@ from gen_profile.solvers.canonical import (
     quintic,
     with_sway_cost,
 )
-from gen_profile.solvers.collocation import BLAS, LONG_GAUSS, Trajectory, sampled
+from gen_profile.solvers.collocation import LONG_GAUSS, Trajectory, sampled
 from gen_profile.solvers.extremal import METHOD, judged
 from gen_profile.solvers.homotopy import MODERATE_ANGLE, solve_by_homotopy
 from gen_profile.solvers.newton import NewtonOutcome
@@ -54,7 +55,7 @@ def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
     InfeasibleProblem
         The machine does not hang at rest, so that it has no natural frequencies.
     """
-    with BLAS.limit(limits=1, user_api="blas"):
+    with one_thread():
         return _solve(problem, near)
 
 

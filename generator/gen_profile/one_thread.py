@@ -1,0 +1,19 @@
+"""Linear algebra on one thread.
+
+Matrices of a hundred rows are too small to share: threads that wait for a busy machine's other core cost up
+to a hundredfold, and how they share the work would show in the last bits.
+"""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+
+from threadpoolctl import ThreadpoolController
+
+_LIBRARIES = ThreadpoolController()
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Let BLAS and LAPACK use one thread in the context."""
+    context: AbstractContextManager[object] = _LIBRARIES.limit(limits=1, user_api="blas")
+    return context
