@@ -1,6 +1,7 @@
 """The picture of a comparison."""
 
 import os
+import re
 from contextlib import contextmanager
 from functools import partial
 from itertools import combinations
@@ -19,6 +20,7 @@ from gen_profile.spec_reading import preset_spec
 from gen_profile.workflows.compare import Comparison, compare
 from gen_profile.workflows.comparison_plot import draw
 from gen_profile.workflows.method_styles import method_styles
+from gen_profile.workflows.wording import number
 
 FEW = ("--set", "cost.sway_weight=0", "--set", "robustness={}")
 
@@ -125,10 +127,15 @@ def test_every_bar_is_told_beside_it_and_not_on_it(drawn):
     assert len(axis.texts) == len(axis.patches) == len(comparison.rows)
     for text, bar, row in zip(axis.texts, axis.patches, comparison.rows, strict=True):
         worst = 1e3 * row.figures["sway_residual_worst_m"]
-        assert text.get_text().endswith(f" {worst:.3g}")
+        assert text.get_text().endswith(f" {number(worst)}")
         assert ("▸" in text.get_text()) == (worst > axis.get_xlim()[1])
         ends = min(bar.get_window_extent().x1, axis.bbox.x1)
         assert text.get_window_extent().x0 >= ends - 1.0
+
+
+def test_numerical_error_is_no_figure_of_a_bar(tmp_path):
+    assert run_here("compare", *FEW, "--plot", tmp_path / "picture.svg").code == 0
+    assert not re.search(r"<!-- +[\d.]+e-", (tmp_path / "picture.svg").read_text("utf-8"))
 
 
 def test_sway_is_drawn_on_the_nominal_machine_and_at_both_ends_of_the_ranges(drawn):

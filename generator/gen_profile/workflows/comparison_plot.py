@@ -130,7 +130,7 @@ def _residuals(axis: Any, comparison: Comparison, styles: Styles) -> None:
     axis.barh(methods, worst, color=[styles[method].colour for method in methods])
     for place, value in enumerate(worst):
         arrow = "" if value <= end else "▸ "
-        axis.text(min(value, end), place, f" {arrow}{value:.3g}", va="center", fontsize="small")
+        axis.text(min(value, end), place, f" {arrow}{number(value)}", va="center", fontsize="small")
     axis.axvline(limit, color="k", linestyle=":")
     axis.invert_yaxis()
     load = comparison.spec.machine().end_load_name
