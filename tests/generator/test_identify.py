@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from command_line import run_here
 from generator.free_swings import periods, swing
+from generator.lagrangian_machines import Lagrange
+from scipy.integrate import solve_ivp
 
 from gen_profile.errors import CosimulationError, OutputError, SpecError
 from gen_profile.identification.measurements import (
@@ -207,6 +209,36 @@ def test_degrees_that_are_taken_for_radians(tmp_path):
     outcome = run_here("identify", "--preset", "paper", "--free", "L1", "--swing", tmp_path / "log.csv")
     assert outcome.code == 2
     assert "the log's angle goes over 20 rad, more than half a turn; is it in deg?" in outcome.err
+
+
+def test_a_log_that_begins_before_the_stop(tmp_path):
+    """The cart brakes for 2.5 s; the range found holds the rope all the same."""
+    lagrange, true = Lagrange("single-pendulum-crane"), preset_spec("single-pendulum-crane").plant.parameters
+
+    def rates(t, x):
+        push = -0.6 if t < 2.5 else 0.0
+        axes = lagrange.accelerations(
+            np.array([x[0], 0.0, 4.0]), np.array([x[1], 0.0, 0.0]), np.array([push, 0.0]), true
+        )
+        return np.r_[x[1], axes]
+
+    times = np.arange(0.0, 30.0, 0.1)
+    exact = solve_ivp(rates, (0.0, 30.0), [0.0, 0.0], "DOP853", times, max_step=0.1).y[0]
+    noisy = exact + np.random.default_rng(0).normal(0.0, 3e-3, len(times))
+    (tmp_path / "log.csv").write_text(
+        "".join(f"{t:.1f};{v:.5f}\n" for t, v in zip(times, noisy, strict=True)), "utf-8"
+    )
+    words = [
+        "identify", "--preset", "single-pendulum-crane", "--set", "plant.L0=2.6", "--free", "L0",
+        "--swing", tmp_path / "log.csv", "--at", "0,4", "--out", tmp_path / "new.toml",
+    ]  # fmt: skip
+    early, late = run_here(*words), run_here(*words, "--after", "2.5")
+    assert "BEWARE" in early.out
+    assert "leave out what was logged before the axes stood still (--after)" in early.out
+    assert "BEWARE" not in late.out
+    for outcome in (run_here(*words, "--json"), run_here(*words, "--after", "2.5", "--json")):
+        row = outcome.document["parameters"]["L0"]
+        assert abs(row["value"] - true["L0"]) <= row["half_range"]
 
 
 def test_a_contradiction_is_told(tmp_path):

@@ -35,6 +35,7 @@ MANIFEST_WORDS = {
 
 COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
 COSTLY_OVERSHOOT = 0.1  # of the sway on the way, likewise
+UNREST = 2.0  # times farther off the model at a log's beginning than later from which on a warning is due
 
 # head → unit, figure, how many of the unit make one of the figure's
 COLUMNS = {
@@ -178,6 +179,15 @@ def identification(found: Identification, path: Path) -> str:
             f"{row['samples']} samples of its {row['quantity']}, noise {row['noise']:.2g}",
         )
         for row in document["logs"]
+    ]
+    rows += [
+        (
+            "BEWARE",
+            f"the log of {row['load']} is {row['unrest']:.2g} times farther off the model at first than later; "
+            "leave out what was logged before the axes stood still (--after)",
+        )
+        for row in document["logs"]
+        if row["unrest"] > UNREST
     ]
     if found.estimate.contradiction > 1.0:
         widened = (

@@ -36,6 +36,9 @@ class Estimate:
         What the identified machine would have shown instead of the readings.
     noise : tuple of float
         Standard deviation of every log's samples, in rad or m.
+    unrest : tuple of float
+        How many times farther off the model than the rest every log's first period is: about 1, unless the
+        axes still moved then.
     contradiction : float
         Birge ratio by which the uncertainties were widened; 1 where the readings agree.
     """
@@ -45,6 +48,7 @@ class Estimate:
     half_range: dict[str, float]
     model: tuple[float, ...]
     noise: tuple[float, ...]
+    unrest: tuple[float, ...]
     contradiction: float
 
 
@@ -94,5 +98,6 @@ def estimate(
         half_range=by_name(half_ranges),
         model=tuple(map(float, fit.predicted(unknowns))),
         noise=tuple(map(float, noise)),
+        unrest=around.unrest(),
         contradiction=around.contradiction,
     )

@@ -74,8 +74,7 @@ class Fit:
         names, guess = self.names, self.expected
         if not self.models:
             return self.improved(guess, np.empty(0)), np.empty(0)
-        slowest = linearize(self.machine.plant, self.machine.parameters, self.machine.q_a).frequencies[0]
-        until, longest = 2.0 * np.pi / slowest, max(model.log.times[-1] for model in self.models)
+        until, longest = self.models[0].period, max(model.log.times[-1] for model in self.models)
         starts = [model.guess(self.machine.parameters, until) for model in self.models]
         unknowns = np.concatenate([guess, *starts])
         noise = self._noise(unknowns, until, 0)

@@ -36,12 +36,15 @@ class SwingModel:
     log : SwingLog
     shown : (s,) array of int
         Which of q_u and q̇_u, one after the other, are unknowns; all others are zero.
+    period : float
+        Of the machine's slowest mode, roughly, in s.
     """
 
     plant: Plant
     q_a: tuple[float, ...]
     log: SwingLog
     shown: NDArray[np.intp]
+    period: float
 
     @property
     def unknowns(self) -> int:
@@ -118,7 +121,7 @@ def swing_model(
         )
     size = np.linalg.norm(_linear_answers(plant, parameters, q_a, log), axis=0)
     shown = np.flatnonzero(size > SHOWN * size.max())
-    return SwingModel(plant=plant, q_a=q_a, log=log, shown=shown)
+    return SwingModel(plant=plant, q_a=q_a, log=log, shown=shown, period=period)
 
 
 def _linear_answers(

@@ -72,6 +72,16 @@ class Uncertainty:
         """Find half of the range of so many standard deviations for every parameter, shape (p,)."""
         return np.array([self._half_range(index, factor) for index in range(len(self.fit.names))])
 
+    def unrest(self) -> tuple[float, ...]:
+        """Say how many times farther off than the rest the first period of every log is."""
+        found, first = [], len(self.fit.readings)
+        for model in self.fit.models:
+            residuals = self.residuals[first : first + len(model.log.times)]
+            first += len(residuals)
+            early, late = np.split(np.square(residuals), [model.samples(model.period)])
+            found.append(float(np.sqrt(early.mean() / late.mean())) if len(late) and late.any() else 1.0)
+        return tuple(found)
+
     def _by_resolution(self) -> Array:
         """Follow the logs' rounding errors through the fit, shape (p,)."""
         answers = self.covariance @ _own_slopes(self.slopes, len(self.fit.names)).T

@@ -68,8 +68,14 @@ class Identification:
                 for reading, model in zip(self.readings, found.model, strict=True)
             ],
             "logs": [
-                {"load": log.load, "quantity": log.quantity, "samples": len(log.times), "noise": noise}
-                for log, noise in zip(self.logs, found.noise, strict=True)
+                {
+                    "load": log.load,
+                    "quantity": log.quantity,
+                    "samples": len(log.times),
+                    "noise": noise,
+                    "unrest": unrest,
+                }
+                for log, noise, unrest in zip(self.logs, found.noise, found.unrest, strict=True)
             ],
         }
 
