@@ -183,7 +183,7 @@ def identification(found: Identification, path: Path) -> str:
     rows += [
         (
             "BEWARE",
-            f"the log of {row['load']} is {row['unrest']:.2g} times farther off the model at first than later; "
+            f"the log of {row['load']} is {row['unrest']:.2g} times farther off the model at first; "
             "leave out what was logged before the axes stood still (--after)",
         )
         for row in document["logs"]
