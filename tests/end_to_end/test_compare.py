@@ -1,5 +1,8 @@
 """`gen-profile compare` against the paper's tables, printed and independently found."""
 
+import re
+from pathlib import Path
+
 import pytest
 from command_line import run_here
 
@@ -73,6 +76,18 @@ def test_reproduces_what_was_found_independently(figures, method, figure, text):
 @pytest.mark.parametrize(("method", "figure", "text"), cells(PRINTED))
 def test_reproduces_the_printed_tables(figures, method, figure, text):
     assert in_table_units(figure, figures[method][figure]) == pytest.approx(float(text), rel=0.02)
+
+
+def test_the_page_on_the_paper_shows_what_the_command_finds(figures):
+    """Every digit of its table."""
+    page = (Path(__file__).parents[2] / "docs" / "paper.md").read_text("utf-8")
+    shown = re.findall(r"^\| (NZV|ZVD|β = \d+) \|(.+)\|$", page, re.MULTILINE)
+    assert len(shown) == len(FOUND)
+    for name, cells_ in shown:
+        row = figures[name.lower().replace("β = ", "optimal-beta")]
+        for figure, text in zip((*FIGURES, "sway_residual_worst_m"), cells_.split("|"), strict=True):
+            half_a_digit = 0.5 * 10.0 ** -len(text.strip().partition(".")[2])
+            assert in_table_units(figure, row[figure]) == pytest.approx(float(text), abs=1.1 * half_a_digit)
 
 
 @pytest.mark.parametrize(("method", "millimetres"), SHORTER_ROPE.items())

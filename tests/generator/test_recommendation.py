@@ -44,6 +44,11 @@ def test_a_shaper_is_recommended_where_it_wins_and_the_best_optimal_motion_named
     assert "least on the way (10 mm; the best shaper, zvd: 20 mm)" in found["gentlest"].reason
 
 
+def test_large_figures_are_told_without_powers_of_ten():
+    rows = {"zvd": row(3.0, 0.5, 1.394, 0.001), "optimal": row(3.0, 0.7, 1.2, 0.001)}
+    assert "(1200 mm; the best shaper, zvd: 1394 mm)" in advice(rows)["gentlest"].reason
+
+
 def test_time_decides_where_it_differs():
     rows = {"zvd": row(3.1, 0.5, 0.02, 0.001), "zv": row(3.0, 0.9, 0.03, 0.002)}
     found = advice(rows)["fastest"]

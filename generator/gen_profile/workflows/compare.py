@@ -12,6 +12,7 @@ from gen_profile.spec import Spec
 from gen_profile.workflows.contenders import Contender, contenders
 from gen_profile.workflows.planning import Trial, figures, keeps_residual_sway, try_motion
 from gen_profile.workflows.recommendation import Recommendation, efficient, recommend
+from gen_profile.workflows.wording import mm
 
 Progress = Callable[[str], None]
 
@@ -129,5 +130,5 @@ def _row(spec: Spec, contender: Contender) -> Row:
 def _limit_in_words(spec: Spec) -> str:
     limits = spec.check.residual_sway
     if len(set(limits.values())) == 1:
-        return f"{1e3 * next(iter(limits.values())):.3g} mm"
-    return ", ".join(f"{1e3 * limit:.3g} mm ({load})" for load, limit in limits.items())
+        return mm(next(iter(limits.values())))
+    return ", ".join(f"{mm(limit)} ({load})" for load, limit in limits.items())

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import attrs
 
+from gen_profile.workflows.wording import number
+
 SAME = 1e-3  # relative difference of figures that says nothing
 # what one would like less of
 OBJECTIVES = (
@@ -89,12 +91,12 @@ def _least(
         return min(alike, key=lambda method: rows[method]["sway_residual_worst_m"])
 
     winner = best(list(rows))
-    words = f"({factor * rows[winner][objective]:.3g} {unit}"
+    words = f"({number(factor * rows[winner][objective])} {unit}"
     others = [method for method in rows if (method in optimal) != (winner in optimal)]
     if others:
         second = best(others)
         kind = "optimal motion" if second in optimal else "shaper"
-        words += f"; the best {kind}, {second}: {factor * rows[second][objective]:.3g} {unit}"
+        words += f"; the best {kind}, {second}: {number(factor * rows[second][objective])} {unit}"
     return winner, words + ")"
 
 
