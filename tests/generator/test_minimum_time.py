@@ -44,6 +44,17 @@ def test_of_the_papers_crane(limits, desensitized):
     assert 0.998 * best < found < 1.02 * best
 
 
+def test_with_a_limit_of_the_sway_on_the_way():
+    limits = LimitsSpec(acceleration=0.5, sway=0.02)
+    found = choice.minimum_time(crane_problem(desensitized=("L1",), limits=limits))
+    frequencies, _ = modes(CRANE.nominal())
+    swung = (CRANE.nominal(), 0.02)
+    best = shortest(frequencies, [0.3], found, frequencies, acceleration=0.5, sway=swung)
+    loose = shortest(frequencies, [0.3], found, frequencies, acceleration=0.5)
+    assert loose < 0.95 * best  # the sway is what it waits for
+    assert 0.998 * best < found < 1.02 * best
+
+
 def of_the_chain(p):
     """Masses in a row, the first one tied to the axis."""
     k = [p[f"k{i}"] for i in (1, 2, 3)]

@@ -18,7 +18,7 @@ SIDES = 32  # of the polygon that stands for a circle
 
 
 def modes(p: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies, and the payload's sway per unit acceleration impulse in each mode."""
+    """Frequencies, and the payload's sway per unit acceleration impulse in each mode, with its sign."""
     m1, m2, L1, L2, g = (p[name] for name in ("m1", "m2", "L1", "L2", "g"))
     mass = np.array([[(m1 + m2) * L1**2, m2 * L1 * L2], [m2 * L1 * L2, m2 * L2**2]])
     stiffness = np.diag([(m1 + m2) * g * L1, m2 * g * L2])
@@ -26,7 +26,7 @@ def modes(p: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
     drive = shapes.T @ np.array([(m1 + m2) * L1, m2 * L2])
     seen = np.array([L1, L2]) @ shapes
     frequencies = np.sqrt(squares)
-    return frequencies, np.abs(seen * drive) / frequencies
+    return frequencies, seen * drive / frequencies
 
 
 class LinearCrane:
@@ -65,6 +65,19 @@ class LinearCrane:
             [self.row(lambda s: -s * np.sin(frequency * s)), self.row(lambda s: s * np.cos(frequency * s))]
         )
 
+    def sway(self, p: Mapping[str, float], limit: float) -> tuple[np.ndarray, np.ndarray]:
+        """Rows that bound the payload's sway on the way, at every other node, in units of the limit."""
+        shown = list(zip(*modes(p), strict=True))
+        rows = []
+        for late in self.h * np.arange(self.intervals - 1, 0, -2):
+
+            def kernel(s: np.ndarray, late: float = late) -> np.ndarray:
+                past = np.maximum(s - late, 0.0)
+                return sum(gain * np.sin(frequency * past) for frequency, gain in shown)
+
+            rows.append(self.row(kernel) / limit)
+        return np.vstack([rows, np.negative(rows)]), np.ones(2 * len(rows))
+
     def limits(self, velocity: float, jerk: float) -> tuple[np.ndarray, np.ndarray]:
         """Rows that bound the speed at the nodes, and the slope of the acceleration."""
         step = np.diff(np.eye(self.intervals + 1), axis=0) / self.h
@@ -80,6 +93,7 @@ def feasible(
     duration: float,
     *,
     desensitized: Sequence[float],
+    sway: tuple[Mapping[str, float], float] | None = None,
     **limits: float,
 ) -> bool:
     """Whether a rest-to-rest move within limits leaves modes at rest, some even if they are a little off."""
@@ -91,6 +105,9 @@ def feasible(
         rows = np.vstack([rows, crane.slopes(frequency)])
     values = np.concatenate([distance * values, np.zeros(len(rows) - len(values))])
     upper, sides = crane.limits(limits.get("velocity", 1e3), limits.get("jerk", 1e6))
+    if sway is not None:
+        swung, ones = crane.sway(*sway)
+        upper, sides = np.vstack([upper, swung]), np.concatenate([sides, ones])
     bound = limits.get("acceleration", 1e3)
     size = np.abs(rows).max(axis=1)
     found = linprog(
@@ -129,7 +146,7 @@ def least_worst_sway(
         total = np.zeros(count + radii + 1)
         for k, (frequency, seen) in enumerate(zip(*modes(machine), strict=True)):
             block = np.zeros((SIDES, count + radii + 1))
-            block[:, :count] = 1e3 * seen * directions @ crane.quadratures(frequency)
+            block[:, :count] = 1e3 * abs(seen) * directions @ crane.quadratures(frequency)
             block[:, count + 2 * i + k] = -1.0
             upper.append(block)
             total[count + 2 * i + k] = 1.0
