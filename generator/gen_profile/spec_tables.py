@@ -303,7 +303,9 @@ def _limits(table: Table, move: Table, plant: Plant | None, faults: Faults) -> T
     for column, name in enumerate(names if plant else ()):
         most = finite(axes[name].get("velocity", table.get("velocity")))
         if most is not None and abs(move["final_velocity"][column]) > max(most, 0.0):
-            faults.add("move.final_velocity", f"must keep limits.velocity, found {move['final_velocity']}")
+            faults.add(
+                "move.final_velocity", f"must keep limits.velocity ({most:g}), found {move['final_velocity']}"
+            )
         where = f"limits.axis.{name}.travel" if "travel" in axes[name] else "limits.travel"
         travel = axes[name].get("travel", table.get("travel"))
         if (

@@ -7,12 +7,12 @@ import attrs
 import numpy as np
 import pytest
 
-from gen_profile.errors import LimitViolation
+from gen_profile.errors import InfeasibleProblem, LimitViolation
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import choice, relaxation
 from gen_profile.solvers.cures import Trial, cures
 from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.planning import plan
+from gen_profile.workflows.planning import plan, timed
 
 HOIST = "limits.axis.hoist={travel=[0.9, 7.1], acceleration=0.3}"
 LAG = "actuator={type='first-order', tau=0.1}"
@@ -144,3 +144,28 @@ def test_the_indirect_method_which_knows_no_limits_is_told_how_to_keep_them():
     assert 'solver.method = "auto"' in told
     for change in ("solver.method=auto", f"move.duration={duration}", f"limits.acceleration={limit}"):
         plan(preset_spec("paper", [*overrides, change]))
+
+
+def test_a_speed_that_leads_out_of_an_axis_range_is_told_one_that_does_not():
+    with pytest.raises(InfeasibleProblem) as refusal:
+        plan(preset_spec("single-pendulum-crane", ["move.final_velocity=[0.0, -0.2]"]))
+    (speed,) = re.findall(r"end at (-[\d.]+) m/s or slower\.", str(refusal.value))
+    plan(preset_spec("single-pendulum-crane", [f"move.final_velocity=[0.0, {speed}]"]))
+    with pytest.raises(InfeasibleProblem):
+        plan(preset_spec("single-pendulum-crane", [f"move.final_velocity=[0.0, {1.02 * float(speed)}]"]))
+
+
+def test_where_no_duration_will_do_the_limit_to_blame_is_named():
+    overrides = ["limits.acceleration=1", "limits.sway=0.01", "move.initial={theta1=0.02}"]
+    with pytest.raises(InfeasibleProblem, match=r"^move\.duration: no duration keeps the limits") as refusal:
+        timed(preset_spec("paper", [*overrides, "move.duration=minimum"]))
+    ((duration, limit),) = re.findall(
+        r"In ([\d.]+) s it would do with limits\.sway = ([\d.]+\d)", str(refusal.value)
+    )
+    cured = plan(preset_spec("paper", [*overrides, f"limits.sway={limit}", f"move.duration={duration}"]))
+    assert cured.figures["sway_transient_peak_m"] <= float(limit)
+
+
+def test_the_sway_between_collocation_points_is_within_the_limit_over_a_range_too():
+    overrides = ["robustness.method=range", "limits.sway=0.016"]
+    assert plan(preset_spec("paper", overrides)).figures["sway_transient_peak_m"] <= 0.016

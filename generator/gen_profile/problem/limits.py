@@ -57,6 +57,12 @@ def rounded_up(value: float, digits: int = 3) -> str:
     return f"{math.ceil(value / unit) * unit:.{digits}g}"
 
 
+def rounded_down(value: float, digits: int = 3) -> str:
+    """Write some digits of a positive number, rounded down: what is called few enough must be."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return f"{math.floor(value / unit) * unit:.{digits}g}"
+
+
 def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Breach]:
     """List what the motion needs of every limit there is."""
     for column in range(command.axes):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from gen_profile.errors import InfeasibleProblem
+from gen_profile.problem.limits import rounded_up
 from gen_profile.profile import Array, Profile
 from gen_profile.shapers.base_moves import QUINTIC, BaseMove
 from gen_profile.shapers.impulses import SHAPERS, Impulses, convolve
@@ -61,7 +62,7 @@ class ShapedMove:
         if stretch < duration * SHORTEST_BASE:
             raise InfeasibleProblem(
                 f"move.duration: the {self.name} shaper's delay is {delay:.4g} s for this machine, so "
-                f"{duration:g} s leaves no time to move; state more than {delay:.4g} s, "
+                f"{duration:g} s leaves no time to move; state at least {rounded_up(delay, digits=4)} s, "
                 "or choose another method."
             )
         knots = _knots(self.shaper, self.base, stretch, duration)

@@ -19,7 +19,7 @@ from gen_profile.solvers.solution import Solution
 
 FACTORS = (1.01, 1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
 NEAR = 1.05  # how many times a value that will not do the one that is named may be
-FARTHER = 1.1  # times the least value with a solution, up to which one that is welcome is looked for
+FARTHER = 1.7  # times the least value with a solution, up to which one that is welcome is looked for
 
 
 @attrs.frozen(kw_only=True)
@@ -39,9 +39,10 @@ class Trial:
     keeps: Callable[[Solution], bool]
     welcome: Callable[[Solution], bool]
 
-    def works(self, problem: Problem) -> bool:
-        """Whether a problem has a solution that will do."""
-        return self.keeps(self.solve(problem))
+    def pleases(self, problem: Problem) -> bool:
+        """Whether a problem has a solution that will do and is welcome."""
+        solution = self.solve(problem)
+        return self.keeps(solution) and self.welcome(solution)
 
     def least(self, changed: Callable[[float], Problem]) -> float | None:
         """Find the least factor of a change that will do: the first one nearly always does."""
@@ -131,9 +132,9 @@ def _widened(problem: Problem, limits: Mapping[str, Any], trial: Trial) -> str:
 
 def _less_robust(problem: Problem, trial: Trial) -> Iterator[str]:
     """Ask for less robustness."""
-    if problem.order > 1 and trial.works(attrs.evolve(problem, order=1)):
+    if problem.order > 1 and trial.pleases(attrs.evolve(problem, order=1)):
         yield "robustness.order = 1"
-    elif problem.desensitized and trial.works(attrs.evolve(problem, desensitized=(), order=1)):
+    elif problem.desensitized and trial.pleases(attrs.evolve(problem, desensitized=(), order=1)):
         yield 'robustness.method = "none"'
 
 

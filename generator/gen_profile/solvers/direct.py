@@ -10,7 +10,7 @@ motion can do where angles are small.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import attrs
@@ -136,20 +136,37 @@ def solve(problem: Problem, near: Iterate | None = None) -> Solution:
         solution = solve(attrs.evolve(problem, desensitized=kept), near)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     sway_cost, iterations = resolve_sway_cost(problem)
-    allowed = asked = problem.limits.sway
     start = near or setup.transcription.rest()
-    for _ in range(SWAY_ROUNDS):
-        goal = LeastCost(setup=setup, sway_cost=sway_cost, sway_limit=asked)
+
+    def attempt(sway_limit: float | None) -> Solution:
+        nonlocal iterations, start
+        goal = LeastCost(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
         found = sequence(setup, start, goal)
-        iterations += found.iterations
-        solution = conclude(setup, found, sway_cost, iterations)
-        if allowed is None or asked is None or solution.optimum is None:
+        iterations, start = iterations + found.iterations, found.iterate
+        return conclude(setup, found, sway_cost, iterations)
+
+    return within_sway(problem.limits.sway, attempt)
+
+
+def within_sway(limit: float | None, attempt: Callable[[float | None], Solution]) -> Solution:
+    """Ask for less sway at the collocation points until that between them is within the limit, too.
+
+    Parameters
+    ----------
+    limit : float or None
+        m.
+    attempt : float or None → Solution
+        Solves with a limit at the collocation points.
+    """
+    asked = limit
+    for _ in range(SWAY_ROUNDS):
+        solution = attempt(asked)
+        if limit is None or asked is None or solution.optimum is None:
             break
         sway = sway_on_the_way(solution)
-        if sway <= allowed:
+        if sway <= limit:
             break
-        asked *= goals.WITHIN * allowed / sway
-        start = found.iterate
+        asked *= goals.WITHIN * limit / sway
     return solution
 
 

@@ -30,6 +30,7 @@ from gen_profile.solvers.direct import (
     resolve_sway_cost,
     sequence,
     set_up,
+    within_sway,
 )
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
@@ -61,15 +62,23 @@ def solve(problem: Problem) -> Solution:
     Solution
         Its `worst_case_bound` is what no motion on the same intervals goes below where angles are small.
     """
-    bounded = _bounded(problem)
+
+    def attempt(sway_limit: float | None) -> Solution:
+        return _bounded(attrs.evolve(problem, limits=attrs.evolve(problem.limits, sway=sway_limit)))
+
+    return attrs.evolve(within_sway(problem.limits.sway, attempt), problem=problem)
+
+
+def _bounded(problem: Problem) -> Solution:
+    """Solve a problem, with a limit of the effort where it needs one."""
+    bounded = _limits_effort(problem)
     solution = _solve(problem, TRACES if bounded else TRACES[:1])
     if solution.optimum is not None or bounded:
         return solution
-    held = _held_back(problem)
-    return attrs.evolve(_solve(held or problem, TRACES), problem=problem)
+    return _solve(_held_back(problem) or problem, TRACES)
 
 
-def _bounded(problem: Problem) -> bool:
+def _limits_effort(problem: Problem) -> bool:
     """Whether limits bound how much effort less sway may take: on every axis its acceleration or jerk."""
     limits = [problem.limits.of(axis) for axis in range(len(problem.target))]
     return all(own.acceleration is not None or own.jerk is not None for own in limits)

@@ -14,7 +14,7 @@ from gen_profile.errors import InfeasibleProblem, LimitViolation
 from gen_profile.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.problem.limits import breaches
+from gen_profile.problem.limits import breaches, rounded_down, rounded_up
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.profile import Array, Profile, grid_length, grid_times
@@ -31,6 +31,7 @@ from gen_profile.workflows.shaping import shaped_motion
 SHORTEST_WATCH = 4.0  # s; a residual is watched for this long, or for two of the slowest periods
 STANDSTILL = 10.0  # time constants after which a lagging drive counts as standing: its speed is down to e⁻¹⁰
 RESIDUAL_SAMPLES = 4001
+SLOW = 5.0  # periods of the slowest mode, which are time enough where no duration keeps the limits
 CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
@@ -96,10 +97,14 @@ def timed(spec: Spec) -> Spec:
         return spec
     if spec.solver.shaper is not None:
         return _lasting(spec, shaped_motion(spec, spec.solver.shaper).duration)
-    shortest = choice.minimum_time(problem_of(spec))
+    problem = problem_of(spec)
+    shortest = choice.minimum_time(problem)
     if shortest is None:
+        slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
+        slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * 2.0 * np.pi / slowest)))
+        cure = choice.remedy(slow, "direct") or "Widen the limits."
         raise InfeasibleProblem(
-            "move.duration: no duration keeps the limits and brings the load to rest; widen the limits."
+            f"move.duration: no duration keeps the limits and brings the load to rest. {cure}"
         )
     quickest = _lasting(spec, shortest)
     if _calms(quickest):
@@ -193,11 +198,14 @@ def _require_room(spec: Spec, until: float) -> None:
     """Refuse to judge a motion that goes on, while it is watched, to where the machine cannot be."""
     move = spec.move
     beyond = np.array(move.target) + (until - move.duration) * np.array(move.final_velocity)
-    for axis, at in zip(spec.machine().actuated, beyond, strict=True):
+    for axis, target, at in zip(spec.machine().actuated, move.target, beyond, strict=True):
         if not axis.lower <= at <= axis.upper:
+            room = (axis.upper if at > target else axis.lower) - target
+            fast = rounded_down(abs(room) / (until - move.duration)) if room else "0"
             raise InfeasibleProblem(
                 f"move.final_velocity: {axis.name} would be at {at:.3g} {axis.unit} while the sway is "
-                f"watched, and its range is {axis.lower:g} to {axis.upper:g} {axis.unit}; end slower."
+                f"watched, and its range is {axis.lower:g} to {axis.upper:g} {axis.unit}; "
+                f"end at {'-' if at < target else ''}{fast} {axis.unit}/s or slower."
             )
 
 
