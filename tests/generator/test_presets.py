@@ -46,7 +46,9 @@ def test_every_quantity_has_its_unit_beside_it(name):
 
 @pytest.mark.parametrize("name", presets())
 def test_the_limits_that_a_preset_offers_leave_it_its_motion(name):
-    offered = re.sub(r"^# (\[limits\]|[\w.]+ = )", r"\1", preset_text(name), flags=re.MULTILINE)
+    before, heading, after = preset_text(name).partition("# [limits]")
+    block, check, rest = after.partition("[check]")
+    offered = before + heading[2:] + re.sub("^# ", "", block, flags=re.MULTILINE) + check + rest
     limited = parse_spec(offered)
     assert attrs.evolve(limited, limits=preset_spec(name).limits) == preset_spec(name)
     assert len(limited.limits.stated()) == 1 + 3 * len(limited.machine().actuated)
