@@ -88,6 +88,12 @@ def _direct(problem: Problem) -> Solution:
     return solution if easiest is None or easiest.share > 1.0 else direct.solve(problem, easiest.iterate)
 
 
+def requirements(problem: Problem) -> str:
+    """Say which limits would have to be wider for a motion in the duration of a problem that has none."""
+    trial = Trial(solve=lambda other: attempt(other, "direct"), keeps=keeps_limits, welcome=lambda _: True)
+    return cures(problem, trial, in_time=True)
+
+
 def minimum_time(problem: Problem) -> float | None:
     """Find the shortest duration in s for a problem's limits and robustness; None where none was found."""
     if problem.worst_case is None:

@@ -72,7 +72,7 @@ class Trial:
         return enough
 
 
-def cures(problem: Problem, trial: Trial) -> str:
+def cures(problem: Problem, trial: Trial, *, in_time: bool = False) -> str:
     """Name what to change, each thing by itself, in one or two sentences; nothing where nothing was found.
 
     Parameters
@@ -80,9 +80,11 @@ def cures(problem: Problem, trial: Trial) -> str:
     problem : Problem
         Without a solution.
     trial : Trial
+    in_time : bool
+        Look for what would do in the duration asked for only.
     """
     sentences = []
-    longer = _longer(problem, trial)
+    longer = None if in_time else _longer(problem, trial)
     if longer is not None:
         within = "With these limits it" if problem.limits.stated() else "It"
         sentences.append(f"{within} takes at least {longer} s (move.duration).")
