@@ -9,7 +9,7 @@ import pytest
 
 from gen_profile.errors import InfeasibleProblem, LimitViolation
 from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import choice, relaxation
+from gen_profile.solvers import choice, direct, relaxation
 from gen_profile.solvers.cures import Trial, cures
 from gen_profile.spec_reading import preset_spec
 from gen_profile.workflows.planning import plan, timed
@@ -169,3 +169,16 @@ def test_where_no_duration_will_do_the_limit_to_blame_is_named():
 def test_the_sway_between_collocation_points_is_within_the_limit_over_a_range_too():
     overrides = ["robustness.method=range", "limits.sway=0.016"]
     assert plan(preset_spec("paper", overrides)).figures["sway_transient_peak_m"] <= 0.016
+
+
+def test_redundant_sensitivities_are_left_out_here_too():
+    uncertain = ["robustness.uncertain={L1=0.2, L2=0.2}"]
+    problem = problem_of(preset_spec("paper", [*uncertain, "limits.sway=0.016"]))
+    easiest = relaxation.relaxed(problem, ["limits.sway"])
+    alone = relaxation.relaxed(attrs.evolve(problem, desensitized=("L1",)), ["limits.sway"])
+    assert easiest.share == pytest.approx(alone.share, rel=1e-6)
+    begun_there = direct.solve(problem, easiest.iterate)
+    assert begun_there.redundant == ("L2",)
+    assert begun_there.raise_for_status().cost == pytest.approx(
+        direct.solve(problem).raise_for_status().cost, rel=1e-6
+    )

@@ -111,7 +111,11 @@ def relaxed(problem: Problem, loosened: Sequence[str]) -> Relaxed | None:
     Relaxed or None
         None where the other limits cannot be kept, or the programs do not settle.
     """
-    setup = attrs.evolve(set_up(problem)[0], tried=())
+    setup, redundant = set_up(problem)
+    if redundant:
+        kept = tuple(name for name in problem.desensitized if name not in redundant)
+        return relaxed(attrs.evolve(problem, desensitized=kept), loosened)
+    setup = attrs.evolve(setup, tried=())
     free = LeastCost(
         setup=attrs.evolve(setup, problem=attrs.evolve(problem, limits=LimitsSpec())),
         sway_cost=SwayCost(beta=0.0, gamma=1.0),
