@@ -12,11 +12,11 @@ from gen_profile.problem.problem import Problem
 from gen_profile.solvers import direct, indirect, worst_case
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.cures import Trial, cures
-from gen_profile.solvers.direct import sway_on_the_way
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.relaxation import relaxed
 from gen_profile.solvers.solution import Solution
+from gen_profile.solvers.transient_sway import sway_on_the_way
 from gen_profile.spec import LimitsSpec, SolverName
 
 Judge = Callable[[Solution], bool]

@@ -10,7 +10,7 @@ motion can do where angles are small.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import attrs
@@ -27,16 +27,15 @@ from gen_profile.problem.pontryagin import SNAP_TIME, optimality_system
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.profile import Array
-from gen_profile.response import greatest_sway
 from gen_profile.solvers import goals
 from gen_profile.solvers.acceleration import accelerate
 from gen_profile.solvers.bezier import Piece, power_basis
 from gen_profile.solvers.canonical import Canonical, canonical_problem, independence
 from gen_profile.solvers.condensing import IntervalMaps, axes_map
 from gen_profile.solvers.conic import ConicProgram, ConicSolution, Matrix, Verdict
-from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Optimum, Solution, Status
 from gen_profile.solvers.transcription import Iterate, Machine, Transcription
+from gen_profile.solvers.transient_sway import sway_on_the_way, within_sway
 from gen_profile.spec import LimitsSpec
 
 METHOD = "direct"
@@ -50,7 +49,6 @@ SLOW = 0.3  # share of the step before from which on steps are combined
 MAX_ITERATIONS = 50
 WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
 LEAST_SHARE = 0.01  # of a load's limit, of which a change is still measured
-SWAY_ROUNDS = 4  # to account for what the sway does between collocation points
 HORIZONTAL = np.pi / 2.0
 
 
@@ -146,28 +144,6 @@ def solve(problem: Problem, near: Iterate | None = None) -> Solution:
         return conclude(setup, found, sway_cost, iterations)
 
     return within_sway(problem.limits.sway, attempt)
-
-
-def within_sway(limit: float | None, attempt: Callable[[float | None], Solution]) -> Solution:
-    """Ask for less sway at the collocation points until that between them is within the limit, too.
-
-    Parameters
-    ----------
-    limit : float or None
-        m.
-    attempt : float or None → Solution
-        Solves with a limit at the collocation points.
-    """
-    asked = limit
-    for _ in range(SWAY_ROUNDS):
-        solution = attempt(asked)
-        if limit is None or asked is None or solution.optimum is None:
-            break
-        sway = sway_on_the_way(solution)
-        if sway <= limit:
-            break
-        asked *= goals.WITHIN * limit / sway
-    return solution
 
 
 def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
@@ -495,9 +471,3 @@ def _cost(setup: Setup, iterate: Iterate, sway_cost: SwayCost) -> float:
     sway = transcription.end_sway_found(iterate)
     swayed = float(transcription.quadrature() @ sway_cost.values(sway))
     return duration * (setup.cost_scale * effort + swayed)
-
-
-def sway_on_the_way(solution: Solution) -> float:
-    """Greatest sway of the nominal machine's end load during the motion of a solution, in m."""
-    problem = solution.problem
-    return greatest_sway(problem.plant, optimal_profile(solution), problem.parameters, problem.initial)

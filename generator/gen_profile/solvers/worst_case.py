@@ -30,10 +30,10 @@ from gen_profile.solvers.direct import (
     resolve_sway_cost,
     sequence,
     set_up,
-    within_sway,
 )
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
+from gen_profile.solvers.transient_sway import within_sway
 
 TRACES = (1e-11, 1e-9, 1e-7)  # of effort, in the least worst case
 MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
