@@ -386,15 +386,16 @@ def done_here(run, folder):
     """The child's work in this process, where coverage looks; its refusal, if any."""
     folder.mkdir()
     write_job(run, folder)
-    foreign_child.main(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        # FMPy's proxy keeps the last logger it was given, for all FMUs of a process, beyond that logger's life
+        patch.setattr("fmpy.logging.addLoggerProxy", lambda callbacks: None)
+        foreign_child.main(folder)
     refusal = folder / "refusal.txt"
     return refusal.read_text() if refusal.exists() else None
 
 
 @pytest.mark.parametrize("version", Version)
-def test_the_childs_work_in_this_process(tmp_path, version, monkeypatch):
-    # FMPy's proxy keeps the last logger it was given, for all FMUs of a process, beyond that logger's life
-    monkeypatch.setattr("fmpy.logging.addLoggerProxy", lambda callbacks: None)
+def test_the_childs_work_in_this_process(tmp_path, version):
     path = write_fmu(tmp_path / "customer.fmu", version=version)
     assert done_here(run_of(path), tmp_path / "work") is None
     np.testing.assert_array_equal(np.load(tmp_path / "work" / "result.npy"), run_foreign(run_of(path)))
