@@ -230,7 +230,7 @@ def test_a_design_against_the_worst_machine_tells_its_bound(tmp_path):
     ) in evidence.blocks[0].rows
 
 
-def test_of_many_uncertain_parameters_those_that_matter_have_curves_and_the_worst_machines_are_listed(tmp_path):
+def test_of_many_uncertain_parameters_those_that_matter_have_curves_and_the_worst_machines_rows(tmp_path):
     ranges = "{m1=0.1, m2=0.1, L1=0.1, L2=0.1, g=0.001}"
     words = (
         "--set",

@@ -387,7 +387,7 @@ def done_here(run, folder):
     folder.mkdir()
     write_job(run, folder)
     with pytest.MonkeyPatch.context() as patch:
-        # FMPy's proxy keeps the last logger it was given, for all FMUs of a process, beyond that logger's life
+        # FMPy's proxy keeps the last logger it was given, for a whole process, beyond that logger's life
         patch.setattr("fmpy.logging.addLoggerProxy", lambda callbacks: None)
         foreign_child.main(folder)
     refusal = folder / "refusal.txt"
