@@ -58,7 +58,8 @@ def test_a_case_ends_in_a_record(tmp_path, values, status, reason):
 
 
 def test_a_case_begins_where_its_neighbour_ended(tmp_path):
-    recipe = prepared(tmp_path, "plant.L1=0.45,0.46", overrides=["cost.sway_weight=50"]).recipe
+    far = ["cost.sway_weight=50", 'cost.sway_scale="auto"', "move.distance=3.2"]  # swings by 20°
+    recipe = prepared(tmp_path, "plant.L1=0.45,0.46", overrides=far).recipe
     cold = run_case(recipe, 1, {"plant.L1": 0.46})
     warm = run_case(recipe, 1, {"plant.L1": 0.46}, run_case(recipe, 0, {"plant.L1": 0.45}).start)
     assert warm.record["solver"]["iterations"] < cold.record["solver"]["iterations"]

@@ -94,12 +94,13 @@ def test_gains_are_the_answers_to_single_controls(case):
     response, driven = response_of(matrix, mesh), np.array([2, 4])
     outputs = np.random.default_rng(4).normal(size=(5, LONG_GAUSS.stages, 3, N))
     seen, final = response.gains(driven, outputs)
-    for point, control in [(0, 1), (11, 0), (39, 1)]:
-        pushed = np.zeros((40, N))
+    count = 5 * LONG_GAUSS.stages
+    for point, control in [(0, 1), (11, 0), (count - 1, 1)]:
+        pushed = np.zeros((count, N))
         pushed[point, driven[control]] = 1.0
         _, states, end = response.states(pushed.reshape(5, -1, N))
         column = 2 * point + control
-        expected = (outputs @ states[..., None]).reshape(40, 3)
+        expected = (outputs @ states[..., None]).reshape(count, 3)
         np.testing.assert_allclose(seen[:, :, column], expected, atol=1e-13)
         np.testing.assert_allclose(final[:, column], end, atol=1e-13)
 

@@ -68,7 +68,8 @@ def test_both_ways_lead_to_the_same_motion(name):
     quick, sure = indirect.solve(PROBLEMS[name]), solve_surely(PROBLEMS[name])
     assert is_quick(quick)
     assert not is_quick(sure)
-    assert quick.optimum.cost == pytest.approx(sure.optimum.cost, rel=1e-6)
+    measured = PROBLEMS[name].sway_scale is None  # to some 1e-6, on either mesh
+    assert quick.optimum.cost == pytest.approx(sure.optimum.cost, rel=4e-6 if measured else 1e-6)
     ends = [np.abs(solution.optimum.costates[0]) for solution in (quick, sure)]
     np.testing.assert_allclose(*ends, rtol=1e-4, atol=1e-5 * ends[0].max())
 

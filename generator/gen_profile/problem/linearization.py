@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 
 import attrs
 import numpy as np
@@ -83,10 +83,17 @@ def linearize(
     InfeasibleProblem
         A mode has no restoring force, so the machine has no natural frequency to speak of.
     """
+    axes = [0.0] * len(plant.actuated) if q_a is None else map(float, q_a)
+    return _linearized(plant, tuple(parameters.items()), tuple(axes))
+
+
+@lru_cache(maxsize=64)
+def _linearized(
+    plant: Plant, parameters: tuple[tuple[str, float], ...], q_a: tuple[float, ...]
+) -> Linearization:
     n_u, m = len(plant.unactuated), len(plant.actuated)
     still_u, still_a = np.zeros((1, n_u)), np.zeros((1, m))
-    axes = still_a if q_a is None else np.array([q_a], dtype=np.float64)
-    rest = (still_u, still_u, axes, still_a, parameter_column(plant, dict(parameters)))
+    rest = (still_u, still_u, np.array([q_a]), still_a, parameter_column(plant, dict(parameters)))
     motion_terms, sway_terms = _terms(plant)
     free_q, free_dq, driven = np.split(motion_terms(*rest)[0], [n_u, 2 * n_u], axis=1)
     frequencies, modes = _modes(plant, -free_q)

@@ -40,15 +40,14 @@ def independent_states(A: Array, B: Array, order: NDArray[np.intp], shares: Arra
         responses, step = B[None], expm(A / SAMPLES)
     while len(responses) <= SAMPLES:
         responses, step = np.concatenate([responses, step @ responses]), step @ step
-    rows = responses.transpose(1, 0, 2).reshape(len(A), -1)
-    basis = np.empty((0, rows.shape[1]))
+    outside = responses.transpose(1, 0, 2).reshape(len(A), -1)[order]
+    least = shares * np.linalg.norm(outside, axis=1)
     chosen = np.zeros(len(order), dtype=bool)
-    for i, (row, share) in enumerate(zip(rows[order], shares, strict=True)):
+    for i, row in enumerate(
+        outside
+    ):  # modified Gram-Schmidt: those behind lose what they share with the chosen
         size = np.linalg.norm(row)
-        outside = row
-        for _ in range(2):  # once more, against cancellation
-            outside = outside - (basis @ outside) @ basis
-        chosen[i] = size > 0.0 and np.linalg.norm(outside) > share * size
+        chosen[i] = size > least[i]
         if chosen[i]:
-            basis = np.vstack([basis, outside / np.linalg.norm(outside)])
+            outside[i + 1 :] -= np.outer(outside[i + 1 :] @ row / size**2, row)
     return chosen

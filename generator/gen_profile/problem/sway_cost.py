@@ -17,15 +17,16 @@ class SwayCost:
     beta: float
     gamma: float
 
+    def exponents(self, sway: Array) -> Array:
+        """(γ d)², shape (points,)."""
+        return np.asarray(self.gamma**2 * (sway**2).sum(axis=1))
+
     def values(self, sway: Array) -> Array:
         """Evaluate the cost, shape (points,)."""
-        return np.asarray(self.beta * np.exp(np.minimum(self.gamma**2 * (sway**2).sum(axis=1), STEEPEST)))
+        return np.asarray(self.beta * np.exp(np.minimum(self.exponents(sway), STEEPEST)))
 
-    def slopes(self, sway: Array) -> Array:
-        """Differentiate it by every direction, shape (points, directions)."""
-        return 2.0 * self.gamma**2 * self.values(sway)[:, None] * sway
-
-    def curvatures(self, sway: Array) -> Array:
-        """Differentiate it twice, shape (points, directions, directions)."""
+    def derivatives(self, sway: Array) -> tuple[Array, Array]:
+        """Differentiate it once and twice: (points, directions) and (points, directions, directions)."""
+        steepness = 2.0 * self.gamma**2 * self.values(sway)[:, None]
         square = np.eye(sway.shape[1]) + 2.0 * self.gamma**2 * sway[:, :, None] * sway[:, None]
-        return np.asarray(2.0 * self.gamma**2 * self.values(sway)[:, None, None] * square)
+        return steepness * sway, steepness[..., None] * square

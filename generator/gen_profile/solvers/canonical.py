@@ -106,7 +106,7 @@ class Canonical:
         """
         n = len(self.final)
         linear = self.system.linear(self.unknowns(points), self.data.row()) @ self._transform
-        return np.linalg.inv(self.basis) @ linear[:, :n], linear[:, n:, :n]
+        return self._inverse_transform[:n, :n] @ linear[:, :n], linear[:, n:, :n]
 
     @property
     def sway_cost(self) -> SwayCost:

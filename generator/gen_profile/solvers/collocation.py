@@ -81,7 +81,7 @@ def _gauss(name: str, stages: int) -> Scheme:
 
 
 GAUSS = _gauss("Gauss", STAGES)
-LONG_GAUSS = _gauss("Gauss, long intervals", 2 * STAGES)
+LONG_GAUSS = _gauss("Gauss, long intervals", 9)
 RADAU = _scheme("Radau", np.append((roots_jacobi(STAGES - 1, 1.0, 0.0)[0] + 1.0) / 2.0, 1.0))
 SCHEMES = {scheme.name: scheme for scheme in (GAUSS, LONG_GAUSS, RADAU)}
 
@@ -160,9 +160,11 @@ class Trajectory:
 def sampled(function: Callable[[Array], Array], scheme: Scheme, mesh: Array) -> Trajectory:
     """Interpolate a function, times → (times, size) array, on a mesh."""
     points = (mesh[:-1, None] + np.diff(mesh)[:, None] * scheme.c).ravel()
-    nodes = function(mesh)
-    stages = function(points).reshape(-1, scheme.stages, nodes.shape[1])
-    return Trajectory(scheme=scheme, mesh=mesh, nodes=nodes, stages=stages)
+    values = function(np.concatenate([mesh, points]))
+    nodes, stages = np.split(values, [len(mesh)])
+    return Trajectory(
+        scheme=scheme, mesh=mesh, nodes=nodes, stages=stages.reshape(-1, scheme.stages, values.shape[1])
+    )
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -65,8 +65,8 @@ def cost(
         sway, matrix, offset = transcription.end_sway(iterate, maps, width)
         points, directions = sway.shape
         shares = transcription.quadrature()
-        slope = shares[:, None] * sway_cost.slopes(sway)
-        curvature = shares[:, None, None] * sway_cost.curvatures(sway)
+        slope, curvature = sway_cost.derivatives(sway)
+        slope, curvature = shares[:, None] * slope, shares[:, None, None] * curvature
         hessian = place(curvature, np.arange(points) * directions, points * directions)
         quadratic = quadratic + matrix.T @ hessian @ matrix
         linear = matrix.T @ (slope.ravel() + hessian @ (offset - sway.ravel()))

@@ -120,7 +120,7 @@ def _slower(quiet: Canonical, linear: Trajectory, factor: float) -> NewtonOutcom
 
 def _beside(weighted: Canonical, near: Trajectory | None, intervals: int) -> Advance | None:
     """Find the solution from that of a similar problem, if that lies near enough."""
-    if near is None:
+    if near is None or near.size != 2 * len(weighted.final) or weighted.data.beta == 0.0:
         return None
     mesh = np.linspace(0.0, 1.0, intervals + 1)
     outcome = solve_newton(weighted, weighted.modal(sampled(near, _scheme(weighted), mesh)))

@@ -22,7 +22,7 @@ from gen_profile.solvers.canonical import (
     quintic,
     with_sway_cost,
 )
-from gen_profile.solvers.collocation import LONG_GAUSS, Trajectory, sampled
+from gen_profile.solvers.collocation import LONG_GAUSS, Trajectory
 from gen_profile.solvers.extremal import METHOD, judged
 from gen_profile.solvers.homotopy import MODERATE_ANGLE, solve_by_homotopy
 from gen_profile.solvers.newton import NewtonOutcome
@@ -32,8 +32,8 @@ from gen_profile.solvers.solution import Solution
 
 __all__ = ["METHOD", "solve"]
 
-LONG_INTERVALS = 10  # at least
-RADIANS_PER_LONG_INTERVAL = 5.0  # of the fastest mode that matters
+LONG_INTERVALS = 8  # at least
+RADIANS_PER_LONG_INTERVAL = 6.0  # of the fastest mode that matters
 
 
 def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
@@ -43,7 +43,7 @@ def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
     ----------
     problem : Problem
     near : Trajectory, optional
-        Of the solution of a similar problem, to begin at.
+        Of the solution of a similar problem, to begin at where one linear model does not do.
 
     Returns
     -------
@@ -68,19 +68,14 @@ def _solve(problem: Problem, near: Trajectory | None) -> Solution:
         solution = _solve(attrs.evolve(problem, desensitized=kept), near)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
-    useful = near is not None and near.size == 2 * len(quiet.final) and problem.sway_weight > 0.0
-    near = near if useful else None
-    for start in dict.fromkeys((near, None)):
-        try:
-            found = _solve_simply(problem, quiet, start)
-        except np.linalg.LinAlgError:
-            continue
-        if found is not None:
-            return found
-    return solve_by_homotopy(problem, quiet, near)
+    try:
+        found = _solve_simply(problem, quiet)
+    except np.linalg.LinAlgError:
+        found = None
+    return found or solve_by_homotopy(problem, quiet, near)
 
 
-def _solve_simply(problem: Problem, quiet: Canonical, near: Trajectory | None) -> Solution | None:
+def _solve_simply(problem: Problem, quiet: Canonical) -> Solution | None:
     """Solve with few long intervals and one linear model; there is none where the machine swings too far.
 
     Raises
@@ -93,21 +88,29 @@ def _solve_simply(problem: Problem, quiet: Canonical, near: Trajectory | None) -
     intervals = max(LONG_INTERVALS, math.ceil(quiet.phase / RADIANS_PER_LONG_INTERVAL))
     mesh = np.linspace(0.0, 1.0, intervals + 1)
     start = quintic(quiet, mesh, LONG_GAUSS)
-    measured, weighted = NewtonOutcome(solution=start, iterations=0, residual=0.0), quiet
+    weighted, iterations = quiet, 0
     if problem.sway_weight > 0.0:
         if problem.sway_scale is None:
-            measured = solve_simplified(quiet, start)
-        if measured.solution is None:
-            return None
-        weighted = with_sway_cost(problem, quiet, measured.solution)
-    if near is not None:
-        start = quiet.modal(sampled(near, LONG_GAUSS, mesh))
-    found = solve_simplified(weighted, start)
+            measured = _refined(quiet, start)
+            if measured.solution is None:
+                return None
+            start, iterations = measured.solution, measured.iterations
+        weighted = with_sway_cost(problem, quiet, start)
+    found = _refined(weighted, start)
     if found.solution is None:
         return None
-    refined = refine(weighted, found.solution, solve=solve_simplified)
-    if refined.solution is None:
-        return None
-    iterations = measured.iterations + found.iterations + refined.iterations
-    solution = judged(problem, weighted, refined.solution, iterations, refined.residual or found.residual)
+    solution = judged(problem, weighted, found.solution, iterations + found.iterations, found.residual)
     return solution if solution.optimum is None or solution.optimum.angle < MODERATE_ANGLE else None
+
+
+def _refined(problem: Canonical, start: Trajectory) -> NewtonOutcome:
+    """Solve on the start's mesh, then on finer ones as needed."""
+    found = solve_simplified(problem, start)
+    if found.solution is None:
+        return found
+    refined = refine(problem, found.solution, solve=solve_simplified)
+    return attrs.evolve(
+        refined,
+        iterations=found.iterations + refined.iterations,
+        residual=refined.residual or found.residual,
+    )

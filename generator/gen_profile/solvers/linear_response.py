@@ -13,12 +13,15 @@ import numpy as np
 from gen_profile.profile import Array
 from gen_profile.solvers.collocation import IntArray, Scheme
 
+ROUNDING = 1e-12
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class LinearResponse:
     """Solutions of ``δx' = A δx + f`` from ``δx(0) = 0``, and of its adjoint ``δλ' = −Aᵀ δλ − l``.
 
-    Matrices are given for every interval, or for one that stands for all.
+    Matrices are given for every interval, or for one that stands for all: where the machine is the same at
+    all points.
 
     Attributes
     ----------
@@ -40,11 +43,6 @@ class LinearResponse:
     slopes: Array
     slopes_by_node: Array
     transition: Array
-
-    @property
-    def varies(self) -> bool:
-        """Whether the machine differs from interval to interval."""
-        return len(self.A) > 1
 
     @property
     def weights(self) -> Array:
@@ -124,7 +122,9 @@ class LinearResponse:
 
     def _transposed(self, values: Array) -> Array:
         """Aᵀ λ at every point."""
-        return (values[:, :, None] @ self.A)[:, :, 0]
+        if len(self.A) == 1:
+            return np.asarray(values @ self.A[0, 0])
+        return np.asarray((values[:, :, None] @ self.A)[:, :, 0])
 
 
 def linear_response(A: Array, scheme: Scheme, lengths: Array) -> LinearResponse:
@@ -142,7 +142,7 @@ def linear_response(A: Array, scheme: Scheme, lengths: Array) -> LinearResponse:
         When the equations of an interval are singular.
     """
     lengths = lengths[:, None, None]
-    if np.array_equal(A, np.broadcast_to(A[0], A.shape)) and np.ptp(lengths) < 1e-12:
+    if (A[0, 0] == A).all() and np.ptp(lengths) < ROUNDING:
         A = A[:1]
     count, stages, n, _ = A.shape
     inner = -np.einsum("kij,kiab->kiajb", lengths[:count] * scheme.A, A).reshape(count, stages * n, -1)
@@ -163,7 +163,10 @@ def linear_response(A: Array, scheme: Scheme, lengths: Array) -> LinearResponse:
 
 def _times(matrices: Array, vectors: Array) -> Array:
     """Multiply the vector of every interval, whatever its shape, by the interval's matrix."""
-    return (matrices @ vectors.reshape(len(vectors), -1, 1))[..., 0]
+    flat = vectors.reshape(len(vectors), -1)
+    if len(matrices) == 1:
+        return np.asarray(flat @ matrices[0].T)
+    return np.asarray((matrices @ flat[..., None])[..., 0])
 
 
 def _propagated(transition: Array, offset: Array, initial: Array) -> Array:

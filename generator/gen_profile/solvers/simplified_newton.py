@@ -1,25 +1,26 @@
 """Simplified Newton's method on Pontryagin's conditions, for machines that swing little.
 
-The conditions are evaluated exactly. What corrects them is a linear-quadratic problem: the machine linearised
-as it hangs at rest along the way, and the curvature of the sway's cost where the iteration stands. Its states
-are eliminated, so that only the controls are left to solve for. The less the machine swings, the faster it
-converges (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 2.1). A machine that differs from
-place to place, as a crane that hoists, is linearised anew in every iteration.
+The conditions are evaluated exactly. What they miss is corrected by a convex problem: a linear machine, which
+is this one as it hangs at rest along the way, and the cost as it is. Its states are eliminated, so that only
+the controls are left to solve for. The less the machine swings, the faster the iteration converges
+(Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 2.1). A machine that differs from place to
+place, as a crane that hoists, is linearised anew in every iteration.
 """
 
 from __future__ import annotations
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.profile import Array
 from gen_profile.solvers.canonical import Canonical
 from gen_profile.solvers.collocation import IntArray, Trajectory
+from gen_profile.solvers.least_cost import LinearMachine, least_cost
 from gen_profile.solvers.linear_response import LinearResponse, linear_response
 from gen_profile.solvers.newton import NewtonOutcome
 
 TOLERANCE = 1e-7  # distance to the solution, as the last steps let it be foreseen
-GROWTH = 2.0  # of a step over the one before it, as only the cost's steepness may cause at the start
 BELIEVED = 0.01  # least quotient of steps that is taken for the rate of convergence
 SLOW = 0.5  # share of the step before beyond which another method is the better one
 MAX_ITERATIONS = 20
@@ -42,29 +43,29 @@ class _Iterate:
 
 @attrs.frozen(kw_only=True, eq=False)
 class _Model:
-    """The linear-quadratic problem, but for its sway's cost.
+    """The machine, linearised.
 
     Attributes
     ----------
     response : LinearResponse
     driven : (m,) array of int
         States that the controls drive.
-    effort : (m,) array
-        Second derivative of the effort by each of these states' slopes.
     costed : (intervals, stages, outputs, n) array
-        Derivative by the states of the end load's sway, and of what else is costed by half its square.
-    gain : (points, outputs, points · m) array
-        Derivative of the same by all controls.
-    final_gain : (n, points · m) array
-        Derivative of the final states.
+        Derivative by the states of the end load's sway, and of what else costs half its square.
+    asked : (n,) array of bool
+        Whether a final state is given.
+    machine : LinearMachine
+        The same, as its controls see it.
+    is_uniform : bool
+        Whether the machine is the same everywhere.
     """
 
     response: LinearResponse
     driven: IntArray
-    effort: Array
     costed: Array
-    gain: Array
-    final_gain: Array
+    asked: NDArray[np.bool_]
+    machine: LinearMachine
+    is_uniform: bool
 
 
 def solve_simplified(problem: Canonical, start: Trajectory) -> NewtonOutcome:
@@ -93,9 +94,9 @@ def solve_simplified(problem: Canonical, start: Trajectory) -> NewtonOutcome:
         current, shrinkage = following, step / before
         if shrinkage < SLOW and step * max(shrinkage, BELIEVED) < TOLERANCE:
             return NewtonOutcome(solution=current.trajectory, iterations=iteration, residual=step)
-        if not shrinkage < (GROWTH if iteration <= 2 else 1.0):
+        if not shrinkage < 1.0:
             break
-        if model.response.varies:
+        if not model.is_uniform:
             model = _model(problem, current.trajectory, current.trajectory.points)
     return NewtonOutcome(solution=None, iterations=iteration, residual=step)
 
@@ -113,81 +114,59 @@ def _model(problem: Canonical, like: Trajectory, points: Array) -> _Model:
     """Linearise at given states and costates, at a trajectory's points in time."""
     layout, times = problem.system.layout, like.stages.shape[:2]
     n = layout.size
-    by_unknowns, costed = problem.linear(points)
+    by_unknowns, costed = problem.linear(points[:: times[1]])
+    is_uniform = not (np.ptp(by_unknowns, axis=0).any() or np.ptp(costed, axis=0).any())
+    if is_uniform:
+        by_unknowns, costed = (np.repeat(found, times[1], axis=0) for found in (by_unknowns, costed))
+    else:
+        by_unknowns, costed = problem.linear(points)
     A = by_unknowns[:, :, :n].reshape(*times, n, n)
     driven = np.arange(n)[layout.axis(layout.orders - 1)]
     response = linear_response(A, like.scheme, np.diff(like.mesh))
     costed = costed.reshape(*times, -1, n)
     gain, final_gain = response.gains(driven, costed)
+    asked = ~np.isnan(problem.final)
+    effort = -1.0 / by_unknowns[0, driven, n + driven]  # the controls are −λ / effort
+    machine = LinearMachine(
+        weights=response.weights.ravel(),
+        effort=(response.weights * effort).ravel(),
+        gain=gain,
+        conditions=final_gain[asked],
+    )
     return _Model(
         response=response,
         driven=driven,
-        effort=-1.0 / by_unknowns[0, driven, n + driven],  # the controls are −λ / effort
         costed=costed,
-        gain=gain,
-        final_gain=final_gain,
+        asked=asked,
+        machine=machine,
+        is_uniform=is_uniform,
     )
 
 
 def _corrected(problem: Canonical, model: _Model, current: _Iterate) -> _Iterate:
-    """Solve the linear-quadratic problem for what the conditions miss."""
+    """Solve the linear machine's problem for what the conditions miss."""
     n, response, weights = len(problem.final), model.response, model.response.weights
     slopes, sway = problem.slopes(current.trajectory.points)
     missed = slopes.reshape(current.slopes.shape) - current.slopes
     force, load = missed[..., :n], -weights * missed[..., n:]
-    stiffness = _stiffness(problem, model, sway)
-
-    def loaded(states: Array) -> Array:
-        back = model.costed.swapaxes(2, 3) @ (stiffness @ (model.costed @ states[..., None]))
-        return np.asarray(load + back[..., 0])
-
     _, states, final = response.states(force)
-    slope, _ = response.costates(loaded(states), np.zeros(n))
-    asked = ~np.isnan(problem.final)
-    controls, final_costates = _least(
-        _hessian(model, stiffness),
-        slope[..., model.driven].ravel(),
-        model.final_gain[asked],
-        (problem.final - current.trajectory.nodes[-1, :n] - final)[asked],
+    slope, _ = response.costates(load, np.zeros(n))
+    least = least_cost(
+        model.machine,
+        problem.sway_cost,
+        sway,
+        moved=(model.costed @ states[..., None]).reshape(len(sway), -1),
+        slope=slope[..., model.driven].ravel(),
+        missing=(problem.final - current.trajectory.nodes[-1, :n] - final)[model.asked],
     )
-    force[..., model.driven] += controls.reshape(*force.shape[:2], -1)
-    rises, states, _ = response.states(force)
-    end = np.zeros(n)
-    end[asked] = final_costates
-    _, falls = response.costates(loaded(states), end)
+    force[..., model.driven] += least.controls.reshape(*force.shape[:2], -1)
+    rises, _, _ = response.states(force)
+    load += (model.costed.swapaxes(2, 3) @ least.pull.reshape(*load.shape[:2], -1, 1))[..., 0]
+    final_costates = np.zeros(n)
+    final_costates[model.asked] = least.multipliers
+    _, falls = response.costates(load, final_costates)
     slopes = current.slopes + np.concatenate([rises, -falls / weights], axis=-1)
-    return _integrated(current.trajectory, slopes, problem.initial, current.final_costates + end)
-
-
-def _stiffness(problem: Canonical, model: _Model, sway: Array) -> Array:
-    """Second derivative of the cost by what is costed, times the points' weights.
-
-    Shape (intervals, stages, outputs, outputs).
-    """
-    outputs, sways = model.gain.shape[1], sway.shape[1]
-    stiffness = np.broadcast_to(np.eye(outputs), (len(sway), outputs, outputs)).copy()
-    stiffness[:, :sways, :sways] = problem.sway_cost.curvatures(sway)
-    weights = model.response.weights[..., None]
-    return np.asarray(weights * stiffness.reshape(*weights.shape[:2], outputs, outputs))
-
-
-def _hessian(model: _Model, stiffness: Array) -> Array:
-    """Second derivative of the cost by the controls."""
-    points, outputs, controls = model.gain.shape
-    pulled = stiffness.reshape(points, outputs, outputs) @ model.gain
-    hessian = model.gain.reshape(-1, controls).T @ pulled.reshape(-1, controls)
-    hessian[np.diag_indices(controls)] += (model.response.weights * model.effort).ravel()
-    return np.asarray(hessian)
-
-
-def _least(hessian: Array, slope: Array, constraints: Array, sides: Array) -> tuple[Array, Array]:
-    """Minimise ``½ vᵀ H v + sᵀ v`` where ``C v = c``: v and the multipliers."""
-    size, count = len(hessian), len(constraints)
-    matrix = np.zeros((size + count, size + count))
-    matrix[:size, :size] = hessian
-    matrix[size:, :size], matrix[:size, size:] = constraints, constraints.T
-    solution = np.linalg.solve(matrix, np.concatenate([-slope, sides]))
-    return solution[:size], solution[size:]
+    return _integrated(current.trajectory, slopes, problem.initial, current.final_costates + final_costates)
 
 
 def _consistent(problem: Canonical, start: Trajectory) -> _Iterate:
