@@ -140,10 +140,11 @@ def test_growth_with_intervals(intervals, monkeypatch):
         memory = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         began = time.perf_counter()
-        module.solve(problem)
+        solution = module.solve(problem)
         spent = time.perf_counter() - began
         print(
-            f"\n{module.METHOD:9} {intervals:5} intervals {1e3 * spent:9.1f} ms {memory / 2**20:7.1f} MB",
+            f"\n{module.METHOD:9} {intervals:5} intervals {1e3 * spent:9.1f} ms {memory / 2**20:7.1f} MB "
+            f"{solution.status.name}",
             end="",
         )
 
