@@ -78,11 +78,15 @@ def test_costates_are_those_that_an_integrator_finds_backward(case):
     np.testing.assert_allclose(falls / response.weights, slopes, atol=1e-6)
 
 
-def test_costates_and_states_are_adjoint_to_the_last_bits(case):
-    matrix, mesh = case
+@pytest.mark.parametrize(
+    ("matrix", "mesh"),
+    [(turning, MESH), (turning, np.array([0.0, 1.0])), (lambda t: turning(0.0), EVEN)],
+    ids=["varying", "one interval", "constant"],
+)
+def test_costates_and_states_are_adjoint_to_the_last_bits(matrix, mesh):
     response = response_of(matrix, mesh, GAUSS)
     random = np.random.default_rng(3)
-    pushed, load = random.normal(size=(2, 5, GAUSS.stages, N))
+    pushed, load = random.normal(size=(2, len(mesh) - 1, GAUSS.stages, N))
     end = random.normal(size=N)
     _, states, final = response.states(pushed)
     costates, _ = response.costates(load, end)

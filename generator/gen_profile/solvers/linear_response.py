@@ -122,7 +122,7 @@ class LinearResponse:
 
     def _transposed(self, values: Array) -> Array:
         """Aᵀ λ at every point."""
-        if len(self.A) == 1:
+        if len(self.A) < len(self.lengths):
             return np.asarray(values @ self.A[0, 0])
         return np.asarray((values[:, :, None] @ self.A)[:, :, 0])
 
