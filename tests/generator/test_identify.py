@@ -121,6 +121,14 @@ def test_dates_count_from_the_first(mark):
     np.testing.assert_allclose(log.times, 0.04 * np.arange(22), atol=1e-6)
 
 
+def test_readings_that_no_such_machine_shows():
+    """A rope of 1,200 m swings so slowly."""
+    preset = ("--preset", "single-pendulum-crane")
+    outcome = run_here("identify", *preset, "--period=695±0.3/10", "--free", "L0")
+    assert outcome.code == 3
+    assert re.search(r"With no L0 .* not even with \d+, the most that it takes; look for", outcome.errors[-1])
+
+
 def test_readings_that_cannot_all_be_right():
     readings = "--measured=L1=0.47±0.005", "--period=17.3±0.2/10", "--period=2:2.1±0.02"
     outcome = run_here("identify", *readings, "--free", "L2")

@@ -26,6 +26,7 @@ from gen_profile.identification.measurements import DirectReading
 from gen_profile.profile import Array
 
 WIDEST = 0.9  # relative half-range beyond which it is of no use: a spec cannot state it
+IMPOSSIBLE = 10.0  # standard deviations off a reading, which no chance brings about
 CHANCE = 1e-3  # how rarely good readings may look contradictory
 INDISTINCT = 1e-6  # relative size of a combination of parameters that no measurement depends on
 ZEROS = 32  # of a sensor that are tried, all over one step of its resolution
@@ -167,11 +168,12 @@ def uncertainty(fit: Fit, unknowns: Array, noise: Array) -> Uncertainty:
     Raises
     ------
     InfeasibleProblem
-        The measurements do not determine the parameters.
+        The measurements do not determine the parameters, or ask for more than the machine takes.
     """
     residuals, slopes = fit.residuals(unknowns, noise)
     own, count = _own_slopes(slopes, len(fit.names)), len(fit.readings)
     _require_determined(fit.names, own)
+    _require_possible(fit, unknowns, residuals[:count])
     return Uncertainty(
         fit=fit,
         unknowns=unknowns,
@@ -207,6 +209,21 @@ def _require_determined(names: Sequence[str], slopes: Array) -> None:
         f"The measurements do not determine {' and '.join(blind)}; measure "
         f"{'it' if len(blind) == 1 else 'one of them'} directly (--measured), or another mode's period."
     )
+
+
+def _require_possible(fit: Fit, unknowns: Array, residuals: Array) -> None:
+    """Refuse readings that no such machine shows: the best one lies at a bound, and is far off them."""
+    if np.abs(residuals).max(initial=0.0) < IMPOSSIBLE:
+        return
+    values = unknowns[: len(fit.names)]
+    for bounds, word in zip(fit.bounds, ("least", "most"), strict=True):
+        for name, at in zip(fit.names, np.isclose(values, bounds, rtol=1e-6, atol=1e-9), strict=True):
+            if at:
+                edge = float((bounds * fit.scale)[fit.names.index(name)])
+                raise InfeasibleProblem(
+                    f"With no {name} would the machine show these readings, not even with {edge:g}, the "
+                    f"{word} that it takes; look for a wrong reading, or a wrong unit."
+                )
 
 
 def _birge_ratio(residuals: Array, freedom: int) -> float:
