@@ -33,6 +33,29 @@ QUINTIC_JERK = 60.0  # with which a quintic move starts, in distances per cube o
 
 
 @attrs.frozen(kw_only=True, eq=False)
+class Coordinates:
+    """Modal coordinates ξ and their costates, ζ together.
+
+    Attributes
+    ----------
+    basis : (n, n) array
+        The states of an `OptimalitySystem` are ``basis @ ξ``.
+    """
+
+    basis: Array
+
+    @cached_property
+    def transform(self) -> Array:
+        """Matrix from ζ to states and costates: canonical, so that the equations keep their form."""
+        return _blocks(self.basis, np.asarray(np.linalg.inv(self.basis)).T)
+
+    @cached_property
+    def inverse_transform(self) -> Array:
+        """Matrix from states and costates to ζ."""
+        return _blocks(np.asarray(np.linalg.inv(self.basis)), self.basis.T)
+
+
+@attrs.frozen(kw_only=True, eq=False)
 class Canonical:
     """A boundary value problem whose unknowns ζ are modal coordinates ξ and their costates.
 
@@ -43,8 +66,7 @@ class Canonical:
     ----------
     system : OptimalitySystem
     data : Data
-    basis : (n, n) array
-        The states of `system` are ``basis @ ξ``.
+    coordinates : Coordinates
     initial, final : (n,) arrays
         ξ at the start and at the end; NaN where no end condition is asked for.
     shown : (n,) array
@@ -56,7 +78,7 @@ class Canonical:
 
     system: OptimalitySystem
     data: Data
-    basis: Array
+    coordinates: Coordinates
     initial: Array
     final: Array
     shown: Array
@@ -64,15 +86,15 @@ class Canonical:
 
     def unknowns(self, points: Array) -> Array:
         """Turn ζ into states and costates as `system` knows them, shape (points, 2 n)."""
-        return points @ self._transform.T
+        return points @ self.coordinates.transform.T
 
     def dimensionless(self, solution: Trajectory) -> Trajectory:
         """Turn ζ into states and costates along a solution."""
-        return solution.transformed(self._transform)
+        return solution.transformed(self.coordinates.transform)
 
     def modal(self, solution: Trajectory) -> Trajectory:
         """Turn states and costates into ζ."""
-        return solution.transformed(self._inverse_transform)
+        return solution.transformed(self.coordinates.inverse_transform)
 
     def flow(self, points: Array) -> Array:
         """Evaluate ζ' and beside it its Jacobian, shape (points, 2 n, 1 + 2 n).
@@ -83,8 +105,8 @@ class Canonical:
             When they overflow.
         """
         flow = _finite(self.system.flow(self.unknowns(points), self.data.row()))
-        modal = self._inverse_transform @ flow
-        modal[:, :, 1:] = modal[:, :, 1:] @ self._transform
+        modal = self.coordinates.inverse_transform @ flow
+        modal[:, :, 1:] = modal[:, :, 1:] @ self.coordinates.transform
         return np.asarray(modal)
 
     def slopes(self, points: Array) -> tuple[Array, Array]:
@@ -97,7 +119,7 @@ class Canonical:
         """
         found = _finite(self.system.slopes(self.unknowns(points), self.data.row()))[:, :, 0]
         size = points.shape[1]
-        return found[:, :size] @ self._inverse_transform.T, found[:, size:]
+        return found[:, :size] @ self.coordinates.inverse_transform.T, found[:, size:]
 
     def linear(self, points: Array) -> tuple[Array, Array]:
         """Differentiate ξ' by ζ, and by ξ the end load's sway in m and what else costs half its square.
@@ -105,8 +127,8 @@ class Canonical:
         Shapes (points, n, 2 n) and (points, sways + …, n).
         """
         n = len(self.final)
-        linear = self.system.linear(self.unknowns(points), self.data.row()) @ self._transform
-        return self._inverse_transform[:n, :n] @ linear[:, :n], linear[:, n:, :n]
+        linear = self.system.linear(self.unknowns(points), self.data.row()) @ self.coordinates.transform
+        return self.coordinates.inverse_transform[:n, :n] @ linear[:, :n], linear[:, n:, :n]
 
     @property
     def sway_cost(self) -> SwayCost:
@@ -133,7 +155,7 @@ class Canonical:
         return (
             attrs.evolve(
                 self,
-                basis=self.basis * largest,
+                coordinates=Coordinates(basis=self.coordinates.basis * largest),
                 initial=self.initial / largest,
                 final=self.final / largest,
                 shown=self.shown * largest,
@@ -197,15 +219,6 @@ class Canonical:
         largest = np.abs(nodes).max(axis=0)
         return np.where(largest > 0.0, largest, 1.0)
 
-    @cached_property
-    def _transform(self) -> Array:
-        """Matrix from ζ to states and costates: canonical, so that the equations keep their form."""
-        return _blocks(self.basis, np.asarray(np.linalg.inv(self.basis)).T)
-
-    @cached_property
-    def _inverse_transform(self) -> Array:
-        return _blocks(np.asarray(np.linalg.inv(self.basis)), self.basis.T)
-
 
 def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     """State the problem with β = 0.
@@ -248,7 +261,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     return Canonical(
         system=system,
         data=data,
-        basis=basis,
+        coordinates=Coordinates(basis=basis),
         initial=initial,
         final=final,
         shown=shown,

@@ -39,6 +39,8 @@ class Scheme:
         Collocation points, and weights for integrals.
     A, adjoint : (stages, stages) arrays
         Integrals from 0 to the points, for states and for costates.
+    slopes : (stages, stages) array
+        A⁻¹: slopes in terms of what the points are beyond the beginning.
     end : (stages,) array
         bᵀ A⁻¹: what is reached at 1 in terms of what is at the points.
     interpolation : (stages + 1, stages + 1) array
@@ -50,6 +52,7 @@ class Scheme:
     b: Array
     A: Array
     adjoint: Array
+    slopes: Array
     end: Array
     interpolation: Array
 
@@ -71,6 +74,7 @@ def _scheme(name: str, c: Array) -> Scheme:
         A=A,
         # the costates that belong to discretised states (Hager, Numerische Mathematik 87, 2000)
         adjoint=b - b * A.T / b[:, None],
+        slopes=np.linalg.inv(A),
         end=b @ np.linalg.inv(A),
         interpolation=np.linalg.inv(np.append(0.0, c)[:, None] ** np.append(0, powers)),
     )

@@ -209,7 +209,7 @@ def _nominal(problem: Problem, canonical: Canonical, asked: NDArray[np.bool_]) -
     layout, scale = canonical.system.layout, canonical.data.scale
     states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
     exact = problem.worst_case is None or problem.worst_case.nominal_zero
-    modal = np.asarray(np.linalg.inv(canonical.basis), dtype=np.float64)
+    modal = np.asarray(np.linalg.inv(canonical.coordinates.basis), dtype=np.float64)
     swung = initial_state(problem.plant, problem.initial)
     return Machine(
         equations=motion_equations(problem.plant, problem.desensitized, problem.order),

@@ -109,15 +109,15 @@ class LinearResponse:
         seen_within = outputs @ values
         seen_within = seen_within.reshape(len(seen_within), -1, causes)
 
-        seen = np.empty((intervals, seen_within.shape[1], intervals * len(columns)))
+        seen = np.zeros((intervals, seen_within.shape[1], intervals * len(columns)))
         final = np.zeros((n, intervals * len(columns)))
         for k in range(intervals):
             within, to_end = seen_within[k % len(seen_within)], across[k % len(across)]
-            own = slice(k * len(columns), (k + 1) * len(columns))
-            seen[k] = within[:, :n] @ final
-            seen[k, :, own] += within[:, n:]
-            final = to_end[:, :n] @ final
-            final[:, own] += to_end[:, n:]
+            past, own = slice(0, k * len(columns)), slice(k * len(columns), (k + 1) * len(columns))
+            seen[k, :, past] = within[:, :n] @ final[:, past]
+            seen[k, :, own] = within[:, n:]
+            final[:, past] = to_end[:, :n] @ final[:, past]
+            final[:, own] = to_end[:, n:]
         return seen.reshape(-1, outputs.shape[2], intervals * len(columns)), final
 
     def _transposed(self, values: Array) -> Array:

@@ -172,7 +172,7 @@ def _corrected(problem: Canonical, model: _Model, current: _Iterate) -> _Iterate
 def _consistent(problem: Canonical, start: Trajectory) -> _Iterate:
     """Begin at the initial state; costates of free final states end at zero."""
     lengths = np.diff(start.mesh)[:, None, None]
-    slopes = np.linalg.solve(start.scheme.A, start.stages - start.nodes[:-1, None]) / lengths
+    slopes = start.scheme.slopes @ (start.stages - start.nodes[:-1, None]) / lengths
     n = len(problem.final)
     final_costates = np.where(np.isnan(problem.final), 0.0, start.nodes[-1, n:])
     return _integrated(start, slopes, problem.initial, final_costates)
