@@ -85,8 +85,9 @@ def least_cost(
         reached = sway + outputs[:, :sways]
         pull, (slopes, stiffness[:, :sways, :sways]) = outputs.copy(), cost.derivatives(reached)
         pull[:, :sways] = slopes - before
-        hessian = gain.T @ (weights[..., None] * stiffness @ machine.gain).reshape(gain.shape)
-        hessian[np.diag_indices(size)] += machine.effort
+        pulled = ((weights[..., None] * stiffness)[..., None] * machine.gain[:, None]).sum(axis=2)
+        hessian = gain.T @ pulled.reshape(gain.shape)
+        hessian.flat[:: size + 1] += machine.effort
         change, multipliers = _newton_step(
             hessian,
             slope + machine.effort * controls + gain.T @ (weights * pull).ravel(),
