@@ -83,10 +83,10 @@ def _within_bounds(
 ) -> None:
     """Refuse relative ranges that reach beyond what the machine takes."""
     for parameter in plant.parameters:
-        share = finite(shares.get(parameter.name))
-        if share is None or not 0.0 < share < 1.0:
+        share, value = finite(shares.get(parameter.name)), parameters[parameter.name]
+        if share is None or not 0.0 < share < 1.0 or not parameter.lower <= value <= parameter.upper:
             continue  # or told elsewhere
-        for end in (parameters[parameter.name] * (1.0 + sign * share) for sign in (-1.0, 1.0)):
+        for end in (value * (1.0 + sign * share) for sign in (-1.0, 1.0)):
             if not parameter.lower <= end <= parameter.upper:
                 bounds = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
                 faults.add(place(where, parameter.name), f"reaches {end:.6g}, and the machine takes {bounds}")

@@ -276,3 +276,11 @@ def test_whatever_stands_there_gives_a_spec_or_sentences(changes):
         assert all(re.match(r"[\w.'-]+", fault) and fault.isprintable() for fault in error.faults)
     else:
         assert spec_from_dict(spec.to_dict()) == spec
+
+
+def test_a_value_out_of_bounds_is_told_once_not_its_range_too():
+    with pytest.raises(SpecError) as caught:
+        preset_spec("paper", ["plant.L1=-1"])
+    assert [str(line) for line in str(caught.value).splitlines()] == [
+        "plant.L1: must be a number from 0.01 to 200 m, found -1."
+    ]
