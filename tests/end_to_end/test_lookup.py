@@ -1,9 +1,12 @@
 """The nearest safe profile of a sweep, held against checks of one's own."""
 
+import json
 import shutil
 
+import pyarrow
 import pytest
 from command_line import run_here
+from pyarrow import parquet
 
 from gen_profile.spec_reading import preset_spec
 from gen_profile.workflows.check import check_artefact
@@ -46,7 +49,7 @@ def test_what_was_swept_is_found_itself(library):
     assert found["artefacts"][0]["path"] == str(library / row["folder"] / "paper.csv")
 
 
-@pytest.mark.parametrize("length", [0.29, 0.31])
+@pytest.mark.parametrize("length", [0.305, 0.31])
 def test_between_the_values_the_nearest_is_judged_on_the_machine_asked_for(library, length):
     found = looked_up(library, f"--plant.L1={length}", "--move.distance=0.31", "--solver.method=auto")
     assert found["used"] == {"solver.method": "auto", "move.distance": 0.3, "plant.L1": 0.3}
@@ -70,7 +73,7 @@ def test_a_nearer_profile_that_is_not_safe_there_is_passed_over(library):
     assert f"passed over  case {passed_over[0]}: The " in text
 
 
-@pytest.mark.parametrize(("distance", "length"), [(0.39, 0.33), (0.36, 0.3), (0.25, 0.29)])
+@pytest.mark.parametrize(("distance", "length"), [(0.39, 0.33), (0.36, 0.3), (0.33, 0.31)])
 def test_nearness_counts_in_steps_of_the_grid(library, distance, length):
     found = looked_up(library, f"--move.distance={distance}", f"--plant.L1={length}", "--solver.method=auto")
     tried = [*(entry["case"] for entry in found["passed_over"]), found["case"]]
@@ -84,10 +87,49 @@ def test_nearness_counts_in_steps_of_the_grid(library, distance, length):
 
 
 def test_nothing_safe_is_said(library):
-    outcome = run_here("lookup", library, "--move.distance=0.3", "--plant.L1=1.5", "--solver.method=auto")
+    outcome = run_here("lookup", library, "--move.distance=0.4", "--plant.L1=0.34", "--solver.method=auto")
     assert outcome.code == 4
-    assert "nearest profiles is safe there. Of the nearest, case" in outcome.err
+    assert "nearest profiles is safe there. The nearest profile that passed is case 2" in outcome.err
     assert "Sweep a finer grid" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("distance", "length", "named", "nearest"),
+    [
+        (40, 0.3, ["--move.distance 40: beyond the grid, 0.3 to 0.4 were swept."], "case 2"),
+        (-0.3, 0.3, ["--move.distance -0.3: beyond the grid"], "case 0"),
+        (0.4, 0.2, ["--plant.L1 0.2: beyond the grid, 0.3 to 0.35 were swept."], "case 2"),
+        (0.2, 0.4, ["--move.distance 0.2: beyond", "--plant.L1 0.4: beyond"], "case 1"),
+    ],
+)
+def test_beyond_the_grid_is_refused_and_the_nearest_named(library, distance, length, named, nearest):
+    words = (f"--move.distance={distance}", f"--plant.L1={length}", "--solver.method=auto")
+    outcome = run_here("lookup", library, *words)
+    assert (outcome.code, outcome.out) == (4, "")
+    *beyond, last = outcome.err.splitlines()  # and no word of a simulation
+    assert len(beyond) == len(named)
+    assert all(sentence in line for sentence, line in zip(named, beyond, strict=True))
+    assert f"The nearest profile that passed is {nearest} (" in last
+
+
+def test_what_is_more_than_a_step_of_the_grid_away_is_no_answer(library, tmp_path):
+    """As where the move asked for lies between two of which no profile passed."""
+    shutil.copytree(library, tmp_path / "copy")
+    description = json.loads((library / "sweep.json").read_bytes())
+    description["vary"]["move.distance"] = [0.3, 0.4, 0.5]
+    (tmp_path / "copy" / "sweep.json").write_text(json.dumps(description), "utf-8")
+    rows = read_table(library).to_pylist()
+    kept = [row for row in rows if row["move.distance"] == 0.3]
+    parquet.write_table(pyarrow.Table.from_pylist(kept), tmp_path / "copy" / "sweep.parquet")
+    outcome = run_here(
+        "lookup", tmp_path / "copy", "--move.distance=0.41", "--plant.L1=0.3", "--solver.method=auto"
+    )
+    assert (outcome.code, outcome.out) == (4, "")
+    (error,) = outcome.err.splitlines()
+    assert (
+        "No profile within a step of the grid passed its check. The nearest profile that passed is" in error
+    )
+    assert "case 0 (solver.method auto, move.distance 0.3, plant.L1 0.3)" in error
 
 
 @pytest.mark.parametrize(
@@ -100,7 +142,11 @@ def test_nothing_safe_is_said(library):
         (["--solver.method=auto", "--move.distance=nan", "--plant.L1=0.3"], "must be a finite number"),
         (["--plant.L2=0.3"], "--plant.L2: the sweep did not vary this; did you mean 'plant.L1'?"),
         (["--solver.method=auto", "--move.distance=0.3", "--plant.L1=-7"], "plant.L1: must be a number from"),
+        (["--solver.method=auto", "--plant.L1=0,3"], "found '0,3'; write a decimal point: 0.3."),
+        (["--solver.method=aut", "--plant.L1=x"], "--move.distance: state it"),
         (["--plant.L1"], "--plant.L1 needs a value"),
+        (["--plant.L1", "--move.distance", "0.3"], "--plant.L1 needs a value"),
+        (["--plant.L1=0.3", "--plant.L1=0.35"], "--plant.L1 is stated twice"),
         (["other"], "name one folder"),
     ],
 )
@@ -108,6 +154,7 @@ def test_faults_are_named(library, words, sentence):
     outcome = run_here("lookup", library, *words)
     assert outcome.code == 2
     assert sentence in outcome.err
+    assert "co-simulation" not in outcome.err  # all is read before anything is tried
 
 
 def test_files_that_were_altered_or_lost_are_not_used(library, tmp_path):

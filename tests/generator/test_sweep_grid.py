@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gen_profile.errors import SpecError
 from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.sweep_grid import CHAIN, overrides, parse_grid
+from gen_profile.workflows.sweep_grid import CHAIN, Axis, overrides, parse_grid
 
 
 def test_the_last_axis_changes_fastest():
@@ -89,3 +89,11 @@ def test_overrides_say_what_the_values_are():
 def test_tells_what_makes_no_sense(axes, sentence):
     with pytest.raises(SpecError, match=sentence):
         parse_grid(axes)
+
+
+def test_steps_count_from_value_to_value_however_far_apart_they_are():
+    axis = Axis(key="move.distance", values=(10, 1, 2.0))
+    assert axis.steps(np.array([1.0, 2.0, 10.0, 1.5, 6.0, -7.0, 40.0])) == pytest.approx(
+        [0, 1, 2, 0.5, 1.5, 0, 2]
+    )
+    assert Axis(key="plant.L1", values=(0.5,)).steps(0.5) == 0.0

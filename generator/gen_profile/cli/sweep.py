@@ -95,8 +95,8 @@ def sweep(
 def lookup(words: tuple[str, ...], as_json: bool) -> None:
     """Find the nearest safe profile of a sweep.
 
-    Every key that was varied is an option here. Nearness counts in steps of the grid; safe is what, played on
-    the machine asked for, keeps the limits of the check.
+    Every key that was varied is an option here. Nearness counts in steps of the grid: what is more than one
+    away is no answer. Safe is what, played on the machine asked for, keeps the limits of the check.
     """
     from gen_profile.cli import words as tables
     from gen_profile.cli.progress import progress
@@ -107,8 +107,7 @@ def lookup(words: tuple[str, ...], as_json: bool) -> None:
 
     folder, asked = _folder_and_values(words)
     with progress() as tell:
-        tell("checking by co-simulation")
-        found = run(folder, asked, lambda: tell("compiling the plant's FMU, once"))
+        found = run(folder, asked, tell)
     print_outcome(found.to_dict(), tables.found_profile(found), as_json)
 
 
@@ -149,8 +148,10 @@ def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:
             continue
         key, equals, value = word.removeprefix("--").partition("=")
         value = value if equals else next(rest, "")
-        if not value:
+        if not value or value.startswith("--"):
             raise click.UsageError(f"--{key} needs a value.")
+        if key in asked:
+            raise click.UsageError(f"--{key} is stated twice.")
         asked[key] = value
     if len(folders) != 1:
         raise click.UsageError("name one folder that was swept to, and a value for every key varied there.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,17 @@ from gen_profile.errors import CheckFailed, SpecError
 from gen_profile.manifest import FILENAME, parse_manifest
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import overridden, spec_from_dict
-from gen_profile.suggestion import suggestion
+from gen_profile.suggestion import decimal_point, suggestion
 from gen_profile.workflows.check import Judgement, check_artefact
 from gen_profile.workflows.sweep_case import PASSED
 from gen_profile.workflows.sweep_grid import Axis, Grid, overrides
 from gen_profile.workflows.sweep_store import grid_of, read_swept
 from gen_profile.workflows.sweep_table import Table, cell, read_table
+from gen_profile.workflows.wording import named
 
 TRIES = 64
+ROUNDING = 1e-9  # of a step of the grid
+FINER = "Sweep a finer grid, or a more robust design."
 MACHINE = ("plant.", "actuator.", "check.", "robustness.uncertain.")  # what one has; all else, one may choose
 
 
@@ -90,11 +93,12 @@ class Found:
         }
 
 
-def lookup(folder: Path, asked: Mapping[str, str], on_build: Callable[[], None] = lambda: None) -> Found:
+def lookup(folder: Path, asked: Mapping[str, str], progress: Callable[[str], None] = lambda _: None) -> Found:
     """Find the nearest profile that keeps the limits on the machine asked for, by co-simulation of the file.
 
-    Distances are counted in steps of the grid. Keys of the machine and its check are taken as asked; in all
-    others, such as the move, what the profile was designed for stands in for what was asked.
+    Distances are counted in steps of the grid, and what is more than one step away is another profile, not an
+    answer. Keys of the machine and its check are taken as asked; in all others, such as the move, what the
+    profile was designed for stands in for what was asked.
 
     Parameters
     ----------
@@ -102,8 +106,8 @@ def lookup(folder: Path, asked: Mapping[str, str], on_build: Callable[[], None] 
         Of a finished sweep.
     asked : mapping of str to str
         A value for every varied key.
-    on_build : callable, optional
-        Called before the plant's FMU is compiled.
+    progress : callable, optional
+        Told every step.
 
     Raises
     ------
@@ -112,39 +116,53 @@ def lookup(folder: Path, asked: Mapping[str, str], on_build: Callable[[], None] 
     OutputError
         There is no finished sweep, or its files were altered.
     CheckFailed
-        No profile near is safe there.
+        No profile near is safe there, or what was asked for lies beyond the grid.
     """
     grid = grid_of(folder)
     wanted = _wanted(grid, asked)
+    rows, nearest = _near(grid, read_table(folder), wanted)
+    if nearest is None:
+        raise CheckFailed(f"The sweep in {folder} has no profile that passed and could be used.")
+    _spec_there(folder / nearest["folder"], wanted)  # may refuse what was asked for
+    _require_within(grid, wanted, nearest)
+    if not rows:
+        raise CheckFailed(
+            f"No profile within a step of the grid passed its check. {_named(nearest, wanted)} {FINER}"
+        )
+    progress("checking by co-simulation")
     passed_over: dict[int, str] = {}
-    for row in _nearest(grid, read_table(folder), wanted):
-        judgement = _judge(folder, row, wanted, on_build)
+    for row in rows:
+        judgement = _judge(folder, row, wanted, lambda: progress("compiling the plant's FMU, once"))
         if judgement.check.passed:
             used = {key: row[key] for key in wanted}
             return Found(asked=wanted, used=used, row=row, judgement=judgement, passed_over=passed_over)
         passed_over[row["case"]] = " ".join(judgement.check.reasons())
-    if not passed_over:
-        raise CheckFailed(f"The sweep in {folder} has no profile that passed and could be used.")
-    case, reason = next(iter(passed_over.items()))
     raise CheckFailed(
-        f"None of the {len(passed_over)} nearest profiles is safe there. Of the nearest, case {case}: "
-        f"{reason} Sweep a finer grid, or a more robust design."
+        f"None of the {len(rows)} nearest profiles is safe there. {_named(rows[0], wanted)} "
+        f"{passed_over[rows[0]['case']]} {FINER}"
     )
 
 
 def _wanted(grid: Grid, asked: Mapping[str, str]) -> dict[str, Any]:
     """Read what was asked for, as the table's cells hold it."""
     axes = {axis.key: axis for axis in grid.axes}
-    for key in asked:
-        if key not in axes:
-            raise SpecError(f"--{key}: the sweep did not vary this{suggestion(key, axes)}")
+    faults = [
+        f"--{key}: the sweep did not vary this{suggestion(key, axes)}" for key in asked if key not in axes
+    ]
+    wanted = {}
     for key, axis in axes.items():
-        if key not in asked:
-            raise SpecError(f"--{key}: state it, {_range(axis)} were swept.")
-    return {key: _value(axis, asked[key]) for key, axis in axes.items()}
+        try:
+            wanted[key] = _value(axis, asked.get(key))
+        except SpecError as error:
+            faults += error.faults
+    if faults:
+        raise SpecError(*faults)
+    return wanted
 
 
-def _value(axis: Axis, text: str) -> float | str:
+def _value(axis: Axis, text: str | None) -> float | str:
+    if text is None:
+        raise SpecError(f"--{axis.key}: state it, {_range(axis)} were swept.")
     if not axis.numeric:
         known = [str(cell(axis, value)) for value in axis.values]
         if text not in known:
@@ -155,7 +173,7 @@ def _value(axis: Axis, text: str) -> float | str:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise SpecError(f"--{axis.key}: must be a finite number, found {text[:60]!r}.")
+        raise SpecError(f"--{axis.key}: must be a finite number, found {text[:60]!r}{decimal_point(text)}.")
     return value
 
 
@@ -165,18 +183,42 @@ def _range(axis: Axis) -> str:
     return ", ".join(str(cell(axis, value)) for value in axis.values)
 
 
-def _nearest(grid: Grid, table: Table, wanted: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Give usable rows by their distance, the nearest first; of equally near ones, the earlier case."""
+def _near(
+    grid: Grid, table: Table, wanted: Mapping[str, Any]
+) -> tuple[list[dict[str, Any]], dict[str, Any] | None]:
+    """Give usable rows within a step of the grid, the nearest first, and the nearest of all.
+
+    Of equally near ones, the earlier case comes first.
+    """
     usable = compute.equal(table["status"], PASSED)
-    squares = np.zeros(len(table))
+    squares, farthest = np.zeros(len(table)), np.zeros(len(table))
     for axis in grid.axes:
         if axis.numeric:
-            squares += ((table[axis.key].to_numpy() - wanted[axis.key]) / axis.step) ** 2
+            steps = np.abs(axis.steps(table[axis.key].to_numpy()) - axis.steps(wanted[axis.key]))
+            squares += steps**2
+            farthest = np.maximum(farthest, steps)
         else:
             usable = compute.and_(usable, compute.equal(table[axis.key], wanted[axis.key]))
     cases = np.flatnonzero(usable.to_numpy())
-    order = cases[np.argsort(squares[cases], kind="stable")][:TRIES]
-    yield from table.take(order).to_pylist()
+    order = cases[np.argsort(squares[cases], kind="stable")]
+    near = order[farthest[order] <= 1.0 + ROUNDING][:TRIES]
+    return table.take(near).to_pylist(), next(iter(table.take(order[:1]).to_pylist()), None)
+
+
+def _require_within(grid: Grid, wanted: Mapping[str, Any], nearest: Mapping[str, Any]) -> None:
+    """Refuse what lies beyond the values swept: however near the last of them is, it is another."""
+    beyond = [
+        f"--{axis.key} {wanted[axis.key]:g}: beyond the grid, {_range(axis)} were swept."
+        for axis in grid.axes
+        if axis.numeric and not min(axis.values) <= wanted[axis.key] <= max(axis.values)
+    ]
+    if beyond:
+        raise CheckFailed("\n".join([*beyond, f"{_named(nearest, wanted)} Sweep further for this one."]))
+
+
+def _named(row: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+    values = ", ".join(named({key: row[key] for key in wanted}))
+    return f"The nearest profile that passed is case {row['case']} ({values})."
 
 
 def _judge(

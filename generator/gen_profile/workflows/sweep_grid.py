@@ -11,6 +11,7 @@ from typing import Any
 
 import attrs
 import numpy as np
+import numpy.typing as npt
 
 from gen_profile.errors import SpecError
 
@@ -39,10 +40,13 @@ class Axis:
         """Whether all values are numbers, so that one may be nearer than another."""
         return all(isinstance(value, int | float) and not isinstance(value, bool) for value in self.values)
 
-    @property
-    def step(self) -> float:
-        """Mean spacing of a numeric axis; 1 where there is but one value."""
-        return (max(self.values) - min(self.values)) / max(1, len(self.values) - 1) or 1.0
+    def steps(self, values: npt.NDArray[np.float64] | float) -> npt.NDArray[np.float64]:
+        """Count from the least value of a numeric axis to others, of the same shape: its second one is at 1.
+
+        Between its values one interpolates; what lies beyond its ends counts as these.
+        """
+        known = np.sort(np.asarray(self.values, dtype=np.float64))
+        return np.asarray(np.interp(np.asarray(values), known, np.arange(len(known))))
 
 
 @attrs.frozen(kw_only=True)
