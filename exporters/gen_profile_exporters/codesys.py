@@ -1,5 +1,7 @@
 """CODESYS: a PLCopen XML project with the playback block, a SoftMotion wrapper, and the motion as a cam.
 
+The project is in the dialect that CODESYS writes itself, which is not that of the format ``plcopen-xml``.
+
 The wrapper streams setpoints with ``SMC_FollowSetValues`` (SM3_Basic), which checks nothing: the limits are
 the profile's. The cam is a table of ``SMC_CAMXYVA``, between whose points SoftMotion interpolates by
 quintics.
@@ -33,10 +35,11 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     wrapper = axis_wrapper(source, len(target.axes), CODESYS)
     points = quintic_points(profile, target)
     cams = [_cam(source.name, points, axis) for axis in range(len(target.axes))]
-    pous = [plcopen_xml.pou(source), plcopen_xml.pou(wrapper), *cams]
+    pous = [plcopen_xml.CODESYS.pou(source), plcopen_xml.CODESYS.pou(wrapper), *cams]
     return (
         File(
-            filename=f"{target.name}.codesys.xml", content=write_xml(plcopen_xml.project(target.name, pous))
+            filename=f"{target.name}.codesys.xml",
+            content=write_xml(plcopen_xml.CODESYS.project(target.name, pous)),
         ),
     )
 
@@ -67,10 +70,10 @@ def _cam(block: str, points: QuinticPoints, axis: int) -> etree._Element:
         body=f"Cam.byType := 3;\nCam.byVarType := 6;\nCam.nElements := {last + 1};\nCam.xStart := 0.0;\n"
         f"Cam.xEnd := {literal(points.time[-1])};\nCam.pce := ADR(aPoints);\n",
     )
-    element = plcopen_xml.pou(source)
+    element = plcopen_xml.CODESYS.pou(source)
     columns = (points.time, *(q[:, axis] for q in (points.position, points.velocity, points.acceleration)))
     rows = zip(*(map(literal, column.tolist()) for column in columns), strict=True)
-    plcopen_xml.initialise_structures(
+    plcopen_xml.CODESYS.initialise_structures(
         element, "aPoints", [dict(zip(MEMBERS, row, strict=True)) for row in rows]
     )
     return element

@@ -98,7 +98,7 @@ BUILT_IN: dict[str, Format] = {
     ),
     "plcopen-xml": Format(
         module="gen_profile_exporters.plcopen_xml",
-        summary="playback function block as PLCopen XML (TC6 v2.01)",
+        summary="playback function block as PLCopen XML (TC6 v2.01) for Beremiz and OpenPLC",
         proof="schema-checked",
         suffix=".xml",
     ),

@@ -29,17 +29,17 @@ def write_xml(root: etree._Element) -> bytes:
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n"
 
 
-def child(parent: etree._Element, path: str, namespaces: dict[str, str] | None = None) -> etree._Element:
-    """Find an element that must be there.
+def child(parent: etree._Element, path: str) -> etree._Element:
+    """Find an element that must be there; ``{*}`` in its path stands for any namespace.
 
     Raises
     ------
     ExportError
         It is not.
     """
-    found = parent.find(path, namespaces)
+    found = parent.find(path)
     if found is None:
-        raise ExportError(f"line {parent.sourceline}: {path.rpartition(':')[2]} is missing; export it again.")
+        raise ExportError(f"line {parent.sourceline}: {path.replace('{*}', '')} is missing; export it again.")
     return found
 
 

@@ -53,7 +53,7 @@ MUTATIONS = {
         (rf'(?s){XML_TABLE}value="[^"]+"', r'\1value="NaN"'),
     ],
 }
-NAMES = plcopen_xml.NAMES
+XHTML = "http://www.w3.org/1999/xhtml"
 
 
 def goal_of(profile, layout="segments", **options):
@@ -138,13 +138,36 @@ class TestPlcopenXml:
     @pytest.mark.parametrize("profile", [MOVE, TWO_MOVES], ids=["one", "two"])
     @pytest.mark.parametrize("format_", [plcopen_xml, codesys], ids=["plcopen-xml", "codesys"])
     def test_it_is_valid(self, tc6_schema, format_, profile, layout):
+        """CODESYS writes the namespace of version 2.0, whose schema no registry has."""
         (file,) = format_.encode(profile, goal_of(profile, layout))
-        tc6_schema.assertValid(etree.fromstring(file.content))
+        tc6_schema.assertValid(etree.fromstring(file.content.replace(b"/tc6_0200", b"/tc6_0201")))
+
+    def test_beremiz_and_openplc_find_the_statements(self):
+        """Their reader (xmlclass.py in both) takes the text of the first ``p`` that ``ST`` holds."""
+        root = etree.fromstring(plcopen_xml.encode(MOVE, goal_of(MOVE))[0].content)
+        names = {"tc6": "http://www.plcopen.org/xml/tc6_0201", "ns": XHTML}
+        (statements,) = root.xpath(
+            "/tc6:project/tc6:types/tc6:pous/tc6:pou/tc6:body/tc6:ST", namespaces=names
+        )
+        assert (
+            statements.xpath("ns:p", namespaces=names)[0].text
+            == take_apart(block_text(MOVE, goal_of(MOVE))).body
+        )
+        # What it rewrites before parsing would need a prefix that our document does not declare.
+        assert b"CDATA" not in etree.tostring(root) and b"]]>" not in etree.tostring(root)
+
+    def test_codesys_finds_the_statements(self):
+        """Where its own exports have them."""
+        root = etree.fromstring(codesys.encode(MOVE, goal_of(MOVE))[0].content)
+        assert root.tag == "{http://www.plcopen.org/xml/tc6_0200}project"
+        bodies = root.findall(f".//{{*}}body/{{*}}ST/{{{XHTML}}}xhtml")
+        assert len(bodies) == len(root.findall(".//{*}pou")) == 3
+        assert bodies[0].text == take_apart(block_text(MOVE, goal_of(MOVE))).body
 
     def test_no_entity_is_expanded(self):
         text = (
             '<!DOCTYPE a [<!ENTITY e SYSTEM "file:///etc/hostname">]>'
-            f'<project xmlns="{plcopen_xml.NAMESPACE}"><types><pous><pou name="&e;"/></pous></types>'
+            f'<project xmlns="{plcopen_xml.TC6.namespace}"><types><pous><pou name="&e;"/></pous></types>'
             "</project>"
         )
         with pytest.raises(ExportError):
@@ -152,7 +175,7 @@ class TestPlcopenXml:
 
     def test_variables_keep_their_comments(self):
         root = etree.fromstring(plcopen_xml.encode(MOVE, goal_of(MOVE))[0].content)
-        (variable,) = root.iterfind(".//p:inputVars/p:variable[@name='bHold']", NAMES)
+        (variable,) = root.iterfind(".//{*}inputVars/{*}variable[@name='bHold']")
         assert "go on when it drops" in "".join(variable.itertext())
 
 
@@ -160,19 +183,19 @@ class TestCodesys:
     def test_the_cam_holds_the_quintics(self):
         goal = goal_of(TWO_MOVES, unit="mm")
         root = etree.fromstring(codesys.encode(TWO_MOVES, goal)[0].content)
-        assert [pou.get("name") for pou in root.iterfind(".//p:pou", NAMES)] == [
+        assert [pou.get("name") for pou in root.iterfind(".//{*}pou")] == [
             "FB_bay_3", "FB_bay_3_Axis", "FB_bay_3_Cam1", "FB_bay_3_Cam2",
         ]  # fmt: skip
         points = quintic_points(TWO_MOVES, goal)
         for number in (1, 2):
-            (cam,) = root.iterfind(f".//p:pou[@name='FB_bay_3_Cam{number}']", NAMES)
+            (cam,) = root.iterfind(f".//{{*}}pou[@name='FB_bay_3_Cam{number}']")
             for member, values in (
                 ("dX", points.time),
                 ("dY", points.position[:, number - 1]),
                 ("dV", points.velocity[:, number - 1]),
                 ("dA", points.acceleration[:, number - 1]),
             ):
-                found = cam.iterfind(f".//p:structValue/p:value[@member='{member}']/p:simpleValue", NAMES)
+                found = cam.iterfind(f".//{{*}}structValue/{{*}}value[@member='{member}']/{{*}}simpleValue")
                 assert [float(value.get("value")) for value in found] == values.tolist()
 
 
