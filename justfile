@@ -6,6 +6,7 @@ lint:
     ruff format --check
     ruff check
     mypy
+    mypy --platform win32 --cache-dir .mypy_cache/win32
     lint-imports
 
 # The whole suite with branch coverage; pyproject.toml holds the least share.

@@ -175,9 +175,8 @@ def test_a_folder_without_a_sweep_is_named(tmp_path):
     assert "There is no sweep in" in outcome.err
 
 
-def test_a_sweep_of_which_nothing_passed_is_named(tmp_path):
-    arguments = ("--preset", "paper", "--vary", "check.residual_sway=1e-9", "--out", tmp_path)
-    assert run_here("sweep", *arguments).code == 0
-    outcome = run_here("lookup", tmp_path, "--check.residual_sway=1")
+def test_a_sweep_of_which_nothing_passed_is_named(library):
+    """As of this one's shaped moves, which leave the hook swinging."""
+    outcome = run_here("lookup", library, "--move.distance=0.3", "--plant.L1=0.3", "--solver.method=zv")
     assert outcome.code == 4
     assert "has no profile that passed" in outcome.err

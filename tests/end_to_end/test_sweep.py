@@ -7,10 +7,11 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from command_line import PROGRAM, run_here
+from command_line import PROGRAM, run_here, run_process
 from distributed import Client
 
 from gen_profile.spec_reading import preset_spec, preset_text
@@ -104,9 +105,11 @@ def test_goes_on_in_its_folder_and_repeats_nothing(swept):
     assert stamps(folder) == before
 
 
-def test_any_number_of_processes_finds_the_same_table(swept, tmp_path):
-    alone = run_here("sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "1")
-    assert alone.code == 0
+def test_any_number_of_processes_finds_the_same_table_on_any_system(swept, tmp_path):
+    """Here without what only some systems have; numbers on other processors may differ in last bits."""
+    hidden = str(Path(__file__).parents[1] / "other_systems")
+    alone = run_process("sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "1", PYTHONPATH=hidden)
+    assert alone.code == 0, alone.err
     assert (tmp_path / "sweep.parquet").read_bytes() == (swept[0] / "sweep.parquet").read_bytes()
 
 

@@ -1,8 +1,10 @@
 """Import layers: every module stands in one, and what must start fast does."""
 
+import os
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -48,13 +50,20 @@ def test_every_layer_exists(layer):
     assert layer in set(modules())
 
 
+def printed(script, **environment):
+    """Run Python in a process of its own, and give what it prints."""
+    return subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+
+
+@cache
 def loaded_by(*imported):
-    script = f"import sys, {', '.join(imported)}; print(*sys.modules)"
-    return set(
-        subprocess.run(
-            [sys.executable, "-c", script], capture_output=True, text=True, check=True
-        ).stdout.split()
-    )
+    return set(printed(f"import sys, {', '.join(imported)}; print(*sys.modules)").split())
 
 
 @pytest.mark.parametrize("heavy", ["casadi", "scipy", "fmpy", "matplotlib"])
@@ -71,3 +80,9 @@ def test_shapers_need_numpy_only(heavy):
 
 def test_that_test_would_see_casadi():
     assert "casadi" in loaded_by("gen_profile.problem.linearization")
+
+
+def test_every_module_loads_where_the_system_lacks_what_only_some_have():
+    imports = "\n".join(f"import {name}" for name in modules())
+    hidden = str(ROOT / "tests" / "other_systems")
+    assert printed(f"import os\n{imports}\nprint(hasattr(os, 'fork'))", PYTHONPATH=hidden) == "False\n"

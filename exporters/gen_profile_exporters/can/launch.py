@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import socket
 import struct
+import sys
 import time
 
 import can
@@ -16,6 +17,7 @@ from can.interfaces.socketcan import SocketcanBus
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.clock import NANOSECONDS
 
+assert sys.platform == "linux"  # for the type checker, too
 SO_TXTIME = SCM_TXTIME = 61  # asm-generic/socket.h
 TRIAL = NANOSECONDS // 50  # how far ahead the frame of the trial is sent
 _HEARTBEAT = can.Message(arbitration_id=frames.HEARTBEAT + frames.MASTER, data=b"\x05", is_extended_id=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -38,9 +39,12 @@ def real_time() -> Iterator[tuple[str, ...]]:
 @contextmanager
 def priority(level: int) -> Iterator[tuple[str, ...]]:
     """Run the block's thread with real-time priority; yields what was refused, as a sentence."""
+    if sys.platform != "linux":
+        yield ("Real-time priority is available on Linux only.",)
+        return
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(level))
-    except (OSError, AttributeError):  # not permitted; no such thing on this system
+    except OSError:
         yield ("Real-time priority is not permitted (grant it with `ulimit -r 80` or CAP_SYS_NICE).",)
         return
     try:

@@ -86,7 +86,7 @@ class Port:
         ------
         SpecError
         """
-        if not launch or self.interface != "socketcan" or sys.platform != "linux":
+        if sys.platform != "linux" or not launch or self.interface != "socketcan":
             return self.open(bitrate), ()
         from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # needs sockets of Linux
 
@@ -389,5 +389,5 @@ def _stopped_by_signals(streamer: Streamer) -> Iterator[None]:
 
 def _clock(refused: tuple[str, ...]) -> SystemClock:
     """Spin before each cycle where that takes the processor from nobody."""
-    spare = not refused and len(os.sched_getaffinity(0)) > 1
+    spare = not refused and sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
     return SystemClock(SPIN if spare else 0)

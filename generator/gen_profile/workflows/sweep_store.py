@@ -13,7 +13,6 @@ A case is finished when its ``case.json`` is there, which is the last of its fil
 
 from __future__ import annotations
 
-import fcntl
 import json
 import shutil
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import attrs
+from filelock import FileLock, Timeout
 
 from gen_profile.errors import OutputError
 from gen_profile.manifest import sha256
@@ -146,19 +146,21 @@ def opened(store: Store) -> Iterator[None]:
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
     """Hold a lock that ends with the process, however that ends."""
+    lock = FileLock(folder / LOCK)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / LOCK).open("w")
-    except OSError as error:
+        lock.acquire(blocking=False)
+    except Timeout as error:
+        raise OutputError(f"Another sweep is at work in {folder}; wait for its end.") from error
+    except (OSError, NotImplementedError) as error:  # the latter of file systems without locks
         raise OutputError(
-            f"Cannot write to the folder {folder}: {error.strerror or error}; choose another one."
+            f"Cannot write to the folder {folder}: {getattr(error, 'strerror', '') or error}; "
+            "choose another one."
         ) from error
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise OutputError(f"Another sweep is at work in {folder}; wait for its end.") from error
+    try:
         yield
+    finally:
+        lock.release()
 
 
 def grid_of(folder: Path) -> Grid:
