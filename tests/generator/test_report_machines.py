@@ -12,7 +12,7 @@ from gen_profile.plants.machine_file import plant_of_file, read_machine_file
 from gen_profile.plants.plant import Coordinate
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.report.animation import Actor, Animation
-from gen_profile.report.machines import Pose, body_size, drawings
+from gen_profile.report.machines import body_size, drawings, pose_of
 from gen_profile.report.page import ASSETS
 
 FRAMES = 50
@@ -27,7 +27,7 @@ def swinging(plant, seed=1):
     q_a = 2.0 + 3.0 * times * random.uniform(0.5, 1.0, len(plant.actuated))
     q_u = 0.3 * np.sin(7.0 * times + random.uniform(0.0, 6.0, len(plant.unactuated)))
     parameters = plant.nominal()
-    return Pose(plant=plant, parameters=parameters, q_a=q_a, q_u=q_u, size=body_size(plant, parameters, q_a))
+    return plant, pose_of(plant, parameters, q_a, q_u, body_size(plant, parameters, q_a))
 
 
 def shown(drawing, kind, which=0):
@@ -44,30 +44,30 @@ def places(lagrangian, pose):
 
 
 def test_hook_and_payload_are_drawn_where_their_masses_are():
-    pose = swinging(find_plant("double-pendulum-crane"))
-    (side,) = drawings(pose)
+    plant, pose = swinging(find_plant("double-pendulum-crane"))
+    (side,) = drawings(plant, pose)
     hook, payload = places(double_pendulum, pose)[:, :, [0, 2]].transpose(1, 0, 2)
     np.testing.assert_allclose(shown(side, "hook"), hook, atol=1e-12)
     np.testing.assert_allclose(shown(side, "load"), payload, atol=1e-12)
 
 
 def test_a_hoisted_load_is_drawn_where_its_mass_is():
-    pose = swinging(find_plant("single-pendulum-crane"))
-    (side,) = drawings(pose)
+    plant, pose = swinging(find_plant("single-pendulum-crane"))
+    (side,) = drawings(plant, pose)
     np.testing.assert_allclose(shown(side, "load"), places(single_pendulum, pose)[:, 0, [0, 2]], atol=1e-12)
 
 
 @pytest.mark.parametrize("number, axes", [(0, [0, 2]), (1, [0, 1])])
 def test_a_gantry_s_load_is_drawn_where_its_mass_is_from_both_sides(number, axes):
-    pose = swinging(find_plant("gantry-crane"))
+    plant, pose = swinging(find_plant("gantry-crane"))
     np.testing.assert_allclose(
-        shown(drawings(pose)[number], "load"), places(gantry, pose)[:, 0, axes], atol=1e-12
+        shown(drawings(plant, pose)[number], "load"), places(gantry, pose)[:, 0, axes], atol=1e-12
     )
 
 
 def test_a_tower_crane_s_load_is_drawn_where_its_mass_is_from_above():
-    pose = swinging(find_plant("tower-crane"))
-    above, along = drawings(pose)
+    plant, pose = swinging(find_plant("tower-crane"))
+    above, along = drawings(plant, pose)
     mass = places(tower, pose)[:, 0]
     np.testing.assert_allclose(shown(above, "load"), mass[:, :2], atol=1e-12)
     slew = pose.q_a[:, 0]
@@ -76,15 +76,15 @@ def test_a_tower_crane_s_load_is_drawn_where_its_mass_is_from_above():
 
 
 def test_an_arm_is_drawn_at_its_angle():
-    pose = swinging(find_plant("flexible-joint"))
-    (above,) = drawings(pose)
+    plant, pose = swinging(find_plant("flexible-joint"))
+    (above,) = drawings(plant, pose)
     along = places(flexible_joint, pose)[:, 0, :2]  # of length 1
     np.testing.assert_allclose(shown(above, "load"), pose.p.R * along, atol=1e-12)
 
 
 def test_masses_of_a_chain_trail_their_places_by_their_coordinates():
-    pose = swinging(find_plant("mass-spring-chain-3"))
-    (side,) = drawings(pose)
+    plant, pose = swinging(find_plant("mass-spring-chain-3"))
+    (side,) = drawings(plant, pose)
     blocks = [shape.points[0] for shape in side.shapes if shape.kind == "load"]
     trailing = side.rest[:, blocks, 0] - side.points[:, blocks, 0]
     np.testing.assert_allclose(trailing, pose.q_u, atol=1e-12)
@@ -92,8 +92,8 @@ def test_masses_of_a_chain_trail_their_places_by_their_coordinates():
 
 
 def test_a_liquid_rises_at_the_trailing_wall_as_the_plant_says_and_keeps_its_volume():
-    pose = swinging(find_plant("slosh-tank"))
-    (side,) = drawings(pose)
+    plant, pose = swinging(find_plant("slosh-tank"))
+    (side,) = drawings(plant, pose)
     (liquid,) = (shape for shape in side.shapes if shape.kind == "liquid")
     surface = side.points[:, liquid.points[1:-1]]
     (rise,), _ = pose.loads()
@@ -103,8 +103,8 @@ def test_a_liquid_rises_at_the_trailing_wall_as_the_plant_says_and_keeps_its_vol
 
 def test_a_machine_of_one_s_own_is_drawn_from_its_outputs(request):
     plant = plant_of_file(read_machine_file(request.config.rootpath / EXAMPLE))
-    pose = swinging(plant)
-    (side,) = drawings(pose)
+    plant, pose = swinging(plant)
+    (side,) = drawings(plant, pose)
     slope = np.array([np.cos(pose.p.s), np.sin(pose.p.s)])
     np.testing.assert_allclose(shown(side, "body"), pose.q_a * slope, atol=1e-12)
     rope = shown(side, "load") - shown(side, "body")
@@ -114,8 +114,8 @@ def test_a_machine_of_one_s_own_is_drawn_from_its_outputs(request):
 def test_one_s_own_turning_machine_without_places_hangs_from_where_it_turns(request):
     plant = plant_of_file(read_machine_file(request.config.rootpath / EXAMPLE))
     turning = Coordinate(name="turntable", unit="rad")
-    pose = swinging(attrs.evolve(plant, actuated=(turning,), bodies=()))
-    (side,) = drawings(pose)
+    plant, pose = swinging(attrs.evolve(plant, actuated=(turning,), bodies=()))
+    (side,) = drawings(plant, pose)
     np.testing.assert_allclose(shown(side, "body"), 0.0, atol=1e-12)
     (sway,), (height,) = pose.loads()
     np.testing.assert_allclose(shown(side, "load"), np.stack([-sway, height], 1), atol=1e-12)
@@ -123,8 +123,8 @@ def test_one_s_own_turning_machine_without_places_hangs_from_where_it_turns(requ
 
 @pytest.mark.parametrize("type_", plant_types())
 def test_every_machine_s_animation_keeps_its_points_in_the_picture_and_to_a_thousandth_of_it(type_):
-    pose = swinging(find_plant(type_))
-    actor = Actor(name="nominal", colour="#000", sway=pose.q_u[:, 0], drawings=drawings(pose))
+    plant, pose = swinging(find_plant(type_))
+    actor = Actor(name="nominal", colour="#000", sway=pose.q_u[:, 0], drawings=drawings(plant, pose))
     animation = Animation(
         times=np.linspace(0.0, 1.0, FRAMES), arrival=0.5, limit=0.1, load="load", actors=[actor]
     )
@@ -143,7 +143,7 @@ def test_every_machine_s_animation_keeps_its_points_in_the_picture_and_to_a_thou
 def test_the_page_s_script_knows_every_kind_of_shape():
     script = (ASSETS / "animation.js").read_text("utf-8")
     for type_ in plant_types():
-        for drawing in drawings(swinging(find_plant(type_))):
+        for drawing in drawings(*swinging(find_plant(type_))):
             for shape in drawing.shapes:
                 assert shape.kind == "load" or f"    {shape.kind}: {{" in script
                 assert (shape.size != (0.0, 0.0)) == (shape.kind not in LINES)

@@ -20,6 +20,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gen_profile.plants.drawing import Drawing, Pose, hanging, level
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
 
 
@@ -70,6 +71,11 @@ def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) 
     return Mechanics(mass=[p.m1, p.m2], place=places, gravity=p.g)
 
 
+def picture(pose: Pose) -> tuple[Drawing, ...]:
+    """Draw the cart and what hangs below it."""
+    return (hanging("from the side", pose, trolley=level),)
+
+
 PLANT = Plant(
     type="double-pendulum-crane",
     summary="cart, hook and payload on two ropes",
@@ -102,4 +108,5 @@ PLANT = Plant(
     outputs=outputs,
     bodies=("hook", "payload"),
     mechanics=mechanics,
+    picture=picture,
 )

@@ -17,7 +17,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, stacked
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.profile import Array
 
 
 def equations(
@@ -47,6 +49,28 @@ def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) 
     return Mechanics(mass=[p.J / p.R**2], place=[place], springs=0.5 * p.k * alpha**2)
 
 
+def picture(pose: Pose) -> tuple[Drawing, ...]:
+    """Draw hub and arm from above; where the arm would be if it were stiff is drawn as its plumb line."""
+    reach = pose.p.R
+
+    def above(pose: Pose) -> Array:
+        arm = pose.q_a[:, 0] - pose.q_u[:, 0]
+        tip = reach * np.cos(arm), reach * np.sin(arm)
+        return stacked((0.0, 0.0), tip, frames=len(arm))
+
+    return (
+        drawn(
+            "from above",
+            pose,
+            above,
+            Shape(kind="plumb", points=[0, 1]),
+            Shape(kind="frame", points=[0, 1]),
+            Shape(kind="hook", points=[0], size=(0.1 * reach, 0.1 * reach)),
+            Shape(kind="load", points=[1], size=(0.05 * reach, 0.05 * reach)),
+        ),
+    )
+
+
 PLANT = Plant(
     type="flexible-joint",
     summary="arm behind a torsion spring on a driven hub",
@@ -74,4 +98,5 @@ PLANT = Plant(
     outputs=outputs,
     bodies=("tip",),
     mechanics=mechanics,
+    picture=picture,
 )

@@ -17,7 +17,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, hanging, level, stacked, travel
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.profile import Array
 
 
 def equations(
@@ -61,6 +63,42 @@ def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) 
     return Mechanics(mass=[p.m], place=[(x - seen.sway[0], y - seen.sway[1], seen.height[0])], gravity=p.g)
 
 
+def picture(pose: Pose) -> tuple[Drawing, ...]:
+    """Draw trolley and load from the side, along x, and with the bridge from above."""
+    x, y = pose.q_a.T
+    size = pose.size
+    (left, right), (near, far) = travel(x, 3.0 * size), travel(y, 3.0 * size)
+
+    def above(pose: Pose) -> Array:
+        (x, y), (sway_x, sway_y) = pose.q_a.T, pose.loads()[0]
+        return stacked(
+            (left, near),
+            (right, near),
+            (left, far),
+            (right, far),
+            (x, near),
+            (x, far),
+            (x, y),
+            (x - sway_x, y - sway_y),
+            frames=len(x),
+        )
+
+    return (
+        hanging("from the side", pose, trolley=level, columns=slice(0, 1)),
+        drawn(
+            "from above",
+            pose,
+            above,
+            Shape(kind="rail", points=[0, 1]),
+            Shape(kind="rail", points=[2, 3]),
+            Shape(kind="frame", points=[4, 5]),
+            Shape(kind="body", points=[6], size=(size, size)),
+            Shape(kind="rope", points=[6, 7]),
+            Shape(kind="load", points=[7], size=(0.7 * size, 0.7 * size)),
+        ),
+    )
+
+
 PLANT = Plant(
     type="gantry-crane",
     summary="bridge and trolley, and a payload that swings in both directions",
@@ -85,4 +123,5 @@ PLANT = Plant(
     outputs=outputs,
     bodies=("payload",),
     mechanics=mechanics,
+    picture=picture,
 )

@@ -18,6 +18,8 @@ from typing import Any
 
 import attrs
 
+from gen_profile.plants.drawing import Drawing, Pose
+
 # A float, or a symbol that NumPy functions accept.
 Scalar = Any
 
@@ -156,6 +158,8 @@ class Plant:
         Names of the bodies that `mechanics` tells of.
     mechanics : (q_u, q_a, p) → Mechanics
         For the loads' places and energy, and as a proof of the equations. A motion can be planned without.
+    picture : (pose) → drawings, optional
+        What an animation shows; a machine without is drawn from its outputs.
     """
 
     type: str
@@ -171,6 +175,7 @@ class Plant:
     outputs: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Outputs]
     bodies: tuple[str, ...] = ()
     mechanics: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Mechanics] = _no_bodies
+    picture: Callable[[Pose], tuple[Drawing, ...]] | None = None
 
     @property
     def end_load(self) -> slice:

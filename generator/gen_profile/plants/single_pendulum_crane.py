@@ -18,6 +18,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gen_profile.plants.drawing import Drawing, Pose, hanging, level
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
 
 
@@ -53,6 +54,11 @@ def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) 
     return Mechanics(mass=[p.m], place=[(cart - seen.sway[0], 0.0, seen.height[0])], gravity=p.g)
 
 
+def picture(pose: Pose) -> tuple[Drawing, ...]:
+    """Draw the cart and what hangs below it."""
+    return (hanging("from the side", pose, trolley=level),)
+
+
 PLANT = Plant(
     type="single-pendulum-crane",
     summary="cart with a hoist, and a payload on the rope",
@@ -78,4 +84,5 @@ PLANT = Plant(
     outputs=outputs,
     bodies=("payload",),
     mechanics=mechanics,
+    picture=picture,
 )

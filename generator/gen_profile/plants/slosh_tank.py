@@ -25,9 +25,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, stacked, travel
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.profile import Array
 
 ODD = (1, 3)  # 2n − 1 of the modes
+SURFACE = 17  # points of the liquid's drawn surface
 
 
 def equations(
@@ -79,6 +82,43 @@ def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) 
     return Mechanics(mass=mass, place=place, gravity=p.g)
 
 
+def picture(pose: Pose) -> tuple[Drawing, ...]:
+    """Draw the tank with the liquid: each mode is a cosine along it, and as high at the wall as it says."""
+    a, h = pose.p.a, pose.p.h
+    height = 1.35 * h
+    along = np.linspace(0.0, 1.0, SURFACE)
+
+    def points(pose: Pose) -> Array:
+        place = pose.q_a[:, 0]
+        heights = [
+            4.0 * a / (odd * np.pi) ** 2 * np.sin(theta) for odd, theta in zip(ODD, pose.q_u.T, strict=True)
+        ]
+        surface = [
+            (
+                place + (share - 0.5) * a,
+                h + sum(rise * np.cos(odd * np.pi * share) for odd, rise in zip(ODD, heights, strict=True)),
+            )
+            for share in along
+        ]
+        left, right = place - 0.5 * a, place + 0.5 * a
+        corners = [(left, height), (left, 0.0), (right, 0.0), (right, height)]
+        low, high = travel(place, 0.6 * a)
+        return stacked((low, 0.0), (high, 0.0), *corners, *surface, frames=len(place))
+
+    surface = range(6, 6 + SURFACE)
+    return (
+        drawn(
+            "from the side",
+            pose,
+            points,
+            Shape(kind="rail", points=[0, 1]),
+            Shape(kind="plumb", points=[surface[0], surface[-1]]),
+            Shape(kind="liquid", points=[3, *surface, 4]),
+            Shape(kind="frame", points=[2, 3, 4, 5]),
+        ),
+    )
+
+
 PLANT = Plant(
     type="slosh-tank",
     summary="liquid in a rectangular tank that is moved along its length",
@@ -101,4 +141,5 @@ PLANT = Plant(
     outputs=outputs,
     bodies=("mode1", "mode2"),
     mechanics=mechanics,
+    picture=picture,
 )

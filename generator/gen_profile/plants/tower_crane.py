@@ -27,7 +27,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, hanging, stacked
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.profile import Array
 
 
 def equations(
@@ -79,6 +81,43 @@ def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) 
     return Mechanics(mass=[p.m], place=[(x, y, seen.height[0])], gravity=p.g)
 
 
+def picture(pose: Pose) -> tuple[Drawing, ...]:
+    """Draw the jib from above, and trolley and load along it."""
+    reach, size = 1.1 * float(pose.q_a[:, 1].max()), pose.size
+
+    def above(pose: Pose) -> Array:
+        (slew, radius), (radial, tangential) = pose.q_a.T, pose.loads()[0]
+        along, across = np.stack([np.cos(slew), np.sin(slew)]), np.stack([-np.sin(slew), np.cos(slew)])
+        load = (radius - radial) * along - tangential * across
+        return stacked(
+            tuple(-0.25 * reach * along),
+            tuple(reach * along),
+            (0.0, 0.0),
+            tuple(radius * along),
+            tuple(load),
+            frames=len(slew),
+        )
+
+    return (
+        drawn(
+            "from above",
+            pose,
+            above,
+            Shape(kind="frame", points=[0, 1]),
+            Shape(kind="body", points=[2], size=(1.5 * size, 1.5 * size)),
+            Shape(kind="rope", points=[3, 4]),
+            Shape(kind="hook", points=[3], size=(0.8 * size, 0.8 * size)),
+            Shape(kind="load", points=[4], size=(size, size)),
+        ),
+        hanging(
+            "along the jib",
+            pose,
+            trolley=lambda pose: (pose.q_a[:, 1], np.zeros(len(pose.q_a))),
+            columns=slice(0, 1),
+        ),
+    )
+
+
 PLANT = Plant(
     type="tower-crane",
     summary="slewing jib with a trolley, and a payload that swings along and across it",
@@ -103,4 +142,5 @@ PLANT = Plant(
     outputs=outputs,
     bodies=("payload",),
     mechanics=mechanics,
+    picture=picture,
 )

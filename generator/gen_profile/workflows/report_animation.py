@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gen_profile.report.animation import Actor, Animation
-from gen_profile.report.machines import Pose, body_size, drawings
+from gen_profile.report.machines import body_size, drawings, pose_of
 from gen_profile.spec import Spec
 from gen_profile.workflows.planning import Trial
 from gen_profile.workflows.report_figures import Shown, end_load_sway
@@ -39,9 +39,11 @@ def animation(spec: Spec, trial: Trial, shown: Sequence[Shown], arrival: float) 
         if one.rank > TWINS:
             continue
         response, parameters = responses[one.index], trial.machines[one.index].parameters
-        pose = Pose(plant=plant, parameters=parameters, q_a=response.position, q_u=response.q_u, size=size)
+        pose = pose_of(plant, parameters, response.position, response.q_u, size)
         sway = end_load_sway(spec, response)
-        actors.append(Actor(name=one.name, colour=one.style.colour, sway=sway, drawings=drawings(pose)))
+        actors.append(
+            Actor(name=one.name, colour=one.style.colour, sway=sway, drawings=drawings(plant, pose))
+        )
     return Animation(
         times=times,
         arrival=arrival,
