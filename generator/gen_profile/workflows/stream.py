@@ -86,17 +86,17 @@ class Port:
         ------
         SpecError
         """
-        if sys.platform != "linux" or not launch or self.interface != "socketcan":
-            return self.open(bitrate), ()
-        from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # needs sockets of Linux
+        if sys.platform == "linux" and launch and self.interface == "socketcan":
+            from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # sockets of Linux
 
-        bus = launching_bus(self.channel)
-        if bus is not None:
-            return bus, ("The kernel sends every cycle at its instant (launch times).",)
-        return self.open(bitrate), (
-            f"Frames leave when this program wakes up; `tc qdisc replace dev {self.channel} root fq` would "
-            "have the kernel send each at its instant.",
-        )
+            bus = launching_bus(self.channel)
+            if bus is not None:
+                return bus, ("The kernel sends every cycle at its instant (launch times).",)
+            return self.open(bitrate), (
+                f"Frames leave when this program wakes up; `tc qdisc replace dev {self.channel} root fq` would "
+                "have the kernel send each at its instant.",
+            )
+        return self.open(bitrate), ()
 
 
 @attrs.frozen(kw_only=True, eq=False)
