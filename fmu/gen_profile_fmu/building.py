@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from gen_profile_fmu.cache import cached
+from gen_profile.private_folder import temporary_folder
+from gen_profile_fmu.cache import cached, own_folder
 from gen_profile_fmu.compiler import Compiler, compile_library, find_compiler
 from gen_profile_fmu.fmu_files import SOURCE_FILE, Sources, Version, archive, digest, flat, fmu_files, sources
 from gen_profile_fmu.model import Model
@@ -101,10 +101,11 @@ def compile_texts(
     CosimulationError
         With the compiler's words.
     """
-    with tempfile.TemporaryDirectory(dir=cache, prefix="build-") as folder:
+    zig_cache = own_folder(cache / "zig", within=cache)
+    with temporary_folder(cache, "build-") as folder:
         if on_build is not None:
             on_build()
         for file, text in texts.items():
-            Path(folder, file).write_text(text, encoding="utf-8", newline="\n")
-        compile_library(compiler, Path(folder), source, name, zig_cache=cache / "zig")
-        return Path(folder, name).read_bytes()
+            (folder / file).write_text(text, encoding="utf-8", newline="\n")
+        compile_library(compiler, folder, source, name, zig_cache=zig_cache)
+        return (folder / name).read_bytes()

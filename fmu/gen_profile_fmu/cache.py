@@ -1,23 +1,27 @@
 """A per-user cache of built files: entries by content hash, verified when read, written atomically.
 
-Builds are reproducible, so two processes that write the same entry at once write the same bytes, and each
-file takes its place by a rename: whoever reads sees whole files only. The list of checksums comes last.
+What lies there is loaded and run, so the folders are the user's own: nobody else may write them. Builds are
+reproducible, so two processes that write the same entry at once write the same bytes, and each file takes its
+place by a rename: whoever reads sees whole files only. The list of checksums comes last.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import logging
 import os
-import stat
+import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import platformdirs
 
 from gen_profile.errors import CosimulationError
+from gen_profile.private_folder import is_private, make_private, others_may_write, temporary_folder
 
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CACHE"
 _CHECKSUMS = "checksums.json"
@@ -28,15 +32,14 @@ def cache_folders() -> Iterator[Path]:
     """List folders to look in and to write to, the preferred one first.
 
     That is what the environment variable `GEN_PROFILE_CACHE` names, else the cache folder of the user; then,
-    for users without a home or with one that cannot be written, a private folder among the temporary files.
+    for users without a home or with one that will not do, a private folder among the temporary files.
     """
     named = os.environ.get(ENVIRONMENT_VARIABLE, "").strip()
     preferred = Path(named).absolute() if named else _users_folder()
     if preferred is not None:
         yield preferred
-    private = _private_temporary_folder()  # made only when the first folder will not do
-    if private is not None:
-        yield private
+    user = "user" if sys.platform == "win32" else os.geteuid()
+    yield Path(tempfile.gettempdir()) / f"gen-profile-{user}"
 
 
 def _users_folder() -> Path | None:
@@ -48,21 +51,23 @@ def _users_folder() -> Path | None:
     return folder if folder.is_absolute() else None  # "~" stays where some versions find no home
 
 
-def _private_temporary_folder() -> Path | None:
-    """Make a folder that only this user can write; None when somebody else has taken its name."""
-    user = os.getuid() if hasattr(os, "getuid") else "user"
-    folder = Path(tempfile.gettempdir()) / f"gen-profile-{user}"
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        status = folder.lstat()
-    except OSError as error:
-        _logger.debug("No cache in %s: %s", folder, error)
-        return None
-    if not stat.S_ISDIR(status.st_mode):
-        return None
-    if hasattr(os, "getuid") and (status.st_uid != os.getuid() or stat.S_IMODE(status.st_mode) & 0o077):
-        _logger.warning("The folder %s is not this user's alone; it is not used as a cache.", folder)
-        return None
+def own_folder(folder: Path, within: Path | None = None) -> Path:
+    """Make a folder unless it is there, and refuse one that others may write: what lies in it is run.
+
+    Parameters
+    ----------
+    folder : Path
+    within : Path, optional
+        One above it that is known to be the user's own.
+
+    Raises
+    ------
+    OSError
+    """
+    make_private(folder)
+    temporary = Path(tempfile.gettempdir())  # nothing lies safer there, however it is kept
+    if others_may_write(folder, within) and not (folder.parent == temporary and is_private(folder)):
+        raise PermissionError(errno.EPERM, "others may write there, and what it holds is run")
     return folder
 
 
@@ -86,25 +91,35 @@ def cached(name: str, make: Callable[[Path], Mapping[str, bytes]]) -> Path:
         When there is no folder to keep it in.
     """
     refusals = []
-    for cache in cache_folders():
+    for folder in cache_folders():
         try:
-            if not is_intact(cache / name):
-                cache.mkdir(parents=True, exist_ok=True, mode=0o700)
-                write_entry(cache / name, make(cache))
+            own_folder(folder)
+            if not is_intact(folder / name):
+                write_entry(folder / name, make(folder))
         except OSError as error:
-            refusals.append(f"{cache}: {error.strerror or error}")
+            refusals.append(f"{folder}: {error.strerror or error}")
+            if error.errno == errno.EPERM:
+                _warn(refusals[-1])
         else:
-            return cache / name
+            return folder / name
     raise CosimulationError(
         f"There is no folder to keep the plant's FMU in ({'; '.join(refusals)}). "
         f"Name one that can be written in the environment variable {ENVIRONMENT_VARIABLE}."
     )
 
 
+@cache
+def _warn(refusal: str) -> None:
+    """Say once why another folder is used."""
+    _logger.warning("Not used as a cache: %s.", refusal)
+
+
 def is_intact(entry: Path) -> bool:
-    """Whether an entry is complete and every file as it was written."""
+    """Whether an entry is complete, and every file as it was written, where nobody else may write."""
     try:
         checksums = json.loads((entry / _CHECKSUMS).read_text(encoding="utf-8"))
+        if any(others_may_write(entry / name, entry.parent) for name in (_CHECKSUMS, *checksums)):
+            return False
         return bool(checksums) and all(
             _sha256((entry / name).read_bytes()) == checksum for name, checksum in checksums.items()
         )
@@ -122,20 +137,11 @@ def write_entry(entry: Path, files: Mapping[str, bytes]) -> None:
     """
     checksums = {name: _sha256(content) for name, content in sorted(files.items())}
     listing = (json.dumps(checksums, indent=1) + "\n").encode("utf-8")
-    for name, content in (*sorted(files.items()), (_CHECKSUMS, listing)):
-        _write_atomically(entry / name, content)
-
-
-def _write_atomically(path: Path, content: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".new-")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with temporary_folder(entry.parent, ".new-") as new:
+        for name, content in (*sorted(files.items()), (_CHECKSUMS, listing)):
+            own_folder((entry / name).parent, within=entry.parent)
+            (new / "file").write_bytes(content)
+            (new / "file").replace(entry / name)
 
 
 def _sha256(content: bytes) -> str:

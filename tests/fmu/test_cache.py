@@ -10,8 +10,7 @@ import pytest
 from fmu.caches import share_zig
 
 from gen_profile.errors import CosimulationError
-from gen_profile_fmu import cache as cache_module
-from gen_profile_fmu.cache import cache_folders, is_intact, write_entry
+from gen_profile_fmu.cache import cache_folders, cached, is_intact, write_entry
 from gen_profile_fmu.cosimulation import PlantCosimulation
 from gen_profile_fmu.plant_fmu import plant_fmu
 
@@ -130,7 +129,7 @@ class TestPlantFmu:
         def unknown(_):
             raise KeyError("no such user")
 
-        share_zig(cache, temporary_folder / f"gen-profile-{os.getuid()}")
+        share_zig(cache, temporary_folder / f"gen-profile-{os.geteuid()}")
         for variable in ("HOME", "XDG_CACHE_HOME", "GEN_PROFILE_CACHE"):
             monkeypatch.delenv(variable, raising=False)
         monkeypatch.setattr("pwd.getpwuid", unknown)
@@ -141,7 +140,7 @@ class TestPlantFmu:
     def test_falls_back_when_the_cache_cannot_be_written(
         self, obstacle, tmp_path, cache, temporary_folder, builds, crane, monkeypatch
     ):
-        share_zig(cache, temporary_folder / f"gen-profile-{os.getuid()}")
+        share_zig(cache, temporary_folder / f"gen-profile-{os.geteuid()}")
         named = tmp_path / "file" / "cache" if obstacle == "a file" else Path("/proc/self")
         (tmp_path / "file").write_text("in the way")
         monkeypatch.setenv("GEN_PROFILE_CACHE", str(named))
@@ -169,36 +168,107 @@ class TestPlantFmu:
         assert builds.count == 0
 
 
-class TestCacheFolders:
-    def test_begin_with_the_users(self, monkeypatch):
-        monkeypatch.delenv("GEN_PROFILE_CACHE")
-        monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
-        first, *_ = cache_folders()
-        assert first.name == "gen-profile"
+class TestFoldersOfOthers:
+    """What is in the cache is loaded and run: what others could have laid there is not."""
 
-    def test_are_private_among_temporary_files(self, temporary_folder):
-        *_, private = cache_folders()
-        assert private.stat().st_mode & 0o777 == 0o700
-        assert list(cache_folders())[-1] == private
+    @pytest.fixture
+    def laid(self, tmp_path, monkeypatch):
+        """Lay an entry whose checksums fit into a cache, as somebody else would."""
+        folder = tmp_path / "shared"
+        folder.mkdir()
+        write_entry(folder / "entry", {"library": b"somebody else's"})
+        monkeypatch.setenv("GEN_PROFILE_CACHE", str(folder))
+        return folder
+
+    def found(self):
+        return (cached("entry", lambda _: {"library": b"our own"}) / "library").read_bytes()
+
+    def test_what_this_user_laid_is_taken(self, laid, temporary_folder):
+        assert self.found() == b"somebody else's"
+        assert not list(temporary_folder.iterdir())
+
+    @pytest.mark.parametrize("whose", ["cache", "entry", "file", "list"])
+    @pytest.mark.parametrize(
+        "trap", ["somebody else's", *["open to a group"][: os.geteuid() == 0], "open to all"]
+    )
+    def test_what_others_could_have_laid_is_not(self, laid, temporary_folder, monkeypatch, whose, trap):
+        entry = laid / "entry"
+        place = {"cache": laid, "entry": entry, "file": entry / "library", "list": entry / "checksums.json"}[
+            whose
+        ]
+        if trap == "somebody else's":
+            give_away(place, monkeypatch)
+        else:
+            place.chmod(place.stat().st_mode | (0o020 if trap == "open to a group" else 0o002))
+            if os.geteuid() == 0:  # a group of the user's own number is his own
+                os.chown(place, -1, 12345)
+        assert self.found() == b"our own"
+
+    def test_another_folder_is_used_and_named(self, laid, temporary_folder, caplog):
+        laid.chmod(0o777)
+        for _ in range(2):
+            assert self.found() == b"our own"
+        assert [path.name for path in temporary_folder.iterdir()] == [f"gen-profile-{os.geteuid()}"]
+        (sentence,) = caplog.messages  # once
+        assert sentence == f"Not used as a cache: {laid}: others may write there, and what it holds is run."
+
+    @pytest.mark.parametrize("renamed_by", ["all", "owners"])
+    def test_a_cache_in_a_folder_where_others_rename_is_not_used(self, laid, temporary_folder, renamed_by):
+        laid.parent.chmod(0o777 if renamed_by == "all" else 0o1777)
+        assert self.found() == (b"our own" if renamed_by == "all" else b"somebody else's")
+
+    def test_a_link_into_a_folder_of_others_is_not_followed(self, laid, temporary_folder, monkeypatch):
+        link = laid.with_name("link")
+        link.symlink_to(laid)
+        monkeypatch.setenv("GEN_PROFILE_CACHE", str(link))
+        assert self.found() == b"somebody else's"
+        laid.chmod(0o777)
+        assert self.found() == b"our own"
 
     @pytest.mark.parametrize("trap", ["open to others", "a link", "a file", "somebody else's"])
-    def test_do_not_trust_what_others_could_have_laid(self, temporary_folder, trap, monkeypatch):
-        private = temporary_folder / f"gen-profile-{os.getuid()}"
+    def test_nor_the_one_among_temporary_files(self, laid, temporary_folder, trap, monkeypatch):
+        laid.chmod(0o777)
+        private = temporary_folder / f"gen-profile-{os.geteuid()}"
         if trap == "a link":
-            elsewhere = temporary_folder / "elsewhere"
-            elsewhere.mkdir(mode=0o700)
-            private.symlink_to(elsewhere)
+            private.symlink_to(laid)
         elif trap == "a file":
             private.write_text("")
         else:
-            private.mkdir()
-            private.chmod(0o777 if trap == "open to others" else 0o700)
-        if trap == "somebody else's":
-            user = os.getuid()
-            private.rename(temporary_folder / f"gen-profile-{user + 1}")
-            monkeypatch.setattr(os, "getuid", lambda: user + 1)
-        assert private not in list(cache_folders())
-        assert len(list(cache_folders())) == 1
+            private.mkdir(mode=0o700)
+            if trap == "open to others":
+                private.chmod(0o777)
+            else:
+                give_away(private, monkeypatch)
+                monkeypatch.setattr("gen_profile_fmu.cache.cache_folders", lambda: [laid, private])
+        with pytest.raises(CosimulationError, match=r"no folder to keep .*shared: others may write there"):
+            self.found()
+
+    def test_one_that_is_new_is_private(self, temporary_folder, monkeypatch):
+        monkeypatch.setenv("GEN_PROFILE_CACHE", str(temporary_folder / "a" / "b"))
+        before = os.umask(0)
+        try:
+            entry = cached("entry", lambda _: {"folder/file": b""})
+        finally:
+            os.umask(before)
+        assert [path.stat().st_mode & 0o777 for path in (entry, *entry.parents[:2], entry / "folder")] == [
+            0o700
+        ] * 4
+
+
+def give_away(path, monkeypatch):
+    """Make a file somebody else's: root can, and for others everything is somebody else's."""
+    if os.geteuid() == 0:
+        os.chown(path, 12345, -1)
+    else:
+        user = os.geteuid() + 1
+        monkeypatch.setattr(os, "geteuid", lambda: user)
+
+
+def test_the_cache_is_the_users(monkeypatch):
+    monkeypatch.delenv("GEN_PROFILE_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
+    first, *_ = cache_folders()
+    assert first.name == "gen-profile"
 
 
 def test_an_entry_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
@@ -209,7 +279,7 @@ def test_an_entry_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     def fail(*_):
         raise OSError("No space left on device")
 
-    monkeypatch.setattr(cache_module.Path, "replace", fail)
+    monkeypatch.setattr(Path, "replace", fail)
     with pytest.raises(OSError, match="No space"):
         write_entry(entry, {"folder/file": b"new"})
     assert (entry / "folder" / "file").read_bytes() == b"old"

@@ -2,9 +2,13 @@
 
 import errno
 import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from gen_profile.errors import OutputError
 from gen_profile.workflows.delivery import deliver, staged
@@ -99,3 +103,65 @@ def test_a_file_that_cannot_be_replaced_is_a_sentence(tmp_path):
         staging.write("one.txt", b"1")
         staging.deliver()
     assert tree(tmp_path) == {"one.txt": None}
+
+
+KILLED = """
+import sys
+from pathlib import Path
+from gen_profile.workflows.delivery import staged
+with staged(Path(sys.argv[1])) as staging:
+    staging.write("one.txt", b"half")
+    print(flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_what_a_killed_run_left_goes_and_what_is_at_work_stays(tmp_path):
+    (tmp_path / ".gen-profile-mine").mkdir()  # no lock: made by somebody, or not locked yet
+    (tmp_path / ".gen-profile-mine" / "file").write_bytes(b"")
+    precious = tmp_path / "precious"
+    precious.mkdir(mode=0o700)
+    (precious / ".lock").write_bytes(b"")
+    (tmp_path / ".gen-profile-link").symlink_to(precious)
+    before = tree(tmp_path)
+    command = [sys.executable, "-c", KILLED, str(tmp_path)]
+    with (
+        subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as victim,
+        subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other,
+    ):
+        for process in (victim, other):
+            process.stdout.readline()
+        both = tree(tmp_path)
+        victim.kill()
+        victim.wait()
+        assert tree(tmp_path) == both
+        deliver(tmp_path / "two.txt", b"2")
+        (left,) = {path.split("/")[0] for path in tree(tmp_path).keys() - before.keys()} - {"two.txt"}
+        assert (tmp_path / left / "one.txt").read_bytes() == b"half"
+        other.communicate()
+    assert tree(tmp_path) == before | {"two.txt": b"2"}
+
+
+def test_a_folder_that_is_taken_for_abandoned_before_it_is_locked_is_made_again(tmp_path, monkeypatch):
+    taken = []
+    acquire = FileLock.acquire
+
+    def late(lock, *arguments, **options):
+        if not taken:
+            taken.append(Path(lock.lock_file).parent)
+            shutil.rmtree(taken[0])
+        return acquire(lock, *arguments, **options)
+
+    monkeypatch.setattr(FileLock, "acquire", late)
+    deliver(tmp_path / "one.txt", b"1")
+    assert taken
+    assert tree(tmp_path) == {"one.txt": b"1"}
+
+
+def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise NotImplementedError("FileSystem does not appear to support flock")
+
+    monkeypatch.setattr(FileLock, "acquire", refuse)
+    deliver(tmp_path / "one.txt", b"1")
+    assert tree(tmp_path) == {"one.txt": b"1"}

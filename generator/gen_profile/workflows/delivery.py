@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from gen_profile.errors import OutputError
+from gen_profile.private_folder import temporary_folder
 
 
 class Staging:
@@ -34,6 +34,8 @@ class Staging:
 def staged(destination: Path) -> Iterator[Staging]:
     """Open a staging folder in an output folder; what is not delivered when it closes is gone.
 
+    So is what a run that was killed left there.
+
     An output folder that was made for this and holds nothing at the end is gone, too.
 
     Raises
@@ -45,10 +47,8 @@ def staged(destination: Path) -> Iterator[Staging]:
         made = [folder for folder in (destination, *destination.parents) if not folder.exists()]
         try:
             destination.mkdir(parents=True, exist_ok=True)
-            with TemporaryDirectory(
-                prefix=".gen-profile-", dir=destination, ignore_cleanup_errors=True
-            ) as folder:
-                yield Staging(Path(folder), destination)
+            with temporary_folder(destination, ".gen-profile-") as folder:
+                yield Staging(folder, destination)
         finally:
             _remove_empty(made)
     except OSError as error:

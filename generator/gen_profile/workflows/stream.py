@@ -93,8 +93,8 @@ class Port:
             if bus is not None:
                 return bus, ("The kernel sends every cycle at its instant (launch times).",)
             return self.open(bitrate), (
-                f"Frames leave when this program wakes up; `tc qdisc replace dev {self.channel} root fq` would "
-                "have the kernel send each at its instant.",
+                "Frames leave when this program wakes up; `tc qdisc replace dev "
+                f"{self.channel} root fq` would have the kernel send each at its instant.",
             )
         return self.open(bitrate), ()
 
