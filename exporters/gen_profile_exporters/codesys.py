@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from lxml import etree
 
-from gen_profile.profile import Profile, SampledProfile
+from gen_profile.profile import Profile
 from gen_profile_exporters import plcopen_xml
 from gen_profile_exporters.axis_wrapper import CODESYS, axis_wrapper
 from gen_profile_exporters.block_source import BlockSource, Variable, take_apart
@@ -32,9 +32,20 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         As for Structured Text.
     """
     source = take_apart(block_text(profile, target))
-    wrapper = axis_wrapper(source, len(target.axes), CODESYS)
     points = quintic_points(profile, target)
-    cams = [_cam(source.name, points, axis) for axis in range(len(target.axes))]
+    return _project(source, target, [_cam(source.name, points, axis) for axis in range(len(target.axes))])
+
+
+def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
+    """Write the project with any playback block, and its wrapper."""
+    return _project(source, target, [])
+
+
+unwrap, replay = plcopen_xml.unwrap, plcopen_xml.replay
+
+
+def _project(source: BlockSource, target: Target, cams: list[etree._Element]) -> tuple[File, ...]:
+    wrapper = axis_wrapper(source, len(target.axes), CODESYS)
     pous = [plcopen_xml.CODESYS.pou(source), plcopen_xml.CODESYS.pou(wrapper), *cams]
     return (
         File(
@@ -42,17 +53,6 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
             content=write_xml(plcopen_xml.CODESYS.project(target.name, pous)),
         ),
     )
-
-
-def replay(content: bytes, target: Target) -> SampledProfile:
-    """Work out what the project's first function block issues.
-
-    Raises
-    ------
-    ExportError
-        The document is no such project, or its block was altered.
-    """
-    return plcopen_xml.replay(content, target)
 
 
 def _cam(block: str, points: QuinticPoints, axis: int) -> etree._Element:

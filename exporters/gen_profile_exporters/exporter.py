@@ -9,6 +9,7 @@ import attrs
 from gen_profile.profile import Profile, SampledProfile
 from gen_profile.spec import CanSpec, ExportSpec, Spec
 from gen_profile.units import AxisScale
+from gen_profile_exporters.block_source import BlockSource
 
 
 @attrs.frozen(kw_only=True)
@@ -69,6 +70,30 @@ class Exporter(Protocol):
         ------
         ExportError
             The content is not what `encode` writes: truncated, damaged or meant for another target.
+        """
+        ...
+
+
+class BlockContainer(Exporter, Protocol):
+    """A format whose first file holds a function block: any, be it of one motion or of a library."""
+
+    def wrap(self, source: BlockSource, target: Target) -> tuple[File, ...]:
+        """Write the block, and what the controller needs around it.
+
+        Raises
+        ------
+        ExportError
+            The format or the target cannot take the block.
+        """
+        ...
+
+    def unwrap(self, content: bytes, target: Target) -> BlockSource:
+        """Read the first file's first block as Structured Text has it.
+
+        Raises
+        ------
+        ExportError
+            There is none.
         """
         ...
 

@@ -145,24 +145,38 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     ExportError
         As for Structured Text.
     """
-    source = take_apart(block_text(profile, target))
-    return (
-        File(filename=f"{target.name}.xml", content=write_xml(TC6.project(target.name, [TC6.pou(source)]))),
-    )
+    return wrap(take_apart(block_text(profile, target)), target)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
-    """Work out what the project's first function block issues, whichever its dialect.
+    """Work out what the project's first function block issues.
 
     Raises
     ------
     ExportError
         The document is no such project, or its block was altered.
     """
+    return read_block(unwrap(content, target).text(), target)
+
+
+def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
+    """Write a project with any block in it."""
+    project = TC6.project(target.name, [TC6.pou(source)])
+    return (File(filename=f"{target.name}.xml", content=write_xml(project)),)
+
+
+def unwrap(content: bytes, target: Target) -> BlockSource:
+    """Read a project's first function block, whichever the dialect.
+
+    Raises
+    ------
+    ExportError
+        The document is no such project.
+    """
     root = parse_xml(content)
     if root.tag not in [f"{{{dialect.namespace}}}project" for dialect in (TC6, CODESYS)]:
         raise ExportError("The document is no PLCopen project of TC6 version 2; export it again.")
-    return read_block(_source(child(root, "{*}types/{*}pous/{*}pou")).text(), target)
+    return _source(child(root, "{*}types/{*}pous/{*}pou"))
 
 
 def _default(namespace: str) -> dict[str, str]:
@@ -181,7 +195,10 @@ def _source(element: etree._Element) -> BlockSource:
                 variables += [_read_variable(section, item) for item in group.findall("{*}variable")]
     body = child(element, "{*}body/{*}ST/*")
     return BlockSource(
-        header="", name=attribute(element, "name"), variables=tuple(variables), body=body.text or ""
+        header=f"(*\n    {_text(element)}\n*)\n",
+        name=attribute(element, "name"),
+        variables=tuple(variables),
+        body=body.text or "",
     )
 
 
@@ -197,7 +214,18 @@ def _read_variable(section: str, element: etree._Element) -> Variable:
     initial = ", ".join(values)
     if array is not None and values:
         initial = f"[{initial}]"
-    return Variable(section=section, name=attribute(element, "name"), type=type_, initial=initial)
+    return Variable(
+        section=section,
+        name=attribute(element, "name"),
+        type=type_,
+        initial=initial,
+        comment=_text(element),
+    )
+
+
+def _text(element: etree._Element) -> str:
+    """Read what documents an element; it cannot end the comment that it becomes."""
+    return element.findtext("{*}documentation/*", "").replace("*)", "").replace("(*", "")
 
 
 def _read_type(element: etree._Element) -> str:

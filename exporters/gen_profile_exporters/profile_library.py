@@ -16,10 +16,17 @@ import attrs
 
 from gen_profile.errors import ExportError
 from gen_profile.profile import SampledProfile
-from gen_profile_exporters.block_source import BlockSource, Variable, take_apart
+from gen_profile_exporters.block_source import BlockSource, Variable
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback_table import MOST_SAMPLES
-from gen_profile_exporters.structured_text import block_name, initialiser, plain, read_block
+from gen_profile_exporters.structured_text import (
+    axis_lines,
+    block_name,
+    initialiser,
+    plain,
+    read_block,
+    read_table,
+)
 
 SCALARS = ("cLast", "cSlope", "cSlopeRate", "cCrc", "cLastSegment")
 PER_AXIS = ("cRoom", "cInverse", "cStart", "cTarget")
@@ -61,32 +68,32 @@ class LibraryEntry:
 
     Attributes
     ----------
-    text : str
+    source : BlockSource
         Its playback block.
     label : str
         What it is for, a few words.
     """
 
-    text: str
+    source: BlockSource
     label: str
 
 
-def library_text(name: str, entries: Sequence[LibraryEntry]) -> str:
+def library_source(entries: Sequence[LibraryEntry], target: Target) -> BlockSource:
     """Write a block that plays any of several motions, which `nProfile` counts from 0.
 
     Parameters
     ----------
-    name : str
-        Of the library.
     entries : sequence of LibraryEntry
         One or more, for the same axes and cycle, in the same layout.
+    target : Target
+        Whose name is that of the library.
 
     Raises
     ------
     ExportError
-        They differ in more than their motions, or are too much to compile.
+        They differ in more than their motions, were altered, or are too much to compile.
     """
-    sources = [take_apart(entry.text) for entry in entries]
+    sources = [entry.source for entry in entries]
     for number, source in enumerate(sources):
         if _common(source) != _common(sources[0]):
             raise ExportError(
@@ -99,10 +106,10 @@ def library_text(name: str, entries: Sequence[LibraryEntry]) -> str:
             f"The tables of all profiles have {rows} rows, and no more than {MOST_SAMPLES} were seen to "
             "compile; split them into several libraries."
         )
-    return _assembled(sources, _header(sources, name, entries), block_name(name)).text()
+    return _assembled(sources, _header(entries, target), block_name(target.name))
 
 
-def read_library(text: str, target: Target) -> tuple[SampledProfile, ...]:
+def read_library(library: BlockSource, target: Target) -> tuple[SampledProfile, ...]:
     """Work out what a library's block issues for each of its motions.
 
     Each is taken out of the library as a block of its own, which must be one to the letter, with a checksum
@@ -111,20 +118,27 @@ def read_library(text: str, target: Target) -> tuple[SampledProfile, ...]:
     Raises
     ------
     ExportError
-        The text is no such library, or was altered.
+        The block is no such library, or was altered.
     """
-    library = take_apart(text)
     arrays = {variable.name: variable.elements for variable in library.variables if variable.array}
     try:
         singles = [_single(library, arrays, number) for number in range(len(arrays[FIRST_ROW]))]
     except (KeyError, ValueError, IndexError) as error:
         raise ExportError("The block is no library of motions, or was altered; export it again.") from error
     motions = tuple(read_block(single.text(), target) for single in singles)
-    if take_apart(_assembled(singles, library.header, library.name).text()) != library:
+    if _program(_assembled(singles, library.header, library.name)) != _program(library):
         raise ExportError(
             "The block does not select its motions as it should: it was altered; export it again."
         )
     return motions
+
+
+def _program(source: BlockSource) -> tuple[object, ...]:
+    """Give what a block does, however its text is laid out."""
+    variables = {
+        (v.section, v.name, v.type, *(v.elements if v.array else [v.initial])) for v in source.variables
+    }
+    return variables, source.body.split()
 
 
 def _assembled(sources: Sequence[BlockSource], header: str, name: str) -> BlockSource:
@@ -247,21 +261,18 @@ def _part(
     )
 
 
-def _header(sources: Sequence[BlockSource], name: str, entries: Sequence[LibraryEntry]) -> str:
+def _header(entries: Sequence[LibraryEntry], target: Target) -> str:
     """Describe the library; how to use it is what the header of a single motion says."""
-    _, start, use = sources[0].header.partition("    Call the block once")
-    waits = [int(found) for source in sources for found in _WAIT.findall(source.header)]
+    headers = [entry.source.header for entry in entries]
+    _, start, use = headers[0].partition("    Call the block once")
+    waits = [int(found) for header in headers for found in _WAIT.findall(header)]
     use = _WAIT.sub(f"{max(waits, default=0)} cycles after power-up or another nProfile", use)
     use = use.replace("the peaks above and to the stop jerk", "the motion's own peaks and stop jerk")
     use = use.removesuffix("\n").removesuffix("*)")
-    crcs = [v.initial for source in sources for v in source.variables if v.name == "cCrc"]
-    listed = [
-        f"    {number:6d}  {crc.removeprefix('16#')}  {plain(entry.label)}"
-        for number, (crc, entry) in enumerate(zip(crcs, entries, strict=True))
-    ]
+    listed = [line for number, entry in enumerate(entries) for line in _listed(number, entry, target)]
     lines = [
         "(*",
-        f"    {plain(name)}: playback function block for {len(sources)} motions,",
+        f"    {plain(target.name)}: playback function block for {len(entries)} motions,",
         "    IEC 61131-3 Structured Text, from gen-profile.",
         "",
         "    nProfile selects the motion; another one is taken over while none is played.",
@@ -274,3 +285,13 @@ def _header(sources: Sequence[BlockSource], name: str, entries: Sequence[Library
         "",
     ]
     return "\n".join(lines)
+
+
+def _listed(number: int, entry: LibraryEntry, target: Target) -> list[str]:
+    """Tell what a motion is for, how long it takes, and what it asks of each axis."""
+    table = read_table(entry.source.text(), target)
+    duration = f"{table.last * table.cycle_time:g} s, {table.last} cycles"
+    return [
+        f"    {number:6d}  {table.crc():08X}  {plain(entry.label)}: {duration}",
+        *(f"          {line}" for lines in axis_lines(table) for line in lines.splitlines()),
+    ]

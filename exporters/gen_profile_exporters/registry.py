@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         twincat,
     )
     from gen_profile_exporters.can import exporter as can
-    from gen_profile_exporters.exporter import Exporter
+    from gen_profile_exporters.exporter import BlockContainer, Exporter
 
     # Holds the project's own formats to the protocol wherever types are checked.
     _CONFORMING: tuple[Exporter, ...] = (
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         structured_text,
         twincat,
     )
+    _CONTAINERS: tuple[BlockContainer, ...] = (codesys, plcopen_xml, siemens_scl, structured_text, twincat)
 
 Proof = Literal["executed", "read back", "schema-checked", "parsed", "untested"]
 
@@ -61,6 +62,8 @@ class Format(NamedTuple):
         Of the artefact's name, such as ``".csv"``.
     may_end_at_speed : bool
         What plays it does not hold the last setpoint: what comes next is somebody else's.
+    holds_block : bool
+        It carries the playback block: its module is a `gen_profile_exporters.exporter.BlockContainer`.
     """
 
     module: str
@@ -68,6 +71,7 @@ class Format(NamedTuple):
     proof: Proof
     suffix: str
     may_end_at_speed: bool = False
+    holds_block: bool = False
 
 
 BUILT_IN: dict[str, Format] = {
@@ -82,6 +86,7 @@ BUILT_IN: dict[str, Format] = {
         summary="playback block, SoftMotion wrapper and XYVA cam in a PLCopen XML project for CODESYS",
         proof="schema-checked",
         suffix=".codesys.xml",
+        holds_block=True,
     ),
     "csv": Format(
         module="gen_profile_exporters.csv_table",
@@ -95,12 +100,14 @@ BUILT_IN: dict[str, Format] = {
         summary="playback function block in portable IEC 61131-3 Structured Text",
         proof="executed",
         suffix=".st",
+        holds_block=True,
     ),
     "plcopen-xml": Format(
         module="gen_profile_exporters.plcopen_xml",
         summary="playback function block as PLCopen XML (TC6 v2.01) for Beremiz and OpenPLC",
         proof="schema-checked",
         suffix=".xml",
+        holds_block=True,
     ),
     "rockwell-l5x": Format(
         module="gen_profile_exporters.rockwell_l5x",
@@ -113,12 +120,14 @@ BUILT_IN: dict[str, Format] = {
         summary="playback block, wrapper and cam points as SCL sources for TIA Portal",
         proof="untested",
         suffix=".scl",
+        holds_block=True,
     ),
     "twincat": Format(
         module="gen_profile_exporters.twincat",
         summary="playback block, NC wrapper and motion function points for TwinCAT 3",
         proof="parsed",
         suffix=".TcPOU",
+        holds_block=True,
     ),
 }
 OTHER_NAMES = {"st": "plc"}
@@ -151,6 +160,40 @@ def find_exporter(name: str) -> Exporter:
     if listed not in known:
         raise SpecError(f"--export: unknown format {name!r}{suggestion(name, known)}")
     return cast("Exporter", import_module(known[listed].module))
+
+
+def find_container(name: str) -> BlockContainer:
+    """Load the exporter of a format that carries the playback block.
+
+    Raises
+    ------
+    SpecError
+        It carries none, or no format has that name.
+    """
+    exporter = find_exporter(name)
+    if not formats()[format_named(name)].holds_block:
+        raise SpecError(f"{name} carries no playback block; {_containers()}.")
+    return cast("BlockContainer", exporter)
+
+
+def container_of(path: PurePath | str) -> str:
+    """Tell by a file's suffix which format it is, of those that carry the playback block.
+
+    Raises
+    ------
+    SpecError
+        None has that suffix.
+    """
+    found = _longest_suffix(path, formats())
+    if found is None or not formats()[found].holds_block:
+        fault = f"{found} carries no playback block" if found else "no format has that suffix"
+        raise SpecError(f"{path}: {fault}; {_containers()}.")
+    return found
+
+
+def _containers() -> str:
+    suffixes = (f"{form.suffix} ({name})" for name, form in formats().items() if form.holds_block)
+    return f"the suffixes of those that do are {', '.join(suffixes)}"
 
 
 def require_end(names: Iterable[str], *, stops: bool) -> None:

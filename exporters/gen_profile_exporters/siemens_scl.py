@@ -31,7 +31,7 @@ POINT_ERROR = 1e-6  # m (or rad)
 BYTES = {"LREAL": 8, "DINT": 4, "DWORD": 4}
 
 _BLOCK = re.compile(
-    r'FUNCTION_BLOCK\s+"(\w+)"\s*\{[^}]*\}\s*VERSION\s*:\s*[\d.]+(.*?)\bBEGIN\b(.*?)END_FUNCTION_BLOCK',
+    r'((?:\(\*(?:(?!\*\)).)*\*\)\s*)?)FUNCTION_BLOCK\s+"(\w+)"\s*\{[^}]*\}\s*VERSION\s*:\s*[\d.]+(.*?)\bBEGIN\b(.*?)END_FUNCTION_BLOCK',
     re.DOTALL,
 )
 _WORD = re.compile(r"[()]|(?<![.#\w])[A-Za-z]\w*(\s*:=)?")
@@ -47,19 +47,9 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         As for Structured Text; the table is larger than a data block, or the cam needs too many points.
     """
     source = take_apart(block_text(profile, target))
-    size = sum(_bytes(variable) for variable in source.variables)
-    if size > MOST_BYTES:
-        raise ExportError(
-            f"export.plc_layout: the table takes {size / 1000:.1f} kB, a data block holds "
-            f"{MOST_BYTES / 1000:g} kB; "
-            'take "segments", or a longer export.cycle_time.'
-        )
-    wrapper = axis_wrapper(source, len(target.axes), SIEMENS)
-    text = "\n".join([_scl(source), _scl(wrapper)])
-    return (
-        File(filename=f"{target.name}.scl", content=text.encode("ascii")),
-        File(filename=f"{target.name}_cam.scl", content=_cams(source.name, profile, target).encode("ascii")),
-    )
+    blocks = wrap(source, target)
+    cams = _cams(source.name, profile, target)
+    return (*blocks, File(filename=f"{target.name}_cam.scl", content=cams.encode("ascii")))
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
@@ -70,21 +60,52 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     ExportError
         The text is no such block, or it was altered.
     """
+    return read_block(unwrap(content, target).text(), target)
+
+
+def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
+    """Write the source with any playback block, and its wrapper.
+
+    Raises
+    ------
+    ExportError
+        The tables are larger than a data block.
+    """
+    size = sum(_bytes(variable) for variable in source.variables)
+    if size > MOST_BYTES:
+        raise ExportError(
+            f"export.plc_layout: the table takes {size / 1000:.1f} kB, a data block holds "
+            f"{MOST_BYTES / 1000:g} kB; "
+            'take "segments", a longer export.cycle_time, or fewer motions in a library.'
+        )
+    wrapper = axis_wrapper(source, len(target.axes), SIEMENS)
+    text = "\n".join([_scl(source), _scl(wrapper)])
+    return (File(filename=f"{target.name}.scl", content=text.encode("ascii")),)
+
+
+def unwrap(content: bytes, target: Target) -> BlockSource:
+    """Read the first block, and turn it back into portable text.
+
+    Raises
+    ------
+    ExportError
+        There is none.
+    """
     text = content.decode("latin-1")
     found = _BLOCK.search(text)
     if found is None:
         raise ExportError("There is no SCL block of this export; export it again.")
-    name, declarations, body = found.groups()
+    header, name, declarations, body = found.groups()
     portable = _unmarked(body.replace(_SHIFT, _PORTABLE_SHIFT))
     source = take_apart(
-        f"FUNCTION_BLOCK {name}\n{declarations.lstrip()}\n{portable.lstrip()}END_FUNCTION_BLOCK\n"
+        f"{header}FUNCTION_BLOCK {name}\n{declarations.lstrip()}\n{portable.lstrip()}END_FUNCTION_BLOCK\n"
     )
     arrays_back = [
         attrs.evolve(variable, section="VAR CONSTANT") if _is_table(variable) else variable
         for variable in source.variables
     ]
     names = variable_names(layout_of(text), len(target.axes))
-    return read_block(ordered(attrs.evolve(source, variables=tuple(arrays_back)), names).text(), target)
+    return ordered(attrs.evolve(source, variables=tuple(arrays_back)), names)
 
 
 def _scl(source: BlockSource) -> str:

@@ -25,6 +25,7 @@ from gen_profile.errors import ExportError
 from gen_profile.profile import Array, Profile, SampledProfile
 from gen_profile.units import AxisScale
 from gen_profile_exporters import playback_block
+from gen_profile_exporters.block_source import BlockSource, take_apart
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback_block import Token
 from gen_profile_exporters.playback_table import PlaybackTable, counted_axes, tabulate
@@ -64,6 +65,22 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     return read_block(content.decode("latin-1"), target)
 
 
+def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
+    """Write any block."""
+    return (File(filename=f"{target.name}.st", content=source.text().encode("ascii")),)
+
+
+def unwrap(content: bytes, target: Target) -> BlockSource:
+    """Read a block.
+
+    Raises
+    ------
+    ExportError
+        The text is none.
+    """
+    return take_apart(content.decode("latin-1"))
+
+
 def block_text(profile: Profile, target: Target) -> str:
     """Write the block, see `encode`."""
     table = tabulate(profile, target)
@@ -73,6 +90,11 @@ def block_text(profile: Profile, target: Target) -> str:
 
 def read_block(text: str, target: Target) -> SampledProfile:
     """Work out what a block issues, see `replay`."""
+    return read_table(text, target).motion()
+
+
+def read_table(text: str, target: Target) -> PlaybackTable:
+    """Read a block's table; raises as `replay` does."""
     layout = playback_block.layout_of(text)
     found = playback_block.match(text, layout, len(target.axes))
     if not _NAME.fullmatch(found["block"].text):
@@ -80,7 +102,7 @@ def read_block(text: str, target: Target) -> SampledProfile:
     _array(found["start_tolerance"])
     table = _table(found, layout, target)
     _verify(found, table)
-    return table.motion()
+    return table
 
 
 def block_name(name: str) -> str:
@@ -98,7 +120,7 @@ def literal(value: float) -> str:
 
 def plain(name: str) -> str:
     """Text that can neither end a comment nor leave ASCII."""
-    return re.sub(r"[^A-Za-z0-9._ -]", "_", name)
+    return re.sub(r"[^A-Za-z0-9._ ,+\[\]-]", "_", name)
 
 
 def _values(table: PlaybackTable) -> dict[str, str]:
@@ -144,14 +166,15 @@ def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
         "cycle": repr(table.cycle_time),
         "kilobytes": f"{size / 1000:.3g}",
         "check_cycles": str(-(-values // playback_block.VALUES_PER_CYCLE)),
-        "axis_lines": "\n".join(_axis_lines(table)),
+        "axis_lines": "\n".join(axis_lines(table)),
         "units": units[0] if len(set(units)) == 1 else ", ".join(units),
         "sha256": table.motion().payload_hash(),
         "start_tolerance": _per_axis(np.array([START_TOLERANCE * abs(axis.factor) for axis in table.axes])),
     }
 
 
-def _axis_lines(table: PlaybackTable) -> list[str]:
+def axis_lines(table: PlaybackTable) -> list[str]:
+    """Tell for each axis from where to where it moves, and its peaks."""
     velocity, acceleration, _ = table.peaks()
     jerk = table.limits().jerk
     return [

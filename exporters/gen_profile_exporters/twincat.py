@@ -30,13 +30,9 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         As for Structured Text.
     """
     source = take_apart(block_text(profile, target))
-    wrapper = axis_wrapper(source, len(target.axes), TWINCAT)
     points = quintic_points(profile, target)
-    return (
-        _pou(source),
-        _pou(wrapper),
-        _variable_list(f"GVL_{block_name(target.name).removeprefix('FB_')}", points),
-    )
+    name = f"GVL_{block_name(target.name).removeprefix('FB_')}"
+    return (*wrap(source, target), _variable_list(name, points))
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
@@ -47,12 +43,28 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     ExportError
         The document is no such block, or it was altered.
     """
+    return read_block(unwrap(content, target).text(), target)
+
+
+def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
+    """Write any playback block, and its wrapper."""
+    return (_pou(source), _pou(axis_wrapper(source, len(target.axes), TWINCAT)))
+
+
+def unwrap(content: bytes, target: Target) -> BlockSource:
+    """Read a block.
+
+    Raises
+    ------
+    ExportError
+        The document is none.
+    """
     root = parse_xml(content)
     if root.tag != "TcPlcObject":
         raise ExportError("The document is no TcPlcObject; export it again.")
     pou = child(root, "POU")
     declaration, body = child(pou, "Declaration").text, child(pou, "Implementation/ST").text
-    return read_block(f"{declaration or ''}\n{body or ''}END_FUNCTION_BLOCK\n", target)
+    return take_apart(f"{declaration or ''}\n{body or ''}END_FUNCTION_BLOCK\n")
 
 
 def _pou(source: BlockSource) -> File:

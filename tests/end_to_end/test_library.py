@@ -11,8 +11,10 @@ from gen_profile.errors import ExportError
 from gen_profile.spec_reading import preset_spec
 from gen_profile.workflows import profile_library
 from gen_profile.workflows.sweep_table import read_table
+from gen_profile_exporters.block_source import take_apart
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.profile_library import read_library
+from gen_profile_exporters.registry import container_of, find_container
 
 CYCLE = "export.cycle_time=0.01"
 AXES = (
@@ -32,7 +34,8 @@ def sweep(folder, *arguments):
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory):
-    return sweep(tmp_path_factory.mktemp("swept"), *AXES, "--export", "csv", "--export", "plc")
+    """The blocks may lie in any container, not only in that of the library."""
+    return sweep(tmp_path_factory.mktemp("swept"), *AXES, "--export", "csv", "--export", "twincat")
 
 
 @pytest.fixture(scope="module")
@@ -64,10 +67,55 @@ def test_holds_the_profiles_that_passed_in_their_order(swept, library):
 def test_issues_what_was_checked(library):
     path, document = library
     target = target_of(preset_spec("paper-beta0", [CYCLE]))
-    motions = read_library(path.read_text("ascii"), target)
+    motions = read_library(take_apart(path.read_text("ascii")), target)
     hashes = [entry["payload_sha256"] for entry in document["profiles"]]
     assert [motion.payload_hash() for motion in motions] == hashes
     assert len(set(hashes)) == len(hashes)
+
+
+@pytest.mark.parametrize(
+    ("name", "others"),
+    [
+        ("bay 3.XML", []),
+        ("bay 3.codesys.xml", []),
+        ("bay 3.scl", []),
+        ("FB_bay_3.TcPOU", ["FB_bay_3_Axis.TcPOU"]),
+    ],
+)
+def test_the_suffix_tells_the_format(swept, library, tmp_path, name, others):
+    outcome = run_here("library", swept, "--out", tmp_path / name, "--json")
+    assert (outcome.code, outcome.errors) == (0, [])
+    document, due = outcome.document, library[1]
+    assert [Path(path).name for path in document["files"]] == [name, *others]
+    assert (document["block"], document["profiles"]) == (due["block"], due["profiles"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        [name, *others, Path(document["index"]).name]
+    )
+    target = target_of(preset_spec("paper-beta0", [CYCLE]))
+    block = find_container(container_of(name)).unwrap((tmp_path / name).read_bytes(), target)
+    hashes = [motion.payload_hash() for motion in read_library(block, target)]
+    assert hashes == [entry["payload_sha256"] for entry in due["profiles"]]
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("bay.L5X", "rockwell-l5x carries no playback block"),
+        ("bay.csv", "csv carries no playback block"),
+        ("bay.pdf", "no format has that suffix"),
+        ("bay", "no format has that suffix"),
+    ],
+)
+def test_a_suffix_of_no_block_is_refused(swept, tmp_path, name, fault):
+    outcome = run_here("library", swept, "--out", tmp_path / name)
+    assert (outcome.code, outcome.errors) == (
+        2,
+        [
+            f"Error: {tmp_path / name}: {fault}; the suffixes of those that do are .codesys.xml (codesys), "
+            ".st (plc), .xml (plcopen-xml), .scl (siemens-scl), .TcPOU (twincat)."
+        ],
+    )
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_same_sweep_makes_the_same_bytes(swept, library, tmp_path):
@@ -80,7 +128,7 @@ def test_the_same_sweep_makes_the_same_bytes(swept, library, tmp_path):
 
 def test_a_file_that_was_altered_is_not_put_in(swept, tmp_path):
     copy = shutil.copytree(swept, tmp_path / "copy")
-    case = next(iter(sorted(copy.glob("cases/*/*/*.st"))))
+    case = next(iter(sorted(copy.glob("cases/*/*/FB_paper*[!s].TcPOU"))))
     case.write_bytes(case.read_bytes().replace(b"cLast : DINT := ", b"cLast : DINT := 1"))
     outcome = run_here("library", copy, "--out", tmp_path / "library.st")
     assert (outcome.code, outcome.errors) == (
@@ -91,11 +139,11 @@ def test_a_file_that_was_altered_is_not_put_in(swept, tmp_path):
 
 
 def test_a_library_that_would_issue_something_else_is_not_written(swept, tmp_path, monkeypatch):
-    def shuffled(name, entries):
-        return library_text(name, entries[::-1])
+    def shuffled(entries, target):
+        return library_source(entries[::-1], target)
 
-    library_text = profile_library.library_text
-    monkeypatch.setattr(profile_library, "library_text", shuffled)
+    library_source = profile_library.library_source
+    monkeypatch.setattr(profile_library, "library_source", shuffled)
     with pytest.raises(ExportError, match="Profile 0 would not issue what case"):
         profile_library.write_library(swept, tmp_path / "library.st")
     assert list(tmp_path.iterdir()) == []

@@ -73,7 +73,7 @@ def inputs(number, starts, **given):
 @pytest.mark.parametrize("axes", [1, 2])
 def test_every_motion_plays_as_its_own_block_and_as_interpreted(layout, axes, tmp_path):
     texts = blocks(goal_of(layout, axes))
-    text = together(texts)
+    text = together(texts, goal_of(layout, axes))
     starts = [np.ravel(FunctionBlock(own)["cStart"]).tolist() for own in texts]
     rows, spans = [], []
     for number in (2, 0, 3, 1, 4, 2):
@@ -100,6 +100,6 @@ def test_the_largest_library_compiles(tmp_path):
     goal = target(cycle_time=0.001, export={"plc_layout": "samples"})
     text = structured_text.block_text(quintic((0.0, 1.0), duration=1.0), goal)
     count = MOST_SAMPLES // 1001
-    library = together([text] * count)
+    library = together([text] * count, goal)
     assert f"cProfiles : DINT := {count};" in library
     compile_text(library, tmp_path)

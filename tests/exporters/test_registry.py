@@ -7,7 +7,14 @@ import pytest
 
 from gen_profile.errors import SpecError
 from gen_profile_exporters import registry
-from gen_profile_exporters.registry import BUILT_IN, Format, find_exporter, format_of, formats
+from gen_profile_exporters.registry import (
+    BUILT_IN,
+    Format,
+    find_container,
+    find_exporter,
+    format_of,
+    formats,
+)
 
 PLUGIN = Format(module="json", summary="a test", proof="untested", suffix=".json")
 NOT_A_FORMAT = "text"
@@ -32,6 +39,17 @@ def test_every_format_can_be_found_and_has_its_own_suffix():
         assert callable(find_exporter(name).replay)
         assert format_of(f"out/motion{form.suffix}") == name
     assert {"csv", "plc", "can"} <= formats().keys()
+
+
+def test_those_that_carry_a_block_take_any_and_others_say_so():
+    for name, form in formats().items():
+        if form.holds_block:
+            assert callable(find_container(name).wrap)
+            assert callable(find_container(name).unwrap)
+        else:
+            with pytest.raises(SpecError, match=f"^{name} carries no playback block; .* are .codesys.xml"):
+                find_container(name)
+    assert find_container("st") is find_exporter("plc")
 
 
 def test_structured_text_goes_by_two_names():

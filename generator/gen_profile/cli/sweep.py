@@ -119,7 +119,7 @@ def lookup(words: tuple[str, ...], as_json: bool) -> None:
     metavar="FILE",
     type=click.Path(path_type=Path),
     default=Path("library.st"),
-    help="Structured Text to write, its block named after it; ./library.st by default.",
+    help="File to write: its name is the block's, its suffix tells the format; ./library.st by default.",
 )
 @json_option
 @debug_option

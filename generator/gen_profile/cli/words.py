@@ -234,7 +234,7 @@ def library(written: Library) -> str:
             "block",
             f"{written.block}, {count} profile{'s'[: count > 1]}, {written.bytes / 1000:.4g} kB of text",
         ),
-        ("wrote", str(written.path)),
+        *zip(["wrote", *[""] * len(written.files)], map(str, written.files), strict=False),
         ("", f"{written.index} tells which is which"),
     ]
     return _block(written.path.stem, rows)

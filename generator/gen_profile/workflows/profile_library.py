@@ -1,4 +1,4 @@
-"""From a sweep to one PLC file that plays any of its profiles, made of the very files that passed."""
+"""From a sweep to one PLC block that plays any of its profiles, made of the very files that passed."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ from gen_profile.workflows.sweep_case import PASSED
 from gen_profile.workflows.sweep_store import grid_of, read_swept
 from gen_profile.workflows.sweep_table import Table, read_table
 from gen_profile.workflows.wording import named
+from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.exporter import Target, target_of
-from gen_profile_exporters.profile_library import LibraryEntry, library_text, read_library
-from gen_profile_exporters.structured_text import block_name
-
-FORMAT = "plc"
+from gen_profile_exporters.profile_library import LibraryEntry, library_source, read_library
+from gen_profile_exporters.registry import container_of, find_container, formats
 
 
 @attrs.frozen(kw_only=True)
@@ -31,6 +30,10 @@ class Library:
     ----------
     path, index : Path
         Of the block, and of a JSON file that tells which profile is which.
+    format : str
+        Of the block's file.
+    files : tuple of Path
+        What was written of that format: the block's file, and what else the format needs.
     block : str
         Name of the function block.
     bytes : int
@@ -41,6 +44,8 @@ class Library:
 
     path: Path
     index: Path
+    format: str
+    files: tuple[Path, ...]
     block: str
     bytes: int
     profiles: tuple[dict[str, Any], ...]
@@ -50,6 +55,8 @@ class Library:
         return {
             "path": str(self.path),
             "index": str(self.index),
+            "format": self.format,
+            "files": [str(path) for path in self.files],
             "block": self.block,
             "bytes": self.bytes,
             "profiles": list(self.profiles),
@@ -62,28 +69,32 @@ def write_library(folder: Path, path: Path) -> Library:
     Parameters
     ----------
     folder : Path
-        Of a finished sweep that exported ``plc``.
+        Of a finished sweep that exported a format with the playback block.
     path : Path
-        File to write, such as ``crane.st``; the function block is named after it.
+        File to write, such as ``crane.st``; the function block is named after it, and its suffix tells the
+        format, which need not be the sweep's.
 
     Raises
     ------
     SpecError
-        The sweep did not export ``plc``, or no case passed.
+        The sweep exported no playback blocks, no case passed, or no format with the block has that suffix.
     OutputError
         The sweep's files were altered, or the library cannot be written.
     ExportError
         The profiles do not fit into one block.
     """
+    format_ = container_of(path)
+    container, stem = find_container(format_), path.name[: -len(formats()[format_].suffix)]
     keys = [axis.key for axis in grid_of(folder).axes]
     profiles: list[dict[str, Any]] = []
     entries, target = [], None
     for row in _passed(read_table(folder)):
         artefact = _block_of(row)
         content = read_swept(folder / row["folder"] / artefact["path"], artefact["sha256"])
-        target = target or _target(folder / row["folder"])
+        target = target or _target(folder / row["folder"], stem.removeprefix("FB_"))
         values = {key: row[key] for key in keys}
-        entries.append(LibraryEntry(text=content.decode("ascii"), label="  ".join(named(values))))
+        source = find_container(artefact["format"]).unwrap(content, target)
+        entries.append(LibraryEntry(source=source, label="  ".join(named(values))))
         profiles.append(
             {
                 "number": len(profiles),
@@ -98,35 +109,50 @@ def write_library(folder: Path, path: Path) -> Library:
         raise SpecError(
             f"No case of the sweep in {folder} passed, so there is nothing to put into a library."
         )
-    text = library_text(path.stem, entries)
-    index, block = path.with_suffix(".json"), block_name(path.stem)
+    library = library_source(entries, target)
+    first, *others = container.wrap(library, target)
+    index = path.with_name(f"{stem}.json")
     with staged(path.parent) as staging:
-        written = staging.write(path.name, text.encode("ascii"))
-        _require_same(written, target, profiles)
-        staging.write(index.name, _index(block, written, profiles))
+        written = staging.write(path.name, first.content)
+        _require_same(container.unwrap(written, target), target, profiles)
+        for file in others:
+            staging.write(file.filename, file.content)
+        staging.write(index.name, _index(library.name, written, profiles))
         staging.deliver()
-    return Library(path=path, index=index, block=block, bytes=len(written), profiles=tuple(profiles))
+    return Library(
+        path=path,
+        index=index,
+        format=format_,
+        files=(path, *(path.with_name(file.filename) for file in others)),
+        block=library.name,
+        bytes=len(written),
+        profiles=tuple(profiles),
+    )
 
 
 def _passed(table: Table) -> list[dict[str, Any]]:
     return [row for row in table.to_pylist() if row["status"] == PASSED]
 
 
-def _target(case: Path) -> Target:
+def _target(case: Path, name: str) -> Target:
+    """Give what the profiles were made for, and the library's own name."""
     path = case / FILENAME
-    return target_of(spec_from_dict(parse_manifest(read_swept(path), str(path)).spec, case))
+    spec = spec_from_dict(parse_manifest(read_swept(path), str(path)).spec, case)
+    return attrs.evolve(target_of(spec), name=name)
 
 
 def _block_of(row: dict[str, Any]) -> dict[str, Any]:
-    found: list[dict[str, Any]] = [artefact for artefact in row["artefacts"] if artefact["format"] == FORMAT]
+    """Find the first file that holds a playback block; what else belongs to it follows it."""
+    known, artefacts = formats(), row["artefacts"]
+    found: list[dict[str, Any]] = [item for item in artefacts if known[item["format"]].holds_block]
     if not found:
         raise SpecError("A library needs the cases' PLC blocks: sweep again with --export plc.")
     return found[0]
 
 
-def _require_same(written: bytes, target: Target, profiles: list[dict[str, Any]]) -> None:
+def _require_same(library: BlockSource, target: Target, profiles: list[dict[str, Any]]) -> None:
     """Hold what the library's file issues to what was checked."""
-    for profile, motion in zip(profiles, read_library(written.decode("ascii"), target), strict=True):
+    for profile, motion in zip(profiles, read_library(library, target), strict=True):
         if motion.payload_hash() != profile["payload_sha256"]:
             raise ExportError(
                 f"Profile {profile['number']} would not issue what case {profile['case']} does."
