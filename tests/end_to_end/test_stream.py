@@ -1,22 +1,27 @@
 """`gen-profile stream` and `drive-sim` as a user calls them, with the virtual bus of python-can."""
 
 import csv
+import errno
 import json
 import os
 import re
 import shutil
 import signal
+import subprocess
 import time
 from importlib import util
+from pathlib import Path
 from threading import Thread
 
 import can
 import canopen
 import pytest
-from command_line import run_here, run_process
+from command_line import PROGRAM, run_here, run_process
 
+from gen_profile.workflows import delivery
 from gen_profile.workflows import stream as workflow
 from gen_profile_exporters.can.clock import SystemClock
+from gen_profile_exporters.can.pacer import Pacer
 from gen_profile_exporters.can.streamer import Streamer
 
 BUSY = ("late at cycle", "cannot hold a cycle")  # a busy machine says so, and is no fault of the program
@@ -82,23 +87,38 @@ def test_drives_that_take_only_speed(tmp_path):
     assert 0.0 < told["drive"]["sway_residual_peak_m"] < 3e-4
 
 
-def test_in_words(deployed):
-    outcome = patiently(deployed / "paper.log", "--simulate-drive", "--self-test")
-    assert "setpoints sent" in outcome.out
+@pytest.fixture
+def full_disk(monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(delivery.Staging, "write", refuse)
+
+
+FULL = r"Cannot write to the folder .*: No space left on device; choose another one\."
+
+
+def test_in_words_even_where_the_log_cannot_be_written(deployed, tmp_path, full_disk):
+    table = ("--log", tmp_path / "driven.csv")
+    outcome = patiently(deployed / "paper.log", "--simulate-drive", "--self-test", *table)
+    assert outcome.code == 2
+    assert re.fullmatch(f"Error: {FULL}", outcome.errors[0])
+    assert re.search("^done: 151 of 151 setpoints sent$", outcome.out, re.MULTILINE)
     lateness = r"half below \d+ µs, 99 % below \d+ µs, all below \d+ µs"
     assert re.search(rf"^lateness: {lateness}; drift −?[\d.]+ µs$", outcome.out, re.MULTILINE)
     assert re.search(rf"^Self-test: {lateness}\.$", outcome.out, re.MULTILINE)
 
 
 def test_a_busy_machine_delays_a_simulation_as_a_whole(deployed, monkeypatch):
-    send = Streamer._send
+    send, sent = Pacer.send, []
 
     def kept_from_it(self, messages):
-        if self.cycles_sent in {40, 80, 81}:
+        sent.append(messages)
+        if len(sent) in {60, 100, 101}:
             time.sleep(0.1)  # five cycles
         send(self, messages)
 
-    monkeypatch.setattr(Streamer, "_send", kept_from_it)
+    monkeypatch.setattr(Pacer, "send", kept_from_it)
     told = run_here("stream", deployed / "paper.log", "--simulate-drive", "--json").document
     assert (told["state"], told["cycles_sent"]) == ("done", 151)
     assert told["drive"]["sway_residual_peak_m"] < 3e-4
@@ -217,23 +237,36 @@ class TestArtefact:
         assert (outcome.code, "cannot be opened" in outcome.err) == (2, True)
 
 
-def test_nobody_on_the_bus(deployed):
-    outcome = run_here(
-        "stream", deployed / "paper.log", "--interface", "virtual", "--channel", "empty", "--json"
-    )
+def test_nobody_on_the_bus(deployed, tmp_path, full_disk):
+    bus = ("--interface", "virtual", "--channel", "empty")
+    outcome = run_here("stream", deployed / "paper.log", *bus, "--log", tmp_path / "driven.csv", "--json")
     assert (outcome.code, outcome.document["state"], outcome.document["drive"]) == (6, "aborted", None)
     assert "does not answer" in outcome.document["reason"]
+    assert re.fullmatch(FULL, outcome.document["notes"][-1])
+
+
+def test_nobody_who_takes_the_outcome(deployed):
+    """As with `2>&1 | head -n 4`, on a full disk besides."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    bus = ("--interface", "virtual", "--channel", "nobody")
+    with Path("/dev/full").open("w") as full:
+        command = [PROGRAM, "stream", deployed / "paper.log", *bus]
+        done = subprocess.run(command, check=False, stdout=full, stderr=writer)
+    os.close(writer)
+    assert done.returncode == 6
 
 
 def test_sigterm_stops_the_axis(deployed, monkeypatch):
-    send = Streamer._send
+    send, sent = Pacer.send, []
 
     def interrupted(self, messages):
-        if self.cycles_sent == 60:
+        sent.append(messages)
+        if len(sent) == 80:
             os.kill(os.getpid(), signal.SIGTERM)
         send(self, messages)
 
-    monkeypatch.setattr(Streamer, "_send", interrupted)
+    monkeypatch.setattr(Pacer, "send", interrupted)
     outcome = streamed(deployed / "paper.log", "--simulate-drive")
     assert outcome.code == 6
     assert outcome.document["reason"] == "Stopped by SIGTERM. The axes were stopped."

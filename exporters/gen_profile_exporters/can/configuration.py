@@ -8,7 +8,8 @@ axis stands.
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from decimal import Decimal
 
 import attrs
@@ -32,6 +33,7 @@ COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it 
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
 RESET_PATIENCE = NANOSECONDS  # for a drive to leave its fault
+HEARTBEAT_WATCHED = (0x1016, 1)
 PERIOD_DIGITS, PERIOD_EXPONENT = (0x60C2, 1), (0x60C2, 2)
 
 Place = tuple[int, int]  # index and subindex
@@ -46,14 +48,21 @@ class Node:
     name: str
 
 
-def configure(link: Link, target: Target, motion: Setpoints, *, reset_fault: bool = False) -> tuple[int, ...]:
+def configure(
+    link: Link, target: Target, motion: Setpoints, meanwhile: Callable[[], None], *, reset_fault: bool = False
+) -> tuple[int, ...]:
     """Set up all drives and find each of them fit to follow.
+
+    A drive may watch our heartbeat as soon as 1016h says so, or still from a stream that was killed. So no
+    drive watches it before the first one, and `meanwhile` sends it from then on.
 
     Parameters
     ----------
     link : Link
     target : Target
     motion : Setpoints
+    meanwhile : callable
+        What must go on while an answer is awaited, once no drive watches our heartbeat any more.
     reset_fault : bool
         Whether a drive that is in fault is reset first.
 
@@ -78,6 +87,8 @@ def configure(link: Link, target: Target, motion: Setpoints, *, reset_fault: boo
         if reset_fault:
             _reset_fault(link, node)
         _require_rest(link, node)
+        _disarm(link, node)
+    link.meanwhile = meanwhile
     return tuple(_configure_one(link, node, target, motion, lists[node.number]) for node in nodes)
 
 
@@ -88,15 +99,21 @@ def start(link: Link, target: Target) -> None:
 
 
 def release(link: Link, target: Target) -> None:
-    """Let the drives be alone again: no more heartbeats watched, no PDOs taken."""
+    """Let the drives be alone again: no PDOs taken, no more heartbeats watched.
+
+    One that does not listen reports a lost heartbeat; the others are none the worse for it.
+    """
     for number in frames.nodes(target):
-        link.sdo(number).download(0x1016, 1, bytes(4))
-        link.send(nmt(PRE_OPERATIONAL, number))
+        with suppress(StreamAborted):
+            link.send(nmt(PRE_OPERATIONAL, number))  # first, lest it miss setpoints while it answers
+    for number in frames.nodes(target):
+        with suppress(StreamAborted, SdoError, struct.error):
+            link.sdo(number).download(*HEARTBEAT_WATCHED, bytes(4))
 
 
 def nmt(command: int, node: int) -> can.Message:
     """Make an NMT command."""
-    return can.Message(arbitration_id=frames.NMT, data=[command, node], is_extended_id=False)
+    return frames.message(frames.NMT, bytes([command, node]))
 
 
 def _configure_one(
@@ -145,6 +162,16 @@ def _reset_fault(link: Link, node: Node) -> None:
     deadline = link.clock.now() + RESET_PATIENCE
     while state_of(_read(link, node, 0x6041)) in FAULTS and link.clock.now() < deadline:
         link.wait_until(link.clock.now() + RESET_PATIENCE // 10)
+
+
+def _disarm(link: Link, node: Node) -> None:
+    """Have the drive not watch our heartbeat, as a stream that was killed has left it."""
+    try:
+        link.sdo(node.number).download(*HEARTBEAT_WATCHED, bytes(4))
+    except SdoAbortedError:  # it watches always, or never: what it then holds is read back
+        return
+    except (SdoError, struct.error) as error:
+        raise _silent(node, error) from error
 
 
 def _require_rest(link: Link, node: Node) -> None:

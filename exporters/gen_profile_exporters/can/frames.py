@@ -23,6 +23,7 @@ from decimal import Decimal
 
 import attrs
 import numpy as np
+from can import Message
 from numpy.typing import NDArray
 
 from gen_profile.errors import ExportError
@@ -110,6 +111,11 @@ def setpoint_pdos(can: CanSpec) -> Pdos:
 def setpoint_fields(can: CanSpec) -> tuple[Field, ...]:
     """List what a drive is sent in each cycle, in all its RPDOs."""
     return tuple(field for fields in setpoint_pdos(can).values() for field in fields)
+
+
+def message(cob_id: int, data: bytes = b"") -> Message:
+    """Make a frame with an 11-bit identifier."""
+    return Message(arbitration_id=cob_id, data=data, is_extended_id=False)
 
 
 def packing(fields: Sequence[Field]) -> struct.Struct:

@@ -10,17 +10,18 @@ import socket
 import struct
 import sys
 import time
+from contextlib import suppress
 
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.clock import NANOSECONDS
+from gen_profile_exporters.can.frames import message
 
 assert sys.platform == "linux"  # for the type checker, too
 SO_TXTIME = SCM_TXTIME = 61  # asm-generic/socket.h
 TRIAL = NANOSECONDS // 50  # how far ahead the frame of the trial is sent
-_HEARTBEAT = can.Message(arbitration_id=frames.HEARTBEAT + frames.MASTER, data=b"\x05", is_extended_id=False)
+_TRIAL = message(0x780)  # reserved by CiA 301: no device takes it, it commands nothing and arms no time-out
 _FRAME = struct.Struct("=IB3x8s")  # struct can_frame of linux/can.h
 
 
@@ -35,7 +36,20 @@ class LaunchingBus(SocketcanBus):
 
     def __init__(self, channel: str) -> None:
         super().__init__(channel)
-        self.socket.setsockopt(socket.SOL_SOCKET, SO_TXTIME, struct.pack("=iI", time.CLOCK_MONOTONIC, 0))
+        with suppress(OSError):  # a kernel without them shows when they are tried
+            self.socket.setsockopt(socket.SOL_SOCKET, SO_TXTIME, struct.pack("=iI", time.CLOCK_MONOTONIC, 0))
+
+    def keeps_instants(self) -> bool:
+        """Have a frame sent later, and listen on the same interface when that is."""
+        only_ours = [can.typechecking.CanFilter(can_id=_TRIAL.arbitration_id, can_mask=0x7FF)]
+        with SocketcanBus(self.channel, can_filters=only_ours) as witness:
+            instant = time.monotonic_ns() + TRIAL
+            try:
+                self.send_at(_TRIAL, instant)
+            except OSError:
+                return False
+            heard = witness.recv(3 * TRIAL / NANOSECONDS)
+            return heard is not None and time.monotonic_ns() >= instant
 
     def send_at(self, message: can.Message, instant: int) -> None:
         """Hand a frame to the kernel, to be sent at an instant of the monotonic clock, in ns.
@@ -48,28 +62,3 @@ class LaunchingBus(SocketcanBus):
         data = _FRAME.pack(message.arbitration_id, message.dlc, bytes(message.data))
         launch = (socket.SOL_SOCKET, SCM_TXTIME, struct.pack("=Q", instant))
         self.socket.sendmsg([data], [launch], socket.MSG_DONTWAIT)
-
-
-def launching_bus(channel: str) -> LaunchingBus | None:
-    """Open an interface for launch times; None where one early heartbeat shows that it keeps none."""
-    try:
-        bus = LaunchingBus(channel)
-    except OSError:  # no such option, or no such interface: for the usual way to find out
-        return None
-    only_ours = [can.typechecking.CanFilter(can_id=_HEARTBEAT.arbitration_id, can_mask=0x7FF)]
-    with SocketcanBus(channel, can_filters=only_ours) as witness:
-        if _keeps_instants(bus, witness):
-            return bus
-    bus.shutdown()
-    return None
-
-
-def _keeps_instants(bus: LaunchingBus, witness: can.BusABC) -> bool:
-    """Have a heartbeat of ours sent later, and listen on the same interface when that is."""
-    instant = time.monotonic_ns() + TRIAL
-    try:
-        bus.send_at(_HEARTBEAT, instant)
-    except OSError:
-        return False
-    heard = witness.recv(3 * TRIAL / NANOSECONDS)
-    return heard is not None and time.monotonic_ns() >= instant

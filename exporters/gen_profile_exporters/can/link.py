@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import can
 import canopen
@@ -28,7 +28,11 @@ FRAMES_AT_ONCE = 64  # a flooded bus must keep nobody from looking at the clock
 
 @runtime_checkable
 class Launching(Protocol):
-    """A bus that sends frames at given instants by itself."""
+    """A bus that may send frames at given instants by itself."""
+
+    def keeps_instants(self) -> bool:
+        """Try whether it does; sends a frame that no CANopen device takes."""
+        ...
 
     def send_at(self, message: can.Message, instant: int) -> None:
         """Have a frame sent at an instant of the clock, in ns."""
@@ -47,16 +51,23 @@ class Link:
     Attributes
     ----------
     launching : Launching or None
-        The bus, if it sends at given instants.
+        The bus, once it proved that it sends at given instants.
+    meanwhile : callable
+        What must go on while an SDO is awaited: heartbeats, for instance.
     """
 
     def __init__(self, bus: can.BusABC, clock: Clock) -> None:
         self.bus = bus
         self.clock = clock
-        self.launching = bus if isinstance(bus, Launching) else None
+        self.launching: Launching | None = None
+        self.meanwhile: Callable[[], None] = lambda: None
         self._takers: list[Callable[[can.Message], None]] = []
-        self._network: Any = canopen.Network(bus)
         self._sdos: dict[int, _Sdo] = {}
+
+    def try_launch_times(self) -> None:
+        """Have cycles sent at their instants by the bus from now on, if it can."""
+        if isinstance(self.bus, Launching) and self.bus.keeps_instants():
+            self.launching = self.bus
 
     def subscribe(self, take: Callable[[can.Message], None]) -> None:
         """Hand every frame received from now on to `take`."""
@@ -98,7 +109,7 @@ class Link:
             take(message)
         node = message.arbitration_id - frames.SDO_ANSWER
         if node in self._sdos and not message.is_extended_id and len(message.data) == 8:
-            self._network.notify(message.arbitration_id, message.data, message.timestamp)
+            self._sdos[node].on_response(message.arbitration_id, message.data, message.timestamp)
         return True
 
     def drain(self) -> None:
@@ -115,19 +126,20 @@ class Link:
     def sdo(self, node: int) -> _Sdo:
         """Open the SDO channel of a node."""
         if node not in self._sdos:
-            channel = _Sdo(self, node)
-            channel.network = self._network
-            self._network.subscribe(channel.tx_cobid, channel.on_response)
-            self._sdos[node] = channel
+            self._sdos[node] = _Sdo(self, node)
         return self._sdos[node]
 
 
 class _Sdo(SdoClient):
-    """canopen's SDO client, which waits for answers by the link instead of by a thread."""
+    """canopen's SDO client, which sends by the link, and waits for answers by it instead of by a thread."""
 
     def __init__(self, link: Link, node: int) -> None:
         super().__init__(frames.SDO_REQUEST + node, frames.SDO_ANSWER + node, canopen.ObjectDictionary())
         self._link = link
+
+    def send_request(self, request: bytes) -> None:
+        """Send as everything is sent, so that a bus that fails is told as everywhere."""
+        self._link.send(frames.message(self.rx_cobid, bytes(request)))
 
     def read_response(self) -> bytes:
         """Wait for the answer, and fail as canopen does when none comes."""
@@ -135,6 +147,7 @@ class _Sdo(SdoClient):
         while self.responses.empty() and self._link.clock.now() < deadline:
             if not self._link.receive():
                 self._link.clock.sleep_until(self._link.clock.now() + POLL)
+            self._link.meanwhile()
         if self.responses.empty():
             raise canopen.SdoCommunicationError("no answer")
         answer: bytes = super().read_response()

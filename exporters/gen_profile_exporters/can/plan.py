@@ -12,7 +12,7 @@ from gen_profile.errors import ExportError
 from gen_profile.profile import SampledProfile
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.exporter import read_setpoints, replay
-from gen_profile_exporters.can.frames import Integers, SetpointFrame
+from gen_profile_exporters.can.frames import Integers, SetpointFrame, message
 from gen_profile_exporters.can.scaling import Setpoints
 from gen_profile_exporters.exporter import Target
 
@@ -76,8 +76,3 @@ def _setpoints(taken: Integers, motion: SampledProfile, target: Target) -> Setpo
     counts_per_si = np.array([axis.counts_per_si for axis in target.axes])
     position = np.rint(motion.position * counts_per_si).astype(np.int64)
     return Setpoints(period=motion.cycle_time, position=position, offsets=others, velocity=first)
-
-
-def message(cob_id: int, data: bytes) -> can.Message:
-    """Make a frame with an 11-bit identifier."""
-    return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False)

@@ -1,86 +1,35 @@
-"""The streamer: configure → align → enable → stream → hold → disable, or abort from wherever it is.
+"""The streamer: listen → configure → align → enable → stream → hold → disable, or stop from wherever it is.
 
-Setpoint k and its SYNC are sent at the absolute instant ``start + k * period``, the setpoint first, so that
-nothing drifts; what came late is never made up for by a burst. A bus that sends at given instants by itself
-gets each cycle a quarter of a period ahead. Before each cycle the drives' answers to the one before are
-judged. Whatever is wrong ends in a quick stop, sent at once and repeated every cycle until the drives say
-that they no longer move; no setpoint follows it. The drives brake on their own ramp (6085h), which needs
-nothing more from a controller or a bus that just proved unreliable. If not even that gets through, they stop
-by themselves, as they were set up to.
+Before each cycle the drives' answers to the one before are judged. Whatever is wrong ends in a quick stop
+(`gen_profile_exporters.can.stopping`), before anything is said about it, and no setpoint follows it.
 """
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from enum import Enum
 
-import attrs
 import can
 import numpy as np
-from canopen.sdo.exceptions import SdoError
-from numpy.typing import NDArray
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import configuration, frames, startup
 from gen_profile_exporters.can.cia402 import FOLLOWS, IP_ENABLE, Controlword, State
 from gen_profile_exporters.can.clock import NANOSECONDS, Clock
-from gen_profile_exporters.can.lateness import Lateness
+from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.link import Link
-from gen_profile_exporters.can.plan import StreamPlan, message
+from gen_profile_exporters.can.pacer import Pacer
+from gen_profile_exporters.can.plan import StreamPlan
+from gen_profile_exporters.can.record import Phase, Record, Recorder
 from gen_profile_exporters.can.scaling import magnitude_counts, quick_stop_deceleration
+from gen_profile_exporters.can.stopping import quick_stop
 from gen_profile_exporters.can.watch import Alert, Axis, Watch
 
 ALIGN_CYCLES = 10  # of preloads before power goes on
 SETTLED_CYCLES = 10  # within the tolerance, before power goes off
 PATIENCE = 5 * NANOSECONDS  # for a change of state (brakes take their time), and for settling
-LISTEN = NANOSECONDS // 10  # for someone else in command, before anything is sent
+LISTEN = NANOSECONDS // 10  # for someone else in command, before anything is sent; two cycles at least
 STOP_MARGIN = NANOSECONDS // 2  # beyond the ramp, for the answer that the axes stand
-HEARTBEATS_PER_TIMEOUT = 3
-
-
-class Phase(Enum):
-    """Where the streamer is, as people call it."""
-
-    CONFIGURE = "configure"
-    ALIGN = "align"
-    ENABLE = "enable"
-    STREAM = "stream"
-    HOLD = "hold"
-    DISABLE = "disable"
-    DONE = "done"
-    ABORTED = "aborted"
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Record:
-    """What became of a stream.
-
-    Attributes
-    ----------
-    phase : Phase
-        `Phase.DONE` or `Phase.ABORTED`.
-    reason : str
-        Why it was aborted; empty when it was not.
-    sent : int
-        Cycles of the motion that were sent.
-    lateness : Lateness
-    actual : (cycles, axes) integer array
-        Position that each drive told after each cycle's SYNC, in counts.
-    told : (cycles,) boolean array
-        For which cycles there is one.
-    final : tuple of int
-        Last position that each drive told.
-    """
-
-    phase: Phase
-    reason: str
-    sent: int
-    lateness: Lateness
-    actual: NDArray[np.int64]
-    told: NDArray[np.bool_]
-    final: tuple[int, ...]
 
 
 class Streamer:
@@ -93,7 +42,7 @@ class Streamer:
     clock : Clock
     plan : StreamPlan
     tell : callable, optional
-        Told each phase as it begins.
+        Told each phase as it begins. While it works the drives get nothing.
     reset_fault : bool
         Whether drives that are in fault are reset first.
     """
@@ -110,32 +59,22 @@ class Streamer:
         self._plan, self._clock, self._tell = plan, clock, tell
         self._reset_fault = reset_fault
         self._link = Link(bus, clock)
-        target = plan.target
-        self._nodes = frames.nodes(target)
-        self._period = frames.period_microseconds(target.can) * 1000
-        timeout = startup.timeout_ms(target.can) * NANOSECONDS // 1000
+        self._pacer = Pacer(self._link, plan.target)
         self._watch = Watch(
-            [Axis(axis.name, node) for axis, node in zip(target.axes, self._nodes, strict=True)],
+            [Axis(axis.name, node) for axis, node in zip(plan.target.axes, self._pacer.nodes, strict=True)],
             clock,
-            period=self._period,
-            heartbeat=startup.heartbeat_ms(target.can) * NANOSECONDS // 1000,
-            timeout=timeout,
-            setpoints=[frame.cob_id for frame in frames.setpoint_frames(target)],
+            period=self._pacer.period,
+            heartbeat=startup.heartbeat_ms(plan.target.can) * NANOSECONDS // 1000,
+            timeout=self._pacer.timeout,
+            setpoints=[frame.cob_id for frame in frames.setpoint_frames(plan.target)],
         )
         self._link.subscribe(self._watch.take)
-        self._sync = message(frames.SYNC, b"")
-        self._heartbeat = message(frames.HEARTBEAT + frames.MASTER, b"\x05")
-        self._beat_every = max(1, timeout // HEARTBEATS_PER_TIMEOUT // self._period)
-        self._beats = 0
-        self._due = self._launch = 0
+        self._recorder = Recorder(len(plan.cycles), len(self._pacer.nodes))
         self._stop_asked = ""
+        self._commanded = False
+        self._led: Integers | None = None  # where the axes are to be by the latest SYNC
         self._answers_for = -1  # cycle whose answers are still to come
         self._sent_at = 0
-        cycles = len(plan.cycles)
-        self._late = np.full(cycles, -1, dtype=np.int64)
-        self._actual = np.zeros((cycles, len(self._nodes)), dtype=np.int64)
-        self._told = np.zeros(cycles, dtype=np.bool_)
-        self._led = plan.motion.at_sync
 
     def ask_to_stop(self, reason: str) -> None:
         """Have the stream aborted before its next cycle; may be called from a signal handler."""
@@ -144,46 +83,61 @@ class Streamer:
     @property
     def cycles_sent(self) -> int:
         """How many setpoints of the motion have been sent."""
-        return int(np.count_nonzero(self._late >= 0))
+        return self._recorder.sent
 
     def run(self) -> Record:
         """Go through all phases; always ends with drives that do not move, or says so."""
-        commanded = False
         try:
-            self._begin(Phase.CONFIGURE)
-            self._link.wait_until(self._clock.now() + LISTEN)
-            self._require_well()
-            self._watch.raise_alert(Alert.CONFIGURING)
-            standing = configuration.configure(
-                self._link, self._plan.target, self._plan.motion, reset_fault=self._reset_fault
-            )
-            self._require_well()
-            commanded = True
+            self._listen()
+            standing = self._configure()
             self._align(standing)
             self._enable()
             self._stream()
             self._hold()
             self._disable()
         except StreamAborted as error:
-            reason = str(error)
-            if commanded:
-                reason = f"{reason} {self._abort()}"
-            return self._record(Phase.ABORTED, reason)
+            return self._record(Phase.ABORTED, f"{error} {self._stop()}".rstrip())
         except BaseException:  # a bug, maybe, but the axes must not run on
-            if commanded:
-                self._abort()
+            self._stop()
             raise
-        return self._record(Phase.DONE, "")
+        return self._record(Phase.DONE, "", self._watch.fault or "")
 
     def _begin(self, phase: Phase) -> None:
-        self._tell(phase.value)
+        with suppress(OSError, ValueError):  # whoever is told may be gone
+            self._tell(phase.value)
+
+    def _listen(self) -> None:
+        """Hear whether someone else is in command, before anything is sent."""
+        self._begin(Phase.CONFIGURE)
+        until = self._clock.now() + max(LISTEN, 2 * self._pacer.period)
+        while self._clock.now() < until:
+            self._link.wait_until(min(until, self._clock.now() + LISTEN // 10))
+            self._require_well()
+        self._link.try_launch_times()
+
+    def _configure(self) -> tuple[int, ...]:
+        """Set the drives up; find out where they stand, in counts."""
+        self._watch.raise_alert(Alert.CONFIGURING)
+        plan = self._plan
+        standing = configuration.configure(
+            self._link, plan.target, plan.motion, self._attend, reset_fault=self._reset_fault
+        )
+        self._require_well()
+        return standing
+
+    def _attend(self) -> None:
+        """Keep our heartbeat going while the drives are set up, as long as all is well."""
+        self._require_well()
+        self._pacer.beat()
 
     def _align(self, standing: Sequence[int]) -> None:
         """Make the drives' setpoints equal to where they stand, before power goes on."""
         self._begin(Phase.ALIGN)
+        self._commanded = True
         self._preload = self._plan.preload(standing)
+        self._led = np.array(standing)
         configuration.start(self._link, self._plan.target)
-        self._due = self._clock.now() + self._period
+        self._pacer.begin()
         for _ in range(ALIGN_CYCLES):
             self._cycle(self._preload)
         self._watch.raise_alert(Alert.CYCLIC)
@@ -199,22 +153,21 @@ class Streamer:
     def _stream(self) -> None:
         """Send every cycle at its instant."""
         self._begin(Phase.STREAM)
-        start, cycle = self._due, 0
+        pacer, cycle = self._pacer, 0
+        start, led = pacer.due, self._plan.motion.at_sync
         while cycle < len(self._plan.cycles):
-            self._due = start + cycle * self._period
+            pacer.due = start + cycle * pacer.period
             self._judge()
-            self._await_due()
-            missed = (self._clock.now() - self._due + self._period // 2) // self._period
-            if missed:
+            if missed := pacer.missed():
                 self._require_skippable(cycle, missed)
                 cycle += missed
                 continue
-            self._send(self._plan.cycles[cycle])
+            pacer.send(self._plan.cycles[cycle])
             self._sent_at = self._clock.now()
-            self._late[cycle] = max(0, self._sent_at - self._due)
+            self._recorder.take_sent(cycle, self._sent_at - pacer.due)
+            self._led, self._answers_for = led[cycle], cycle
             cycle += 1
-            self._answers_for = cycle - 1
-        self._due = start + cycle * self._period
+        pacer.due = start + cycle * pacer.period
 
     def _hold(self) -> None:
         """Repeat the last setpoint until the axes stand at it."""
@@ -224,6 +177,7 @@ class Streamer:
         settled, deadline = 0, self._clock.now() + PATIENCE
         while settled < SETTLED_CYCLES:
             self._cycle(last)
+            self._led = target
             apart = [abs(axis.position - int(at)) for axis, at in zip(self._watch.axes, target, strict=True)]
             settled = settled + 1 if all(a <= b for a, b in zip(apart, allowed, strict=True)) else 0
             if self._clock.now() > deadline:
@@ -239,30 +193,22 @@ class Streamer:
         self._release()
 
     def _release(self) -> None:
-        """Leave drives alone that are switched off; one that does not listen will report a lost heartbeat."""
-        with suppress(StreamAborted, SdoError, struct.error):
-            configuration.release(self._link, self._plan.target)
+        """Leave drives alone that are switched off; our heartbeat goes on until they no longer watch it."""
+        self._link.meanwhile = self._pacer.beat
+        configuration.release(self._link, self._plan.target)
 
-    def _abort(self) -> str:
-        """Quick-stop all axes, and say whether they confirmed it."""
-        self._begin(Phase.ABORTED)
-        self._clock.sleep_until(self._launch)  # no setpoint may follow the stop
-        stop = self._commands(Controlword.QUICK_STOP)
-        deadline = self._clock.now() + self._stopping_time()
-        while True:
-            for frame in (*stop, self._sync, self._heartbeat):
-                with suppress(StreamAborted):
-                    self._link.send(frame)
-            with suppress(StreamAborted):
-                self._link.wait_until(self._clock.now() + self._period)
-            if self._watch.standing:
-                self._release()
-                return "The axes were stopped."
-            if self._clock.now() > deadline:
-                return (
-                    "Not every drive confirmed the quick stop: they stop by their own time-outs; make sure "
-                    "that the axes stand before you approach them."
-                )
+    def _stop(self) -> str:
+        """Stop what may move, leave the drives alone, and then say what became of it."""
+        self._link.meanwhile = lambda: None
+        said = ""
+        if self._commanded:
+            stop = quick_stop(self._pacer, self._watch, self._stopping_time())
+            said = stop.words
+            if stop.unconfirmed:
+                return said  # and those drives watch our heartbeat, which has ended
+        if self._pacer.beating:
+            self._release()
+        return said
 
     def _stopping_time(self) -> int:
         """Time in ns in which every axis comes to rest on its ramp from its greatest velocity."""
@@ -272,11 +218,11 @@ class Streamer:
             fastest[column] / quick_stop_deceleration(motion.position[:, column], motion.period, can, axis)
             for column, axis in enumerate(self._plan.target.axes)
         ]
-        return STOP_MARGIN + 10 * self._period + int(max(ramps) * NANOSECONDS)
+        return STOP_MARGIN + 10 * self._pacer.period + int(max(ramps) * NANOSECONDS)
 
     def _command(self, word: int, state: State, setpoints: Sequence[can.Message], *, bits: int = 0) -> None:
         """Send a controlword every cycle until all drives are in a state."""
-        commands, deadline = self._commands(word), self._clock.now() + PATIENCE
+        commands, deadline = self._pacer.commands(word), self._clock.now() + PATIENCE
         while not all(axis.state is state and axis.statusword & bits == bits for axis in self._watch.axes):
             if self._clock.now() > deadline:
                 words = ", ".join(f"{axis.name}: {axis.state.words}" for axis in self._watch.axes)
@@ -287,33 +233,34 @@ class Streamer:
             self._cycle((*commands, *setpoints))
 
     def _cycle(self, messages: Iterable[can.Message]) -> None:
-        """Send frames and SYNC at the next instant, judged before and after."""
+        """Send frames and SYNC at the next instant, judged before."""
         self._judge()
-        self._await_due()
-        self._send(messages)
-        self._due = max(self._due + self._period, self._clock.now())
+        self._pacer.missed()
+        self._pacer.send(messages)
+        self._sent_at = self._clock.now()
+        self._pacer.next()
 
     def _judge(self) -> None:
         """Take in the answers, shortly before the next cycle."""
-        self._link.wait_until(self._due - self._period // 4)
+        self._link.wait_until(self._pacer.look)
         self._require_well()
-        if self._answers_for >= 0:
-            self._actual[self._answers_for] = [axis.position for axis in self._watch.axes]
-            told = all(axis.heard >= self._sent_at for axis in self._watch.axes)
-            self._told[self._answers_for] = told
-            if told and self._plan.motion.velocity is not None:
-                self._require_following(self._answers_for)
-            self._answers_for = -1
+        told = all(axis.heard >= self._sent_at for axis in self._watch.axes)
+        if told and self._answers_for >= 0:
+            self._recorder.take_answer(self._answers_for, [axis.position for axis in self._watch.axes])
+        if told and self._watch.alert is Alert.FOLLOWING and self._plan.motion.velocity is not None:
+            self._require_following()
+        self._answers_for = -1
 
     def _require_well(self) -> None:
         if self._stop_asked:
             raise StreamAborted(self._stop_asked)
         self._watch.require_well()
 
-    def _require_following(self, cycle: int) -> None:
+    def _require_following(self) -> None:
         """Hold the axes to the motion where no drive does: in csv it controls its velocity only."""
-        can, led = self._plan.target.can, self._led[cycle]
-        for axis, scale, at in zip(self._watch.axes, self._plan.target.axes, led, strict=True):
+        can = self._plan.target.can
+        assert self._led is not None  # drives are told where to be before they are enabled
+        for axis, scale, at in zip(self._watch.axes, self._plan.target.axes, self._led, strict=True):
             apart = abs(axis.position - int(at))
             if apart > magnitude_counts(can.following_error or can.start_tolerance, scale):
                 raise StreamAborted(
@@ -328,36 +275,18 @@ class Streamer:
         step = np.abs(self._plan.motion.position[after] - self._plan.motion.position[before])
         if missed > 1 or (step > steps).any():
             raise StreamAborted(
-                f"This machine was {missed * self._period / 1e6:g} ms late at cycle {cycle}; relieve it, "
-                "permit real-time priority, or choose a longer can.sync_period (see --self-test)."
+                f"This machine was {missed * self._pacer.period / 1e6:g} ms late at cycle {cycle}; relieve "
+                "it, permit real-time priority, or choose a longer can.sync_period (see --self-test)."
             )
 
-    def _await_due(self) -> None:
-        """Sleep until the next cycle's instant, unless it is the bus that waits for it."""
-        if self._link.launching is None:
-            self._clock.sleep_until(self._due)
-
-    def _send(self, messages: Iterable[can.Message]) -> None:
-        self._launch = self._due
-        for frame in messages:
-            self._link.send(frame, self._due)
-        self._link.send(self._sync, self._due)
-        self._beats += 1
-        if self._beats % self._beat_every == 0:
-            self._link.send(self._heartbeat)
-
-    def _commands(self, word: int) -> tuple[can.Message, ...]:
-        data = frames.packing(frames.COMMAND).pack(word)
-        return tuple(message(frames.RPDO1 + node, data) for node in self._nodes)
-
-    def _record(self, phase: Phase, reason: str) -> Record:
-        cycles = np.flatnonzero(self._late >= 0)
-        return Record(
-            phase=phase,
-            reason=reason,
-            sent=self.cycles_sent,
-            lateness=Lateness(cycles=cycles, late=self._late[cycles], period=self._period),
-            actual=self._actual,
-            told=self._told,
-            final=tuple(axis.position for axis in self._watch.axes),
+    def _record(self, phase: Phase, reason: str, aftermath: str = "") -> Record:
+        if phase is Phase.ABORTED:
+            self._begin(phase)
+        return self._recorder.record(
+            phase,
+            reason,
+            tuple(axis.position for axis in self._watch.axes),
+            aftermath=aftermath,
+            launched=self._link.launching is not None,
+            period=self._pacer.period,
         )

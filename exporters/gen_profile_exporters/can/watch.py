@@ -53,6 +53,14 @@ class Axis:
         """State that the statusword tells."""
         return state_of(self.statusword)
 
+    def stands(self, since: int) -> bool:
+        """Whether the drive said after an instant that it is not powered to move."""
+        return self.heard > since and self.state not in MOVING
+
+    def obeys(self, since: int) -> bool:
+        """Whether the drive said after an instant that it no longer follows setpoints."""
+        return self.heard > since and self.state is not State.ENABLED
+
 
 class Watch:
     """Take in every frame, keep the first fault found.
@@ -128,11 +136,6 @@ class Watch:
             self._look_for_silence()
         if self.fault is not None:
             raise StreamAborted(self.fault)
-
-    @property
-    def standing(self) -> bool:
-        """Whether every drive said that it is no longer powered to move."""
-        return all(axis.statusword and axis.state not in MOVING for axis in self.axes)
 
     def _find(self, fault: str) -> None:
         self.fault = self.fault or fault

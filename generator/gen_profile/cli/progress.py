@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import click
 
@@ -18,8 +18,13 @@ def progress() -> Iterator[Callable[[str], None]]:
         return
     from rich.console import Console
 
-    with Console(stderr=True).status("starting …") as status:
+    status = Console(stderr=True).status("starting …")
+    status.start()
+    try:
         yield lambda text: status.update(f"{text} …")
+    finally:
+        with suppress(OSError, SystemExit):  # of Rich, on a terminal that is gone
+            status.stop()
 
 
 def _print_line(text: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,10 +14,10 @@ import click
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import as_overrides, chosen_spec, debug_option, json_option, spec_options
 from gen_profile.cli.outcome import print_outcome
-from gen_profile.errors import SpecError, StreamAborted
+from gen_profile.errors import OutputError, SpecError, StreamAborted
 
 if TYPE_CHECKING:
-    from gen_profile.workflows.stream import Outcome, Source
+    from gen_profile.workflows.stream_outcome import Outcome, Source
     from gen_profile_exporters.can.lateness import Lateness
 
 VIRTUAL = ("virtual", "gen-profile")
@@ -79,6 +80,7 @@ def stream(
     from gen_profile.cli.progress import progress
     from gen_profile.workflows import stream as run
     from gen_profile.workflows.delivery import require_place
+    from gen_profile_exporters.can.port import Port
 
     run.require_extra()
     overrides += as_overrides({"can.mode": mode, "can.node": node})
@@ -88,7 +90,7 @@ def stream(
             plan = run.summary(source)
             print_outcome(plan, _plan_words(plan, _units(source)), as_json)
             return
-        port = run.Port(**_port(interface, channel, simulate_drive))
+        port = Port(**_port(interface, channel, simulate_drive))
         if table is not None:
             require_place(table)  # the log of a motion that was made must not be lost
         notes: tuple[str, ...] = ()
@@ -136,13 +138,14 @@ def drive_sim(
     from gen_profile.workflows.delivery import deliver
     from gen_profile.workflows.wording import mm, number
     from gen_profile_exporters.can import drive_dictionary
+    from gen_profile_exporters.can.port import Port
 
     spec = chosen_spec(spec_path, preset, overrides)
     make = drive_dictionary.Make(miss=miss, own_mapping=own_mapping)
     if eds is not None:
         deliver(eds, drive_dictionary.eds(spec.can.node, make).encode("utf-8"))
         return
-    port = run.Port(**_port(interface, channel, False))
+    port = Port(**_port(interface, channel, False))
     with (
         progress() as tell,
         CraneLoad(spec, lambda: tell("compiling the plant's FMU, once")) as load,
@@ -170,14 +173,47 @@ for parameter in stream.params:
 
 
 def _conclude(outcome: Outcome, table: Path | None, as_json: bool) -> None:
+    """Report what became of a stream, by every way that still takes it, and end in the exit code of that."""
+    import attrs
+
     from gen_profile.workflows.delivery import deliver
 
+    code, complaints = (0, []) if outcome.done else (StreamAborted.exit_code, [_aborted(outcome)])
     if table is not None:
-        deliver(table, outcome.table())
-    print_outcome(outcome.to_dict(), _outcome_words(outcome), as_json)
-    if not outcome.done:
-        click.echo(f"Stream aborted: {outcome.record.reason}", err=True)
-        sys.exit(StreamAborted.exit_code)
+        try:
+            deliver(table, outcome.table())
+        except OutputError as error:
+            outcome = attrs.evolve(outcome, notes=(*outcome.notes, str(error)))
+            code, complaints = code or OutputError.exit_code, [*complaints, f"Error: {error}"]
+    said = [_refusal(print_outcome, outcome.to_dict(), _outcome_words(outcome), as_json)]
+    said += [_refusal(click.echo, complaint, err=True) for complaint in complaints]
+    refusals = [refusal for refusal in said if refusal is not None]
+    if refusals and not code:
+        raise refusals[0]
+    if refusals:
+        _lead_nowhere()
+    if code:
+        sys.exit(code)
+
+
+def _aborted(outcome: Outcome) -> str:
+    return f"Stream aborted: {outcome.record.reason}"
+
+
+def _refusal(say: Callable[..., None], *arguments: Any, **options: Any) -> Exception | None:
+    """Say something, and return why it was not taken, if it was not."""
+    try:
+        say(*arguments, **options)
+    except (OSError, OutputError) as error:
+        return error
+    return None
+
+
+def _lead_nowhere() -> None:
+    """Give up streams that took nothing: Python would try again at its end, and end in a code of its own."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for number in (1, 2):
+        os.dup2(nowhere, number)
 
 
 def _source(

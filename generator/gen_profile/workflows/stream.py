@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import attrs
-import numpy as np
 
 from gen_profile.errors import OutputError, SpecError, StreamAborted
 from gen_profile.manifest import FILENAME, sha256
-from gen_profile.profile import Array, grid_times
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import spec_from_dict
 from gen_profile.workflows.delivered import manifest_beside, read_artefact
+from gen_profile.workflows.stream_outcome import Outcome, Source
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.clock import NANOSECONDS, Clock, SharedClock, SystemClock
+from gen_profile_exporters.can.console import stopped_by_signals, told_aside
 from gen_profile_exporters.can.lateness import Lateness, rehearse
-from gen_profile_exporters.can.plan import StreamPlan, plan_of
+from gen_profile_exporters.can.plan import plan_of
+from gen_profile_exporters.can.port import Port
 from gen_profile_exporters.can.realtime import PEER_PRIORITY, priority, real_time
 from gen_profile_exporters.can.startup import startup_lists
 from gen_profile_exporters.exporter import target_of
@@ -36,139 +35,10 @@ if TYPE_CHECKING:
     from gen_profile.workflows.crane_load import CraneLoad
     from gen_profile_exporters.can.drive_bank import DriveBank
     from gen_profile_exporters.can.drive_dictionary import Make
-    from gen_profile_exporters.can.streamer import Record, Streamer
+    from gen_profile_exporters.can.record import Record
 
 Tell = Callable[[str], None]
 SPIN = 200_000  # ns before each cycle, where a processor can be spared for it
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Source:
-    """A verified motion and the spec that it was designed for."""
-
-    spec: Spec
-    plan: StreamPlan
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Port:
-    """A CAN interface as python-can names it, and its channel."""
-
-    interface: str
-    channel: str
-
-    def open(self, bitrate: int) -> can.BusABC:
-        """Open it.
-
-        Raises
-        ------
-        SpecError
-            There is none of that name, or it cannot be opened.
-        """
-        import can  # noqa: PLC0415  # 0.1 s that a dry run does not need
-
-        try:
-            if self.interface == "udp_multicast":
-                from gen_profile_exporters.can.multicast import MulticastBus  # noqa: PLC0415
-
-                return MulticastBus(self.channel)
-            return can.Bus(channel=self.channel, interface=self.interface, bitrate=bitrate)
-        except (can.CanError, OSError, ValueError, ImportError, NotImplementedError) as error:
-            raise SpecError(
-                f"--interface {self.interface} --channel {self.channel}: cannot be opened ({error}); see "
-                "python-can's documentation for its interfaces."
-            ) from error
-
-    def open_for_streaming(self, bitrate: int, *, launch: bool = True) -> tuple[can.BusABC, tuple[str, ...]]:
-        """Open it, with launch times if they are wanted and kept; say what there is to say about that, too.
-
-        Raises
-        ------
-        SpecError
-        """
-        if sys.platform == "linux" and launch and self.interface == "socketcan":
-            from gen_profile_exporters.can.launch import launching_bus  # noqa: PLC0415  # sockets of Linux
-
-            bus = launching_bus(self.channel)
-            if bus is not None:
-                return bus, ("The kernel sends every cycle at its instant (launch times).",)
-            return self.open(bitrate), (
-                "Frames leave when this program wakes up; `tc qdisc replace dev "
-                f"{self.channel} root fq` would have the kernel send each at its instant.",
-            )
-        return self.open(bitrate), ()
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Outcome:
-    """What became of a stream; see the command-line contract.
-
-    Attributes
-    ----------
-    source : Source
-    record : Record
-    notes : tuple of str
-        What limited this machine's punctuality, or made up for it.
-    sway : float or None
-        Of the simulated machine after the move, in m.
-    """
-
-    source: Source
-    record: Record
-    notes: tuple[str, ...]
-    sway: float | None
-
-    @property
-    def done(self) -> bool:
-        """Whether the motion was carried out to its end."""
-        return not self.record.reason
-
-    @property
-    def planned(self) -> Array:
-        """Position that each axis is led to by the instant of each SYNC, in m, shape (cycles, axes)."""
-        return self._si(self.source.plan.motion.at_sync)
-
-    @property
-    def actual(self) -> Array:
-        """Position that each drive told at each SYNC, in m; not a number where none was told."""
-        return np.where(self.record.told[:, None], self._si(self.record.actual), np.nan)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Nest plain values for JSON."""
-        told = self.record.told
-        apart = np.abs(self.actual - self.planned)[told]
-        target = self._si(self.source.plan.motion.position[-1])
-        drive = {
-            "position_error_m": float(np.abs(self._si(np.array(self.record.final)) - target).max()),
-            "following_error_max_m": float(apart.max()) if told.any() else None,
-            "sway_residual_peak_m": self.sway,
-        }
-        return {
-            "state": self.record.phase.value,
-            "cycles_sent": self.record.sent,
-            "cycles_planned": len(self.source.plan.cycles),
-            "lateness_us": self.record.lateness.to_dict(),
-            "drift_s": self.record.lateness.drift,
-            "drive": drive if told.any() else None,
-            "reason": self.record.reason,
-            "notes": list(self.notes),
-        }
-
-    def table(self) -> bytes:
-        """Render plan and reality side by side (RFC 4180)."""
-        axes = self.source.spec.machine().actuated
-        heads = [f"{axis.name}_{what}_{axis.unit}" for axis in axes for what in ("planned", "actual")]
-        times = grid_times(len(self.planned) - 1, self.source.plan.motion.period)
-        columns = np.stack([self.planned, self.actual], axis=2).reshape(len(times), -1)
-        rows = [
-            ",".join([f"{time:.9g}", *("" if np.isnan(cell) else f"{cell:.9g}" for cell in row)])
-            for time, row in zip(times, columns, strict=True)
-        ]
-        return ("\n".join([",".join(["time_s", *heads]), *rows]) + "\n").encode("ascii")
-
-    def _si(self, counts: Any) -> Array:
-        scale = np.array([axis.counts_per_si for axis in self.source.plan.target.axes])
-        return np.asarray(counts / scale)
 
 
 def require_extra() -> None:
@@ -303,17 +173,27 @@ def stream(
 
     with ExitStack() as stack:
         simulation = stack.enter_context(_simulated(source, port, tell)) if simulate_drive else None
-        bus, remarks = port.open_for_streaming(source.spec.can.bitrate, launch=simulation is None)
-        stack.enter_context(bus)
+        bus = port.open(source.spec.can.bitrate)
+        stack.callback(_shut_down, bus)
+        aside = stack.enter_context(told_aside(tell))
         refused = stack.enter_context(real_time())
         clock = _clock(refused) if simulation is None else simulation.clock
-        streamer = Streamer(bus, clock, source.plan, tell, reset_fault=reset_fault)
-        stack.enter_context(_stopped_by_signals(streamer))
+        streamer = Streamer(bus, clock, source.plan, aside, reset_fault=reset_fault)
+        stack.enter_context(stopped_by_signals(streamer.ask_to_stop))
         before = 0 if simulation is None else simulation.clock.catch_up()
         record = streamer.run()
-    stalls = () if simulation is None else _stalls(simulation.clock.stalled - before)
-    said = (*notes, *refused, *remarks, *stalls)
-    return Outcome(source=source, record=record, notes=said, sway=simulation.sway if simulation else None)
+    if simulation is None:
+        sway, remarks = None, port.remarks(record.launched)
+    else:
+        sway, remarks = simulation.sway, _stalls(simulation.clock.stalled - before)
+    said = (*notes, *refused, *remarks, *_afterwards(record))
+    return Outcome(source=source, record=record, notes=said, sway=sway)
+
+
+def _shut_down(bus: can.BusABC) -> None:
+    """Close a bus that may have failed, which must not hide what became of the stream."""
+    with suppress(Exception):
+        bus.shutdown()
 
 
 def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
@@ -346,6 +226,11 @@ class _Simulation:
     sway: float | None = None
 
 
+def _afterwards(record: Record) -> tuple[str, ...]:
+    """Say what went wrong when the motion was done, which the next stream may meet."""
+    return (f"When the drives were switched off: {record.aftermath}",) if record.aftermath else ()
+
+
 def _stalls(stalled: int) -> tuple[str, ...]:
     """Say how long a simulation stood still, in ns, if it did."""
     milliseconds = round(1e3 * stalled / NANOSECONDS)
@@ -370,21 +255,6 @@ def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
         found = _Simulation(clock)
         yield found
         found.sway = load.residual_sway()
-
-
-@contextmanager
-def _stopped_by_signals(streamer: Streamer) -> Iterator[None]:
-    """Have Ctrl-C and SIGTERM stop the axes as any other fault does."""
-
-    def stop(number: int, _: FrameType | None) -> None:
-        streamer.ask_to_stop(f"Stopped by {signal.Signals(number).name}.")
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _clock(refused: tuple[str, ...]) -> SystemClock:

@@ -97,6 +97,9 @@ class Launching(Tampered):
         self._clock, self._waiting = clock, []
         clock.actors.append(self._launch)
 
+    def keeps_instants(self):
+        return True
+
     def send_at(self, message, instant):
         self._waiting.append((instant, message))
         self._clock.alarms.append(instant)
@@ -140,6 +143,7 @@ class Bench:
         launching=False,
         sluggish=False,
         reset_fault=False,
+        kind=SimulatedDrive,
         **options,
     ):
         channel = f"bench-{next(_channels)}"
@@ -153,15 +157,11 @@ class Bench:
         self.streamer_end = Launching(self._buses[2], self.clock) if launching else Tampered(self._buses[2])
         self.heard = []
         self.clock.actors.append(self._listen)
-        self.drives = self._drives(make or Make(), load, stand)
+        self.drives = self._drives(kind, make or Make(), load, stand)
         self.drives_alive = True
         self.clock.actors.append(lambda: self.drives.poll() if self.drives_alive else None)
-        self.phases = []
-        clock = Sluggish(self.clock) if sluggish else self.clock
-        self.streamer = Streamer(
-            self.streamer_end, clock, self.plan, self.phases.append, reset_fault=reset_fault
-        )
-        self.fault_at = None
+        self._streamer_clock = Sluggish(self.clock) if sluggish else self.clock
+        self.renew(reset_fault=reset_fault)
 
     def __enter__(self):
         return self
@@ -178,6 +178,14 @@ class Bench:
     def now(self):
         """ms since the beginning."""
         return (self.clock.now() - BEGINNING) / MS
+
+    def renew(self, *, reset_fault=False):
+        """Begin again with another streamer, on the same bus and drives."""
+        self.phases = []
+        self.streamer = Streamer(
+            self.streamer_end, self._streamer_clock, self.plan, self.phases.append, reset_fault=reset_fault
+        )
+        self.fault_at = None
 
     def at_cycle(self, cycle, act):
         """Do something once so many setpoints have been streamed, and note when."""
@@ -222,9 +230,9 @@ class Bench:
         while (message := self.witness.recv(0)) is not None:
             self.heard.append(Heard(self.now, message.arbitration_id, bytes(message.data)))
 
-    def _drives(self, make, load, stand):
+    def _drives(self, kind, make, load, stand):
         first = [int(at) for at in (self.plan.motion.position[0] if stand is None else stand)]
         counts = [axis.counts_per_si for axis in self.target.axes]
-        drives = [SimulatedDrive(self.target.can.node + n, make, at) for n, at in enumerate(first)]
+        drives = [kind(self.target.can.node + n, make, at) for n, at in enumerate(first)]
         rest = [at / count for at, count in zip(first, counts, strict=True)]
         return DriveBank(self.drive_end, self.clock, drives, counts, load or RigidLoad(rest))

@@ -12,7 +12,7 @@ from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.drive_dictionary import Make
 from gen_profile_exporters.can.exporter import encode
 from gen_profile_exporters.can.plan import plan_of
-from gen_profile_exporters.can.streamer import Phase
+from gen_profile_exporters.can.record import Phase
 
 
 def refused(bench, reason):

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import can
 import pytest
 
-from gen_profile.workflows.stream import Port
 from gen_profile_exporters.can import launch
+from gen_profile_exporters.can.port import Port
 
 
 class Interface:
@@ -20,11 +20,13 @@ class Interface:
         How long after its launch time a frame is heard, in s; None: never.
     """
 
+    channel = "can7"
+
     def __init__(self, late):
-        self._late, self.instant, self.closed = late, 0, 0
+        self._late, self.instant, self.sent = late, 0, []
 
     def send_at(self, message, instant):
-        assert message.arbitration_id == 0x77F
+        self.sent.append(message.arbitration_id)
         self.instant = instant
 
     def recv(self, timeout):
@@ -32,9 +34,6 @@ class Interface:
             return None
         time.sleep(max(0.0, self.instant / 1e9 + self._late - time.monotonic()))
         return can.Message()
-
-    def shutdown(self):
-        self.closed += 1
 
     def __enter__(self):
         return self
@@ -47,37 +46,28 @@ def refuse(*_):
     raise OSError("No buffer space available")
 
 
-def opened(monkeypatch, interface):
-    """Open a bus for streaming on an interface; return it, and what is said about it."""
-    monkeypatch.setattr(launch, "LaunchingBus", lambda channel: interface)
-    monkeypatch.setattr(launch, "SocketcanBus", lambda channel, can_filters: interface)
-    monkeypatch.setattr(can, "Bus", lambda **_: "usual bus")
-    return Port(interface="socketcan", channel="can7").open_for_streaming(500_000)
-
-
-def test_an_interface_that_keeps_them(monkeypatch):
-    interface = Interface(late=0.0005)
-    bus, (said,) = opened(monkeypatch, interface)
-    assert (bus, interface.closed) == (interface, 0)
-    assert "launch times" in said
-
-
-@pytest.mark.parametrize("late", [-0.02, None], ids=["at once", "never"])
-def test_an_interface_that_keeps_none(monkeypatch, late):
+@pytest.mark.parametrize(
+    ("late", "keeps"), [(0.0005, True), (-0.02, False), (None, False)], ids=["in time", "at once", "never"]
+)
+def test_whether_an_interface_keeps_them_is_tried(monkeypatch, late, keeps):
     interface = Interface(late)
-    bus, (said,) = opened(monkeypatch, interface)
-    assert (bus, interface.closed) == ("usual bus", 1)
-    assert "tc qdisc replace dev can7 root fq" in said
+    monkeypatch.setattr(launch, "SocketcanBus", lambda channel, can_filters: interface)
+    assert launch.LaunchingBus.keeps_instants(interface) is keeps
+    assert interface.sent == [0x780]  # which arms no drive's heartbeat watch, and stops nobody else's stream
 
 
 def test_an_interface_whose_queue_is_full(monkeypatch):
     interface = Interface(late=0.0)
     interface.send_at = refuse
-    assert opened(monkeypatch, interface)[0] == "usual bus"
+    monkeypatch.setattr(launch, "SocketcanBus", lambda channel, can_filters: interface)
+    assert not launch.LaunchingBus.keeps_instants(interface)
 
 
-def test_there_is_none_of_that_name():
-    assert launch.launching_bus("no-such-bus") is None
+def test_what_is_said_of_them():
+    port = Port(interface="socketcan", channel="can7")
+    assert "launch times" in port.remarks(True)[0]
+    assert "tc qdisc replace dev can7 root fq" in port.remarks(False)[0]
+    assert Port(interface="pcan", channel="x").remarks(False) == ()
 
 
 def test_a_frame_as_linux_takes_it():

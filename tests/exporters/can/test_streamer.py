@@ -14,7 +14,7 @@ from gen_profile_exporters.can.candump import read
 from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.drive_dictionary import Make
 from gen_profile_exporters.can.exporter import encode
-from gen_profile_exporters.can.streamer import Phase
+from gen_profile_exporters.can.record import Phase
 
 PHASES = ["configure", "align", "enable", "stream", "hold", "disable"]
 PERIOD = 4  # ms
@@ -321,7 +321,7 @@ class TestLateness:
 
         def oversleep(instant):
             sleep_until(instant)
-            if bench.streamer.cycles_sent == cycle and not done and instant == bench.streamer._due:
+            if bench.streamer.cycles_sent == cycle and not done and instant == bench.streamer._pacer.due:
                 done.append(True)
                 bench.clock.stall(int(milliseconds * 1e6))
 
