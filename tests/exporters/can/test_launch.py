@@ -1,7 +1,6 @@
 """When launch times are used, on interfaces that keep them or do not; on a real queue: `test_vcan`."""
 
 import struct
-import time
 from types import SimpleNamespace
 
 import can
@@ -23,7 +22,10 @@ class Interface:
     channel = "can7"
 
     def __init__(self, late):
-        self._late, self.instant, self.sent = late, 0, []
+        self._late, self.now, self.instant, self.sent = late, 0, 0, []
+
+    def monotonic_ns(self):
+        return self.now
 
     def send_at(self, message, instant):
         self.sent.append(message.arbitration_id)
@@ -32,7 +34,7 @@ class Interface:
     def recv(self, timeout):
         if self._late is None:
             return None
-        time.sleep(max(0.0, self.instant / 1e9 + self._late - time.monotonic()))
+        self.now = max(self.now, self.instant + round(self._late * 1e9))
         return can.Message()
 
     def __enter__(self):
@@ -52,6 +54,7 @@ def refuse(*_):
 def test_whether_an_interface_keeps_them_is_tried(monkeypatch, late, keeps):
     interface = Interface(late)
     monkeypatch.setattr(launch, "SocketcanBus", lambda channel, can_filters: interface)
+    monkeypatch.setattr(launch, "time", interface)
     assert launch.LaunchingBus.keeps_instants(interface) is keeps
     assert interface.sent == [0x780]  # which arms no drive's heartbeat watch, and stops nobody else's stream
 
