@@ -121,7 +121,7 @@ def _configure_one(
 ) -> int:
     _set(link, node, entries)
     mode = MODES[target.can.mode]
-    if (shown := _read(link, node, 0x6061)) != mode:
+    if (shown := _read(link, node, 0x6061, bits=8)) != mode:
         raise StreamAborted(f"axis {node.name}: the drive shows mode {shown} (6061h) instead of {mode}.")
     if target.can.mode != "csv":  # in which the streamer watches, not the drive
         _require_window(link, node)
@@ -176,10 +176,15 @@ def _disarm(link: Link, node: Node) -> None:
 
 def _require_rest(link: Link, node: Node) -> None:
     state = state_of(_read(link, node, 0x6041))
-    if state in FAULTS | MOVING:
+    if state in FAULTS:
         raise StreamAborted(
             f"axis {node.name}: the drive is in the state {state.words!r}; find out why, and reset it there "
             "or by --reset-fault."
+        )
+    if state in MOVING:
+        raise StreamAborted(
+            f"axis {node.name}: the drive is in the state {state.words!r}: somebody else commands it, "
+            "or left it so; have it switched off there (controlword 6040h = 0)."
         )
 
 
@@ -207,7 +212,7 @@ def _set(link: Link, node: Node, entries: Sequence[Entry]) -> None:
 
 def _differing(link: Link, node: Node, final: Mapping[Place, Entry]) -> list[tuple[Entry, bytes | None]]:
     wanted = {place: entry.data for place, entry in final.items()}
-    held = {place: _upload(link, node, *place) for place in final}
+    held = {place: _upload(link, node, *place, entry.bits) for place, entry in final.items()}
     same = {place for place, entry in final.items() if _same(entry, held[place])}
     if _interpolation_period(held) == _interpolation_period(wanted):  # 40 × 0.1 ms are 4 × 1 ms, too
         same |= {PERIOD_DIGITS, PERIOD_EXPONENT}
@@ -277,15 +282,15 @@ def _require_start(link: Link, node: Node, target: Target, motion: Setpoints) ->
     return actual
 
 
-def _read(link: Link, node: Node, index: int, sub: int = 0) -> int:
-    data = _upload(link, node, index, sub)
+def _read(link: Link, node: Node, index: int, sub: int = 0, bits: int = 32) -> int:
+    data = _upload(link, node, index, sub, bits)
     if data is None:
         raise StreamAborted(f"axis {node.name}: the drive has no object {index:04X}h:{sub:02X}.")
     return int.from_bytes(data, "little")
 
 
-def _upload(link: Link, node: Node, index: int, sub: int) -> bytes | None:
-    """Read an object; None where the drive has none."""
+def _upload(link: Link, node: Node, index: int, sub: int, bits: int = 32) -> bytes | None:
+    """Read an object of so many bits, whose answer may have room for more; None where the drive has none."""
     try:
         data: bytes = link.sdo(node.number).upload(index, sub)
     except SdoAbortedError as error:
@@ -296,7 +301,7 @@ def _upload(link: Link, node: Node, index: int, sub: int) -> bytes | None:
         ) from error
     except (SdoError, struct.error) as error:
         raise _silent(node, error) from error
-    return data
+    return data[: bits // 8]
 
 
 def _silent(node: Node, error: Exception) -> StreamAborted:

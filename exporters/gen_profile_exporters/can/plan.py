@@ -57,12 +57,14 @@ def plan_of(content: bytes, target: Target) -> StreamPlan:
             f"{target.can.sync_period:g} s; export the log again."
         )
     taken, _ = read_setpoints(content, target)
+    found = _setpoints(taken, motion, target)
+    return StreamPlan(target=target, motion=found, cycles=cycles_of(found, target))
+
+
+def cycles_of(motion: Setpoints, target: Target) -> tuple[Cycle, ...]:
+    """Encode every cycle of a motion."""
     layout = frames.setpoint_frames(target)
-    return StreamPlan(
-        target=target,
-        motion=_setpoints(taken, motion, target),
-        cycles=tuple(_cycle(layout, values) for values in taken.tolist()),
-    )
+    return tuple(_cycle(layout, values) for values in motion.sent.tolist())
 
 
 def _cycle(layout: Sequence[SetpointFrame], setpoints: Sequence[Sequence[int]]) -> Cycle:

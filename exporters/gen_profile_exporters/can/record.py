@@ -18,6 +18,7 @@ class Phase(Enum):
     CONFIGURE = "configure"
     ALIGN = "align"
     ENABLE = "enable"
+    APPROACH = "approach"
     STREAM = "stream"
     HOLD = "hold"
     DISABLE = "disable"

@@ -131,10 +131,20 @@ def quick_stop_deceleration(position: Integers, period: float, can: CanSpec, axi
     """Deceleration 6085h in counts/s²: the spec's, else twice the motion's own greatest acceleration."""
     if can.quick_stop is not None:
         return magnitude_counts(can.quick_stop, axis)
+    return max(1, min(INT32.max, round(DECELERATION_MARGIN * greatest_acceleration(position, period))))
+
+
+def greatest_velocity(position: Integers, period: float) -> float:
+    """Greatest speed of one axis, in counts/s."""
+    return float(np.abs(np.diff(position)).max()) / period
+
+
+def greatest_acceleration(position: Integers, period: float) -> float:
+    """Greatest acceleration of one axis, in counts/s²."""
     velocity = np.diff(position) / period
     apart = max(1, round(DIFFERENCE / period))
     change = velocity[apart:] - velocity[:-apart] if len(velocity) > apart else velocity
-    return max(1, min(INT32.max, round(DECELERATION_MARGIN * float(np.abs(change).max()) / (apart * period))))
+    return float(np.abs(change).max()) / (apart * period)
 
 
 def _positions(values: Array, axis: AxisScale, can: CanSpec, period: float) -> Integers:

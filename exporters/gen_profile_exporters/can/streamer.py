@@ -1,4 +1,4 @@
-"""The streamer: listen → configure → align → enable → stream → hold → disable, or stop from wherever it is.
+"""The streamer: listen → configure → align → enable → approach → stream → hold → disable; or stop.
 
 Before each cycle the drives' answers to the one before are judged. Whatever is wrong ends in a quick stop
 (`gen_profile_exporters.can.stopping`), before anything is said about it, and no setpoint follows it.
@@ -14,14 +14,19 @@ import numpy as np
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import configuration, frames, startup
+from gen_profile_exporters.can.approach import approach
 from gen_profile_exporters.can.cia402 import FOLLOWS, IP_ENABLE, Controlword, State
 from gen_profile_exporters.can.clock import NANOSECONDS, Clock
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.link import Link
 from gen_profile_exporters.can.pacer import Pacer
-from gen_profile_exporters.can.plan import StreamPlan
+from gen_profile_exporters.can.plan import StreamPlan, cycles_of
 from gen_profile_exporters.can.record import Phase, Record, Recorder
-from gen_profile_exporters.can.scaling import magnitude_counts, quick_stop_deceleration
+from gen_profile_exporters.can.scaling import (
+    greatest_velocity,
+    magnitude_counts,
+    quick_stop_deceleration,
+)
 from gen_profile_exporters.can.stopping import quick_stop
 from gen_profile_exporters.can.watch import Alert, Axis, Watch
 
@@ -92,6 +97,7 @@ class Streamer:
             standing = self._configure()
             self._align(standing)
             self._enable()
+            self._approach(standing)
             self._stream()
             self._hold()
             self._disable()
@@ -149,6 +155,15 @@ class Streamer:
         self._command(Controlword.SWITCH_ON, State.SWITCHED_ON, self._preload)
         self._command(enable, State.ENABLED, self._preload, bits=FOLLOWS)
         self._watch.raise_alert(Alert.FOLLOWING)
+
+    def _approach(self, standing: Sequence[int]) -> None:
+        """Lead axes that stand off the first setpoint to it, slowly."""
+        way = approach(standing, self._plan.motion, self._plan.target)
+        if len(way.position):
+            self._begin(Phase.APPROACH)
+        for messages, led in zip(cycles_of(way, self._plan.target), way.at_sync, strict=True):
+            self._cycle(messages)
+            self._led = led
 
     def _stream(self) -> None:
         """Send every cycle at its instant."""
@@ -213,10 +228,10 @@ class Streamer:
     def _stopping_time(self) -> int:
         """Time in ns in which every axis comes to rest on its ramp from its greatest velocity."""
         motion, can = self._plan.motion, self._plan.target.can
-        fastest = np.abs(np.diff(motion.position, axis=0)).max(axis=0) / motion.period
         ramps = [
-            fastest[column] / quick_stop_deceleration(motion.position[:, column], motion.period, can, axis)
-            for column, axis in enumerate(self._plan.target.axes)
+            greatest_velocity(position, motion.period)
+            / quick_stop_deceleration(position, motion.period, can, axis)
+            for position, axis in zip(motion.position.T, self._plan.target.axes, strict=True)
         ]
         return STOP_MARGIN + 10 * self._pacer.period + int(max(ramps) * NANOSECONDS)
 

@@ -71,11 +71,35 @@ def test_a_device_of_another_kind():
         refused(bench, r"node 1 is no CiA 402 drive \(1000h is 00020191h\)")
 
 
-@pytest.mark.parametrize("state", [State.FAULT, State.ENABLED])
-def test_a_drive_in_another_state(state):
+@pytest.mark.parametrize(
+    ("state", "cure"),
+    [
+        (State.FAULT, "or by --reset-fault"),
+        (State.ENABLED, r"switched off there \(controlword 6040h = 0\)"),
+        (State.QUICK_STOP, r"switched off there \(controlword 6040h = 0\)"),
+    ],
+)
+def test_a_drive_in_another_state(state, cure):
     with Bench() as bench:
         bench.drive.store(0x6041, 0, state.bits)
-        refused(bench, f"in the state '{state.words}'")
+        refused(bench, f"in the state '{state.words}'.*{cure}")
+
+
+def test_answers_that_do_not_state_their_size():
+    """Command 42h of CiA 301: four bytes come, and only the object's type tells how many count."""
+
+    def sizeless(message):
+        command = message.data[0] if message.arbitration_id == 0x581 else 0
+        if command & 0xE3 == 0x43:  # expedited, of a stated size
+            used = 8 - (command >> 2 & 3)
+            message.data = bytearray([0x42, *message.data[1:used], *[0xAA] * (8 - used)])
+        send(message)
+
+    with Bench(vendor=0x2E5) as bench:
+        send, bench.drive_end.send = bench.drive_end.send, sizeless
+        record = bench.run()
+        assert bench.drive.value(0x1016, 1) == 0
+    assert (record.phase, record.reason) == (Phase.DONE, "")
 
 
 def in_fault(bench):
