@@ -1,5 +1,8 @@
 """A function block around the playback block that hands its outputs to the axes of a vendor's motion library.
 
+The vendor's block first takes the axes where they stand, so that no setpoint is a step; then the motion
+begins, under watch: an axis in error, without power or no longer this block's is let go at once, the others
+stop on the path, and nothing goes on before another rising edge and the check of the start.
 The calls follow the vendors' public manuals; they were not tried on a controller.
 """
 
@@ -13,17 +16,97 @@ HEADER = """\
 (*
     {name}: plays {block} on the axes given. Call it in the task of the motion, every fCycleTime.
     Not tried on a controller: watch the first motion with the hand at the emergency stop.
+
+    An axis that fails is let go and left to its own reaction, the others stop on the path: until then, bBusy
+    is set beside bError. It takes another rising edge to start, from where the motion begins.
+
+    nErrorId: as of {block}, and
+              20 an axis is in error
+              21 an axis has no power
+              22 {guide} reports an error, or does not work
+              23 something else took an axis
 *)
 """
 BODY = """\
+{edges}
+(* Idle lasts a cycle at least, so that the vendor's blocks see an edge at the next start. *)
+IF (nStage = cIdle) AND (nDue > 0) THEN
+    nStage := cTaking;
+    nTrigger := nDue;
+{take}
+ELSIF (nStage = cStopping) AND NOT fbMotion.bBusy THEN
+    nStage := cIdle;
+ELSIF (nStage = cPlaying) AND NOT fbMotion.bBusy AND NOT ({held}) THEN
+    nStage := cIdle;
+END_IF;
+IF (nStage = cTaking) OR (nStage = cPlaying) THEN nDue := 0; END_IF;
+
+bReady := TRUE;
 {prepare}
+IF (nFault <> 0) AND (nStage <> cIdle) THEN nStage := cStopping; END_IF;
+
+{levels}
+IF (nStage = cTaking) AND (bReady OR bAbort) THEN
+    nStage := cPlaying;
+{starts}
+END_IF;
 fbMotion(
     {arguments});
 bGuided := fbMotion.bBusy OR fbMotion.bDone OR fbMotion.bAborted;
+IF (nStage = cPlaying) AND fbMotion.bError THEN
+    nStage := cIdle;
+    nFault := fbMotion.nErrorId;
+END_IF;
+
 {feed}
+IF (nFault <> 0) AND (nStage <> cIdle) THEN nStage := cStopping; END_IF;
+
+bBusy := (nStage = cTaking) OR (nStage = cStopping) OR fbMotion.bBusy;
+bDone := (nStage = cPlaying) AND fbMotion.bDone;
+bAborted := (nStage = cPlaying) AND fbMotion.bAborted;
+bError := nFault <> 0;
+nErrorId := nFault;
 {results}
 """
+# For each input whose rising edge starts: what asks for a motion, or takes note of an error.
+EDGE = """\
+IF {input} AND NOT {input}Before THEN
+    nDue := {number};
+    nFault := 0;
+ELSIF {input}Before AND NOT {input} THEN
+    IF nDue = {number} THEN nDue := 0; END_IF;
+    nFault := 0;
+END_IF;
+{input}Before := {input};"""
+PREPARE = """\
+IF nStage = cIdle THEN bTaken{n} := FALSE; END_IF;
+nCause := 0;
+IF (nStage = cTaking) AND (ABS({setpoint} - {actual}) > fStartTolerance{i}) THEN nCause := 2; END_IF;
+{vendor}
+{let_go}"""
+FEED = """\
+bFeed := bTaken{n} AND ((nStage = cTaking) OR bGuided);
+fPosition := fbMotion.fPosition{i};
+fVelocity := fbMotion.fVelocity{i};
+fAcceleration := fbMotion.fAcceleration{i};
+IF nStage = cTaking THEN
+    fPosition := {setpoint};
+    fVelocity := 0.0;
+    fAcceleration := 0.0;
+END_IF;
+nCause := 0;
+{vendor}
+{let_go}"""
+LET_GO = """\
+IF bTaken{n} AND (nCause <> 0) THEN
+    bTaken{n} := FALSE;
+    IF nFault = 0 THEN nFault := nCause; END_IF;
+END_IF;"""
+STAGES = ("cIdle", "cTaking", "cPlaying", "cStopping")
+TRIGGERS = ("bExecute", "bContinue")  # inputs whose rising edge starts
 ACTUAL = "fActPosition"  # the only input of the playback block that comes from the axes
+SETPOINTS = {"fPosition", "fVelocity", "fAcceleration", "nPosition"}  # what goes to them
+STATES = {"bBusy", "bDone", "bAborted", "bError", "nErrorId"}  # outputs that depend on the axes, too
 
 
 @attrs.frozen(kw_only=True)
@@ -36,98 +119,178 @@ class MotionLibrary:
     Attributes
     ----------
     axis_type : str
+    guide : str
+        Name of the block that guides the axis.
     instances : dict of str to str
-        Library blocks by the beginning of their instances' names.
+        Library blocks, and other variables of each axis, by the beginning of their names.
+    setpoint, actual : str
+        Where the axis is told to be, and where it is.
     prepare : str
-        Before the playback block is called; clears ``bReady`` as long as the axis is not ready.
-    actual : str
-        Where the axis stands.
+        Before the playback block is called: tells by ``nCause`` what is wrong with the axis, and clears
+        ``bReady`` as long as it is not guided.
     feed : str
-        After it was called; ``bGuided`` tells that its outputs count.
+        After it was called: gives ``fPosition``, ``fVelocity`` and ``fAcceleration`` to the axis if
+        ``bFeed``, and tells by ``nCause`` what went wrong.
     """
 
     axis_type: str
+    guide: str
     instances: dict[str, str]
-    prepare: str
+    setpoint: str
     actual: str
+    prepare: str
     feed: str
 
 
 TWINCAT = MotionLibrary(
     axis_type="AXIS_REF",
+    guide="MC_ExtSetPointGenEnable",
     instances={
         "fbEnable": "MC_ExtSetPointGenEnable",
         "fbDisable": "MC_ExtSetPointGenDisable",
+        "bEnabled": "BOOL",
         "nDirection": "DINT",
     },
-    prepare="""\
-fbEnable{n}(Axis := Axis{n}, Execute := bExecute, Position := Axis{n}.NcToPlc.ActPos,
-    PositionType := POSITIONTYPE_ABSOLUTE);
-IF NOT fbEnable{n}.Enabled THEN bReady := FALSE; END_IF;""",
+    setpoint="Axis{n}.NcToPlc.SetPos",
     actual="Axis{n}.NcToPlc.ActPos",
+    prepare="""\
+fbEnable{n}(Axis := Axis{n}, Execute := bTaken{n} AND NOT fbDisable{n}.Busy,
+    Position := Axis{n}.NcToPlc.SetPos, PositionType := POSITIONTYPE_ABSOLUTE);
+IF bTaken{n} THEN bEnabled{n} := fbEnable{n}.Enabled; END_IF;
+IF NOT fbEnable{n}.Enabled OR fbEnable{n}.Busy OR fbDisable{n}.Busy THEN bReady := FALSE; END_IF;
+IF NOT fbEnable{n}.Enabled AND (nStage <> cTaking) THEN nCause := 23; END_IF;
+IF fbEnable{n}.Error THEN nCause := 22; END_IF;
+(* Bit 0: operational; bit 31: in error. *)
+IF (Axis{n}.NcToPlc.StateDWord AND 16#00000001) = 16#00000000 THEN nCause := 21; END_IF;
+IF (Axis{n}.NcToPlc.StateDWord AND 16#80000000) <> 16#00000000 THEN nCause := 20; END_IF;""",
     feed="""\
 nDirection{n} := 0;
-IF fbMotion.fVelocity{i} > 0.0 THEN nDirection{n} := 1; END_IF;
-IF fbMotion.fVelocity{i} < 0.0 THEN nDirection{n} := -1; END_IF;
-IF bGuided THEN
-    MC_ExtSetPointGenFeed(Position := fbMotion.fPosition{i}, Velocity := fbMotion.fVelocity{i},
-        Acceleration := fbMotion.fAcceleration{i}, Direction := nDirection{n}, Axis := Axis{n});
+IF fVelocity > 0.0 THEN nDirection{n} := 1; END_IF;
+IF fVelocity < 0.0 THEN nDirection{n} := -1; END_IF;
+IF bFeed THEN
+    MC_ExtSetPointGenFeed(Position := fPosition, Velocity := fVelocity, Acceleration := fAcceleration,
+        Direction := nDirection{n}, Axis := Axis{n});
 END_IF;
-fbDisable{n}(Axis := Axis{n}, Execute := NOT bExecute AND NOT fbMotion.bBusy);""",
+fbDisable{n}(Axis := Axis{n}, Execute := bEnabled{n} AND NOT bTaken{n});""",
 )
 CODESYS = MotionLibrary(
     axis_type="AXIS_REF_SM3",
+    guide="SMC_FollowSetValues",
     instances={"fbFollow": "SMC_FollowSetValues"},
-    prepare="",
+    setpoint="Axis{n}.fSetPosition",
     actual="Axis{n}.fActPosition",
+    prepare="""\
+IF NOT fbFollow{n}.bBusy THEN bReady := FALSE; END_IF;
+(* SMC_AXIS_STATE: 0 power_off, 1 errorstop. *)
+IF Axis{n}.nAxisState = 0 THEN nCause := 21; END_IF;
+IF Axis{n}.nAxisState = 1 THEN nCause := 20; END_IF;""",
     feed="""\
-fbFollow{n}(Axis := Axis{n}, bExecute := bGuided, bAbort := NOT bGuided, dwValueMask := 16#00000007,
-    fSetPosition := fbMotion.fPosition{i}, fSetVelocity := fbMotion.fVelocity{i},
-    fSetAcceleration := fbMotion.fAcceleration{i});""",
+fbFollow{n}(Axis := Axis{n}, bExecute := bFeed, bAbort := NOT bFeed, dwValueMask := 16#00000007,
+    fSetPosition := fPosition, fSetVelocity := fVelocity, fSetAcceleration := fAcceleration);
+IF bFeed AND (nStage <> cTaking) AND NOT fbFollow{n}.bBusy THEN nCause := 22; END_IF;
+IF bFeed AND fbFollow{n}.bError THEN nCause := 22; END_IF;
+IF bFeed AND fbFollow{n}.bCommandAborted THEN nCause := 23; END_IF;""",
 )
 SIEMENS = MotionLibrary(
     axis_type="TO_PositioningAxis",
+    guide="MC_MOTIONINPOSITION",
     instances={"fbInPosition": "MC_MOTIONINPOSITION"},
-    prepare="",
+    setpoint="Axis{n}.Position",
     actual="Axis{n}.ActualPosition",
+    prepare="""\
+IF NOT fbInPosition{n}.Busy THEN bReady := FALSE; END_IF;
+(* Bit 0: enabled; bit 1: in error. *)
+IF NOT Axis{n}.StatusWord.%X0 THEN nCause := 21; END_IF;
+IF Axis{n}.StatusWord.%X1 THEN nCause := 20; END_IF;""",
     feed="""\
-fbInPosition{n}(Axis := Axis{n}, Enable := bGuided, Position := fbMotion.fPosition{i},
-    Velocity := fbMotion.fVelocity{i}, Acceleration := fbMotion.fAcceleration{i});""",
+fbInPosition{n}(Axis := Axis{n}, Enable := bFeed, Position := fPosition, Velocity := fVelocity,
+    Acceleration := fAcceleration);
+IF bFeed AND (nStage <> cTaking) AND NOT fbInPosition{n}.Busy THEN nCause := 22; END_IF;
+IF bFeed AND fbInPosition{n}.Error THEN nCause := 22; END_IF;
+IF bFeed AND fbInPosition{n}.CommandAborted THEN nCause := 23; END_IF;""",
 )
 
 
 def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> BlockSource:
-    """Write the block around a playback block, with the same inputs and flags."""
+    """Write the block around a playback block, with the same inputs and outputs but the axes' own."""
     inputs = [v for v in block.variables if v.section == "VAR_INPUT" and v.name != ACTUAL]
-    flags = [v for v in block.variables if v.section == "VAR_OUTPUT" and v.type in {"BOOL", "INT"}]
+    outputs = [v for v in block.variables if v.section == "VAR_OUTPUT" and v.name not in SETPOINTS]
     numbers = [(str(n), f"[{n}]") for n in range(1, axes + 1)] if axes > 1 else [("", "")]
-    own = {"bReady": "BOOL", "bGuided": "BOOL", "fbMotion": block.name}
-    own |= {f"{name}{n}": type_ for n, _ in numbers for name, type_ in library.instances.items()}
-    prepare, feed = (
-        "\n".join(text.format(n=n, i=i) for n, i in numbers) for text in (library.prepare, library.feed)
-    )
-    if axes > 1:
-        own["fActual"] = f"ARRAY [1..{axes}] OF LREAL"
-        prepare += "".join(f"\nfActual{i} := {library.actual.format(n=n)};" for n, i in numbers)
-    given = {v.name: v.name for v in inputs}
-    given |= {
-        "bExecute": "bExecute AND bReady",
-        ACTUAL: library.actual.format(n="") if axes == 1 else "fActual",
-    }
     name = f"{block.name}_Axis"
     return BlockSource(
-        header=HEADER.format(name=name, block=block.name),
+        header=HEADER.format(name=name, block=block.name, guide=library.guide),
         name=name,
         variables=(
             *(Variable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type) for n, _ in numbers),
             *inputs,
-            *flags,
-            *(Variable(section="VAR", name=key, type=type_) for key, type_ in own.items()),
+            *outputs,
+            *_own(block.name, [v.name for v in inputs], numbers, library),
         ),
-        body=BODY.format(
-            prepare=f"bReady := TRUE;\n{prepare.lstrip()}".rstrip(),
-            arguments=",\n    ".join(f"{key} := {value}" for key, value in given.items()),
-            feed=feed,
-            results="\n".join(f"{v.name} := fbMotion.{v.name};" for v in flags),
-        ),
+        body=_body([v.name for v in inputs], [v.name for v in outputs], numbers, library),
     )
+
+
+def _own(
+    block: str, inputs: list[str], numbers: list[tuple[str, str]], library: MotionLibrary
+) -> list[Variable]:
+    """Declare what is the wrapper's own."""
+    own = {"fbMotion": block, "nStage": "DINT", "nTrigger": "DINT", "nDue": "DINT"}
+    own |= {f"{trigger}{end}": "BOOL" for trigger in _triggers(inputs) for end in ("Before", "Now")}
+    own |= {"nFault": "INT", "nCause": "INT", "bReady": "BOOL", "bGuided": "BOOL", "bFeed": "BOOL"}
+    own |= {"fPosition": "LREAL", "fVelocity": "LREAL", "fAcceleration": "LREAL"}
+    if len(numbers) > 1:
+        own["fStand"] = f"ARRAY [1..{len(numbers)}] OF LREAL"
+    own |= {
+        f"{key}{n}": type_
+        for n, _ in numbers
+        for key, type_ in {"bTaken": "BOOL", **library.instances}.items()
+    }
+    return [
+        *(Variable(section="VAR", name=key, type=type_) for key, type_ in own.items()),
+        *(
+            Variable(section="VAR CONSTANT", name=stage, type="DINT", initial=str(number))
+            for number, stage in enumerate(STAGES)
+        ),
+    ]
+
+
+def _body(
+    inputs: list[str], outputs: list[str], numbers: list[tuple[str, str]], library: MotionLibrary
+) -> str:
+    triggers = _triggers(inputs)
+
+    def each(template: str) -> str:
+        return "\n".join(template.format(n=n, i=i) for n, i in numbers)
+
+    def around(template: str, statements: str) -> str:
+        """Put the vendor's statements into ours, for every axis; both have its number in them."""
+        places = {
+            "setpoint": library.setpoint,
+            "actual": library.actual,
+            "let_go": LET_GO,
+            "vendor": statements,
+        }
+        return each(template.format(n="{n}", i="{i}", **places))
+
+    several = len(numbers) > 1
+    stand = each("fStand{i} := " + library.setpoint + ";") if several else ""
+    given = {key: f"{key}Now" if key in triggers else key for key in inputs}
+    given |= {
+        "bAbort": "bAbort OR (nStage = cStopping)",
+        ACTUAL: "fStand" if several else library.setpoint.format(n=""),
+    }
+    return BODY.format(
+        edges="\n".join(EDGE.format(input=key, number=number) for number, key in enumerate(triggers, 1)),
+        held=" OR ".join(triggers),
+        take=each("    bTaken{n} := TRUE;"),
+        prepare=f"{around(PREPARE, library.prepare)}\n{stand}".rstrip(),
+        levels="\n".join(f"{key}Now := (nStage = cPlaying) AND {key};" for key in triggers),
+        starts="\n".join(f"    {key}Now := nTrigger = {number};" for number, key in enumerate(triggers, 1)),
+        arguments=",\n    ".join(f"{key} := {value}" for key, value in given.items()),
+        feed=around(FEED, library.feed),
+        results="\n".join(f"{key} := fbMotion.{key};" for key in outputs if key not in STATES),
+    )
+
+
+def _triggers(inputs: list[str]) -> list[str]:
+    return [key for key in TRIGGERS if key in inputs]

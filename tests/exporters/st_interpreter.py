@@ -1,10 +1,11 @@
 """Interpreter for a subset of IEC 61131-3 Structured Text: an oracle that knows nothing of the exporter.
 
-One function block per text, with variables of BOOL, INT, DINT, LREAL, DWORD and one-dimensional arrays of
-them; assignments, IF, CASE over integers, FOR, WHILE, expressions with the standard's precedence (third
-edition, table 71), and a few standard functions. It is strict where compilers are: every type must fit,
-integers must not overflow, indices must lie within bounds, inputs and constants are not written, initialisers
-fill their array.
+One function block per text, with variables of BOOL, INT, DINT, LREAL, DWORD, one-dimensional arrays of them,
+and instances of other blocks, whose texts are given (a structure is a block without statements, a function
+one that is called by its own name); calls of these, assignments, IF, CASE over integers, FOR, WHILE,
+expressions with the standard's precedence (third edition, table 71), and a few standard functions. It is
+strict where compilers are: every type must fit, integers must not overflow, indices must lie within bounds,
+inputs and constants are not written, initialisers fill their array.
 
 The text is translated to Python once, so that many cycles can be run.
 """
@@ -21,6 +22,7 @@ GRAMMAR = r"""
     block: SECTION CONSTANT? declaration* "END_VAR"i
     declaration: NAME ":" type [":=" initial] ";"
     type: TYPE -> scalar
+        | NAME -> instance
         | "ARRAY"i "[" INTEGER ".." INTEGER "]" "OF"i TYPE -> array
     ?initial: literal
         | "[" literal ("," literal)* "]" -> values
@@ -32,6 +34,8 @@ GRAMMAR = r"""
         | "CASE"i expression "OF"i label+ ["ELSE"i body] "END_CASE"i ";" -> case
         | "FOR"i NAME ":=" expression "TO"i expression "DO"i body "END_FOR"i ";" -> count
         | "WHILE"i expression "DO"i body "END_WHILE"i ";" -> repeat
+        | NAME ("." NAME)* "(" argument ("," argument)* ")" ";" -> invoke
+    argument: NAME ":=" expression
     branch: expression "THEN"i body
     label: INTEGER ("," INTEGER)* ":" body
 
@@ -47,16 +51,18 @@ GRAMMAR = r"""
     ?primary: REAL -> real | INTEGER -> integer | BOOLEAN -> boolean | BITS -> bits
         | "(" expression ")"
         | NAME "(" expression ("," expression)* ")" -> call
+        | NAME ("." NAME)+ ["[" expression "]"] ["." BIT] -> member
         | variable
     variable: NAME ["[" expression "]"]
 
-    SECTION.3: /VAR_INPUT\b|VAR_OUTPUT\b|VAR\b/i
+    SECTION.3: /VAR_IN_OUT\b|VAR_INPUT\b|VAR_OUTPUT\b|VAR\b/i
     CONSTANT.3: /CONSTANT\b/i
     TYPE.3: /BOOL\b|INT\b|DINT\b|LREAL\b|DWORD\b/i
     BOOLEAN.3: /TRUE\b|FALSE\b/i
     OR.3: /OR\b/i
     XOR.3: /XOR\b/i
     AND.3: /AND\b/i
+    BIT.3: /%X[0-9]+/
     BITS.3: /16#[0-9A-Fa-f]+/
     REAL.2: /[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?/
     INTEGER: /[0-9]+/
@@ -74,6 +80,7 @@ LIMITS = {"INT": (-(2**15), 2**15 - 1), "DINT": (-(2**31), 2**31 - 1), "DWORD": 
 ZERO = {"BOOL": False, "INT": 0, "DINT": 0, "LREAL": 0.0, "DWORD": 0}
 LITERAL = "integer literal"  # fits INT and DINT
 INTEGERS = ("INT", "DINT", LITERAL)
+INSTANCE = "instance"  # in place of an array's bounds
 MOST_TURNS = 10_000  # of one WHILE
 
 # name → types of the arguments ("number": LREAL or integer, all the same), type of the result, Python
@@ -162,6 +169,10 @@ class _Declarations(Interpreter):
         for name, type_, initial in (declaration.children for declaration in rest):
             key = name.lower()
             _check(key not in self.types, f"{name} is declared twice")
+            if type_.data == "instance":
+                self.sections[key], self.types[key] = section.upper(), (str(type_.children[0]), INSTANCE)
+                self.initial[key] = None
+                continue
             scalar = type_.children[-1].upper()
             bounds = tuple(map(int, type_.children[:-1])) or None
             self.sections[key], self.types[key] = section.upper(), (scalar, bounds)
@@ -202,8 +213,9 @@ def _bits(token):
 class _Translator(Interpreter):
     """From the tree to Python: an expression to its type and code, a statement to lines."""
 
-    def __init__(self, declarations):
+    def __init__(self, declarations, library):
         self.sections, self.types = declarations.sections, declarations.types
+        self.library = library
         self.loops = 0
 
     def real(self, tree):
@@ -229,6 +241,61 @@ class _Translator(Interpreter):
         type_, code = self.visit(index)
         _check(type_ in INTEGERS, f"{name} has an index that is no integer")
         return scalar, f"v_{key}[_within({code}, {bounds[0]}, {bounds[1]}, 'index of {key}') - {bounds[0]}]"
+
+    def member(self, tree):
+        *names, index, bit = tree.children
+        (type_, bounds), code = self._path(names)
+        if index is not None:
+            code = f"{code}[_within({self.visit(index)[1]}, {bounds[0]}, {bounds[1]}, 'index') - {bounds[0]}]"
+        if bit is not None:
+            _check(type_ == "DWORD", f"{type_} has no bits")
+            return "BOOL", f"({code} >> {int(bit[2:])} & 1 == 1)"
+        return type_ if index is not None or bounds is None else (type_, bounds), code
+
+    def _path(self, names):
+        """Type and place of a variable in an instance in an instance."""
+        key = names[0].lower()
+        _check(key in self.types, f"{names[0]} is not declared")
+        (type_, bounds), code = self.types[key], f"v_{key}"
+        for name in map(str.lower, names[1:]):
+            _check(bounds is INSTANCE, f"{names[0]} has no members")
+            declared = _declared(type_, self.library)
+            _check(name in declared.types, f"{type_} has no {name}")
+            (type_, bounds), code = declared.types[name], f"{code}['{name}']"
+        return (type_, bounds), code
+
+    def invoke(self, tree):
+        names = [child for child in tree.children if isinstance(child, Token)]
+        name, arguments = ".".join(names), tree.children[len(names) :]
+        if names[0].lower() in self.types:
+            (type_, bounds), instance = self._path(names)
+            _check(bounds is INSTANCE, f"{name} cannot be called")
+        else:
+            type_, instance = name, f"_function('{name.lower()}')"
+        declared = _declared(type_, self.library)
+        given = []
+        for parameter, expression in (argument.children for argument in arguments):
+            due = parameter.lower()
+            _check(
+                declared.sections.get(due) in ("VAR_INPUT", "VAR_IN_OUT"), f"{name} has no input {parameter}"
+            )
+            expected, bounds = declared.types[due]
+            found, code = self._whole(expression)
+            _check(
+                _fits(found, expected if bounds is None else (expected, bounds)),
+                f"{name}: {parameter} mixes types",
+            )
+            given.append(f"{due}={code}")
+        return [f"{instance}.call({', '.join(given)})"]
+
+    def _whole(self, tree):
+        """An expression, or a whole array or instance by its name."""
+        if tree.data == "variable" and tree.children[1] is None:
+            key = tree.children[0].lower()
+            scalar, bounds = self.types.get(key, (None, None))
+            if bounds is not None:
+                return (scalar, bounds), f"v_{key}"
+        return self.visit(tree)
 
     def call(self, tree):
         name, *arguments = tree.children
@@ -278,8 +345,8 @@ class _Translator(Interpreter):
 
     def assign(self, tree):
         name = tree.children[0].children[0].lower()
-        scalar, place = self.visit(tree.children[0])
-        type_, code = self.visit(tree.children[1])
+        scalar, place = self._whole(tree.children[0])
+        type_, code = self._whole(tree.children[1])
         _check(self.sections[name] in ("VAR", "VAR_OUTPUT"), f"{name} must not be written")
         _check(_fits(type_, scalar), f"{name} : {scalar} cannot hold {type_}")
         if scalar in LIMITS:
@@ -341,34 +408,62 @@ def _indented(lines):
 _PARSER = Lark(GRAMMAR, parser="lalr", maybe_placeholders=True)
 
 
-@lru_cache(maxsize=32)
-def _translated(text):
+@lru_cache(maxsize=64)
+def _parsed(text):
     tree = _PARSER.parse(text)
     declarations = _Declarations()
     for part in tree.children[1:-1]:
         declarations.visit(part)
-    lines = _Translator(declarations).visit(tree.children[-1])
+    return tree, declarations
+
+
+def _text_of(type_, library):
+    """Find a block by its name."""
+    found = [text for text in library if str(_parsed(text)[0].children[0]).lower() == type_.lower()]
+    _check(len(found) == 1, f"{type_} is not known")
+    return found[0]
+
+
+def _declared(type_, library):
+    return _parsed(_text_of(type_, library))[1]
+
+
+@lru_cache(maxsize=64)
+def _translated(text, library):
+    tree, declarations = _parsed(text)
+    lines = _Translator(declarations, library).visit(tree.children[-1])
     names = ", ".join(f"v_{name}" for name in declarations.types)
     source = ["def run():", *_indented([f"global {names}" if names else "pass", *lines])]
     return str(tree.children[0]), declarations, compile("\n".join(source), "<structured text>", "exec")
 
 
 class FunctionBlock:
-    """An instance: `call` runs it once with the given inputs and returns its outputs, by lower-case name."""
+    """An instance: `call` runs it once with the given inputs and returns its outputs, by lower-case name.
 
-    def __init__(self, text):
-        self.name, declarations, code = _translated(text)
+    Texts of the blocks that it uses are given as ``library``.
+    """
+
+    def __init__(self, text, library=()):
+        self.name, declarations, code = _translated(text, library)
         self.types, self.sections = declarations.types, declarations.sections
-        self._space = dict(RUNTIME)
+        functions = {}
+        self._space = RUNTIME | {
+            "_function": lambda name: functions.setdefault(
+                name, FunctionBlock(_text_of(name, library), library)
+            )
+        }
         for name, value in declarations.initial.items():
             self._space[f"v_{name}"] = list(value) if isinstance(value, list) else value
+            type_, bounds = self.types[name]
+            if bounds is INSTANCE and self.sections[name] != "VAR_IN_OUT":
+                self._space[f"v_{name}"] = FunctionBlock(_text_of(type_, library), library)
         exec(code, self._space)
         self._outputs = [name for name, section in self.sections.items() if section == "VAR_OUTPUT"]
 
     def call(self, **inputs):
         for name, value in inputs.items():
             key = name.lower()
-            _check(self.sections.get(key) == "VAR_INPUT", f"{name} is no input")
+            _check(self.sections.get(key) in ("VAR_INPUT", "VAR_IN_OUT"), f"{name} is no input")
             self._space[f"v_{key}"] = self._input(key, value)
         self._space["run"]()
         return {name: self[name] for name in self._outputs}
@@ -385,6 +480,9 @@ class FunctionBlock:
         scalar, bounds = self.types[name]
         if bounds is None:
             return _given(scalar, value, name)
+        if bounds is INSTANCE:
+            _check(value.name.lower() == scalar.lower(), f"{name} is no {value.name}")
+            return value
         _check(len(value) == bounds[1] - bounds[0] + 1, f"{name} takes another number of values")
         return [_given(scalar, item, name) for item in value]
 

@@ -136,6 +136,50 @@ def test_broken_declarations_are_errors(declaration):
         block("", declaration)
 
 
+PART = "FUNCTION_BLOCK PART VAR_INPUT w : DWORD; a : ARRAY [1..2] OF LREAL; END_VAR END_FUNCTION_BLOCK"
+USED = """FUNCTION_BLOCK USED VAR_IN_OUT p : PART; END_VAR VAR_INPUT k : INT; END_VAR
+    VAR_OUTPUT sum : LREAL; calls : INT; END_VAR
+    calls := calls + 1; p(w := 16#0000000A); sum := p.a[1] + p.a[2]; END_FUNCTION_BLOCK"""
+
+
+def using(body):
+    declarations = "VAR p : PART; u : USED; a : ARRAY [1..2] OF LREAL := [1.0, 2.0]; END_VAR"
+    outputs = "VAR_OUTPUT sum : LREAL; calls : INT; low : BOOL; high : BOOL; END_VAR"
+    return FunctionBlock(f"FUNCTION_BLOCK T {declarations} {outputs} {body} END_FUNCTION_BLOCK", (PART, USED))
+
+
+def test_instances_are_called_and_share_what_is_passed_in_and_out():
+    body = """p(a := a); u(p := p, k := 1); USED(p := p, k := 2);
+        sum := u.sum; calls := u.calls; low := p.w.%X0; high := p.w.%X1;"""
+    fb = using(body)
+    fb.call()
+    assert fb.call() == {"sum": 3.0, "calls": 2, "low": False, "high": True}
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "u(k := 1.0);",
+        "u(p := u);",
+        "u(sum := 1.0);",
+        "u(unknown := 1);",
+        "p(a := 1.0);",
+        "unknown(k := 1);",
+        "a(k := 1);",
+        "sum := u.calls;",
+        "sum := u.unknown;",
+        "sum := a.b;",
+        "sum := p.a[3];",
+        "low := u.k.%X0;",
+        "u.sum := 1.0;",
+        "sum := u;",
+    ],
+)
+def test_broken_rules_of_instances_are_errors(body):
+    with pytest.raises((StError, LarkError)):
+        using(body).call()
+
+
 def test_only_inputs_can_be_given():
     with pytest.raises(StError):
         block("").call(y=1.0)

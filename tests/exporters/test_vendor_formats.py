@@ -214,7 +214,9 @@ def test_a_wrapper_takes_and_tells_all_but_positions(library, move):
     call = re.search(r"fbMotion\((.*?)\);", wrapper.body, re.DOTALL)[1]
     assert set(re.findall(r"(\w+) :=", call)) == {v.name for v in block.variables if v.section == "VAR_INPUT"}
     told = [name for name in outer if outer[name].section == "VAR_OUTPUT"]
-    assert all(f"{name} := fbMotion.{name};" in wrapper.body for name in told)
+    assert all(len(re.findall(rf"^{name} := .*;$", wrapper.body, re.MULTILINE)) == 1 for name in told)
+    own = [v.name for v in wrapper.variables if v.section == "VAR"]
+    assert all(re.search(rf"\b{name}\b", wrapper.body) for name in own)
 
 
 class TestTwincat:
@@ -252,11 +254,11 @@ class TestSiemens:
     def test_own_names_are_marked_and_others_not(self):
         text = siemens_scl.encode(TWO_MOVES, goal_of(TWO_MOVES))[0].content.decode()
         body = text[text.index("\nBEGIN") :]
-        assert "#fbMotion(\n    bExecute := #bExecute AND #bReady" in body
+        assert "#fbMotion(\n    bExecute := #bExecuteNow" in body
         assert "SHR(IN := #dwCrc, N := 4)" in body
         assert "#LREAL" not in body
         assert not re.search(
-            r"(?<![#\w.])(nCycle|fPosition|cLast)\b(?!\s*:=)", re.sub(r"\(\*.*?\*\)", "", body)
+            r"(?<![#\w.])(nCycle|fPosition|cLast)\b(?!\s*:)", re.sub(r"\(\*.*?\*\)", "", body)
         )
 
     def test_tables_are_no_constants(self):
