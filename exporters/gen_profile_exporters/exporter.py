@@ -13,6 +13,25 @@ from gen_profile_exporters.block_source import BlockSource
 
 
 @attrs.frozen(kw_only=True)
+class AxisVariants:
+    """Which variants of a motion the machine allows along an axis.
+
+    Attributes
+    ----------
+    least_scale : float
+        The distance may be multiplied by this, up to 1.
+    mirror : bool
+        It may be travelled the other way.
+    shift : bool
+        It may begin elsewhere.
+    """
+
+    least_scale: float = 1.0
+    mirror: bool = False
+    shift: bool = False
+
+
+@attrs.frozen(kw_only=True)
 class Target:
     """The controller that an artefact is for.
 
@@ -28,6 +47,8 @@ class Target:
         The controller's cycle, and what each format leaves to choose.
     can : CanSpec
         The bus and the drives on it.
+    variants : tuple of AxisVariants
+        What a controller may change of the motion, axis by axis; empty for nothing.
     """
 
     name: str
@@ -35,6 +56,7 @@ class Target:
     start: tuple[float, ...]
     export: ExportSpec
     can: CanSpec
+    variants: tuple[AxisVariants, ...] = ()
 
     @property
     def cycle_time(self) -> float:
@@ -100,6 +122,12 @@ class BlockContainer(Exporter, Protocol):
 
 def target_of(spec: Spec) -> Target:
     """Pick from a spec what exporters need."""
+    axes = spec.axis_scales()
     return Target(
-        name=spec.name, axes=spec.axis_scales(), start=spec.move.start, export=spec.export, can=spec.can
+        name=spec.name,
+        axes=axes,
+        start=spec.move.start,
+        export=spec.export,
+        can=spec.can,
+        variants=(AxisVariants(least_scale=0.0, mirror=True, shift=True),) * len(axes),
     )

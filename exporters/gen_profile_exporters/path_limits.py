@@ -22,6 +22,8 @@ acceleration hence changes by no more than its *stop jerk* per s,
 
 from __future__ import annotations
 
+from itertools import count
+
 import attrs
 import numpy as np
 
@@ -29,6 +31,8 @@ from gen_profile.profile import Array
 
 # Below these an axis counts as standing still: relative to the greatest of all axes, and at all.
 SMALLEST_SHARE, SMALLEST_VELOCITY = 1e-12, 1e-30
+# Stops that are tried, steps of the longest one, and steps that one has to be sooner than the motion.
+STOPS, STEPS, MARGIN = 64, 512, 3
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -79,3 +83,47 @@ def path_limits(peaks: Array) -> PathLimits:
         slope_rate=slope_rate,
         jerk=jerk + 3.0 * acceleration * slope + velocity * widest,
     )
+
+
+def latest_stop(limits: PathLimits, velocity: Array, acceleration: Array, cycle_time: float) -> int:
+    """Find the cycle from which a stop would end no sooner than the motion, by trying stops all along it.
+
+    Parameters
+    ----------
+    limits : PathLimits
+    velocity, acceleration : (cycles + 1, axes) array
+        Along the path.
+    cycle_time : float
+        s.
+    """
+    cycles = len(velocity) - 1
+    begin = np.unique(np.linspace(0, cycles, STOPS + 1).astype(int))[:-1]
+    path, step = begin.astype(np.float64), max(1.0, cycles / STEPS)  # in cycles
+    rate, slope = np.ones(len(path)), np.zeros(len(path))
+    worth = np.zeros(len(path), dtype=bool)
+    push, forward = acceleration * limits.inverse_velocity, acceleration * velocity > 0.0
+    for passed in count(step, step):
+        going = ~worth & (passed + MARGIN * step < cycles - begin)
+        if not going.any():
+            break
+        slope = _slope(limits, rate, slope, step * cycle_time)
+        at = np.minimum(path.astype(int), cycles)
+        pushes = push[at] * (rate**2)[:, None]
+        room = np.maximum(limits.room - np.abs(pushes), 0.0)
+        least = np.where(forward[at], limits.room, room).min(axis=1)
+        slope = np.clip(slope, -least, room.min(axis=1))
+        before, rate = rate, np.maximum(rate + slope * step * cycle_time, 0.0)
+        path = path + 0.5 * step * (before + rate)
+        worth |= going & (rate <= 0.0)
+    failing = np.flatnonzero(~worth)
+    return int(begin[max(failing[0] - 1, 0)]) if len(failing) else cycles
+
+
+def _slope(limits: PathLimits, rate: Array, slope: Array, time: float) -> Array:
+    """Choose the slopes that bring rates to zero, as the block does."""
+    step = limits.slope_rate * time
+    steps = rate / (step * time)
+    pieces = np.maximum(np.rint(0.5 * np.sqrt(1.0 + 8.0 * steps)), 1.0)
+    wanted = np.minimum(step * (steps / pieces + 0.5 * (pieces - 1.0)), limits.slope)
+    chosen: Array = np.clip(-wanted, slope - step, slope + step)
+    return chosen

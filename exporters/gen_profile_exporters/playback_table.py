@@ -9,14 +9,16 @@ counts     the same as whole 32-bit drive counts, counts per s and counts per sÂ
 
 from __future__ import annotations
 
+from math import ceil
+
 import attrs
 import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile.profile import Array, Profile, SampledProfile
 from gen_profile.units import COUNTS, AxisScale
-from gen_profile_exporters.exporter import Target
-from gen_profile_exporters.path_limits import PathLimits, path_limits
+from gen_profile_exporters.exporter import AxisVariants, Target
+from gen_profile_exporters.path_limits import PathLimits, latest_stop, path_limits
 from gen_profile_exporters.quintic_segments import QuinticSegments, fit, horner
 from gen_profile_exporters.setpoints import (
     INT32,
@@ -26,9 +28,10 @@ from gen_profile_exporters.setpoints import (
     motion_of,
     sampled,
 )
-from gen_profile_exporters.table_checksum import crc32
 
 MOST_SAMPLES = 100_001  # larger tables were not seen to compile
+LEAST_CHECKS = 8  # values that enter the checksum in a cycle
+CHECKED_WITHIN = 1.0  # s, whatever the length of the table
 # Compilers refuse LREAL literals that a REAL could not hold.
 SMALLEST, GREATEST = 1e-37, 1e37
 
@@ -52,6 +55,10 @@ class PlaybackTable:
         Cycle of the end.
     target : (axes,) array
         Position at the end, in axis units.
+    play_on : int
+        Cycle from which a stop by the motion's own peaks would end no sooner than the motion.
+    variants : tuple of AxisVariants
+        What may be changed of the motion at its start, axis by axis.
     """
 
     layout: str
@@ -61,6 +68,8 @@ class PlaybackTable:
     columns: Array
     last: int
     target: Array
+    play_on: int = 0
+    variants: tuple[AxisVariants, ...]
 
     @property
     def start(self) -> Array:
@@ -76,12 +85,21 @@ class PlaybackTable:
         time = (self.last - self.first[-1]) * self.cycle_time
         return horner(self.columns[:, -1], np.array(time))[0]
 
-    def crc(self) -> int:
-        """Checksum, in the order in which the block counts the values off."""
+    def values(self) -> Array:
+        """List all numbers of the table in the order in which the block counts them off."""
         columns = [column.ravel() for column in self.columns]
         if self.first is not None:
             columns.append(np.repeat(self.first, len(self.axes)).astype(np.float64))
-        return crc32(np.concatenate(columns))
+        return np.concatenate(columns)
+
+    def checks(self) -> int:
+        """Values that the block takes into its checksum in a cycle."""
+        return max(LEAST_CHECKS, ceil(len(self.values()) * self.cycle_time / CHECKED_WITHIN))
+
+    def stoppable(self) -> PlaybackTable:
+        """Work out until when a stop by the motion's own peaks is worth it."""
+        _, velocity, acceleration = _quantities(self.played())
+        return attrs.evolve(self, play_on=latest_stop(self.limits(), velocity, acceleration, self.cycle_time))
 
     def played(self) -> AxisTable:
         """List what the block issues every cycle when nothing disturbs it, in axis units."""
@@ -134,6 +152,7 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
     """
     motion = sampled(profile, target, target.cycle_time, "export.cycle_time", MOST_SAMPLES)
     axes = counted_axes(target, target.export.plc_layout)
+    variants = target.variants or (AxisVariants(),) * len(axes)
     if target.export.plc_layout == "segments":
         segments = fit(_quantities(motion), motion.cycle_time)
         factor = np.array([axis.factor for axis in axes])
@@ -146,7 +165,8 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
             columns=_literal(coefficients),
             last=int(segments.first[-1]),
             target=_literal(in_axis_units(segments.target, factor)),
-        )
+            variants=variants,
+        ).stoppable()
     table = axis_table(motion, axes)
     columns = _quantities(table)
     if target.export.plc_layout == "counts":
@@ -160,7 +180,8 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
         columns=columns,
         last=len(table.position) - 1,
         target=columns[0, -1],
-    )
+        variants=variants,
+    ).stoppable()
 
 
 def _quantities(table: AxisTable | SampledProfile) -> Array:

@@ -3,7 +3,7 @@
 The block is that of a single motion (`gen_profile_exporters.structured_text`), with a handful of changes that
 can be undone: tables of all motions stand one after the other in the same arrays, everything else that is a
 motion's own becomes an array, and the statements look these up at the motion that is selected. So every
-motion keeps its literals and its own CRC-32, and what is known of the single block holds for the library.
+motion keeps its literals and its own checksum, and what is known of the single block holds for the library.
 """
 
 from __future__ import annotations
@@ -26,22 +26,25 @@ from gen_profile_exporters.structured_text import (
     plain,
     read_block,
     read_table,
+    table_checksum,
 )
 
-SCALARS = ("cLast", "cSlope", "cSlopeRate", "cCrc", "cLastSegment")
-PER_AXIS = ("cRoom", "cInverse", "cStart", "cTarget")
+SCALARS = ("cLast", "cRows", "cChecks", "cPlayOn", "cSlope", "cSlopeRate", "cChecksum", "cLastSegment")
+PER_AXIS = ("cRoom", "cInverse", "cStopJerk", "cStart", "cTarget", "cLeastScale", "cMirrors", "cShifts")
 TABLES = ("cPosition", "cVelocity", "cAcceleration", *(f"cPower{power}" for power in range(6)))
 SEGMENTS = "cFirst"
-FIRST_ROW, LAST_ROW, FIRST_SEGMENT = "cFirstRow", "cLastRow", "cFirstSegment"
+ROWS, FIRST_ROW, FIRST_SEGMENT = "cRows", "cFirstRow", "cFirstSegment"
 
 SELECTION = """\
 (* Another motion is taken over while none is played; its checksum then begins anew. *)
-IF (nState <> cMoving) AND (nProfile <> nSelected) AND (nProfile >= 0) AND (nProfile < cProfiles) THEN
+IF (nState <> cWaiting) AND (nState <> cMoving) AND (nProfile <> nSelected)
+        AND (nProfile >= 0) AND (nProfile < cProfiles) THEN
     nSelected := nProfile;
     nCheckRow := 0;
     nCheckColumn := 0;
-    dwCrc := 16#FFFFFFFF;
+    fSum := 0.0;
     bChecked := FALSE;
+    bLeft := FALSE;
 END_IF;
 
 """
@@ -50,9 +53,8 @@ _LAST_REFUSAL = "THEN nErrorId := 1; END_IF;\n"  # after it comes ours: others m
 
 OUTPUTS = ("fPosition",)  # which begins at the start
 OWN = (*SCALARS, *PER_AXIS, *TABLES, SEGMENTS, *OUTPUTS)
-ADDED = ("nProfile", "nSelected", "cProfiles", FIRST_ROW, LAST_ROW, FIRST_SEGMENT)
+ADDED = ("nProfile", "nSelected", "cProfiles", FIRST_ROW, FIRST_SEGMENT)
 
-_LAST_CHECKED = re.compile(r"(?<=nCheckRow > )(\d+)(?= THEN)")
 _SCALAR = re.compile(rf"\b({'|'.join((*SCALARS, *PER_AXIS))})\b(?!\[)")
 _AXIS = re.compile(rf"\b({'|'.join(PER_AXIS)})\[nAxis\]")
 _TABLE = re.compile(rf"\b({'|'.join(TABLES)})\[([^\[\]]*)\]")
@@ -155,7 +157,7 @@ def _assembled(sources: Sequence[BlockSource], header: str, name: str) -> BlockS
 def _common(source: BlockSource) -> tuple[object, ...]:
     """Give what is to be the same in all blocks of a library."""
     return (
-        _LAST_CHECKED.sub("", source.body),
+        source.body,
         *(
             (variable.section, variable.name, variable.array[2] if variable.array else variable.type)
             if variable.name in OWN
@@ -167,10 +169,7 @@ def _common(source: BlockSource) -> tuple[object, ...]:
 
 def _rows(source: BlockSource) -> int:
     """Count the rows of a motion's table."""
-    found = _LAST_CHECKED.search(source.body)
-    if found is None:
-        raise ExportError("The block checks no table: it was altered; export it again.")
-    return int(found[1]) + 1
+    return next(int(variable.initial) for variable in source.variables if variable.name == ROWS)
 
 
 def _merged(same: Sequence[Variable]) -> Variable:
@@ -202,7 +201,6 @@ def _selector(sources: Sequence[BlockSource]) -> list[Variable]:
         Variable(section="VAR", name="nSelected", type="DINT", comment="nProfile, once nothing moved"),
         Variable(section="VAR CONSTANT", name="cProfiles", type="DINT", initial=str(len(sources))),
         _array(FIRST_ROW, "DINT", _starts(rows)),
-        _array(LAST_ROW, "DINT", [str(count - 1) for count in rows], "counted from its first"),
     ]
     segments = [len(v.elements) for source in sources for v in source.variables if v.name == SEGMENTS]
     return [*added, _array(FIRST_SEGMENT, "DINT", _starts(segments))] if segments else added
@@ -214,7 +212,6 @@ def _starts(lengths: Sequence[int]) -> list[str]:
 
 def _selecting(body: str) -> str:
     """Make the statements look up what is the selected motion's own."""
-    body = _LAST_CHECKED.sub(f"{LAST_ROW}[nSelected]", body)
     body = _SCALAR.sub(r"\1[nSelected]", body)
     body = _AXIS.sub(r"\1[nSelected * cAxes + nAxis - 1]", body)
     body = _TABLE.sub(rf"\1[{FIRST_ROW}[nSelected] + \2]", body)
@@ -224,13 +221,11 @@ def _selecting(body: str) -> str:
 
 def _single(library: BlockSource, arrays: Mapping[str, list[str]], number: int) -> BlockSource:
     """Undo all that, for one motion."""
-    last_row = arrays[LAST_ROW][number]
     body = library.body.removeprefix(SELECTION).replace(_LAST_REFUSAL + REFUSAL, _LAST_REFUSAL)
-    body = body.replace(f"{LAST_ROW}[nSelected]", last_row)
     body = _OFFSET.sub(r"\1[\2]", body)
     body = body.replace("[nSelected * cAxes + nAxis - 1]", "[nAxis]").replace("[nSelected]", "")
     axes = len(arrays["cStart"]) // len(arrays[FIRST_ROW])
-    rows, first_row = int(last_row) + 1, int(arrays[FIRST_ROW][number])
+    rows, first_row = int(arrays[ROWS][number]), int(arrays[FIRST_ROW][number])
     parts = {name: slice(number, number + 1) for name in SCALARS}
     parts |= {name: slice(number * axes, (number + 1) * axes) for name in PER_AXIS}
     parts |= {name: slice(first_row, first_row + rows) for name in TABLES}
@@ -279,7 +274,7 @@ def _header(entries: Sequence[LibraryEntry], target: Target) -> str:
         "",
         f"{start}{use}              6 nProfile counts no motion",
         "",
-        "    nProfile  CRC-32    motion",
+        "    nProfile  checksum  motion",
         *listed,
         "*)",
         "",
@@ -292,6 +287,6 @@ def _listed(number: int, entry: LibraryEntry, target: Target) -> list[str]:
     table = read_table(entry.source.text(), target)
     duration = f"{table.last * table.cycle_time:g} s, {table.last} cycles"
     return [
-        f"    {number:6d}  {table.crc():08X}  {plain(entry.label)}: {duration}",
+        f"    {number:6d}  {table_checksum(table):>10}  {plain(entry.label)}: {duration}",
         *(f"          {line}" for lines in axis_lines(table) for line in lines.splitlines()),
     ]

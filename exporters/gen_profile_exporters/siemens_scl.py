@@ -1,8 +1,7 @@
 """TIA Portal: the playback block as an external source in SCL, a wrapper, and the motion as points of a cam.
 
 SCL differs from the portable text: names of the block's own are marked by ``#``, arrays cannot be constants
-and so stand among the static variables, and ``SHR`` wants its parameters named. Replay undoes that and reads
-the rest.
+and so stand among the static variables. Replay undoes that and reads the rest.
 The wrapper calls ``MC_MOTIONINPOSITION`` of the S7-1500T. The data block holds an array of
 ``TO_Cam_Struct_PointData`` per axis, to be copied into a TO_Cam (up to 1000 points) or TO_Cam_10k, whose
 spline through points at a regular distance keeps within the error stated.
@@ -28,14 +27,13 @@ from gen_profile_exporters.structured_text import block_text, literal, read_bloc
 MOST_BYTES = 64_000  # of a data block that is not optimised
 MOST_POINTS = 10_000  # TO_Cam_10k
 POINT_ERROR = 1e-6  # m (or rad)
-BYTES = {"LREAL": 8, "DINT": 4, "DWORD": 4}
+BYTES = {"LREAL": 8, "DINT": 4}
 
 _BLOCK = re.compile(
     r'((?:\(\*(?:(?!\*\)).)*\*\)\s*)?)FUNCTION_BLOCK\s+"(\w+)"\s*\{[^}]*\}\s*VERSION\s*:\s*[\d.]+(.*?)\bBEGIN\b(.*?)END_FUNCTION_BLOCK',
     re.DOTALL,
 )
 _WORD = re.compile(r"[()]|(?<![.#\w])[A-Za-z]\w*(\s*:=)?")
-_SHIFT, _PORTABLE_SHIFT = "SHR(IN := #dwCrc, N := 4)", "SHR(dwCrc, 4)"
 
 
 def encode(profile: Profile, target: Target) -> tuple[File, ...]:
@@ -96,7 +94,7 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
     if found is None:
         raise ExportError("There is no SCL block of this export; export it again.")
     header, name, declarations, body = found.groups()
-    portable = _unmarked(body.replace(_SHIFT, _PORTABLE_SHIFT))
+    portable = _unmarked(body)
     source = take_apart(
         f"{header}FUNCTION_BLOCK {name}\n{declarations.lstrip()}\n{portable.lstrip()}END_FUNCTION_BLOCK\n"
     )
@@ -117,7 +115,6 @@ def _scl(source: BlockSource) -> str:
     declaration = attrs.evolve(source, variables=variables, name=f'"{source.name}"').declaration()
     first, rest = declaration.split("\n", 1)
     body = _marked(source.body, {variable.name for variable in source.variables})
-    body = body.replace("SHR(#dwCrc, 4)", _SHIFT)
     return (
         f"{source.header}{first}\n{{ S7_Optimized_Access := 'TRUE' }}\nVERSION : 0.1\n"
         f"{_quoted(rest)}\nBEGIN\n{body}END_FUNCTION_BLOCK\n"
@@ -143,8 +140,8 @@ def _marked(body: str, own: set[str]) -> str:
 
 
 def _unmarked(body: str) -> str:
-    """Take the marks off, and leave those of hexadecimal numbers."""
-    return re.sub(r"(?<!16)#", "", body)
+    """Take the marks off."""
+    return body.replace("#", "")
 
 
 def _is_table(variable: Variable) -> bool:

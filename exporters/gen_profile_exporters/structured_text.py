@@ -6,8 +6,8 @@ compilers have in common: ASCII, ``(* *)`` comments, one-dimensional arrays in `
 as ``-1.5E-7`` that a REAL could hold.
 Each literal reads back to the same double, and the block counts cycles instead of adding up times.
 
-- A rising edge of ``bExecute`` starts, if the task's cycle, the actual position and the table's CRC-32 are
-  right. Dropping it does not stop the motion; at the end the target is held until it drops.
+- A rising edge of ``bExecute`` starts, if the task's cycle, the actual position and the checksum of all
+  constants are right. Dropping it does not stop the motion; at the end the target is held until it drops.
 - ``bHold``, ``bAbort`` and ``rOverride`` change the rate at which the path is played: all axes stay on it,
   and keep to the motion's own peaks of velocity and acceleration (`gen_profile_exporters.path_limits`).
 - Where there are several axes, inputs and outputs are arrays, in the order of the machine's axes.
@@ -26,11 +26,12 @@ from gen_profile.profile import Array, Profile, SampledProfile
 from gen_profile.units import AxisScale
 from gen_profile_exporters import playback_block
 from gen_profile_exporters.block_source import BlockSource, take_apart
-from gen_profile_exporters.exporter import File, Target
+from gen_profile_exporters.exporter import AxisVariants, File, Target
 from gen_profile_exporters.playback_block import Token
 from gen_profile_exporters.playback_table import PlaybackTable, counted_axes, tabulate
 from gen_profile_exporters.quintic_segments import ACCELERATION_ERROR, POSITION_ERROR
 from gen_profile_exporters.setpoints import plausible_cycle_time
+from gen_profile_exporters.table_checksum import checksum
 
 START_TOLERANCE = 1e-3  # m (or rad), the default
 VALUES_PER_LINE = 4
@@ -40,6 +41,7 @@ ROUNDING = 1e-12  # relative, of an evaluated quintic
 MOST_CYCLES = 10_000_000  # of a motion that is read
 
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_SWITCH = {"FALSE": "0", "TRUE": "1"}
 _NUMBER = re.compile(r"\s*[-+]?\d+(\.\d+)?([eE][-+]?\d+)?\s*", re.ASCII)
 
 
@@ -125,6 +127,17 @@ def plain(name: str) -> str:
 
 def _values(table: PlaybackTable) -> dict[str, str]:
     """Fill every hole of the program that follows from the table."""
+    return _constants(table) | {"checksum": str(table_checksum(table))}
+
+
+def table_checksum(table: PlaybackTable) -> int:
+    """Checksum that a block works out: of the table, then of all other constants, axis by axis."""
+    constants = playback_block.constants(_constants(table), table.layout, len(table.axes))
+    numbers = np.array([_array(Token(text, 0)) * np.ones(len(table.axes)) for text in constants])
+    return checksum(np.append(table.values(), numbers.T))
+
+
+def _constants(table: PlaybackTable) -> dict[str, str]:
     limits = table.limits()
     write = _whole_numbers if table.layout == "counts" else _literals
     names = SAMPLE_COLUMNS if table.first is None else SEGMENT_COLUMNS
@@ -138,21 +151,25 @@ def _values(table: PlaybackTable) -> dict[str, str]:
         }
     return values | {
         "last": str(table.last),
-        "last_row": str(rows - 1),
+        "row_count": str(rows),
+        "checks": str(table.checks()),
+        "play_on": str(table.play_on),
         "rows": f"[0..{rows - 1}]",
         "cycle_time": literal(table.cycle_time),
         "slope": literal(limits.slope),
         "slope_rate": literal(limits.slope_rate),
         "room": _per_axis(limits.room),
         "inverse": _per_axis(limits.inverse_velocity),
+        "stop_jerk": _per_axis(limits.jerk),
         "start": _per_axis(table.start),
         "target": _per_axis(table.target),
-        "crc": f"16#{table.crc():08X}",
+        "least_scale": _per_axis(np.array([variant.least_scale for variant in table.variants])),
+        "mirrors": _switches([variant.mirror for variant in table.variants]),
+        "shifts": _switches([variant.shift for variant in table.variants]),
     }
 
 
 def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
-    values = table.columns.size + (0 if table.first is None else table.columns[0].size)
     units = [axis.unit for axis in table.axes]
     size = table.columns.size * (4 if table.layout == "counts" else 8)
     return {
@@ -165,7 +182,7 @@ def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
         "samples": str(table.last),
         "cycle": repr(table.cycle_time),
         "kilobytes": f"{size / 1000:.3g}",
-        "check_cycles": str(-(-values // playback_block.VALUES_PER_CYCLE)),
+        "check_cycles": str(-(-_checked(table) // table.checks())),
         "axis_lines": "\n".join(axis_lines(table)),
         "units": units[0] if len(set(units)) == 1 else ", ".join(units),
         "sha256": table.motion().payload_hash(),
@@ -173,17 +190,29 @@ def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
     }
 
 
+def _checked(table: PlaybackTable) -> int:
+    """Count what enters the checksum."""
+    return len(table.values()) + playback_block.constant_count(table.layout, len(table.axes))
+
+
 def axis_lines(table: PlaybackTable) -> list[str]:
-    """Tell for each axis from where to where it moves, and its peaks."""
+    """Tell for each axis from where to where it moves, its peaks, and what the machine allows."""
     velocity, acceleration, _ = table.peaks()
     jerk = table.limits().jerk
     return [
         f"    Axis {number + 1}, {plain(axis.name)}: {table.start[number]:g} to {table.target[number]:g} "
         f"{axis.unit}, peaks {velocity[number]:.4g} {axis.unit}/s and {acceleration[number]:.4g} "
         f"{axis.unit}/s2,\n"
-        f"        stop jerk {jerk[number]:.4g} {axis.unit}/s3."
+        f"        stop jerk {jerk[number]:.4g} {axis.unit}/s3; {_allowed(table.variants[number])}."
         for number, axis in enumerate(table.axes)
     ]
+
+
+def _allowed(variants: AxisVariants) -> str:
+    """Say which variants of the motion the machine allows."""
+    allowed = [f"fScale from {variants.least_scale:g}"] if variants.least_scale < 1.0 else []
+    allowed += ["bMirror"] * variants.mirror + ["fStartOffset"] * variants.shift
+    return f"allows {', '.join(allowed)}" if allowed else "allows no variants"
 
 
 def _table(found: Mapping[str, Token], layout: str, target: Target) -> PlaybackTable:
@@ -218,6 +247,30 @@ def _table(found: Mapping[str, Token], layout: str, target: Target) -> PlaybackT
         columns=columns_by_axis,
         last=int(last),
         target=columns_by_axis[0, -1] if first is None else _end(found["target"], axes),
+        play_on=_within(found["play_on"], last),
+        variants=_variants(found, axes),
+    )
+
+
+def _within(token: Token, last: float) -> int:
+    number = _number(token.text, token.line)
+    if not (0.0 <= number <= last and number.is_integer()):
+        raise ExportError(
+            f"line {token.line}: {token.text[:40]} is no cycle of the motion; export the block again."
+        )
+    return int(number)
+
+
+def _variants(found: Mapping[str, Token], axes: Sequence[AxisScale]) -> tuple[AxisVariants, ...]:
+    columns = [_array(found[name]) for name in ("least_scale", "mirrors", "shifts")]
+    if any(len(column) != len(axes) for column in columns):
+        raise ExportError(
+            f"line {found['least_scale'].line}: {len(axes)} axes, but values for another number of them; "
+            "export the block again."
+        )
+    return tuple(
+        AxisVariants(least_scale=float(scale), mirror=bool(mirror), shift=bool(shift))
+        for scale, mirror, shift in zip(*columns, strict=True)
     )
 
 
@@ -238,13 +291,13 @@ def _rise(first: Array, last: float) -> bool:
 
 def _verify(found: Mapping[str, Token], table: PlaybackTable) -> None:
     """Refuse a block that would refuse to start, or whose limits are those of another motion."""
-    crc = f"16#{table.crc():08X}"
-    if found["crc"].text.upper() != crc:
+    due, written = _values(table), found["checksum"]
+    if written.text != due["checksum"]:
         raise ExportError(
-            f"line {found['crc'].line}: the table's CRC-32 is {crc}, not {found['crc'].text[:40]}: "
-            "it was altered, and the block would refuse to start (nErrorId 5); export it again."
+            f"line {written.line}: the checksum of the constants is {due['checksum']}, not "
+            f"{written.text[:40]}: one was altered, and the block would refuse to start (nErrorId 5); "
+            "export it again."
         )
-    due = _values(table)
     for name, token in found.items():
         if name in due and _numbers(token) != _numbers(Token(due[name], 0)):
             raise ExportError(
@@ -262,6 +315,11 @@ def _verify(found: Mapping[str, Token], table: PlaybackTable) -> None:
 
 def _per_axis(values: Array) -> str:
     texts = [literal(value) for value in values.tolist()]
+    return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
+
+
+def _switches(values: Sequence[bool]) -> str:
+    texts = [str(value).upper() for value in values]
     return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
 
 
@@ -291,12 +349,13 @@ def _array(token: Token) -> Array:
 
 def _numbers(token: Token) -> list[float] | str:
     """Compare by value where it is numbers, else by text."""
-    if token.text.startswith(("16#", "[0..")):
+    if token.text.startswith("[0.."):
         return token.text.upper()
     return [float(number) for number in _array(token).tolist()]
 
 
 def _number(text: str, line: int) -> float:
+    text = _SWITCH.get(text.strip().upper(), text)
     number = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(number):
         raise ExportError(f"line {line}: {text.strip()[:40]!r} is no finite number; export the block again.")

@@ -5,7 +5,7 @@ import numpy as np
 from gen_profile.profile import Profile
 from gen_profile.spec import CanSpec, ExportSpec
 from gen_profile.units import AxisScale, axis_factor
-from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.exporter import AxisVariants, Target
 
 
 def quintic(*moves, duration=1.0):
@@ -45,4 +45,5 @@ def target(*names, unit="m", sign=1, counts_per_si=1e6, cycle_time=0.01, name="b
         start=(0.0,) * len(scales),
         export=ExportSpec(cycle_time=cycle_time, **(export or {})),
         can=CanSpec(**can),
+        variants=(AxisVariants(least_scale=0.0, mirror=True, shift=True),) * len(scales),
     )

@@ -4,7 +4,7 @@ import numpy as np
 from st_interpreter import FunctionBlock
 
 QUANTITIES = ("position", "velocity", "acceleration")
-IDLE = {"bExecute": False, "bAbort": False, "bHold": False, "rOverride": 1.0}
+IDLE = {"bExecute": False, "bContinue": False, "bAbort": False, "bHold": False, "rOverride": 1.0}
 
 
 def checked(text):

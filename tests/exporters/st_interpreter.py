@@ -473,8 +473,19 @@ class FunctionBlock:
         return list(value) if isinstance(value, list) else value
 
     def alter(self, name, index, value):
-        """Change an element of an array as failing memory would, constant or not."""
-        self._space[f"v_{name.lower()}"][index] = value
+        """Change a variable, or an element of an array, as failing memory would, constant or not."""
+        key = f"v_{name.lower()}"
+        if index is None:
+            self._space[key] = value
+        else:
+            self._space[key][index] = value
+
+    def constants(self):
+        """List all constant values: name, index in an array or None, and the value."""
+        for name in (name for name, section in self.sections.items() if section == "CONSTANT"):
+            whole = self[name]
+            elements = enumerate(whole) if isinstance(whole, list) else [(None, whole)]
+            yield from ((name, index, value) for index, value in elements)
 
     def _input(self, name, value):
         scalar, bounds = self.types[name]

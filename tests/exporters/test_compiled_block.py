@@ -22,10 +22,12 @@ from gen_profile_exporters.playback_table import MOST_SAMPLES, tabulate
 CYCLE = 0.02
 MOVES = {"one": quintic((0.1, 0.4)), "rough": bang_bang(), "two": quintic((0.1, 0.4), (1.2, -0.7))}
 LAYOUTS = ["segments", "samples", "counts"]
-SCALARS = ("rOverride", "fCycleTime", "fScale")
-AXES = ("fActPosition", "fStartOffset")
-SWITCHES = ("bExecute", "bAbort", "bHold", "bMirror")
+SCALARS = ("rOverride", "fCycleTime")
+AXES = ("fActPosition", "fStartOffset", "fScale", "bMirror", "fStopDeceleration", "fStopJerk")
+SWITCHES = ("bExecute", "bAbort", "bHold", "bContinue")
 FLAGS = ("bBusy", "bDone", "bAborted", "bError", "bOffNominal")
+
+UNREAD = {"nposition", "ftimetogo", "fdistancetogo"}
 
 # One line of inputs in, one line of outputs out; hexadecimal floats lose nothing.
 HARNESS = r"""
@@ -121,14 +123,15 @@ def outputs_of(words, axes):
 def interpreted(text, rows):
     fb = FunctionBlock(text)
     outputs = [fb.call(**row) for row in rows]
-    return [{name: value for name, value in row.items() if name != "nposition"} for row in outputs]
+    return [{name: value for name, value in row.items() if name not in UNREAD} for row in outputs]
 
 
 def inputs_of(table, **given):
-    zero = [0.0] * len(table.axes)
-    row = dict.fromkeys(SWITCHES, False) | {"rOverride": 1.0, "fScale": 1.0, "fCycleTime": CYCLE}
-    row |= {"fActPosition": table.start.tolist(), "fStartOffset": zero} | given
-    return row if len(zero) > 1 else row | {name: row[name][0] for name in AXES}
+    axes = len(table.axes)
+    row = dict.fromkeys(SWITCHES, False) | {"rOverride": 1.0, "fCycleTime": CYCLE}
+    row |= {name: [0.0] * axes for name in AXES} | {"bMirror": [False] * axes, "fScale": [1.0] * axes}
+    row |= {"fActPosition": table.start.tolist()} | given
+    return row if axes > 1 else row | {name: row[name][0] for name in AXES}
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -146,7 +149,7 @@ def test_it_plays_replay_and_agrees_with_the_interpreter(name, layout, tmp_path)
     rows = waiting + scenes(table, random.Random(5))
     outputs = run(rows)
     assert outputs == interpreted(text, rows)
-    assert {row["nerrorid"] for row in outputs} == {0, 1, 2, 3, 4}
+    assert {row["nerrorid"] for row in outputs} >= {0, 1, 2, 3, 4, 8}
     assert all(any(row[flag.lower()] for row in outputs) for flag in FLAGS)
 
 
@@ -155,17 +158,22 @@ def scenes(table, choices):
     rows = []
     for _ in range(60):
         shift = choices.choice([0.0, 0.0, 0.3])
-        begin = table.start + choices.choice([shift, shift, shift, shift + 1e7, float("nan")])
+        begin = table.start + choices.choice([shift, shift, shift + 7e-4, shift + 1e7, float("nan")])
         common = {
             "fActPosition": begin.tolist(),
             "fStartOffset": [shift] * len(table.axes),
             "fCycleTime": choices.choice([CYCLE, CYCLE, CYCLE, CYCLE, 0.01]),
-            "fScale": choices.choice([1.0, 1.0, 0.3, 1.5]),
-            "bMirror": choices.random() < 0.3,
+            "fScale": [choices.choice([1.0, 1.0, 0.3, 1.5]) for _ in table.axes],
+            "bMirror": [choices.random() < 0.3 for _ in table.axes],
+            "fStopDeceleration": [choices.choice([0.0, 100.0])] * len(table.axes),
+            "fStopJerk": [choices.choice([0.0, 1e4])] * len(table.axes),
         }
         rows += [inputs_of(table, **common)] * choices.randint(1, 2)
         rows += [inputs_of(table, bExecute=True, bAbort=choices.random() < 0.4, **common)]
         for _ in range(choices.choice([1, 20, 70, 120])):
+            if choices.random() < 0.05:
+                standing = {"bContinue": True, "fActPosition": (table.start + shift).tolist()}
+                rows += [inputs_of(table, **common), inputs_of(table, **(common | standing))]
             row = inputs_of(
                 table,
                 bExecute=choices.random() < 0.95,

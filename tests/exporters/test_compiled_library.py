@@ -18,6 +18,7 @@ from test_compiled_block import (
     LAYOUTS,
     SCALARS,
     SWITCHES,
+    UNREAD,
     compile_text,
     elements,
     outputs_of,
@@ -52,7 +53,8 @@ def compiled(text, axes, folder):
         lines = []
         for row in rows:
             given = [row[name] for name in SCALARS] + [v for name in AXES for v in row[name]]
-            words = [*(str(int(row[name])) for name in SWITCHES), str(row["nProfile"]), *map(repr, given)]
+            given = [repr(float(value)) for value in given]
+            words = [*(str(int(row[name])) for name in SWITCHES), str(row["nProfile"]), *given]
             lines.append(" ".join(words))
         done = subprocess.run(
             [folder / "player"], input="\n".join(lines), check=True, capture_output=True, text=True
@@ -64,9 +66,9 @@ def compiled(text, axes, folder):
 
 def inputs(number, starts, **given):
     axes = len(starts[0])
-    row = dict.fromkeys(SWITCHES, False) | {"rOverride": 1.0, "fScale": 1.0, "fCycleTime": 0.02}
-    at = starts[number % len(starts)]
-    return row | {"fActPosition": at, "fStartOffset": [0.0] * axes, "nProfile": number} | given
+    row = dict.fromkeys(SWITCHES, False) | {"rOverride": 1.0, "fCycleTime": 0.02}
+    row |= {name: [0.0] * axes for name in AXES} | {"bMirror": [False] * axes, "fScale": [1.0] * axes}
+    return row | {"fActPosition": starts[number % len(starts)], "nProfile": number} | given
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -85,14 +87,14 @@ def test_every_motion_plays_as_its_own_block_and_as_interpreted(layout, axes, tm
     for row, found in zip(rows, outputs, strict=True):
         given = row if axes > 1 else row | {name: row[name][0] for name in AXES}
         due = fb.call(**given)
-        assert found == {name: value for name, value in due.items() if name != "nposition"}
+        assert found == {name: value for name, value in due.items() if name not in UNREAD}
     for number, at in spans:
         if number == 4:
             assert outputs[at]["nerrorid"] == 6
             continue
         own = checked(texts[number])
         for found, due in zip(outputs[at:], play(own, start(own)), strict=False):
-            assert found == {name: value for name, value in due.items() if name != "nposition"}
+            assert found == {name: value for name, value in due.items() if name not in UNREAD}
         assert outputs[at + round(DURATIONS[number] / 0.02)]["bdone"]
 
 

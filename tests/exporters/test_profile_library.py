@@ -182,7 +182,7 @@ def test_every_container_of_a_block_holds_a_library(name, layout, axes):
     due = [motion.payload_hash() for motion in read_library(library, goal)]
     assert [motion.payload_hash() for motion in read_library(again, goal)] == due
     assert [v.comment for v in again.variables if v.name == "nProfile"] == ["which motion, 0 to 3"]
-    assert "nProfile  CRC-32    motion" in again.header
+    assert "nProfile  checksum  motion" in again.header
     # The wrapper, where there is one, lets the motion be chosen.
     rest = "".join(file.content.decode() for file in (first, *others)).partition("_Axis")[2]
     assert bool(rest) == ("wrapper" in BUILT_IN[name].summary)
@@ -222,10 +222,10 @@ def test_the_header_tells_which_is_which():
     header = together(texts, goal_of(name="crane 7 *) x")).partition("FUNCTION_BLOCK")[0]
     assert header.count("*)") == 1 and header.isascii()
     for number, text in enumerate(texts):
-        crc = re.search(r"cCrc : DWORD := 16#(\w+);", text)[1]
+        total = re.search(r"cChecksum : DINT := (\d+);", text)[1]
         cycles = round(DURATIONS[number] / 0.02)
-        own = re.search(r"Axis 1, bridge: .*\n +stop jerk .* m/s3\.\n", text)[0].split()
-        row, *axis = re.search(rf"     {number}  {crc}  .*\n.*\n.*\n", header)[0].splitlines()
+        own = re.search(r"Axis 1, bridge: .*\n +stop jerk .*\.\n", text)[0].split()
+        row, *axis = re.search(rf"     {number}  +{total}  .*\n.*\n.*\n", header)[0].splitlines()
         assert row.endswith(f"  L1 {number}: {DURATIONS[number]:g} s, {cycles} cycles")
         assert " ".join(axis).split() == own
     longest = max(int(re.search(r"(\d+) cycles after power-up", text)[1]) for text in texts)
@@ -245,18 +245,12 @@ def test_the_header_tells_which_is_which():
         ("fGain := -fScale;", "fGain := fScale;"),
         (re.compile(r"cPower1 : ARRAY \[0\.\.\d+\] OF LREAL := \[\s*[^,]+,"), None),
         (re.compile(r"cLast : ARRAY \[0\.\.3\] OF DINT := \[\s*50"), "cLast : ARRAY [0..3] OF DINT := [ 51"),
-        (
-            re.compile(r"cLastRow : ARRAY \[0\.\.3\] OF DINT := \[\s*\d+"),
-            "cLastRow : ARRAY [0..3] OF DINT := [ 2",
-        ),
-        (
-            re.compile(r"cLastRow : ARRAY \[0\.\.3\] OF DINT := \[\s*\d+"),
-            "cLastRow : ARRAY [0..3] OF DINT := [ x",
-        ),
+        (re.compile(r"cRows : ARRAY \[0\.\.3\] OF DINT := \[\s*\d+"), "cRows : ARRAY [0..3] OF DINT := [ 2"),
+        (re.compile(r"cRows : ARRAY \[0\.\.3\] OF DINT := \[\s*\d+"), "cRows : ARRAY [0..3] OF DINT := [ x"),
         (re.compile(r"cFirstRow"), "cFirstRows"),
         (
-            re.compile(r"cCrc : ARRAY \[0\.\.3\] OF DWORD := \[\s*16#."),
-            "cCrc : ARRAY [0..3] OF DWORD := [ 16#G",
+            re.compile(r"cChecksum : ARRAY \[0\.\.3\] OF DINT := \["),
+            "cChecksum : ARRAY [0..3] OF DINT := [ 1",
         ),
     ],
 )
@@ -296,9 +290,3 @@ def test_too_many_rows_to_compile_are_refused(monkeypatch):
     monkeypatch.setattr("gen_profile_exporters.profile_library.MOST_SAMPLES", 3)
     with pytest.raises(ExportError, match="split them into several libraries"):
         together(blocks(goal_of()), goal_of())
-
-
-def test_a_block_without_a_check_is_refused():
-    text = blocks(goal_of())[0].replace("IF nCheckRow >", "IF 0 >")
-    with pytest.raises(ExportError, match="checks no table"):
-        together([text], goal_of())

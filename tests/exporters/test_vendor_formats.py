@@ -87,7 +87,7 @@ class TestBlocks:
         content = format_.encode(MOVE, goal)[0].content
         literal = structured_text.literal(sample(MOVE, CYCLE).position[20, 0].item()).encode()
         assert content.count(literal) == 1
-        with pytest.raises(ExportError, match="it was altered"):
+        with pytest.raises(ExportError, match="one was altered"):
             format_.replay(content.replace(literal, b"0.25"), goal)
 
     @pytest.mark.parametrize("layout", LAYOUTS)
@@ -255,7 +255,6 @@ class TestSiemens:
         text = siemens_scl.encode(TWO_MOVES, goal_of(TWO_MOVES))[0].content.decode()
         body = text[text.index("\nBEGIN") :]
         assert "#fbMotion(\n    bExecute := #bExecuteNow" in body
-        assert "SHR(IN := #dwCrc, N := 4)" in body
         assert "#LREAL" not in body
         assert not re.search(
             r"(?<![#\w.])(nCycle|fPosition|cLast)\b(?!\s*:)", re.sub(r"\(\*.*?\*\)", "", body)
@@ -284,7 +283,7 @@ class TestSiemens:
 
     def test_a_table_larger_than_a_data_block_is_refused(self):
         move = quintic((0, 1), duration=3.0)
-        with pytest.raises(ExportError, match=r"the table takes 72\.4 kB, a data block holds 64 kB"):
+        with pytest.raises(ExportError, match=r"the table takes 72\.5 kB, a data block holds 64 kB"):
             siemens_scl.encode(move, goal_of(move, "samples", cycle_time=0.001))
         assert siemens_scl.encode(move, goal_of(move, "counts", cycle_time=0.001))
 
