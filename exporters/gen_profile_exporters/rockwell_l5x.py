@@ -61,6 +61,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
         )
         _tag(tags, f"{name}_Profile", "CAM_PROFILE", len(cycles))
         _tag(tags, f"{name}_Control", "MOTION_INSTRUCTION")
+        _switch(tags, f"{name}_Calculate")
     programs = etree.SubElement(controller, "Programs", {"Use": "Context"})
     program = etree.SubElement(programs, "Program", {"Use": "Context", "Name": "MainProgram"})
     routines = etree.SubElement(program, "Routines", {"Use": "Context"})
@@ -131,6 +132,14 @@ def _tag(tags: etree._Element, name: str, type_: str, dimension: int | None = No
     return etree.SubElement(tags, "Tag", attributes)
 
 
+def _switch(tags: etree._Element, name: str) -> None:
+    """Add a bit that an import sets."""
+    tag = _tag(tags, name, "BOOL")
+    tag.set("Radix", "Decimal")
+    data = etree.SubElement(tag, "Data", {"Format": "Decorated"})
+    etree.SubElement(data, "DataValue", {"DataType": "BOOL", "Radix": "Decimal", "Value": "1"})
+
+
 def _member(parent: etree._Element, name: str, type_: str, radix: str, value: str) -> None:
     etree.SubElement(
         parent, "DataValueMember", {"Name": name, "DataType": type_, "Radix": radix, "Value": value}
@@ -179,9 +188,16 @@ def _routine(target: Target) -> str:
 
 def _statements(names: list[str], points: int) -> list[str]:
     lines = [
-        "// Calculates the cam profiles; when .DN is set, start each axis with MATC:",
-        "// lock position 0, master reference the time in seconds, scaling 1.0. Not tried on a controller.",
+        "// Calculates the cam profiles once after an import, not while a MATC uses them (Status above 2).",
+        "// When .DN of the control tag is set (.ER: an error), start each axis with MATC: lock position 0,",
+        "// master reference the time in seconds, scaling 1.0. Watch MATC's own .ER and .IP, and the axis's",
+        "// faults. Not tried on a controller.",
     ]
     for name in names:
-        lines += [f"MCCP({name}_Control, {name}[0], {points}, 0.0, 0.0, {name}_Profile[0]);"]
+        lines += [
+            f"IF {name}_Calculate AND ({name}_Profile[0].Status <= 2) THEN",
+            f"    MCCP({name}_Control, {name}[0], {points}, 0.0, 0.0, {name}_Profile[0]);",
+            f"    {name}_Calculate := 0;",
+            "END_IF;",
+        ]
     return lines

@@ -305,6 +305,20 @@ class TestRockwell:
             in tag.description
         )
 
+    def test_profiles_are_calculated_once_after_an_import(self, tmp_path):
+        """Structured Text runs MCCP in every scan that reaches it, and so would begin anew for ever."""
+        (file,) = rockwell_l5x.encode(TWO_MOVES, goal_of(TWO_MOVES))
+        (tmp_path / file.filename).write_bytes(file.content)
+        tags = l5x.Project(str(tmp_path / file.filename)).controller.tags
+        text = "\n".join(line.text for line in etree.fromstring(file.content).iter("Line"))
+        for name in ("Cam_bay_3_1", "Cam_bay_3_2"):
+            assert tags[f"{name}_Calculate"].value == 1
+            guarded = (
+                rf"IF {name}_Calculate AND \({name}_Profile\[0\].Status <= 2\) THEN\s+MCCP\({name}_Control, "
+            )
+            assert re.search(guarded + rf"[^;]*;\s+{name}_Calculate := 0;\s+END_IF;", text)
+        assert text.count("MCCP(") == 2
+
     @pytest.mark.parametrize("profile", [MOVE, TWO_MOVES, bang_bang()], ids=["one", "two", "rough"])
     def test_positions_come_back_within_the_stated_error(self, profile):
         goal = goal_of(profile, unit="mm", sign=-1)
