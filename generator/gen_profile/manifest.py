@@ -16,6 +16,7 @@ FILENAME = "manifest.json"
 FORMAT = "gen-profile manifest"
 FORMAT_VERSION = 1
 UNVERIFIED = "unverified"
+SEAL = "manifest_sha256"  # of everything else in it, so that nobody changes a limit or a verdict by hand
 
 
 @attrs.frozen(kw_only=True)
@@ -100,6 +101,7 @@ class Manifest:
     def to_json(self) -> bytes:
         """Render, UTF-8."""
         document = {"format": FORMAT, "format_version": FORMAT_VERSION, **self.to_dict()}
+        document[SEAL] = _seal(document)
         return (json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")
 
 
@@ -115,17 +117,29 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
     Raises
     ------
     OutputError
-        It is none, or of another version.
+        It is none, of another version, or was altered.
     """
     try:
         document = json.loads(content.decode("utf-8"))
+        seal, found = document.pop(SEAL, None), _seal(document)
         if (document.pop("format"), document.pop("format_version")) != (FORMAT, FORMAT_VERSION):
             raise ValueError("another format")
-        return _from_dict(document)
+        manifest = _from_dict(document)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise OutputError(
             f"{source}: not a manifest of this version of gen-profile; export again, or give the spec."
         ) from error
+    if seal != found:
+        raise OutputError(
+            f"{source} was altered after it was written, or comes from an earlier version ({SEAL} does not "
+            "fit), so it vouches for nothing; export again."
+        )
+    return manifest
+
+
+def _seal(document: Mapping[str, Any]) -> str:
+    """Hash a document, whatever its order and layout."""
+    return sha256(json.dumps(document, sort_keys=True, separators=(",", ":")).encode("ascii"))
 
 
 def _from_dict(document: dict[str, Any]) -> Manifest:

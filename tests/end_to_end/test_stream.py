@@ -2,7 +2,6 @@
 
 import csv
 import errno
-import json
 import os
 import re
 import shutil
@@ -13,11 +12,13 @@ from importlib import util
 from pathlib import Path
 from threading import Thread
 
+import attrs
 import can
 import canopen
 import pytest
 from command_line import PROGRAM, run_here, run_process
 
+from gen_profile.manifest import parse_manifest
 from gen_profile.workflows import delivery
 from gen_profile.workflows import stream as workflow
 from gen_profile_exporters.can.clock import SystemClock
@@ -207,11 +208,20 @@ class TestArtefact:
 
     def test_failed(self, deployed, tmp_path):
         path = self.copy(deployed, tmp_path)
-        manifest = path.with_name("manifest.json")
-        document = json.loads(manifest.read_text())
-        document["check"]["passed"] = False
-        manifest.write_text(json.dumps(document))
+        beside = path.with_name("manifest.json")
+        manifest = parse_manifest(beside.read_bytes(), "manifest.json")
+        beside.write_bytes(attrs.evolve(manifest, check={**manifest.check, "passed": False}).to_json())
         assert "failed its check" in self.refused(path, "--accept-unverified")
+
+    @pytest.mark.parametrize("change", ['"start_tolerance": 9.001', '"quick_stop": 0.01'])
+    def test_with_an_altered_manifest(self, deployed, tmp_path, change):
+        path = self.copy(deployed, tmp_path)
+        manifest = path.with_name("manifest.json")
+        text = manifest.read_text()
+        altered = text.replace('"start_tolerance": 0.001', change)
+        assert altered != text
+        manifest.write_text(altered)
+        assert "manifest.json was altered after it was written" in self.refused(path)
 
     def test_that_begins_with_a_swing(self, tmp_path):
         swung = ("--preset=paper", "--set", "move.initial={theta1=0.05}")

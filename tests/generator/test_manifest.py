@@ -74,6 +74,39 @@ def test_refuses_what_is_no_manifest(content):
         parse_manifest(content, "out/manifest.json")
 
 
+def change_deeply(document, key, value):
+    *path, last = key
+    for step in path:
+        document = document[step]
+    document[last] = value
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        (("spec", "move", "duration"), 2.0),
+        (("spec_sha256",), "23"),
+        (("check", "passed"), 1),
+        (("check",), "unverified"),
+        (("artefacts", 0, "sha256"), "01"),
+        (("versions", "gen-profile"), "0.2.0"),
+        (("earlier", 0, "check", "passed"), False),
+        (("manifest_sha256",), "0"),
+        (("manifest_sha256",), None),
+    ],
+)
+def test_an_altered_one_vouches_for_nothing(key, value):
+    document = json.loads(exported("b", "b.csv").after(exported("a", "a.csv")).to_json())
+    change_deeply(document, key, value)
+    with pytest.raises(OutputError, match=r"^manifest\.json was altered .*export again\.$"):
+        parse_manifest(json.dumps(document).encode(), "manifest.json")
+
+
+def test_layout_and_order_do_not_matter():
+    document = dict(reversed(json.loads(MANIFEST.to_json()).items()))
+    assert parse_manifest(json.dumps(document, indent=7).encode(), "manifest.json") == MANIFEST
+
+
 def exported(name, *paths):
     artefacts = tuple(
         attrs.evolve(ARTEFACT, path=path, sha256=sha256(f"{name} {path}".encode())) for path in paths
