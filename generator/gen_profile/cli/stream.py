@@ -290,7 +290,7 @@ def _outcome_words(outcome: Outcome) -> str:
     lines = [f"{told['state']}: {told['cycles_sent']} of {told['cycles_planned']} setpoints sent"]
     if told["cycles_sent"]:
         lines.append(f"lateness: {_lateness_words(late)}; drift {number(1e6 * late.drift)} µs")
-    lines += outcome.notes
+    lines += told["notes"]
     drive = told["drive"]
     if drive is not None:
         unit = " or ".join(f"m{unit}" for unit in dict.fromkeys(_units(outcome.source)))

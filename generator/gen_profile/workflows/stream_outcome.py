@@ -9,6 +9,7 @@ import numpy as np
 
 from gen_profile.profile import Array, grid_times
 from gen_profile.spec import Spec
+from gen_profile_exporters.can.following import Standstill, standstills
 from gen_profile_exporters.can.plan import StreamPlan
 from gen_profile_exporters.can.record import Record
 
@@ -55,6 +56,12 @@ class Outcome:
         """Position that each drive told at each SYNC, in m; not a number where none was told."""
         return np.where(self.record.told[:, None], self._si(self.record.actual), np.nan)
 
+    @property
+    def standstills(self) -> tuple[Standstill, ...]:
+        """Axes that stood still while their setpoints went on."""
+        motion = self.source.plan.motion
+        return standstills(motion.at_sync, self.record.actual, self.record.told, motion.period)
+
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
         told = self.record.told
@@ -64,6 +71,8 @@ class Outcome:
             "position_error_m": float(np.abs(self._si(np.array(self.record.final)) - target).max()),
             "following_error_max_m": float(apart.max()) if told.any() else None,
             "sway_residual_peak_m": self.sway,
+            "cycles_unanswered": self.record.sent - int(told.sum()),
+            "cycles_standing": sum(len(found.cycles) for found in self.standstills),
         }
         return {
             "state": self.record.phase.value,
@@ -73,7 +82,7 @@ class Outcome:
             "drift_s": self.record.lateness.drift,
             "drive": drive if told.any() else None,
             "reason": self.record.reason,
-            "notes": list(self.notes),
+            "notes": [*self.notes, *map(self._standstill_words, self.standstills)],
         }
 
     def table(self) -> bytes:
@@ -87,6 +96,15 @@ class Outcome:
             for time, row in zip(times, columns, strict=True)
         ]
         return ("\n".join([",".join(["time_s", *heads]), *rows]) + "\n").encode("ascii")
+
+    def _standstill_words(self, found: Standstill) -> str:
+        axis, many = self.source.plan.target.axes[found.column], len(found.cycles)
+        unit = self.source.spec.machine().actuated[found.column].unit
+        return (
+            f"axis {axis.name}: it stood still in {many} {'cycles' if many > 1 else 'cycle'} of the motion, "
+            f"from cycle {found.cycles[0]} on, and came {1e3 * found.apart / abs(axis.counts_per_si):.3g} "
+            f"m{unit} off it: its drive left setpoints out."
+        )
 
     def _si(self, counts: Any) -> Array:
         scale = np.array([axis.counts_per_si for axis in self.source.plan.target.axes])

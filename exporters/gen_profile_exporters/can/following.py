@@ -1,0 +1,69 @@
+"""Whether drives took the setpoints: what each told of its way, held against the motion."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from gen_profile_exporters.can.frames import Integers
+
+LAG = 0.1  # s; a drive may be so late, and is not taken for one that stands still
+SLOW = 0.1  # of the motion's greatest step; slower setpoints tell nothing
+LEAST_STEP = 4  # counts; smaller steps tell nothing beside rounding
+
+
+@attrs.frozen(kw_only=True)
+class Standstill:
+    """Cycles in which an axis stood still, or nearly, while its setpoints went on.
+
+    Attributes
+    ----------
+    column : int
+        Of the axes.
+    cycles : tuple of int
+        Their numbers, in order.
+    apart : int
+        How far the axis was off the motion in one of them at most, in counts.
+    """
+
+    column: int
+    cycles: tuple[int, ...]
+    apart: int
+
+
+def standstills(
+    led: Integers, actual: Integers, told: NDArray[np.bool_], period: float
+) -> tuple[Standstill, ...]:
+    """Find the cycles in which axes moved less than half of the least that the latest setpoints asked for.
+
+    Parameters
+    ----------
+    led : (cycles, axes) integer array
+        Where the axes were to be by each SYNC, in counts.
+    actual : (cycles, axes) integer array
+        Where they were.
+    told : (cycles,) boolean array
+        For which cycles that is known.
+    period : float
+        SYNC period in s.
+    """
+    window = max(1, round(LAG / period))
+    steps = np.diff(led, axis=0)
+    if len(steps) < window:
+        return ()
+    found = []
+    for column in range(led.shape[1]):
+        latest = sliding_window_view(steps[:, column], window)  # by row: the steps up to cycle row + window
+        ahead = np.where((latest > 0).all(axis=1), latest.min(axis=1), 0)
+        back = np.where((latest < 0).all(axis=1), latest.max(axis=1), 0)
+        least = ahead + back
+        moved = np.diff(actual[:, column])[window - 1 :] * np.sign(least)
+        enough = np.abs(least) >= max(LEAST_STEP, SLOW * np.abs(steps[:, column]).max())
+        known = (told[1:] & told[:-1])[window - 1 :]
+        cycles = np.flatnonzero(enough & known & (moved < 0.5 * np.abs(least))) + window
+        if cycles.size:
+            apart = np.abs(actual[cycles, column] - led[cycles, column]).max()
+            found.append(Standstill(column=column, cycles=tuple(map(int, cycles)), apart=int(apart)))
+    return tuple(found)
