@@ -175,6 +175,33 @@ def test_abort_stops_and_holds_and_at_the_start_is_refused(vendor):
     assert (outputs["berror"], outputs["nerrorid"]) == (True, 4)
 
 
+def test_the_way_that_is_left_is_played_on_while_held_and_after_it_was_let_go(vendor):
+    for release in (False, True):
+        bench = under_way(vendor)
+        bench.until(lambda row: row["baborted"], bExecute=True, bAbort=True)
+        if release:
+            for _ in range(10):
+                outputs = bench.cycle(bExecute=False, bAbort=False)
+            assert not outputs["baborted"]
+        stood = bench.told[-1][0]
+        outputs = bench.until(lambda row: not row["bbusy"], bAbort=False, bContinue=True)
+        assert outputs["bdone"], outputs
+        assert 0.12 < stood < 0.39 and bench.told[-1][0] == pytest.approx(0.4, abs=1e-12)
+        assert steps(bench) < 0.013  # 0.5625 m/s for a cycle
+
+
+def test_the_way_that_is_left_is_not_played_on_from_elsewhere(vendor):
+    bench = under_way(vendor)
+    bench.put(bench.axes[0], bench.vendor.error)
+    bench.until(lambda row: not row["bbusy"], bExecute=True)
+    bench.put(bench.axes[0], bench.vendor.fit)
+    bench.bring([0.15])
+    told = len(bench.told)
+    outputs = bench.until(lambda row: not row["bbusy"], bExecute=False, bContinue=True)
+    assert (outputs["berror"], outputs["nerrorid"]) == (True, 2)
+    assert {row[0] for row in bench.told[told:]} == {0.15}
+
+
 def test_a_block_that_ends_without_telling_an_error_is_noticed():
     bench = under_way("codesys")
     bench.wrapper["fbFollow"].call(Axis=bench.axes[0], bAbort=True)
