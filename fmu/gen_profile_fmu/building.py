@@ -61,14 +61,16 @@ def build_fmu(
 def _cached_library(made: Sources, compiler: Compiler, name: str, on_build: Callable[[], None]) -> bytes:
     entry = cached(
         f"library-{sources_key(made, compiler)}",
-        lambda cache: {name: compile_texts(made.code, SOURCE_FILE, compiler, name, cache, on_build=on_build)},
+        lambda cache: {
+            name: compile_texts(made.compiled, SOURCE_FILE, compiler, name, cache, on_build=on_build)
+        },
     )
     return (entry / name).read_bytes()
 
 
 def sources_key(made: Sources, compiler: Compiler) -> str:
     """Name a binary by all that it is made of."""
-    return digest(compiler.identity.encode("utf-8"), made.description, *flat(made.code))[:32]
+    return digest(compiler.identity.encode("utf-8"), made.description, *flat(made.compiled))[:32]
 
 
 def compile_texts(

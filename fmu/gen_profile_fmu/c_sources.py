@@ -16,6 +16,10 @@ from gen_profile_fmu.variables import DERIVATIVES, STATES, Kind, Type, Variable,
 
 FOLDER = Path(__file__).parent / "c"
 FEWEST_POWERS = 4  # so that there is a jerk
+# of CasADi's text: all that it exports, and there the functions that only call the one with the equations
+_EXPORTED = r"^CASADI_SYMBOL_EXPORT [^{\n]*\{(?:[^\n]*\}\n|.*?^\}\n)\n?"
+_LEFT_OVER = r"^static const casadi_int casadi_s\d+\[.*\n|^#define casadi_[fs]\d+ .*\n"
+_WRAPPER = r"CASADI_SYMBOL_EXPORT int (\w+)\([^)]*\) ?\{\s*return (casadi_f\d+)\("
 
 
 def hand_written(*names: str) -> dict[str, str]:
@@ -44,9 +48,21 @@ def equations_source(equations: Dynamics) -> str:
         Function("equations_outputs", arguments, e.seen),
         Function("equations_tangent", {**arguments, **changes}, *tangents),
     )
-    # CasADi's helpers have no storage class: they would clash where two FMUs are linked into one program
-    internal = re.sub(r"^(casadi_real|casadi_int|void|int) (?=casadi_\w+\()", r"static \1 ", text, flags=re.M)
-    return f'#include "equations.h"\n#define CASADI_SYMBOL_EXPORT static\n{internal}'
+    return f'#include "equations.h"\n{_bare(text)}'
+
+
+def _bare(text: str) -> str:
+    """Leave of CasADi's text what is called: the functions, under their own names, and what helps them.
+
+    All of it becomes static, lest it clash where several FMUs are linked into one program. What CasADi adds,
+    to ask functions for their names, sparsity and memory, would be unused.
+    """
+    names = {internal: name for name, internal in re.findall(_WRAPPER, text)}
+    bare = re.sub(_EXPORTED, "", text, flags=re.M | re.S)
+    bare = re.sub(_LEFT_OVER, "", bare, flags=re.M)
+    bare = re.sub(r"^(casadi_real|casadi_int|void|int) (?=casadi_\w+\()", r"static \1 ", bare, flags=re.M)
+    bare = re.sub(r"casadi_f\d+", lambda found: names[found[0]], bare)
+    return re.sub(r"(, int mem\) \{\n)", r"\1  (void)arg, (void)res, (void)iw, (void)w, (void)mem;\n", bare)
 
 
 def variables_header(table: VariableTable, n_a: int, n_u: int, constants: Mapping[str, str]) -> str:
@@ -87,7 +103,7 @@ typedef struct {{
     const char *name;
     Type type;
     Kind kind;
-    double start, lower, upper;
+    double start, lower, upper, nominal;
 }} Variable;
 
 static const Variable VARIABLES[N_VALUES] = {{
@@ -138,5 +154,5 @@ def _variable_row(variable: Variable) -> str:
     upper = "DBL_MAX" if variable.upper is None else repr(float(variable.upper))
     return (
         f'    {{"{variable.name}", {variable.type.name}, {variable.kind.name}, '
-        f"{float(variable.start)!r}, {lower}, {upper}}}"
+        f"{float(variable.start)!r}, {lower}, {upper}, {variable.nominal!r}}}"
     )

@@ -21,6 +21,7 @@ from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.instances import slave
 from gen_profile_fmu.plant_fmu import plant_fmu
 from gen_profile_fmu.plant_variables import MAX_STEP, TAU
+from gen_profile_fmu.variables import variable_name
 
 # blocks of variables that are read after every step, and what a Response calls them
 _OBSERVED = {
@@ -146,12 +147,13 @@ class PlantCosimulation:
         """Start anew, at the first setpoint."""
         values = {**self._plant_values(parameters), **self._start_values(setpoints), **values}
         table = {variable.name: reference for reference, variable in enumerate(self._fmu.variables.variables)}
+        references = [table[variable_name(name)] for name in values]
         if self._slave is None:
             raise CosimulationError("This co-simulation has been closed; make a new one.")
         with self._explained():
             self._slave.reset()
             self._slave.setupExperiment(startTime=0.0)
-            self._slave.setReal([table[name] for name in values], list(values.values()))
+            self._slave.setReal(references, list(values.values()))
             self._slave.enterInitializationMode()
             self._slave.exitInitializationMode()
 

@@ -63,14 +63,19 @@ def plant_structure(
 def profile_structure(table: VariableTable) -> Structure:
     """Find the dependencies of an FMU with a motion alone: it depends on the time."""
     known = _motion(table)
-    starting = {*table.references("START_TIME", "WAIT", "TRIGGER", "TIME")}
+    starting = {*table.references("START", "DISTANCE", "START_TIME", "WAIT", "TRIGGER", "TIME")}
     return Structure(running=_within(known, {*table.references("TIME")}), starting=_within(known, starting))
 
 
 def _motion(table: VariableTable) -> dict[int, set[int]]:
-    """Let a motion follow from the time and from what begins it."""
+    """Let a motion follow from the time, from what begins it, and from where it leads."""
     sources = {*table.references("START_TIME", "WAIT", "TRIGGER", "TIME")}
-    return dict.fromkeys(table.references("COMMAND", "MOVING", "DONE"), sources)
+    start, distance = table.references("START"), table.references("DISTANCE")
+    known = dict.fromkeys(table.references("MOVING", "DONE"), sources)
+    for index, reference in enumerate(table.references("COMMAND")):
+        order, axis = divmod(index, len(start))
+        known[reference] = {*sources, distance[axis], *([start[axis]] if order == 0 else [])}
+    return known
 
 
 def _observed(

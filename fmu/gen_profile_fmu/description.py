@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
-import re
+import math
+from collections import defaultdict
+from importlib.metadata import version
 from xml.etree import ElementTree
 
 from gen_profile_fmu.base_units import BASE_UNITS
 from gen_profile_fmu.model import Model
 from gen_profile_fmu.variables import Kind, Type, Variable, VariableTable
 
+_PER_UNIT = {"deg": math.degrees(1.0), "mm": 1e3}  # of an SI unit, whatever it is divided by
 LOG_CATEGORIES = {
     "logEvents": "life cycle of an instance",
     "logStatusWarning": "warnings",
     "logStatusError": "errors and discarded steps",
 }
-_STRUCTURED = re.compile(r"\w+(\.\w+)*|der\(\w+(\.\w+)*\)", re.ASCII)
 
 
-def root_element(model: Model, version: str, **identity: str) -> ElementTree.Element:
+def root_element(model: Model, fmi_version: str, **identity: str) -> ElementTree.Element:
     """Begin a model description; `identity` is what ties it to its binary."""
-    structured = all(_STRUCTURED.fullmatch(variable.name) for variable in model.variables.variables)
+    tool = version("gen-profile")
     attributes = {
-        "fmiVersion": version,
+        "fmiVersion": fmi_version,
         "modelName": model.name,
         **identity,
         "description": model.summary,
-        "generationTool": "gen-profile",
+        "author": model.author,
+        "version": tool,
+        "generationTool": f"gen-profile {tool}",
         "license": "Apache-2.0",
-        "variableNamingConvention": "structured" if structured else "flat",
+        "variableNamingConvention": "structured",
     }
     return ElementTree.Element("fmiModelDescription", attributes)
 
@@ -35,11 +39,18 @@ def root_element(model: Model, version: str, **identity: str) -> ElementTree.Ele
 def add_units(root: ElementTree.Element, table: VariableTable) -> None:
     """List the units in use, with their base units where these are known."""
     definitions = ElementTree.SubElement(root, "UnitDefinitions")
+    shown_in: defaultdict[str, dict[str, float]] = defaultdict(dict)
+    for variable in table.variables:
+        if variable.display_unit != variable.unit:
+            factor = _PER_UNIT[variable.display_unit.partition("/")[0]]
+            shown_in[variable.unit][variable.display_unit] = factor
     for name in sorted({variable.unit for variable in table.variables} - {""}):
         unit = ElementTree.SubElement(definitions, "Unit", name=name)
         if name in BASE_UNITS:
             exponents = {base: str(exponent) for base, exponent in BASE_UNITS[name].items()}
             ElementTree.SubElement(unit, "BaseUnit", exponents)
+        for shown, factor in sorted(shown_in[name].items()):
+            ElementTree.SubElement(unit, "DisplayUnit", name=shown, factor=repr(factor))
 
 
 def add_log_categories(root: ElementTree.Element) -> None:
@@ -78,12 +89,15 @@ def value_attributes(variable: Variable) -> dict[str, str]:
     """Give unit, bounds and start value."""
     bounds = {"min": variable.lower, "max": variable.upper}
     unit = {"unit": variable.unit} if variable.unit else {}
+    if variable.display_unit != variable.unit:
+        unit["displayUnit"] = variable.display_unit
     start = (
         str(bool(variable.start)).lower() if variable.type is Type.BOOLEAN else repr(float(variable.start))
     )
     return {
         **unit,
         **{name: repr(float(bound)) for name, bound in bounds.items() if bound is not None},
+        **({"nominal": repr(variable.nominal)} if variable.nominal != 1.0 else {}),
         **({"start": start} if variable.kind.has_start else {}),
     }
 

@@ -12,6 +12,7 @@ import numpy as np
 from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile.profile import Array, Profile
 from gen_profile.response import Swing
+from gen_profile_fmu.nominals import smooth_move
 from gen_profile_fmu.plant_variables import InputKind, Machine
 from gen_profile_fmu.variables import VariableTable
 
@@ -21,8 +22,10 @@ _COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b")
 _INPUTS = {
     InputKind.ACCELERATION: "The axes have the accelerations of the inputs at once. In co-simulation, "
     "inputs may have time derivatives up to the third order (FMI 2).",
-    InputKind.VELOCITY: "Drives follow the inputs with a first-order lag, τ dv/dt = v_ref − v. "
-    "In co-simulation, inputs may have time derivatives up to the third order (FMI 2).",
+    InputKind.VELOCITY: "Drives follow the inputs with a first-order lag, τ dv/dt = v_ref − v, or at once "
+    "where τ = 0. In co-simulation, inputs may have time derivatives up to the third order (FMI 2); a step "
+    "of the velocity strikes the loads as its impulse; in model exchange drives without lag hold a velocity "
+    "for interpolation_period.",
     InputKind.SETPOINT: "Drives interpolate their setpoints linearly (CiA 402, object 60C2h), so that "
     "velocity is constant between two setpoints, behind a first-order lag where τ &gt; 0. In co-simulation a "
     "setpoint is reached at the end of the step; in model exchange drives take one every "
@@ -121,10 +124,7 @@ def _variables(table: VariableTable) -> str:
 def _push(machine: Machine) -> Profile:
     """Move each axis by a tenth of its unit in 1 s, from rest to rest, from where it starts."""
     start = np.array(machine.position)
-    smooth = 0.1 * np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
-    coefficients = np.repeat(smooth[None, :, None], len(start), axis=2)
-    coefficients[0, 0] = start
-    return Profile(knots=[0.0, 1.0], coefficients=coefficients, target=start + 0.1, method="push")
+    return smooth_move(start.tolist(), (start + 0.1).tolist(), 1.0)
 
 
 def _sway_plot(machine: Machine, profile: Profile, until: float) -> str:

@@ -53,6 +53,7 @@ def _add_interfaces(root: ElementTree.Element, model: Model, source_file: str) -
     cosimulation = {
         "canHandleVariableCommunicationStepSize": "true",
         "canInterpolateInputs": str(model.interpolates_inputs).lower(),
+        "maxOutputDerivativeOrder": str(model.output_order),
     }
     for name, attributes in (("ModelExchange", common), ("CoSimulation", common | cosimulation)):
         interface = ElementTree.SubElement(root, name, attributes)

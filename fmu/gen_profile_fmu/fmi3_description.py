@@ -53,6 +53,7 @@ def _add_interfaces(root: ElementTree.Element, model: Model) -> None:
     cosimulation = {
         "canHandleVariableCommunicationStepSize": "true",
         "providesIntermediateUpdate": str(model.interpolates_inputs).lower(),
+        "maxOutputDerivativeOrder": str(model.output_order),
     }
     ElementTree.SubElement(root, "CoSimulation", common | cosimulation)
 

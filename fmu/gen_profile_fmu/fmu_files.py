@@ -54,7 +54,8 @@ class Sources:
     description : bytes
         modelDescription.xml.
     code : mapping of str to str
-        Every C file by name.
+        Every C file by name, but for FMI's own headers: these an importer supplies (2.0.4, section 2.3; 3.0,
+        section 2.5.1).
     """
 
     model: Model
@@ -63,13 +64,17 @@ class Sources:
     description: bytes
     code: Mapping[str, str]
 
+    @property
+    def compiled(self) -> dict[str, str]:
+        """All that a compiler reads to make a shared library."""
+        return {**self.code, **standard_headers(self.version)}
+
 
 def sources(model: Model, version: Version) -> Sources:
     """Write a model's C files and description for a version of FMI."""
     code = {
         **model.code,
         **{name: (FOLDER / name).read_text(encoding="utf-8") for name in (*_COMMON, *version.own_files)},
-        **standard_headers(version),
     }
     identity = digest(_describe(model, version, ""), *flat(code))[:32]
     return Sources(
@@ -88,21 +93,24 @@ def _describe(model: Model, version: Version, identity: str) -> bytes:
 
 
 def standard_headers(version: Version) -> dict[str, str]:
-    """Read FMI's own headers by name; FMPy brings them along."""
+    """Read FMI's own headers by name, as FMPy brings them along: for shared libraries, without prefixes."""
     folder = Path(fmpy.__file__).parent / "c-code"
     return {name: (folder / name).read_text(encoding="utf-8") for name in version.headers}
 
 
 def _translation_unit(model: Model, version: Version, identity: str) -> str:
     host, *interface = version.own_files
+    prefix = f"FMI{version.value}_FUNCTION_PREFIX"
     names = [host, "model.h", *model.order, *_COMMON, *interface]
     includes = "\n".join(f'#include "{name}"' for name in names if name != "instance.h")
     return f"""\
 /*
  * The whole FMU as one translation unit, so that nothing but FMI's functions has a name outside of it.
- * For a shared library, define FMI{version.value}_OVERRIDE_FUNCTION_PREFIX.
+ * FMI's headers are the importer's. For a shared library, define {prefix[:5]}OVERRIDE_{prefix[5:]}.
  */
-#define FMI{version.value}_FUNCTION_PREFIX {model.identifier}_
+#ifndef {prefix[:5]}OVERRIDE_{prefix[5:]}
+#define {prefix} {model.identifier}_
+#endif
 #define MODEL_IDENTITY "{identity}"
 
 {includes}

@@ -24,6 +24,7 @@ from gen_profile_fmu.compiler import find_compiler
 from gen_profile_fmu.fmu_files import Version, digest, standard_headers
 from gen_profile_fmu.instances import slave
 from gen_profile_fmu.plant_fmu import PlantFmu
+from gen_profile_fmu.variables import variable_name
 
 _SOURCE = "many_runs.c"
 _FUNCTIONS = {
@@ -165,9 +166,10 @@ class ManyRuns:
     def _numbers(self, names: Iterable[str]) -> Any:
         references = []
         for name in names:
-            if name not in self._references:
+            reference = self._references.get(variable_name(name))
+            if reference is None:
                 raise CosimulationError(f"The FMU has no variable {name!r}.")
-            references.append(self._references[name])
+            references.append(reference)
         return (c_uint * len(references))(*references)
 
 

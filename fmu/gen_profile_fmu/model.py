@@ -31,7 +31,9 @@ from gen_profile_fmu.variables import VariableTable
 INPUT_ORDER = 3  # of the time derivatives that a step takes of an input: N_SLOPES in model.h
 PLANT_FILES = ("driven_plant.h", "driven_plant.c", "equations.h")
 MOTION_FILES = ("motion.h", "motion.c")
-NO_INPUTS = {"N_SLOPED_INPUTS": "0", "SLOPED_INPUTS": "0"}
+AUTHOR = "gen-profile"  # where nobody else is named
+OUTPUT_ORDER = 3  # of the time derivatives that a motion's outputs have
+PLAIN = {"N_SLOPED_INPUTS": "0", "SLOPED_INPUTS": "0", "OUTPUT_ORDERS": "0"}
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -46,6 +48,8 @@ class Model:
     structure : Structure
     interpolates_inputs : bool
         Whether inputs may vary within a step: by time derivatives in FMI 2, by intermediate updates in FMI 3.
+    output_order : int
+        Up to which order outputs have time derivatives; 0 for none.
     code : mapping of str to str
         C files by name, all but those of FMI itself.
     order : tuple of str
@@ -54,6 +58,8 @@ class Model:
         Writes HTML for people, which takes a simulation.
     stop_time, step : float
         A sensible experiment, in s.
+    author : str
+        Who made the model.
     """
 
     name: str
@@ -62,11 +68,13 @@ class Model:
     variables: VariableTable
     structure: Structure
     interpolates_inputs: bool
+    output_order: int = 0
     code: Mapping[str, str]
     order: tuple[str, ...]
     page: Callable[[], str]
     stop_time: float
     step: float
+    author: str = AUTHOR
 
 
 def identifier_of(name: str) -> str:
@@ -132,7 +140,7 @@ def _constants(kind: InputKind, axes: int) -> dict[str, str]:
         InputKind.VELOCITY: INPUT_ORDER + 1,
         InputKind.SETPOINT: 1,
     }[kind]
-    return {
+    return PLAIN | {
         "INPUT_KIND": f"{kind.name}_INPUT",
         "N_ORDERS": str(orders),
         "N_SLOPED_INPUTS": str(axes if kind is not InputKind.SETPOINT else 0),
@@ -142,7 +150,8 @@ def _constants(kind: InputKind, axes: int) -> dict[str, str]:
 
 def profile_model(name: str, axes: Sequence[Coordinate], profile: Profile) -> Model:
     """Make the FMU's content of a motion; parameters and errors as `plant_model`."""
-    table = profile_variables(axes)
+    table = profile_variables(axes, profile)
+    constants = PLAIN | {"OUTPUT_ORDERS": str(OUTPUT_ORDER)}
     return Model(
         name=name,
         identifier=identifier_of(name),
@@ -150,9 +159,10 @@ def profile_model(name: str, axes: Sequence[Coordinate], profile: Profile) -> Mo
         variables=table,
         structure=profile_structure(table),
         interpolates_inputs=False,
+        output_order=OUTPUT_ORDER,
         code={
             **hand_written(*MOTION_FILES, "profile_model.c"),
-            "variables.h": variables_header(table, len(axes), 0, NO_INPUTS),
+            "variables.h": variables_header(table, len(axes), 0, constants),
             "motion_table.h": motion_table(profile),
         },
         order=("motion.c", "profile_model.c"),
@@ -177,18 +187,20 @@ def system_model(name: str, machine: Machine, command: Profile) -> Model:
     CosimulationError
         The plant's names cannot be those of an FMU's variables.
     """
-    plant, table = machine.plant, system_variables(machine)
+    plant, table = machine.plant, system_variables(machine, command)
     equations = dynamics(plant)
     tau, velocity, time = (table.references(block) for block in ("TAU", "DQ_A", "TIME"))
-    trigger = table.references("START_TIME", "WAIT", "TRIGGER")
-    drives = {axis: {velocity[axis], *tau, *time, *trigger} for axis in range(len(plant.actuated))}
-    constants = {"N_ORDERS": "N_POWERS - 1", **NO_INPUTS}
+    trigger, distance = table.references("START_TIME", "WAIT", "TRIGGER"), table.references("DISTANCE")
+    axes = range(len(plant.actuated))
+    drives = {axis: {velocity[axis], *tau, *time, *trigger, distance[axis]} for axis in axes}
+    origins = {axis: {start} for axis, start in enumerate(table.references("START"))}
+    constants = {"N_ORDERS": "N_POWERS - 1", **PLAIN}
     return Model(
         name=name,
         identifier=identifier_of(name),
         summary=f"{plant.summary}, following a motion",
         variables=table,
-        structure=plant_structure(equations, table, drives, {axis: set() for axis in drives}),
+        structure=plant_structure(equations, table, drives, origins),
         interpolates_inputs=False,
         code={
             **hand_written(*PLANT_FILES, *MOTION_FILES, "system_model.c"),

@@ -68,7 +68,7 @@ def cached_fmu(model: Model, version: Version, on_build: Callable[[], None] | No
     platform = fmpy.platform if version is Version.FMI2 else fmpy.platform_tuple
 
     def make(cache: Path) -> dict[str, bytes]:
-        binary = compile_texts(made.code, SOURCE_FILE, compiler, library, cache, on_build=on_build)
+        binary = compile_texts(made.compiled, SOURCE_FILE, compiler, library, cache, on_build=on_build)
         laid = fmu_files(made, {f"binaries/{platform}/{library}": binary}, with_extras=False)
         return {**laid, f"{model.identifier}.fmu": archive(laid)}
 

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 
 import attrs
 
 from gen_profile.plants.plant import Coordinate, Plant
-from gen_profile_fmu.variables import DERIVATIVES, Kind, Type, Variable, VariableTable, require_good_names
+from gen_profile.profile import Profile
+from gen_profile_fmu.variables import (
+    DERIVATIVES,
+    STATES,
+    Kind,
+    Type,
+    Variable,
+    VariableTable,
+    require_good_names,
+    variable_name,
+)
 
 TAU = "tau"
 MAX_STEP = "max_step"
 PERIOD = "interpolation_period"
-SHORTEST_LAG = 1e-4  # s, of drives that follow a velocity: without any, their acceleration would be no number
+_STANDING = 1e-9  # m or rad, less than which a motion leads nowhere
 Blocks = dict[str, tuple[Variable, ...]]
 
 
@@ -43,6 +53,8 @@ class Machine:
         Where the axes rest at the start, in m or rad; zeros if not given.
     initial : mapping of str to float
         What swings at the start: unactuated coordinates by name, their rates as ``NAME.rate``.
+    nominal : mapping of str to float
+        Size of the states by their variables' names; 1 for those not given.
     """
 
     plant: Plant
@@ -51,6 +63,7 @@ class Machine:
     period: float = 0.004
     position: Sequence[float] = attrs.field()
     initial: Mapping[str, float] = attrs.field(factory=dict)
+    nominal: Mapping[str, float] = attrs.field(factory=dict)
 
     @position.default
     def _origin(self) -> Sequence[float]:
@@ -71,7 +84,7 @@ def plant_variables(machine: Machine, kind: InputKind) -> VariableTable:
             **_parameters(machine, kind),
             "START": _at(machine.position, _per_axis(axes, "start", words, 0, Kind.FIXED_PARAMETER)),
             "INPUTS": _inputs(machine, kind),
-            "PERIOD": (_period(machine.period),) if kind is InputKind.SETPOINT else (),
+            "PERIOD": _period(machine.period, kind),
             **_states_and_outputs(machine),
             "TIME": (_time(),),
         }
@@ -80,18 +93,19 @@ def plant_variables(machine: Machine, kind: InputKind) -> VariableTable:
     return table
 
 
-def profile_variables(axes: Sequence[Coordinate]) -> VariableTable:
+def profile_variables(axes: Sequence[Coordinate], motion: Profile) -> VariableTable:
     """List the variables of a motion alone; raises as `plant_variables` does."""
-    table = VariableTable(blocks={**_trigger(), **_command(axes), "TIME": (_time(),)})
+    table = VariableTable(blocks={**_way(axes, motion), **_trigger(), **_command(axes), "TIME": (_time(),)})
     require_good_names("Profile", [axis.name for axis in axes], table)
     return table
 
 
-def system_variables(machine: Machine) -> VariableTable:
+def system_variables(machine: Machine, motion: Profile) -> VariableTable:
     """List the variables of a plant that follows a motion; raises as `plant_variables` does."""
     table = VariableTable(
         blocks={
             **_parameters(machine, InputKind.SETPOINT),
+            **_way(machine.plant.actuated, motion),
             **_trigger(),
             **_states_and_outputs(machine),
             **_command(machine.plant.actuated),
@@ -115,21 +129,19 @@ def _parameters(machine: Machine, kind: InputKind) -> Blocks:
         )
         for parameter in machine.plant.parameters
     )
-    lag = () if kind is InputKind.ACCELERATION else (_lag(machine.tau, kind),)
+    lag = () if kind is InputKind.ACCELERATION else (_lag(machine.tau),)
     return {"P": parameters, "TAU": lag, "MAX_STEP": (_longest_step(),)}
 
 
-def _lag(tau: float, kind: InputKind) -> Variable:
+def _lag(tau: float) -> Variable:
     # fixed: position + tau * velocity is the interpolated setpoint only while tau stays as it is
-    velocity = kind is InputKind.VELOCITY
     return Variable(
         name=TAU,
-        description="time constant of the drives' first-order lag"
-        + ("" if velocity else "; 0: ideal drives"),
+        description="time constant of the drives' first-order lag; 0: ideal drives",
         unit="s",
         kind=Kind.FIXED_PARAMETER,
-        start=(tau or 0.1) if velocity else tau,
-        lower=SHORTEST_LAG if velocity else 0.0,
+        start=tau,
+        lower=0.0,
     )
 
 
@@ -145,15 +157,37 @@ def _longest_step() -> Variable:
     )
 
 
-def _period(period: float) -> Variable:
-    return Variable(
+def _period(period: float, kind: InputKind) -> tuple[Variable, ...]:
+    words = {
+        InputKind.SETPOINT: "in which drives go on to a setpoint",
+        InputKind.VELOCITY: "for which ideal drives hold a velocity",
+    }
+    if kind not in words:
+        return ()
+    period_variable = Variable(
         name=PERIOD,
-        description="time in which drives go on to a setpoint, in model exchange; in co-simulation, the step",
+        description=f"time {words[kind]}, in model exchange; in co-simulation, the step",
         unit="s",
         kind=Kind.FIXED_PARAMETER,
         start=period,
         lower=1e-6,
     )
+    return (period_variable,)
+
+
+def _way(axes: Sequence[Coordinate], motion: Profile) -> Blocks:
+    """List the parameters that shift and scale a motion; an axis that comes back to its start only shifts."""
+    start = motion.coefficients[0, 0]
+    distances = _per_axis(axes, "distance", "how far the motion leads, scaled", 0, Kind.FIXED_PARAMETER)
+    return {
+        "START": _at(start, _per_axis(axes, "start", "where the motion begins", 0, Kind.FIXED_PARAMETER)),
+        "DISTANCE": tuple(
+            attrs.evolve(variable, start=float(distance))
+            if abs(distance) > _STANDING
+            else attrs.evolve(variable, lower=0.0, upper=0.0)
+            for variable, distance in zip(distances, motion.target - start, strict=True)
+        ),
+    }
 
 
 def _per_axis(
@@ -172,9 +206,10 @@ def _unit(unit: str, order: int) -> str:
     return (unit, f"{unit}/s", f"{unit}/s^2", f"{unit}/s^3")[order]
 
 
-def _at(position: Sequence[float], variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+def _at(position: Iterable[float], variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
     return tuple(
-        attrs.evolve(variable, start=start) for variable, start in zip(variables, position, strict=True)
+        attrs.evolve(variable, start=float(start))
+        for variable, start in zip(variables, position, strict=True)
     )
 
 
@@ -191,6 +226,17 @@ def _inputs(machine: Machine, kind: InputKind) -> tuple[Variable, ...]:
 
 
 def _states_and_outputs(machine: Machine) -> Blocks:
+    blocks = _of_plant(machine)
+    sized = {
+        block: tuple(
+            attrs.evolve(state, nominal=machine.nominal.get(state.name, 1.0)) for state in blocks[block]
+        )
+        for block in STATES
+    }
+    return {**blocks, **sized}
+
+
+def _of_plant(machine: Machine) -> Blocks:
     plant, axes = machine.plant, machine.plant.actuated
     accelerations = _per_axis(axes, "velocity", "acceleration of the axis", 2, Kind.DERIVATIVE)
     velocities = _per_axis(axes, "position", "velocity of the axis", 1, Kind.DERIVATIVE)
@@ -208,15 +254,16 @@ def _states_and_outputs(machine: Machine) -> Blocks:
             *(attrs.evolve(variable, name=f"der({variable.name})") for variable in velocities),
             *(attrs.evolve(variable, name=f"der({variable.name})") for variable in accelerations),
         ),
-        "SWAY": _of_loads(plant, "sway", "m", "horizontal distance from the place at rest"),
-        "HEIGHT": _of_loads(plant, "height", "m", "height above the suspension point"),
-        "ANGLE": _of_loads(plant, "angle", "rad", "angle of the rope from the vertical"),
+        "SWAY": _of_loads(plant, "sway", "m", "horizontal distance from the place at rest", "mm"),
+        "HEIGHT": _of_loads(plant, "height", "m", "height above the suspension point", "m"),
+        "ANGLE": _of_loads(plant, "angle", "rad", "angle of the rope from the vertical", "deg"),
         **_of_bodies(plant),
     }
 
 
 def _swinging(initial: Mapping[str, float], states: tuple[Variable, ...]) -> tuple[Variable, ...]:
-    return tuple(attrs.evolve(state, start=initial.get(state.name, 0.0)) for state in states)
+    started = {variable_name(name): value for name, value in initial.items()}
+    return tuple(attrs.evolve(state, start=started.get(state.name, 0.0)) for state in states)
 
 
 def _unactuated(plant: Plant, pattern: str, description: str, order: int, kind: Kind) -> tuple[Variable, ...]:
@@ -231,9 +278,17 @@ def _unactuated(plant: Plant, pattern: str, description: str, order: int, kind: 
     )
 
 
-def _of_loads(plant: Plant, quantity: str, unit: str, description: str) -> tuple[Variable, ...]:
+def _of_loads(
+    plant: Plant, quantity: str, unit: str, description: str, display_unit: str
+) -> tuple[Variable, ...]:
     return tuple(
-        Variable(name=f"{quantity}.{load}", description=description, unit=unit, kind=Kind.OUTPUT)
+        Variable(
+            name=f"{quantity}.{load}",
+            description=description,
+            unit=unit,
+            kind=Kind.OUTPUT,
+            display_unit=display_unit,
+        )
         for load in plant.loads
     )
 

@@ -21,6 +21,8 @@ STATES = ("Q_U", "DQ_U", "Q_A", "DQ_A")
 # blocks of what is seen of a plant, in the order in which the equations give it
 OBSERVED = ("SWAY", "HEIGHT", "ANGLE", "PLACE", "ENERGY")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+# units of which people think rather than of the unit that values have
+_DISPLAY_UNITS = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2", "rad/s^3": "deg/s^3"}
 
 
 class Type(Enum):
@@ -54,6 +56,11 @@ class Kind(Enum):
         return self.initial == "exact" or self.causality == "input"
 
 
+def variable_name(name: str) -> str:
+    """Make a structured name (FMI 3.0, section 2.4.7.5.1) of a plant's, which may have hyphens."""
+    return name.replace("-", "_")
+
+
 @attrs.frozen(kw_only=True)
 class Variable:
     """A scalar variable.
@@ -62,15 +69,19 @@ class Variable:
     ----------
     name, description, unit : str
         `unit` is empty for booleans.
+    display_unit : str
+        In which tools show values; that of the angle for angles, else `unit`, by default.
     kind : Kind
     type : Type
     start : float
         Value before anything is set; for outputs, which are calculated, that of the C code's memory.
     lower, upper : float or None
         Allowed values, both ends included.
+    nominal : float
+        Size of its values, by which integrators weigh errors of states.
     """
 
-    name: str
+    name: str = attrs.field(converter=variable_name)
     description: str
     unit: str
     kind: Kind
@@ -78,6 +89,12 @@ class Variable:
     start: float = 0.0
     lower: float | None = None
     upper: float | None = None
+    nominal: float = 1.0
+    display_unit: str = attrs.field()
+
+    @display_unit.default
+    def _usual(self) -> str:
+        return _DISPLAY_UNITS.get(self.unit, self.unit)
 
 
 @attrs.frozen(kw_only=True)

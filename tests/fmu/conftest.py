@@ -1,14 +1,26 @@
+import importlib
 from collections.abc import Iterator
+from types import ModuleType
 
 import numpy as np
 import pytest
 from fmu.slave import FMU2LoggedModel, FMU2LoggedSlave, open_slave
+from system_parts import missing
 
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
 from gen_profile.profile import Profile
 from gen_profile_fmu.cosimulation import PlantCosimulation
 from gen_profile_fmu.plant_fmu import PlantFmu, plant_fmu
+
+
+@pytest.fixture(scope="session")
+def ecos() -> ModuleType:
+    """Give Ecos, whose wheel takes Threading Building Blocks from the system."""
+    try:
+        return importlib.import_module("ecospy")
+    except OSError as error:
+        missing(f"Threading Building Blocks (Debian package libtbb12): {error}")
 
 
 @pytest.fixture(scope="session")

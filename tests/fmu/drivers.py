@@ -84,6 +84,22 @@ class Instance:
             (c_double * n)(*values),
         )
 
+    def output_derivative(self, name: str, order: int) -> float:
+        """Time derivative of an output."""
+        value = c_double()
+        arguments = (
+            self.fmu.component,
+            (c_uint32 * 1)(self.references[name]),
+            1,
+            (c_int32 * 1)(order),
+            byref(value),
+        )
+        if self.version is Version.FMI2:
+            self.fmu.fmi2GetRealOutputDerivatives(*arguments)
+        else:
+            self.fmu.fmi3GetOutputDerivatives(*arguments, 1)
+        return value.value
+
     def events(self) -> float | None:
         """Handle what happens now; the next event's time."""
         if self.version is Version.FMI2:
@@ -147,7 +163,7 @@ def exchange(
         while time < target:
             end = min(time + step, float(target), np.inf if event is None else event)
             end = float(target) if target - end < 1e-12 and (event is None or event > target) else end
-            _advance(instance, time, end - time, before)
+            advance(instance, time, end - time, before)
             time = end
             if event is not None and time >= event:
                 instance.fmu.enterEventMode()
@@ -159,7 +175,7 @@ def exchange(
     return np.array(rows)
 
 
-def _advance(instance: Instance, time: float, step: float, before: Callable[[float], None]) -> None:
+def advance(instance: Instance, time: float, step: float, before: Callable[[float], None]) -> None:
     x = instance.x()
 
     def rates(offset: float, y: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import attrs
 import numpy as np
 
 from gen_profile.plants.plant import Plant
@@ -35,4 +36,5 @@ def model_of(kind: str, plant: Plant, profile: Profile | None = None) -> Model:
         return profile_model("paper profile", plant.actuated, profile)
     if kind == "system":
         return system_model("paper system", machine_of(plant), profile)
-    return plant_model(machine_of(plant), INPUTS[kind])
+    machine = attrs.evolve(machine_of(plant), tau=0.1 if kind == "plant-velocity" else 0.0)
+    return plant_model(machine, INPUTS[kind])

@@ -71,6 +71,25 @@ def test_same_spec_same_archive(tmp_path):
     assert (tmp_path / "a.fmu").read_bytes() == (tmp_path / "b.fmu").read_bytes()
 
 
+def test_a_velocity_of_ideal_drives_has_no_lag(tmp_path):
+    """The motion's own velocity, held in steps of 4 ms at its mean, calms the loads as its setpoints do."""
+    motion, plant = tmp_path / "motion.fmu", tmp_path / "plant.fmu"
+    assert run_here("fmu", "profile", "--out", motion).code == 0
+    assert run_here("fmu", "plant", "--input", "velocity", "--out", plant).code == 0
+    starts = {variable.name: variable.start for variable in read_model_description(str(plant)).modelVariables}
+    assert float(starts["tau"]) == 0.0
+    planned = simulate_fmu(str(motion), stop_time=6.0, output_interval=0.004, fmi_type="CoSimulation")
+    fed = np.zeros(len(planned), dtype=[("time", float), ("cart.setpoint_velocity", float)])
+    fed["time"] = planned["time"]
+    fed["cart.setpoint_velocity"][:-1] = np.diff(planned["cart.setpoint"]) / 0.004
+    outputs = ["cart.position", "sway.payload"]
+    found = simulate_fmu(
+        str(plant), stop_time=6.0, output_interval=0.004, fmi_type="CoSimulation", input=fed, output=outputs
+    )
+    assert found["cart.position"][-1] == pytest.approx(0.3, abs=1e-9)
+    assert abs(found["sway.payload"][found["time"] > 3.0]).max() < 3e-5
+
+
 def test_other_platforms_are_labelled(tmp_path):
     done = run_here("fmu", "plant", "--platform", "linux-arm64", "--out", tmp_path / "a.fmu", "--json")
     assert done.document["platforms"] == [{"name": "linux-arm64", "runs_here": False}]

@@ -1,11 +1,19 @@
 """Instances of the FMU: their saved states, memory, independence and log."""
 
+import subprocess
 from ctypes import byref, c_char, c_size_t, c_void_p
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 from fmpy import fmi2
+from fmu.kinds import model_of
 from fmu.slave import MOVE, FMU2LoggedSlave, open_slave, status_of
+from system_parts import program
+
+from gen_profile_fmu.fmu_files import Version, sources
+
+DAMAGED = Path(__file__).with_name("damaged_states.c")
 
 
 class TestStates:
@@ -70,6 +78,17 @@ class TestStates:
         arguments = (slave.component, state, text, size.value - 1)
         assert status_of(slave.fmi2SerializeFMUstate, *arguments) == fmi2.fmi2Error
         slave.freeFMUState(state)
+
+    @pytest.mark.parametrize("kind", ["profile", "system"])
+    def test_damaged_bytes_are_refused(self, crane, kind, tmp_path):
+        """Under the sanitizers of addresses and of undefined behaviour."""
+        for name, text in sources(model_of(kind, crane), Version.FMI2).compiled.items():
+            (tmp_path / name).write_text(text)
+        checks = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-I{tmp_path}")
+        command = [program("cc", "gcc"), "-std=c99", "-O1", *checks, str(DAMAGED), "-o", "damaged", "-lm"]
+        subprocess.run(command, cwd=tmp_path, check=True)
+        done = subprocess.run([tmp_path / "damaged"], capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stdout) == (0, ""), done.stderr
 
     def test_null_states_are_refused(self, slave):
         assert status_of(slave.fmi2SetFMUstate, slave.component, None) == fmi2.fmi2Error

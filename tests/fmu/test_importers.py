@@ -1,7 +1,6 @@
 """Other people's importers: CasADi's DaeBuilder, Ecos, and a plain C compiler for the sources."""
 
 import html
-import importlib
 import io
 import re
 import subprocess
@@ -10,13 +9,14 @@ from pathlib import Path
 
 import casadi
 import fmpy
+import fmu_manipulation_toolbox
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from fmu.drivers import Instance, cosimulate
 from fmu.kinds import INPUTS, KINDS, model_of, motion
 from numpy.polynomial import Polynomial
-from system_parts import missing, program
+from system_parts import program
 
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem import symbolic as sym
@@ -24,23 +24,19 @@ from gen_profile.problem.dynamics import dynamics
 from gen_profile.profile import Profile
 from gen_profile_fmu.building import build_fmu
 from gen_profile_fmu.fmu_files import Version, archive, fmu_files, sources
+from gen_profile_fmu.model import system_model
+from gen_profile_fmu.nominals import smooth_move, state_nominals
 from gen_profile_fmu.plant_fmu import cached_fmu
+from gen_profile_fmu.plant_variables import Machine
 
 CRANE = find_plant("double-pendulum-crane")
+HEADERS = Path(fmu_manipulation_toolbox.__file__).parent / "resources" / "fmi"  # the standard's, unaltered
+LINKED = Path(__file__).with_name("two_fmus.c")
 
 
 @pytest.fixture(params=Version)
 def version(request):
     return request.param
-
-
-@pytest.fixture(scope="module")
-def ecos():
-    """Give Ecos, whose wheel takes Threading Building Blocks from the system."""
-    try:
-        return importlib.import_module("ecospy")
-    except OSError as error:
-        missing(f"Threading Building Blocks (Debian package libtbb12): {error}")
 
 
 def _own_jacobian(kind, x, u):
@@ -131,6 +127,22 @@ def test_ecos_runs_every_version(ecos, kind, version):
     assert found == pytest.approx(exact, abs=1e-12)
 
 
+def test_default_tolerances_of_model_exchange_do():
+    """CVode weighs errors by the nominal values of the states, which are some hundredths of a radian."""
+    plant = find_plant("tower-crane")
+    move = smooth_move([0.0, 30.0], [2.0, 45.0], 30.0)
+    nominal = state_nominals(plant, plant.nominal(), move)
+    machine = Machine(plant=plant, parameters=plant.nominal(), nominal=nominal)
+    path = str(cached_fmu(system_model("tower", machine, move), Version.FMI2).archive)
+    exact, integrated = (
+        simulate_fmu(path, fmi_type=interface, stop_time=40.0, output_interval=0.05)
+        for interface in ("CoSimulation", "ModelExchange")
+    )
+    for name in ("sway.payload_radial", "sway.payload_tangential"):
+        same = np.interp(exact["time"], integrated["time"], integrated[name])
+        np.testing.assert_allclose(same, exact[name], rtol=0.0, atol=5e-5)
+
+
 def in_pieces():
     """0.3 m in 3 s, cut into pieces of 0.1 s whose ends are rounded as tenths are: 0.30000000000000004 …"""
     knots = np.arange(31) * 0.1
@@ -159,7 +171,7 @@ def test_events_may_lie_next_to_communication_points(kind, start, version):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_source_fmus_compile_with_a_plain_compiler_and_run(kind, version, tmp_path):
-    """By C99 alone, in the folder of sources, as an importer without our compiler would."""
+    """By C99 alone and with the standard's headers, as an importer does, who finds nothing to warn of."""
     model = model_of(kind, CRANE)
     content = archive(fmu_files(sources(model, version), {}))
     with zipfile.ZipFile(io.BytesIO(content)) as packed:
@@ -170,7 +182,20 @@ def test_source_fmus_compile_with_a_plain_compiler_and_run(kind, version, tmp_pa
     library.parent.mkdir(parents=True)
     system = program("cc", "gcc")
     override = f"-DFMI{version.value}_OVERRIDE_FUNCTION_PREFIX"
-    command = [system, "-std=c99", "-O1", "-shared", "-fPIC", override, "-o", str(library), "fmu.c", "-lm"]
+    warnings = (
+        "-Wall",
+        "-Wextra",
+        "-Wpedantic",
+        "-Wconversion",
+        "-Wshadow",
+        "-Werror",
+        "-isystem",
+        str(HEADERS),
+    )
+    command = [
+        *(system, "-std=c99", "-O1", *warnings),
+        *("-shared", "-fPIC", override, "-o", str(library), "fmu.c", "-lm"),
+    ]
     done = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     for interface in ("CoSimulation", "ModelExchange"):
@@ -181,27 +206,27 @@ def test_source_fmus_compile_with_a_plain_compiler_and_run(kind, version, tmp_pa
 
 
 def test_two_source_fmus_link_into_one_program(version, tmp_path):
-    """Statically, as real-time targets do: no name of one FMU clashes with the other's."""
-    objects = []
-    for kind in ("plant-acceleration", "system"):
-        model = model_of(kind, CRANE)
-        folder = tmp_path / kind
+    """Statically, as real-time targets do: both run in it, and no name of one clashes with the other's."""
+    system, objects, facts = program("cc", "gcc"), [], [f"-DFMI={version.value}"]
+    for name, kind in (("plant", "plant-acceleration"), ("system", "system")):
+        made = sources(model_of(kind, CRANE), version)
+        table = made.model.variables
+        facts += [f'-D{name.upper()}_IDENTITY="{made.identity}"']
+        facts += [f"-D{name.upper()}_{block}={table.offset(block)}" for block in table.blocks]
+        assert not {file for file in made.code if file in version.headers}  # these are the importer's
+        folder = tmp_path / name
         folder.mkdir()
-        for name, text in sources(model, version).code.items():
-            (folder / name).write_text(text)
-        subprocess.run([program("cc", "gcc"), "-std=c99", "-c", "fmu.c"], cwd=folder, check=True)
-        objects.append(folder / "fmu.o")
-    names = [{line.split()[-1] for line in _symbols(path) if line.split()[-2] == "T"} for path in objects]
-    assert names[0]
-    if version is Version.FMI3:  # FMPy's header of FMI 2 has no prefixes; the standard's own has
-        assert not names[0] & names[1]
-        assert {name.split("_fmi3")[0] for name in names[1]} == {"paper_system"}
-    assert all("_fmi" in name or name.startswith("fmi") for name in names[0] | names[1])
-
-
-def _symbols(path):
-    done = subprocess.run([program("nm", "binutils"), str(path)], capture_output=True, text=True, check=True)
-    return done.stdout.splitlines()
+        for file, text in made.code.items():
+            (folder / file).write_text(text)
+        objects.append(str(folder / "fmu.o"))
+        command = [system, "-std=c99", "-O1", "-I", str(HEADERS), "-c", "fmu.c", "-o", objects[-1]]
+        subprocess.run(command, cwd=folder, check=True)
+    command = [system, "-std=c99", "-I", str(HEADERS), *facts]
+    subprocess.run([*command, str(LINKED), *objects, "-lm", "-o", "both"], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "both"], capture_output=True, text=True, check=True)
+    position, setpoint = map(float, done.stdout.split())
+    assert position == pytest.approx(0.5 * 0.2**2, abs=1e-12)  # pushed with 1 m/s² for 0.2 s
+    assert setpoint == pytest.approx(motion(1).derivative(np.array([0.2]), 0)[0, 0], abs=1e-12)
 
 
 def test_pictures_have_one_unit_each_and_round_ticks():

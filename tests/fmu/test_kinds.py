@@ -1,11 +1,13 @@
 """Every kind of FMU, by FMI 2 and 3, in both interfaces, against separately written equations."""
 
 from itertools import pairwise
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmu import absolute_angle_crane as oracle
-from fmu.drivers import Instance, cosimulate, exchange
+from fmu.drivers import Instance, advance, cosimulate, exchange
 from fmu.kinds import model_of, motion
 from scipy.integrate import solve_ivp
 
@@ -94,6 +96,21 @@ class TestModelExchange:
         np.testing.assert_allclose(found[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
         np.testing.assert_allclose(found[:, 2], carts, rtol=0.0, atol=1e-8)
 
+    def test_of_velocities_holds_one_each_period_where_drives_are_ideal(self, open_instance):
+        instance = open_instance("plant-velocity", exchange=True)
+        positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
+        instance.begin({**OTHER, "tau": 0.0, "interpolation_period": 0.02})
+        velocities = [*np.diff(positions) / 0.02, 0.0]
+
+        def next_velocity(time):
+            instance.write({"cart.setpoint_velocity": velocities[int(time / 0.02 + 1e-9)]})
+
+        times = np.arange(101) * 0.02
+        found = exchange(instance, times, next_velocity, OUTPUTS, 1e-3)
+        states, carts = oracle.swing_in_steps(positions, 0.02, 0.0, OTHER)
+        np.testing.assert_allclose(found[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(found[:, 2], carts, rtol=0.0, atol=1e-8)
+
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     def test_of_a_system(self, open_instance, tau):
         instance = open_instance("system", exchange=True)
@@ -143,21 +160,26 @@ def followed(times, tau):
 
 
 class TestCosimulation:
-    @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
-    def test_interpolates_inputs(self, kind):
+    @pytest.mark.parametrize(
+        ("kind", "tau"), [("plant-acceleration", None), ("plant-velocity", 0.05), ("plant-velocity", 0.0)]
+    )
+    def test_interpolates_inputs(self, kind, tau):
         """With derivatives up to the third order, 10 ms steps are as good as continuous inputs (FMI 2)."""
         instance = Instance(cached_fmu(model_of(kind, CRANE), Version.FMI2), Version.FMI2, exchange=False)
-        lag = kind == "plant-velocity"
-        instance.begin({**OTHER, **({"tau": 0.05} if lag else {})})
-        name = "cart.setpoint_velocity" if lag else "cart.setpoint_acceleration"
+        instance.begin({**OTHER, **({} if tau is None else {"tau": tau})})
+        name = "cart.setpoint_acceleration" if tau is None else "cart.setpoint_velocity"
 
         def before(time, _):
             instance.write({name: wave(time)})
             instance.slopes(name, *(wave(time, order) for order in (1, 2, 3)))
 
         found = cosimulate(instance, TIMES, before, OUTPUTS)
-        follow = (lambda t, v: (wave(t) - v) / 0.05) if lag else (lambda t, v: wave(t))
-        np.testing.assert_allclose(found, expected(follow), rtol=0.0, atol=1e-8)
+
+        def follow(time, velocity):
+            return (wave(time) - velocity) / tau if tau else wave(time, 1 if tau == 0.0 else 0)
+
+        # a velocity that the axes have at once errs as its Taylor series does: 0.8 · 3⁴ · (10 ms)⁴ / 4! m/s
+        np.testing.assert_allclose(found, expected(follow), rtol=0.0, atol=1e-8 if tau != 0.0 else 3e-8)
         instance.close()
 
     @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
@@ -206,6 +228,22 @@ class TestCosimulation:
             state = solve_ivp(rates, (low, high), state, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
             rows.append(state[[0, 1, 4, 5]])
         np.testing.assert_allclose(found, rows, rtol=0.0, atol=1e-9)
+
+    def test_of_velocities_that_ideal_drives_have_at_once(self, open_instance):
+        """As interpolated setpoints: a velocity held over a step strikes the loads as its impulse."""
+        instance = open_instance("plant-velocity", exchange=False)
+        positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
+        instance.begin({**OTHER, "tau": 0.0})
+        times, velocities = np.arange(101) * 0.02, np.diff(positions) / 0.02
+        found = cosimulate(
+            instance,
+            times,
+            lambda time, _: instance.write({"cart.setpoint_velocity": velocities[round(time / 0.02)]}),
+            OUTPUTS,
+        )
+        states, carts = oracle.swing_in_steps(positions, 0.02, 0.0, OTHER)
+        np.testing.assert_allclose(found[:, :2], states[:, :2], rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(found[:, 2], carts, rtol=0.0, atol=1e-12)
 
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     def test_of_setpoints(self, open_instance, tau):
@@ -349,12 +387,105 @@ class TestDirectionalDerivatives:
             np.testing.assert_allclose(found, exact, rtol=1e-6, atol=1e-7, err_msg=known)
         instance.fmu.exitInitializationMode()
 
-    def test_of_a_profile_are_zero(self, open_instance):
-        instance = open_instance("profile", exchange=True)
-        instance.begin({})
-        assert instance.directional(["cart.setpoint"], ["start_time"], [1.0]) == [0.0]
+    @pytest.mark.parametrize("kind", ["profile", "system"])
+    def test_of_a_motion_reach_its_parameters(self, open_instance, kind):
+        """Half a second after it began, and where it goes elsewhere than planned."""
+        instance = open_instance(kind, exchange=True)
+        unknowns = [f"cart.setpoint{suffix}" for suffix in ("", "_velocity", "_acceleration", "_jerk")]
+        unknowns += ["cart.position", "sway.payload", "der(theta1.rate)"] if kind == "system" else []
 
-    def test_backwards_agree_with_forwards(self):
+        def evaluate(**changes):
+            instance.fmu.reset()
+            values = {"cart.start": 0.2, "cart.distance": -0.5, "start_time": -1.0}
+            instance.write({**values, **{name.replace("__", "."): v for name, v in changes.items()}})
+            instance.initialise()
+            return instance.read(*unknowns)
+
+        for known, value in {"cart__start": 0.2, "cart__distance": -0.5, "start_time": -1.0}.items():
+            exact = (evaluate(**{known: value + 1e-6}) - evaluate(**{known: value - 1e-6})) / 2e-6
+            evaluate()
+            found = instance.directional(unknowns, [known.replace("__", ".")], [1.0])
+            np.testing.assert_allclose(found, exact, rtol=1e-6, atol=1e-8, err_msg=known)
+        instance.fmu.exitInitializationMode()
+
+
+class TestMotion:
+    """What a profile and a system can do beyond the motion that was planned."""
+
+    @pytest.mark.parametrize("kind", ["profile", "system"])
+    def test_goes_elsewhere(self, open_instance, kind):
+        instance = open_instance(kind, exchange=False)
+        instance.begin({"cart.start": 1.0, "cart.distance": -0.6})
+        times = np.arange(0.0, 3.0, 0.01)
+        names = [f"cart.setpoint{suffix}" for suffix in ("", "_velocity", "_acceleration", "_jerk")]
+        found = cosimulate(instance, times, lambda *_: None, names)
+        planned = motion(1)
+        scale = -0.6 / (planned.target[0] - 0.1)
+        for order in range(4):
+            exact = scale * planned.derivative(times, order)[:, 0] + (
+                1.0 - 0.1 * scale if order == 0 else 0.0
+            )
+            np.testing.assert_allclose(found[:, order], exact, rtol=0.0, atol=1e-12)
+        if kind == "system":
+            assert instance.read("cart.position")[0] == pytest.approx(0.4, abs=1e-15)
+
+    def test_has_exact_output_derivatives(self, open_instance, version):
+        instance = open_instance("profile", exchange=False)
+        instance.begin({})
+        for low, high in pairwise([0.0, 0.3, 1.1, 2.5]):  # in both pieces, and after them
+            instance.fmu.doStep(low, high - low)
+            for done, suffix in enumerate(("", "_velocity", "_acceleration", "_jerk")):
+                for order in (1, 2, 3):
+                    found = instance.output_derivative(f"cart.setpoint{suffix}", order)
+                    exact = motion(1).derivative(np.array([high]), done + order)[0, 0]
+                    assert found == pytest.approx(exact, abs=1e-12)
+        description = ElementTree.parse(instance.fmu.unzipDirectory + "/modelDescription.xml")
+        assert description.find("CoSimulation").get("maxOutputDerivativeOrder") == "3"
+
+    @pytest.mark.parametrize(
+        ("name", "order"), [("cart.setpoint", 0), ("cart.setpoint", 4), ("start_time", 1)]
+    )
+    def test_refuses_derivatives_that_it_does_not_have(self, open_instance, name, order):
+        instance = open_instance("profile", exchange=False)
+        instance.begin({})
+        with pytest.raises(FMICallException):
+            instance.output_derivative(name, order)
+        instance.fmu.reset()
+        instance.begin({})
+
+    @pytest.mark.parametrize("kind", ["profile", "system"])
+    def test_is_known_beyond_an_event_that_was_not_handled_yet(self, open_instance, kind):
+        """As importers look that take a step across an event, and handle it afterwards; and back again."""
+        instance = open_instance(kind, exchange=True)
+        instance.begin({"start_time": 0.1})
+        instance.events()
+        instance.fmu.enterContinuousTimeMode()
+        for time in (0.05, 0.3, 0.9, 2.4, 3.0, 0.9, 0.3, 0.05):
+            instance.fmu.setTime(time)
+            found = instance.read("cart.setpoint", "cart.setpoint_acceleration")
+            exact = [motion(1).derivative(np.array([time - 0.1]), order)[0, 0] for order in (0, 2)]
+            np.testing.assert_allclose(found, exact, rtol=0.0, atol=1e-13)
+
+    def test_of_a_system_survives_late_events(self, open_instance):
+        """An importer with a fixed step that handles an event at the next end of a step."""
+        instance = open_instance("system", exchange=True)
+        instance.begin(OTHER)
+        event, step, rows = instance.events(), 2.3e-3, []
+        instance.fmu.enterContinuousTimeMode()
+        times = np.arange(1740) * step
+        for time in times[:-1]:
+            rows.append(instance.read(*OUTPUTS))
+            advance(instance, time, step, lambda _: None)
+            if event is not None and time + step >= event:
+                instance.fmu.enterEventMode()
+                event = instance.events()
+                instance.fmu.enterContinuousTimeMode()
+        began = followed(np.array([0.0, *(times + 0.1)]), 0.0)[1:]
+        np.testing.assert_allclose(rows, began[:-1], rtol=0.0, atol=2e-5)
+
+
+class TestBackwards:
+    def test_agrees_with_forwards(self):
         fmu = cached_fmu(model_of("plant-velocity", CRANE), Version.FMI3)
         instance = Instance(fmu, Version.FMI3, exchange=True)
         instance.begin({**OTHER, "theta1": 0.3, "theta2": 0.1})

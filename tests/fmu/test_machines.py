@@ -13,6 +13,7 @@ from gen_profile.plants.registry import BUILT_IN, find_plant
 from gen_profile.response import Swing
 from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.plant_fmu import cached_fmu
+from gen_profile_fmu.variables import variable_name
 
 PLANTS = [*(find_plant(name) for name in BUILT_IN), WINCH]
 
@@ -30,7 +31,8 @@ def test_a_system_moves_as_its_equations_say(plant, version):
     (exact,) = Swing(plant, profile, [plant.nominal()], 3.0).at(times)
     instance = Instance(cached_fmu(model_of("system", plant, profile), version), version, exchange=False)
     instance.begin({})
-    names = [*(f"sway.{load}" for load in plant.loads), *(f"{axis.name}.position" for axis in plant.actuated)]
+    sways = [f"sway.{variable_name(load)}" for load in plant.loads]
+    names = [*sways, *(f"{axis.name}.position" for axis in plant.actuated)]
     found = cosimulate(instance, times, lambda *_: None, names)
     instance.close()
     size = np.abs(exact.sway).max()
@@ -109,7 +111,7 @@ def test_setpoints_that_stand_still_leave_every_machine_at_rest(plant):
         cached_fmu(model_of("plant-setpoint", plant), Version.FMI2), Version.FMI2, exchange=False
     )
     instance.begin({f"{axis.name}.{what}": 0.7 for axis in plant.actuated for what in ("start", "setpoint")})
-    names = [f"sway.{load}" for load in plant.loads]
+    names = [f"sway.{variable_name(load)}" for load in plant.loads]
     found = cosimulate(instance, np.linspace(0.0, 1.0, 11), lambda *_: None, names)
     instance.close()
     np.testing.assert_allclose(found, 0.0, atol=1e-12)

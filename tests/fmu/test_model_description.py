@@ -1,7 +1,9 @@
 """The model descriptions, judged by other people's readers and against the equations."""
 
+import importlib.metadata
 import io
 import math
+import re
 import subprocess
 import sys
 import zipfile
@@ -26,6 +28,7 @@ from gen_profile_fmu.base_units import BASE_UNITS
 from gen_profile_fmu.fmu_files import Version, archive, fmu_files, sources
 from gen_profile_fmu.model import identifier_of
 from gen_profile_fmu.plant_fmu import cached_fmu, plant_fmu
+from gen_profile_fmu.variables import variable_name
 
 PLANTS = [*(find_plant(name) for name in BUILT_IN), WINCH]
 CRANE = find_plant("double-pendulum-crane")
@@ -96,7 +99,7 @@ def test_says_what_the_plant_says(plant, kind, version):
             ("output", unit),
             ("output", unit + "/s"),
         ]
-    for load in plant.loads:
+    for load in map(variable_name, plant.loads):
         units = [variables[f"{quantity}.{load}"].unit for quantity in ("sway", "height", "angle")]
         assert units == ["m", "m", "rad"]
     for body in plant.bodies:
@@ -186,7 +189,7 @@ def test_dependencies_are_those_of_the_equations(plant, kind, version):
     found = {unknown.variable.name: names(unknown) for unknown in description.outputs}
     for quantity in ("sway", "height", "angle"):
         for load, value in zip(plant.loads, getattr(seen, quantity), strict=True):
-            assert found[f"{quantity}.{load}"] == sources_of(value)
+            assert found[f"{quantity}.{variable_name(load)}"] == sources_of(value)
     told = plant.mechanics(each[0], each[2], named)
     places = [casadi.vertcat(*place) for place in told.place]
     for body, place in zip(plant.bodies, places, strict=True):
@@ -223,7 +226,7 @@ def test_start_values_follow_from_parameters_and_start_states(plant, kind, versi
         assert starting[f"{axis.name}.position"] == {f"{axis.name}.start"}
         assert starting[f"{axis.name}.velocity"] == set()
     starts = {f"{axis.name}.start" for axis in plant.actuated}
-    for load in plant.loads:
+    for load in map(variable_name, plant.loads):
         assert starting[f"angle.{load}"] <= parameters | coordinates | starts
     for unknown in description.derivatives:
         name = unknown.variable.name
@@ -287,11 +290,46 @@ def test_the_model_identifier_is_a_c_identifier(type_, identifier):
     assert identifier_of(type_) == identifier
 
 
-@pytest.mark.parametrize("name", ["sling", "front-sling"])
-def test_names_are_structured_where_they_can_be(name, version):
-    plant = attrs.evolve(WINCH, unactuated=(Coordinate(name=name, unit="rad"),))
+# FMI 2.0.4, section 2.2.9, and FMI 3.0, section 2.4.7.5.1, but for arrays and quotes
+STRUCTURED = re.compile(r"[a-zA-Z_]\w*(\.[a-zA-Z_]\w*)*|der\([a-zA-Z_]\w*(\.[a-zA-Z_]\w*)*\)", re.ASCII)
+
+
+def test_every_name_is_structured(plant, kind, version):
+    root = ElementTree.fromstring(sources(model_of(kind, plant), version).description)
+    assert root.get("variableNamingConvention") == "structured"
+    named = [variable.get("name") for variable in root.find("ModelVariables")]
+    assert [name for name in named if not STRUCTURED.fullmatch(name)] == []
+
+
+def test_a_plants_hyphens_become_underscores(version):
+    plant = attrs.evolve(WINCH, unactuated=(Coordinate(name="front-sling", unit="rad"),))
     description = read(model_of("plant-setpoint", plant), version)
-    assert description.variableNamingConvention == ("flat" if "-" in name else "structured")
+    assert "front_sling.rate" in {variable.name for variable in description.modelVariables}
+
+
+def test_tells_who_made_it_with_what(version):
+    root = ElementTree.fromstring(sources(model_of("system", CRANE), version).description)
+    release = importlib.metadata.version("gen-profile")
+    assert root.get("version") == release
+    assert root.get("generationTool") == f"gen-profile {release}"
+    assert root.get("author") == "gen-profile"
+
+
+def test_shows_angles_in_degrees_and_sway_in_millimetres(version):
+    description = read(model_of("system", CRANE), version)
+    variables = {variable.name: variable for variable in description.modelVariables}
+    units = {unit.name: {shown.name: shown.factor for shown in unit.displayUnits}
+             for unit in description.unitDefinitions}  # fmt: skip
+    for name, unit, shown, factor in (
+        ("theta1", "rad", "deg", 180.0 / math.pi),
+        ("theta1.rate", "rad/s", "deg/s", 180.0 / math.pi),
+        ("sway.payload", "m", "mm", 1000.0),
+    ):
+        found = variables[name]
+        found = found.declaredType or found
+        assert (found.unit, found.displayUnit) == (unit, shown)
+        assert float(units[unit][shown]) == pytest.approx(factor, rel=1e-15)
+    assert variables["cart.position"].displayUnit is None
 
 
 @pytest.mark.parametrize("name", ["tau", "max_step", "phi", "time"])

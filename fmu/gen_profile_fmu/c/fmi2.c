@@ -136,8 +136,8 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference references[], size_t n,
                                         const fmi2Integer orders[], fmi2Real values[]) {
     ENTER(c, INITIALIZED, "fmi2GetRealOutputDerivatives");
-    (void)references, (void)orders, (void)values;
-    return n == 0 ? fmi2OK : FMI(fail(instance, "Time derivatives of outputs are not given."));
+    REQUIRE_POINTER(references && orders && values, n, "fmi2GetRealOutputDerivatives");
+    return FMI(get_output_derivatives(instance, references, n, orders, values));
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean no_state_set_before) {
@@ -203,7 +203,7 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *handle) {
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate handle, size_t *size) {
     ENTER(c, ANY_MODE, "fmi2SerializedFMUstateSize");
     REQUIRE_POINTER(handle && size, 1, "fmi2SerializedFMUstateSize");
-    *size = sizeof(Snapshot);
+    *size = sizeof(Record);
     return fmi2OK;
 }
 

@@ -235,8 +235,9 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Bo
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference references[], size_t n,
                                     const fmi3Int32 orders[], fmi3Float64 values[], size_t n_values) {
     ENTER(c, INITIALIZED, "fmi3GetOutputDerivatives");
-    (void)references, (void)orders, (void)values, (void)n_values;
-    return n == 0 ? fmi3OK : FMI(fail(instance, "Time derivatives of outputs are not given."));
+    REQUIRE_POINTER(references && orders && values, n, "fmi3GetOutputDerivatives");
+    REQUIRE_SIZE(n, n_values, "fmi3GetOutputDerivatives");
+    return FMI(get_output_derivatives(instance, references, n, orders, values));
 }
 
 /* ---- saved states ---------------------------------------------------------------------------------------- */
@@ -262,7 +263,7 @@ fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *handle) {
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState handle, size_t *size) {
     ENTER(c, ANY_MODE, "fmi3SerializedFMUStateSize");
     REQUIRE_POINTER(handle && size, 1, "fmi3SerializedFMUStateSize");
-    *size = sizeof(Snapshot);
+    *size = sizeof(Record);
     return fmi3OK;
 }
 

@@ -245,6 +245,27 @@ static Status set_reals(Instance *instance, const unsigned references[], size_t 
     return OK;
 }
 
+/* Time derivatives of outputs, each of an order of its own. */
+static Status get_output_derivatives(Instance *instance, const unsigned references[], size_t n, const int orders[],
+                                     double values[]) {
+    (void)references, (void)orders, (void)values;
+    if (n > 0 && OUTPUT_ORDERS == 0) return fail(instance, "Time derivatives of outputs are not given.");
+#if OUTPUT_ORDERS > 0
+    refresh_outputs(&instance->state);
+    for (size_t i = 0; i < n; i++) {
+        const Variable *variable = find_variable(instance, references[i], REAL);
+        if (!variable) return FAILED;
+        if (orders[i] < 1 || orders[i] > OUTPUT_ORDERS) {
+            return fail(instance, "Time derivatives of outputs have orders 1 to %u.", (unsigned)OUTPUT_ORDERS);
+        }
+        if (!model_output_derivative(&instance->state.model, references[i], orders[i], &values[i])) {
+            return fail(instance, "Time derivatives of %s are not given.", variable->name);
+        }
+    }
+#endif
+    return OK;
+}
+
 /* ---- derivatives with respect to variables --------------------------------------------------------------- */
 
 static Status require_knowns(Instance *instance, const unsigned knowns[], size_t n) {
@@ -285,12 +306,17 @@ static Status set_time(Instance *instance, double time) {
     return OK;
 }
 
+/* As memcpy, which must not be given the null pointer of an empty list. */
+static void copy_values(double *to, const double *from, size_t n) {
+    for (size_t i = 0; i < n; i++) to[i] = from[i];
+}
+
 static Status set_states(Instance *instance, const double states[], size_t n) {
     if (n != N_STATES) return fail(instance, "There are %u continuous states.", (unsigned)N_STATES);
     for (size_t i = 0; i < n; i++) {
         if (!isfinite(states[i])) return fail(instance, "%s must be finite.", VARIABLES[STATES + i].name);
     }
-    memcpy(instance->state.model.values + STATES, states, n * sizeof *states);
+    copy_values(instance->state.model.values + STATES, states, n);
     instance->state.is_integrated = 1;
     mark_stale(&instance->state);
     return OK;
@@ -299,7 +325,7 @@ static Status set_states(Instance *instance, const double states[], size_t n) {
 static Status get_states(Instance *instance, double states[], size_t n) {
     if (n != N_STATES) return fail(instance, "There are %u continuous states.", (unsigned)N_STATES);
     refresh_outputs(&instance->state);
-    memcpy(states, instance->state.model.values + STATES, n * sizeof *states);
+    copy_values(states, instance->state.model.values + STATES, n);
     return OK;
 }
 
@@ -307,13 +333,13 @@ static Status get_derivatives(Instance *instance, double derivatives[], size_t n
     if (n != N_STATES) return fail(instance, "There are %u continuous states.", (unsigned)N_STATES);
     refresh_outputs(&instance->state);
     refresh_derivatives(&instance->state);
-    memcpy(derivatives, instance->state.model.values + DERIVATIVES, n * sizeof *derivatives);
+    copy_values(derivatives, instance->state.model.values + DERIVATIVES, n);
     return OK;
 }
 
 static Status get_nominals(Instance *instance, double nominals[], size_t n) {
     if (n != N_STATES) return fail(instance, "There are %u continuous states.", (unsigned)N_STATES);
-    for (size_t i = 0; i < n; i++) nominals[i] = 1.0;
+    for (size_t i = 0; i < n; i++) nominals[i] = VARIABLES[STATES + i].nominal;
     return OK;
 }
 
@@ -407,14 +433,14 @@ static Snapshot *new_snapshot(Instance *instance) {
 static Status save(Instance *instance, void **handle) {
     Snapshot *snapshot = *handle ? *handle : new_snapshot(instance);
     if (!snapshot) return FAILED;
-    memcpy(snapshot->identity, MODEL_IDENTITY, sizeof snapshot->identity);
-    snapshot->state = instance->state;
+    snapshot->nothing = NULL;
+    memcpy(&snapshot->state, &instance->state, sizeof snapshot->state);
     *handle = snapshot;
     return OK;
 }
 
 static Status restore(Instance *instance, const void *handle) {
-    instance->state = ((const Snapshot *)handle)->state;
+    memcpy(&instance->state, &((const Snapshot *)handle)->state, sizeof instance->state);
     return OK;
 }
 
@@ -424,19 +450,57 @@ static void forget(Instance *instance, void **handle) {
     *handle = NULL;
 }
 
+/* FNV-1a of a record up to its checksum: a byte that has changed changes it. */
+static unsigned long long checksum_of(const Record *record) {
+    const unsigned char *bytes = (const unsigned char *)record;
+    unsigned long long hash = 0xcbf29ce484222325ULL;
+    for (size_t i = 0; i < offsetof(Record, checksum); i++) hash = (hash ^ bytes[i]) * 0x100000001b3ULL;
+    return hash;
+}
+
+static int are_values_sound(const Model *model) {
+    for (unsigned i = 0; i < N_VALUES; i++) {
+        const Variable *variable = &VARIABLES[i];
+        const double value = model->values[i];
+        if (can_be_set(i, ANY_MODE) && !(value >= variable->lower && value <= variable->upper)) return 0;
+    }
+    return 1;
+}
+
+/* Whether a state can be gone on from, whoever made it. */
+static int is_sound(const State *state) {
+    const int mode = state->mode;
+    const int is_one_mode = mode > 0 && (mode & (mode - 1)) == 0 && (mode & ANY_MODE) == mode;
+    const int flags = state->outputs_are_stale | state->derivatives_are_stale | state->has_experiment | state->is_integrated;
+    const Model *model = &state->model;
+    return is_one_mode && (flags & ~1) == 0 && isfinite(model->time) && isfinite(model->start_time) &&
+           !isnan(state->stop_time) && !isnan(model->next_event) && are_values_sound(model) && model_is_sound(model);
+}
+
 static Status write_bytes(Instance *instance, const void *handle, void *bytes, size_t size) {
-    if (size < sizeof(Snapshot)) return fail(instance, "The buffer is too small for the FMU state.");
-    memcpy(bytes, handle, sizeof(Snapshot));
+    if (size < sizeof(Record)) return fail(instance, "The buffer is too small for the FMU state.");
+    Record record;
+    memset(&record, 0, sizeof record);
+    memcpy(record.identity, MODEL_IDENTITY, sizeof record.identity);
+    memcpy(&record.state, &((const Snapshot *)handle)->state, sizeof record.state);
+    record.checksum = checksum_of(&record);
+    memcpy(bytes, &record, sizeof record);
     return OK;
 }
 
 static Status read_bytes(Instance *instance, const void *bytes, size_t size, void **handle) {
-    if (size != sizeof(Snapshot) || memcmp(bytes, MODEL_IDENTITY, sizeof MODEL_IDENTITY) != 0) {
+    Record record;
+    if (size != sizeof record || memcmp(bytes, MODEL_IDENTITY, sizeof MODEL_IDENTITY) != 0) {
         return fail(instance, "The bytes are not a state of this FMU.");
+    }
+    memcpy(&record, bytes, sizeof record);
+    if (record.checksum != checksum_of(&record) || !is_sound(&record.state)) {
+        return fail(instance, "The bytes of the FMU state are damaged.");
     }
     Snapshot *snapshot = *handle ? *handle : new_snapshot(instance);
     if (!snapshot) return FAILED;
-    memcpy(snapshot, bytes, sizeof *snapshot);
+    snapshot->nothing = NULL;
+    memcpy(&snapshot->state, &record.state, sizeof snapshot->state);
     *handle = snapshot;
     return OK;
 }

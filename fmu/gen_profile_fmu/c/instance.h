@@ -49,11 +49,18 @@ typedef struct {
     int logged_categories;
 } Instance;
 
-/* What is handed out as a saved state; the identity rejects another model's bytes. */
+/* What is handed out as a saved state. */
+typedef struct {
+    void *nothing;           /* null: what importers free that hand over a state where its address belongs */
+    State state;
+} Snapshot;
+
+/* The same as bytes; the identity rejects another model's, and the checksum what was damaged. */
 typedef struct {
     char identity[sizeof MODEL_IDENTITY];
     State state;
-} Snapshot;
+    unsigned long long checksum;
+} Record;
 
 typedef struct {
     int states_jumped;

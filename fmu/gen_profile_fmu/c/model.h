@@ -13,6 +13,8 @@
 
 enum { N_SLOPES = 3 };             /* time derivatives of an input that a step takes */
 
+static const double EVENT_TOLERANCE = 1e-13;  /* relative */
+
 typedef struct {
     double values[N_VALUES];       /* every variable; a variable's value reference is its index */
     double time;
@@ -30,7 +32,9 @@ typedef struct {
  * Whether an event's time is come, but for rounding: importers take a communication point that is as good as an event's
  * time for it, and would find the event due again at once, too soon for an integrator.
  */
-static int is_come(const Model *model, double event) { return event - model->time <= 1e-13 * fabs(model->time); }
+static int is_come(const Model *model, double event) {
+    return event - model->time <= EVENT_TOLERANCE * fabs(model->time);
+}
 
 /* Set what follows from the parameters at the start, as often as they change. */
 static void model_start(Model *model);
@@ -38,8 +42,16 @@ static void model_start(Model *model);
 /* Act on what happens at the present time. Returns whether states jumped. Sets next_event. */
 static int model_event(Model *model);
 
+/* Whether no value but those of variables lies where it would lead out of a table or into an endless step. */
+static int model_is_sound(const Model *model);
+
 /* Calculate the outputs from the states, the parameters and the time. */
 static void model_outputs(Model *model);
+
+#if OUTPUT_ORDERS > 0
+/* A time derivative of an output, at present. Returns whether it is known. */
+static int model_output_derivative(const Model *model, unsigned output, int order, double *value);
+#endif
 
 /* Calculate the derivatives of the continuous states. */
 static void model_derivatives(Model *model);

@@ -1,8 +1,9 @@
 /*
  * A plant with inputs: what its drives are asked for, as accelerations, velocities or positions.
  *
- * ACCELERATION_INPUT: the axes have it at once. VELOCITY_INPUT: drives with lag follow it. Both are polynomials of
- * time within a step where their derivatives were given, else constant.
+ * ACCELERATION_INPUT: the axes have it at once. VELOCITY_INPUT: drives follow it, with a lag or at once. Both are
+ * polynomials of time within a step where their derivatives were given, else constant. In model exchange, where a
+ * velocity that is followed at once would need a derivative, drives without lag hold one every `interpolation_period`.
  * SETPOINT_INPUT: drives that interpolate their setpoints linearly (CiA 402, object 60C2h). Between two setpoints
  * the reference velocity is constant, (new - reached) / period. In co-simulation a step is a period, at whose end
  * the setpoint is reached; in model exchange drives take a setpoint every `interpolation_period`.
@@ -14,22 +15,37 @@
 
 static double lag(const Model *model) { return INPUT_KIND == ACCELERATION_INPUT ? 0.0 : model->values[TAU]; }
 
+/* Whether, in model exchange, the drives take their inputs at times of their own. */
+static int takes_samples(const Model *model) {
+    return INPUT_KIND == SETPOINT_INPUT || (INPUT_KIND == VELOCITY_INPUT && lag(model) == 0.0);
+}
+
 static void model_start(Model *model) {
     plant_start(model, model->values + START);
     model->samples = 0;
-    model->next_event = INPUT_KIND == SETPOINT_INPUT ? model->start_time : HUGE_VAL;
+    model->next_event = takes_samples(model) ? model->start_time : HUGE_VAL;
 }
 
-static int model_event(Model *model) {
-    if (INPUT_KIND != SETPOINT_INPUT || !is_come(model, model->next_event)) return 0;
-    const double period = model->values[PERIOD];
+static int model_is_sound(const Model *model) { return model->samples >= 0; }
+
+/* Let the drives go for their setpoints, to reach them at the next sample. */
+static void take_setpoints(Model *model, double period) {
     for (int i = 0; i < N_A; i++) {
         model->held[i] = (model->values[INPUTS + i] - model->reached[i]) / period;
         model->reached[i] = model->values[INPUTS + i];
     }
-    model->samples++;
-    model->next_event = model->start_time + model->samples * period;
-    return lag(model) == 0.0 && plant_jump(model, model->held);
+}
+
+static int model_event(Model *model) {
+    if (!takes_samples(model)) return 0;
+    if (is_come(model, model->next_event)) {
+        const double period = model->values[PERIOD];
+        if (INPUT_KIND == SETPOINT_INPUT) take_setpoints(model, period);
+        model->samples++;
+        model->next_event = model->start_time + model->samples * period;
+    }
+    /* a velocity may change at any event */
+    return lag(model) == 0.0 && plant_jump(model, INPUT_KIND == SETPOINT_INPUT ? model->held : model->values + INPUTS);
 }
 
 static void model_outputs(Model *model) { plant_outputs(model); }

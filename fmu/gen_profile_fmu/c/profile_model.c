@@ -1,6 +1,5 @@
 /* A motion alone: no states, exact at any time. */
 #include <math.h>
-#include <string.h>
 
 #include "motion.h"
 
@@ -15,14 +14,22 @@ static int model_event(Model *model) {
     return 0;
 }
 
+static int model_is_sound(const Model *model) { return motion_is_sound(model); }
+
 static void model_outputs(Model *model) { motion_outputs(model); }
+
+static int model_output_derivative(const Model *model, unsigned output, int order, double *value) {
+    double position[N_A][N_POWERS];
+    const int index = (int)output - COMMAND;
+    if (index < 0 || index >= N_COMMANDS * N_A) return 0;
+    motion_from_now(model, position);
+    *value = derivative_now(position[index % N_A], index / N_A + order);
+    return 1;
+}
 
 static void model_derivatives(Model *model) { (void)model; }
 
-static void model_tangent(const Model *model, double tangent[N_VALUES]) {
-    (void)model; /* nothing that may be changed on the way has an influence */
-    memset(tangent + COMMAND, 0, 4 * N_A * sizeof *tangent);
-}
+static void model_tangent(const Model *model, double tangent[N_VALUES]) { motion_tangent(model, tangent); }
 
 static void model_start_tangent(double tangent[N_VALUES]) { (void)tangent; }
 

@@ -6,12 +6,9 @@
 #include "motion.h"
 
 static void model_start(Model *model) {
-    double position[N_A][N_POWERS], origin[N_A];
     model->began = HUGE_VAL;
     model->segment = -1;
-    motion_from_now(model, position);
-    for (int i = 0; i < N_A; i++) origin[i] = position[i][0];
-    plant_start(model, origin);
+    plant_start(model, model->values + START);
     motion_pass_knots(model);
 }
 
@@ -19,6 +16,8 @@ static int model_event(Model *model) {
     motion_pass_knots(model);
     return 0;
 }
+
+static int model_is_sound(const Model *model) { return motion_is_sound(model); }
 
 static void model_outputs(Model *model) {
     motion_outputs(model);
@@ -44,14 +43,18 @@ static void model_tangent(const Model *model, double tangent[N_VALUES]) {
     double acceleration[N_A], change[N_A];
     const double tau = model->values[TAU];
     accelerations(model, acceleration);
+    motion_tangent(model, tangent);
     for (int i = 0; i < N_A; i++) {
-        change[i] = tau > 0.0 ? -(tangent[DQ_A + i] + acceleration[i] * tangent[TAU]) / tau : 0.0;
+        const double *asked = tangent + COMMAND + i; /* position, velocity, acceleration */
+        const double lacking = asked[N_A] - tangent[DQ_A + i] - acceleration[i] * tangent[TAU];
+        change[i] = tau > 0.0 ? lacking / tau : asked[2 * N_A];
     }
     plant_tangent(model, acceleration, change, tangent);
-    memset(tangent + COMMAND, 0, 4 * N_A * sizeof *tangent);
 }
 
-static void model_start_tangent(double tangent[N_VALUES]) { (void)tangent; }
+static void model_start_tangent(double tangent[N_VALUES]) {
+    memcpy(tangent + Q_A, tangent + START, N_A * sizeof *tangent);
+}
 
 static double model_substeps(const Model *model, double step) {
     return plant_substeps(model, model->values[TAU], step);

@@ -12,12 +12,12 @@ from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
 # spelled out here because --help must not wait for CasADi; a test holds them against the workflow's
-KINDS = ("plant", "profile", "system")
+KINDS = ("plant", "profile", "system", "ssp")
 INPUTS = ("setpoint", "acceleration", "velocity")
 PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86_64", "macos-arm64", "all")
 
 
-@cli.command(epilog="Example: gen-profile fmu system --preset paper --fmi 3 --out paper.fmu")
+@cli.command(epilog="Example: gen-profile fmu ssp --preset paper --fmi 3 --out paper.ssp")
 @click.argument("kind", type=click.Choice(KINDS))
 @spec_options
 @click.option(
@@ -40,8 +40,9 @@ PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86
     "path",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="FMU to write; named after the spec in this folder by default.",
+    help="FMU or SSP to write; named after the spec in this folder by default.",
 )
+@click.option("--author", metavar="NAME", help="Who made the model; gen-profile by default.")
 @json_option
 @debug_option
 def fmu(
@@ -54,15 +55,17 @@ def fmu(
     platform: str | None,
     source_only: bool,
     path: Path | None,
+    author: str | None,
     as_json: bool,
 ) -> None:
-    """Write an FMU of a plant, of a profile, or of the system of both."""
+    """Write an FMU of a plant, of a profile, or of the system of both; or both FMUs as an SSP."""
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.fmu import export_fmu, platform_names
     from gen_profile_fmu.fmu_files import Version
+    from gen_profile_fmu.model import AUTHOR
     from gen_profile_fmu.plant_variables import InputKind
 
-    if input_name is not None and kind != "plant":
+    if input_name is not None and kind not in {"plant", "ssp"}:
         raise SpecError(f"--input: a {kind} has no inputs but its trigger; leave it out, or write a plant.")
     if source_only and platform is not None:
         raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
@@ -76,6 +79,7 @@ def fmu(
             input_kind=InputKind(input_name or "setpoint"),
             platforms=platforms,
             path=path,
+            author=author or AUTHOR,
             progress=tell,
         )
     document = made.to_dict()
