@@ -65,7 +65,7 @@ def zig_cc(tmp_path, cache):
 def test_no_source_has_a_warning(written, zig_cc, plant, kind, version):
     """By Clang's front end; GNU's is asked where importers' compilers are."""
     written(plant, kind, version)
-    zig_cc(*STRICT, "-isystem", str(HEADERS), "-fsyntax-only", SOURCE_FILE)
+    zig_cc(*STRICT, "-isystem", str(HEADERS), "-c", SOURCE_FILE, "-o", "object.o")
 
 
 def test_the_loop_of_many_runs_has_no_warning(tmp_path, zig_cc):
