@@ -481,7 +481,7 @@ class TestMotion:
                 event = instance.events()
                 instance.fmu.enterContinuousTimeMode()
         began = followed(np.array([0.0, *(times + 0.1)]), 0.0)[1:]
-        # its own step over the jump of the acceleration errs by a sixth of a step; the old segment's, by all of it
+        # a step over the jump of the acceleration errs by a sixth of it; the old segment's polynomial, by all
         np.testing.assert_allclose(rows, began[:-1], rtol=0.0, atol=5e-4)
 
 
