@@ -5,7 +5,7 @@ Importers look for the names of XML elements with the prefixes that the standard
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from importlib.metadata import version
 from xml.etree import ElementTree
 
@@ -174,7 +174,7 @@ def _type_name(variable: Variable) -> str:
     return "Real" if variable.type is Type.REAL else "Boolean"
 
 
-def _unit(variable: Variable) -> Mapping[str, str]:
+def _unit(variable: Variable) -> dict[str, str]:
     """Name a variable's unit, where its base units are known: without them, SSP takes none."""
     return {"unit": variable.unit} if variable.unit in BASE_UNITS else {}
 
