@@ -10,25 +10,7 @@ from gen_profile.profile import Profile, SampledProfile
 from gen_profile.spec import CanSpec, ExportSpec, Spec
 from gen_profile.units import AxisScale
 from gen_profile_exporters.block_source import BlockSource
-
-
-@attrs.frozen(kw_only=True)
-class AxisVariants:
-    """Which variants of a motion the machine allows along an axis.
-
-    Attributes
-    ----------
-    least_scale : float
-        The distance may be multiplied by this, up to 1.
-    mirror : bool
-        It may be travelled the other way.
-    shift : bool
-        It may begin elsewhere.
-    """
-
-    least_scale: float = 1.0
-    mirror: bool = False
-    shift: bool = False
+from gen_profile_exporters.machine_variants import AxisVariants, machine_variants
 
 
 @attrs.frozen(kw_only=True)
@@ -122,12 +104,11 @@ class BlockContainer(Exporter, Protocol):
 
 def target_of(spec: Spec) -> Target:
     """Pick from a spec what exporters need."""
-    axes = spec.axis_scales()
     return Target(
         name=spec.name,
-        axes=axes,
+        axes=spec.axis_scales(),
         start=spec.move.start,
         export=spec.export,
         can=spec.can,
-        variants=(AxisVariants(least_scale=0.0, mirror=True, shift=True),) * len(axes),
+        variants=machine_variants(spec),
     )

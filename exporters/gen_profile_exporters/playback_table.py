@@ -17,7 +17,8 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.profile import Array, Profile, SampledProfile
 from gen_profile.units import COUNTS, AxisScale
-from gen_profile_exporters.exporter import AxisVariants, Target
+from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.machine_variants import AxisVariants
 from gen_profile_exporters.path_limits import PathLimits, latest_stop, path_limits
 from gen_profile_exporters.quintic_segments import QuinticSegments, fit, horner
 from gen_profile_exporters.setpoints import (

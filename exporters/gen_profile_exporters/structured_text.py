@@ -26,7 +26,8 @@ from gen_profile.profile import Array, Profile, SampledProfile
 from gen_profile.units import AxisScale
 from gen_profile_exporters import playback_block
 from gen_profile_exporters.block_source import BlockSource, take_apart
-from gen_profile_exporters.exporter import AxisVariants, File, Target
+from gen_profile_exporters.exporter import File, Target
+from gen_profile_exporters.machine_variants import AxisVariants
 from gen_profile_exporters.playback_block import Token
 from gen_profile_exporters.playback_table import PlaybackTable, counted_axes, tabulate
 from gen_profile_exporters.quintic_segments import ACCELERATION_ERROR, POSITION_ERROR

@@ -144,6 +144,24 @@ def compare(
 @click.option("--scenario", metavar="N", type=int, help="Try only the scenario of this number (row).")
 @click.option("--strict", is_flag=True, help="Let faults in the timing of setpoints count as well.")
 @click.option(
+    "--scale",
+    metavar="AXIS=FACTOR",
+    multiple=True,
+    help="Judge the motion smaller along an axis, as a playback block plays it. Repeatable.",
+)
+@click.option(
+    "--mirror",
+    metavar="AXIS",
+    multiple=True,
+    help="Judge the motion the other way along an axis. Repeatable.",
+)
+@click.option(
+    "--offset",
+    metavar="AXIS=DISTANCE",
+    multiple=True,
+    help="Judge the motion begun elsewhere along an axis, in m or rad. Repeatable.",
+)
+@click.option(
     "--csv",
     "table_path",
     metavar="FILE",
@@ -161,6 +179,9 @@ def check(
     samples: int | None,
     scenario: int | None,
     strict: bool,
+    scale: tuple[str, ...],
+    mirror: tuple[str, ...],
+    offset: tuple[str, ...],
     table_path: Path | None,
     as_json: bool,
 ) -> None:
@@ -189,6 +210,9 @@ def check(
             samples=samples,
             row=scenario,
             strict=strict,
+            scale=scale,
+            mirror=mirror,
+            offset=offset,
             progress=lambda done, total: tell(f"checking by co-simulation, {done} of {total} scenarios"),
         )
     if table_path is not None:

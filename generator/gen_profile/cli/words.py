@@ -91,6 +91,7 @@ def judgement(found: Judgement) -> str:
     ]
     rows = [
         ("move", _move(found.spec)),
+        *([("variant", found.variant)] if found.variant else []),
         ("manifest", MANIFEST_WORDS[found.manifest]),
         *findings,
         *_groups(check),

@@ -18,6 +18,7 @@ from gen_profile.spec_reading import spec_from_dict
 from gen_profile.workflows.delivered import manifest_beside, read_artefact
 from gen_profile.workflows.foreign_check import judge_foreign
 from gen_profile.workflows.monte_carlo import Progress, with_further
+from gen_profile.workflows.motion_variant import parse_variant, varied
 from gen_profile.workflows.scenarios import further_scenarios, scenarios
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile_exporters.exporter import target_of
@@ -36,6 +37,8 @@ class Judgement:
     check : Check
     manifest : str
         ``"matches"``, ``"differs"`` (the file is not the one that was exported), or ``"none"`` for this spec.
+    variant : str or None
+        What was changed of the motion, in words.
     """
 
     path: Path
@@ -43,6 +46,7 @@ class Judgement:
     spec: Spec
     check: Check
     manifest: str
+    variant: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -50,6 +54,7 @@ class Judgement:
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
             "artefact": {"format": self.format, "path": str(self.path), "manifest": self.manifest},
+            "variant": self.variant,
             "check": self.check.to_dict(),
         }
 
@@ -62,6 +67,9 @@ def check_artefact(
     samples: int | None = None,
     row: int | None = None,
     strict: bool = False,
+    scale: Sequence[str] = (),
+    mirror: Sequence[str] = (),
+    offset: Sequence[str] = (),
     progress: Progress = lambda _, __: None,
 ) -> Judgement:
     """Replay a file, co-simulate it, and compare it with its manifest.
@@ -80,6 +88,8 @@ def check_artefact(
         Number of the only scenario to try.
     strict : bool
         Whether faults in the timing of setpoints count as well.
+    scale, mirror, offset : sequences of str
+        A variant to judge, see `gen_profile.workflows.motion_variant.parse_variant`.
     progress : callable
         Told how many scenarios beyond the machines are done, and of how many.
 
@@ -88,7 +98,7 @@ def check_artefact(
     OutputError
         The file cannot be read, or there is no spec.
     SpecError
-        There is no such scenario.
+        There is no such scenario or axis.
     ExportError
         The file is damaged.
     CosimulationError
@@ -97,13 +107,17 @@ def check_artefact(
     manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
     spec = spec or _spec_of(manifest, path)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
+    variant = parse_variant(spec, scale, mirror, offset)
     standing = _provenance(manifest, content, spec)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
-    check = _verdict(spec, setpoints, _rows(spec, row), on_build, progress)
+    judged = varied(spec, setpoints, variant) if variant.told() else (spec, setpoints)
+    check = _verdict(*judged, _rows(judged[0], row), on_build, progress)
     faults = (*check.faults, *_alterations(path, standing))
     check = attrs.evolve(check, strict=strict, faults=faults)
-    return Judgement(path=path, format=format_, spec=spec, check=check, manifest=standing)
+    return Judgement(
+        path=path, format=format_, spec=spec, check=check, manifest=standing, variant=variant.told()
+    )
 
 
 def _rows(spec: Spec, row: int | None) -> tuple[Scenario, ...]:

@@ -1,0 +1,178 @@
+"""Which variants of a motion a machine allows, axis by axis, decided from its equations.
+
+With q̈_u = f(q_u, q̇_u, q_a, q̇_a, q̈_a), an axis may be
+
+shifted    if neither f nor the sway depends on where it stands
+mirrored   if besides signs σ exist for which the machine mirrored in that axis does the same:
+           f(σ q_u, σ q̇_u, …, −q̇_a, −q̈_a) = σ f, and every sway changes at most its sign
+scaled     if besides the load's small swing is linear in the axis's motion, whatever the other axes do: the
+           force on a load at rest is linear in (q̇_a, q̈_a), f's derivatives by q_u and q̇_u do not depend on
+           them, and no other axis pushes what this one moves, so that nothing is cancelled between axes
+
+A hoist changes the rope and so allows nothing; nor does the radius of a tower crane. A load that swings at
+the start allows shifts only. Equations are compared at a few fixed states, numerically, so any machine will do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import product
+from types import SimpleNamespace
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile.plants.plant import Plant
+from gen_profile.profile import Array
+from gen_profile.spec import Spec
+
+STATES = 4
+SWING = 0.1  # rad (or m), of the loads in these states
+TOLERANCE = 1e-6  # relative
+STEP = 1e-5  # of differences
+MOST_SIGNS = 8  # coordinates whose signs are tried one by one; of more, all together
+
+
+@attrs.frozen(kw_only=True)
+class AxisVariants:
+    """Which variants of a motion the machine allows along an axis.
+
+    Attributes
+    ----------
+    least_scale : float
+        The distance may be multiplied by this, up to 1.
+    mirror : bool
+        It may be travelled the other way.
+    shift : bool
+        It may begin elsewhere.
+    """
+
+    least_scale: float = 1.0
+    mirror: bool = False
+    shift: bool = False
+
+
+# Accelerations, then sways, of (q_u, q̇_u, q_a, q̇_a, q̈_a).
+Law = Callable[[Array, Array, Array, Array, Array], tuple[Array, Array]]
+
+
+def machine_variants(spec: Spec) -> tuple[AxisVariants, ...]:
+    """Decide for every axis of a spec's machine."""
+    plant = spec.machine()
+    law, states = _law(plant, spec), _states(plant, spec)
+    found = []
+    for axis in range(len(plant.actuated)):
+        shift = _shifts(law, states, axis)
+        mirror = shift and not spec.move.initial and _mirrors(law, states, axis)
+        scaled = mirror and _is_linear(law, states, axis)
+        found.append(AxisVariants(least_scale=0.0 if scaled else 1.0, mirror=mirror, shift=shift))
+    return tuple(found)
+
+
+def _law(plant: Plant, spec: Spec) -> Law:
+    p = SimpleNamespace(**spec.plant.parameters)
+
+    def law(q_u: Array, dq_u: Array, q_a: Array, dq_a: Array, ddq_a: Array) -> tuple[Array, Array]:
+        terms = plant.equations(list(q_u), list(dq_u), list(q_a), list(dq_a), p)
+        push = np.array(terms.K_u) + np.array(terms.G_u) - np.array(terms.M_au).T @ ddq_a
+        sway = plant.outputs(list(q_u), list(q_a), p).sway
+        return np.linalg.solve(np.array(terms.M_uu, dtype=float), push), np.array(sway, dtype=float)
+
+    return law
+
+
+def _states(plant: Plant, spec: Spec) -> list[list[Array]]:
+    """List states on the way of the move, at which laws are compared; always the same ones."""
+    random = np.random.default_rng(1)
+    start, target = np.array(spec.move.start), np.array(spec.move.target)
+    size = np.abs(target - start) + 0.1
+    speed, push = size / spec.move.duration, size / spec.move.duration**2
+    loads = len(plant.unactuated)
+    return [
+        [
+            *(SWING * random.uniform(-1.0, 1.0, (2, loads))),
+            start + share * (target - start),
+            speed * random.uniform(0.5, 1.0, len(size)),
+            push * random.uniform(0.5, 1.0, len(size)),
+        ]
+        for share in np.linspace(0.1, 0.9, STATES)
+    ]
+
+
+def _same(found: Sequence[Array], due: Sequence[Array]) -> bool:
+    return all(
+        np.abs(one - other).max() <= TOLERANCE * (np.abs(other).max() + TOLERANCE)
+        for one, other in zip(found, due, strict=True)
+    )
+
+
+def _changed(state: list[Array], axis: int, *, by: float = 0.0, factor: float = 1.0) -> list[Array]:
+    """Let an axis stand elsewhere, and move so many times as fast."""
+    q_u, dq_u, q_a, dq_a, ddq_a = (values.copy() for values in state)
+    q_a[axis] += by
+    dq_a[axis] *= factor
+    ddq_a[axis] *= factor
+    return [q_u, dq_u, q_a, dq_a, ddq_a]
+
+
+def _shifts(law: Law, states: list[list[Array]], axis: int) -> bool:
+    return all(
+        _same(law(*_changed(state, axis, by=by)), law(*state)) for state in states for by in (0.05, 0.01)
+    )
+
+
+def _mirrors(law: Law, states: list[list[Array]], axis: int) -> bool:
+    loads = len(states[0][0])
+    signs = product((-1.0, 1.0), repeat=loads) if loads <= MOST_SIGNS else [(-1.0,) * loads]
+    return any(all(_mirrored(law, state, axis, np.array(sign)) for state in states) for sign in signs)
+
+
+def _mirrored(law: Law, state: list[Array], axis: int, sign: Array) -> bool:
+    q_u, dq_u, *axes = _changed(state, axis, factor=-1.0)
+    acceleration, sway = law(sign * q_u, sign * dq_u, *axes)
+    due, seen = law(*state)
+    return _same((sign * acceleration, np.abs(sway)), (due, np.abs(seen)))
+
+
+def _is_linear(law: Law, states: list[list[Array]], axis: int) -> bool:
+    return all(_linear_at(law, state, axis) for state in states)
+
+
+def _linear_at(law: Law, state: list[Array], axis: int) -> bool:
+    rest = [np.zeros_like(state[0]), np.zeros_like(state[1]), *state[2:]]
+    still = _changed(rest, axis, factor=0.0)
+    others = law(*still)[0]
+    whole = law(*rest)[0] - others
+    if not all(
+        _same([law(*_changed(rest, axis, factor=k))[0] - others], [k * whole]) for k in (0.5, 0.25, -1.0)
+    ):
+        return False
+    coupling = _coupling(law, still)
+    if not _same([_coupling(law, rest)], [coupling]):
+        return False
+    return not (_reached(whole, coupling) & _reached(others, coupling)).any()
+
+
+def _coupling(law: Law, state: list[Array]) -> Array:
+    """Differentiate the accelerations by q_u, then by q̇_u, one column each."""
+    columns = []
+    for which, number in product((0, 1), range(len(state[0]))):
+        ends = []
+        for sign in (-1.0, 1.0):
+            moved = [values.copy() for values in state]
+            moved[which][number] += sign * STEP
+            ends.append(law(*moved)[0])
+        columns.append((ends[1] - ends[0]) / (2.0 * STEP))
+    return np.array(columns).T
+
+
+def _reached(push: Array, coupling: Array) -> NDArray[np.bool_]:
+    """Tell which coordinates a push moves, through their coupling too."""
+    small = TOLERANCE * np.abs(coupling).max()
+    loads = len(push)
+    linked = (np.abs(coupling[:, :loads]) > small) | (np.abs(coupling[:, loads:]) > small)
+    reached: NDArray[np.bool_] = np.abs(push) > TOLERANCE * (np.abs(push).max() + TOLERANCE)
+    for _ in range(loads):
+        reached = reached | (linked @ reached)
+    return reached
