@@ -10,7 +10,8 @@ scaled     if besides the load's small swing is linear in the axis's motion, wha
            them, and no other axis pushes what this one moves, so that nothing is cancelled between axes
 
 A hoist changes the rope and so allows nothing; nor does the radius of a tower crane. A load that swings at
-the start allows shifts only. Equations are compared at a few fixed states, numerically, so any machine will do.
+the start allows shifts only. Equations are compared at a few fixed states, numerically, so any machine
+will do.
 """
 
 from __future__ import annotations

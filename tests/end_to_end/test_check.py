@@ -307,3 +307,46 @@ def test_two_specs_may_share_a_folder(tmp_path):
     outcome = run_here("check", tmp_path / "paper.csv", "--json")
     assert (outcome.code, outcome.document["name"]) == (4, "paper")
     assert outcome.document["artefact"]["manifest"] == "differs"
+
+
+def test_a_variant_of_a_motion_with_hoist_is_judged_as_the_block_would_play_it(tmp_path):
+    done = run_here("--preset", "single-pendulum-crane", "--export", "plc", "--out", tmp_path)
+    assert done.code == 0
+    (block,) = tmp_path.glob("*.st")
+    assert re.search(
+        r"Axis 1, cart: [^.]*\.[^;]*; allows fScale from 0, bMirror, fStartOffset\.", block.read_text()
+    )
+    assert "allows no variants." in block.read_text()
+    found = {}
+    for words in (
+        "",
+        "--scale cart=0.5",
+        "--mirror cart",
+        "--scale cart=0.5 --scale hoist=0.5",
+        "--offset hoist=3",
+    ):
+        done = run_here("check", block, *words.split(), "--scenario", "1", "--json")
+        document = json.loads(done.out)
+        assert (document["variant"] is None) == (words == "")
+        found[words] = document["check"]["scenarios"][0]["residual_peaks_m"]["payload"], done.code
+    planned, code = found.pop("")
+    assert code == 0
+    assert found.pop("--mirror cart") == (pytest.approx(planned, abs=1e-8), 0)
+    smaller, code = found.pop("--scale cart=0.5")
+    assert smaller < 0.6 * planned and code == 0
+    assert all(sway > 0.05 and code == 4 for sway, code in found.values())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--scale crat=0.5", "no axis 'crat'; did you mean 'cart'"),
+        ("--scale 1.5", "--scale cart=1.5: a playback block takes 0 to 1"),
+        ("--offset cart=far", "'far' is no number"),
+        ("--mirror 7", "no axis '7'"),
+    ],
+)
+def test_a_variant_that_is_none_is_refused(folder, words, message):
+    done = run_here("check", folder / "paper.csv", *words.split())
+    assert done.code == 2
+    assert message in done.err
