@@ -248,9 +248,10 @@ static Status set_reals(Instance *instance, const unsigned references[], size_t 
 /* Time derivatives of outputs, each of an order of its own. */
 static Status get_output_derivatives(Instance *instance, const unsigned references[], size_t n, const int orders[],
                                      double values[]) {
+#if OUTPUT_ORDERS == 0
     (void)references, (void)orders, (void)values;
-    if (n > 0 && OUTPUT_ORDERS == 0) return fail(instance, "Time derivatives of outputs are not given.");
-#if OUTPUT_ORDERS > 0
+    return n == 0 ? OK : fail(instance, "Time derivatives of outputs are not given.");
+#else
     refresh_outputs(&instance->state);
     for (size_t i = 0; i < n; i++) {
         const Variable *variable = find_variable(instance, references[i], REAL);
@@ -262,8 +263,8 @@ static Status get_output_derivatives(Instance *instance, const unsigned referenc
             return fail(instance, "Time derivatives of %s are not given.", variable->name);
         }
     }
-#endif
     return OK;
+#endif
 }
 
 /* ---- derivatives with respect to variables --------------------------------------------------------------- */
@@ -424,20 +425,17 @@ static Status do_step(Instance *instance, double time, double step) {
 
 /* ---- saved states --------------------------------------------------------------------------------------- */
 
-static Snapshot *new_snapshot(Instance *instance) {
-    Snapshot *snapshot = host_allocate(&instance->host, sizeof *snapshot);
-    if (!snapshot) fail(instance, "There is no memory for an FMU state.");
-    return snapshot;
-}
-
-static Status save(Instance *instance, void **handle) {
-    Snapshot *snapshot = *handle ? *handle : new_snapshot(instance);
-    if (!snapshot) return FAILED;
+/* Hand a state out, in the memory of `handle` or in memory of its own. */
+static Status keep(Instance *instance, const State *state, void **handle) {
+    Snapshot *snapshot = *handle ? *handle : host_allocate(&instance->host, sizeof *snapshot);
+    if (!snapshot) return fail(instance, "There is no memory for an FMU state.");
     snapshot->nothing = NULL;
-    memcpy(&snapshot->state, &instance->state, sizeof snapshot->state);
+    memcpy(&snapshot->state, state, sizeof *state);
     *handle = snapshot;
     return OK;
 }
+
+static Status save(Instance *instance, void **handle) { return keep(instance, &instance->state, handle); }
 
 static Status restore(Instance *instance, const void *handle) {
     memcpy(&instance->state, &((const Snapshot *)handle)->state, sizeof instance->state);
@@ -460,19 +458,18 @@ static unsigned long long checksum_of(const Record *record) {
 
 static int are_values_sound(const Model *model) {
     for (unsigned i = 0; i < N_VALUES; i++) {
-        const Variable *variable = &VARIABLES[i];
         const double value = model->values[i];
-        if (can_be_set(i, ANY_MODE) && !(value >= variable->lower && value <= variable->upper)) return 0;
+        if (can_be_set(i, ANY_MODE) && !(value >= VARIABLES[i].lower && value <= VARIABLES[i].upper)) return 0;
     }
     return 1;
 }
 
 /* Whether a state can be gone on from, whoever made it. */
 static int is_sound(const State *state) {
-    const int mode = state->mode;
-    const int is_one_mode = mode > 0 && (mode & (mode - 1)) == 0 && (mode & ANY_MODE) == mode;
-    const int flags = state->outputs_are_stale | state->derivatives_are_stale | state->has_experiment | state->is_integrated;
     const Model *model = &state->model;
+    const int mode = state->mode, is_one_mode = mode > 0 && (mode & (mode - 1)) == 0 && (mode & ANY_MODE) == mode;
+    const int flags =
+        state->outputs_are_stale | state->derivatives_are_stale | state->has_experiment | state->is_integrated;
     return is_one_mode && (flags & ~1) == 0 && isfinite(model->time) && isfinite(model->start_time) &&
            !isnan(state->stop_time) && !isnan(model->next_event) && are_values_sound(model) && model_is_sound(model);
 }
@@ -497,10 +494,5 @@ static Status read_bytes(Instance *instance, const void *bytes, size_t size, voi
     if (record.checksum != checksum_of(&record) || !is_sound(&record.state)) {
         return fail(instance, "The bytes of the FMU state are damaged.");
     }
-    Snapshot *snapshot = *handle ? *handle : new_snapshot(instance);
-    if (!snapshot) return FAILED;
-    snapshot->nothing = NULL;
-    memcpy(&snapshot->state, &record.state, sizeof snapshot->state);
-    *handle = snapshot;
-    return OK;
+    return keep(instance, &record.state, handle);
 }
