@@ -256,12 +256,17 @@ class TestFoldersOfOthers:
 
 
 def give_away(path, monkeypatch):
-    """Make a file somebody else's: root can, and for others everything is somebody else's."""
+    """Make a file somebody else's, which only root can; for others it says that it is."""
     if os.geteuid() == 0:
         os.chown(path, 12345, -1)
-    else:
-        user = os.geteuid() + 1
-        monkeypatch.setattr(os, "geteuid", lambda: user)
+        return
+    lstat = Path.lstat
+
+    def given_away(one):
+        mode, inode, device, links, _, *rest = lstat(one)
+        return os.stat_result((mode, inode, device, links, 12345, *rest)) if one == path else lstat(one)
+
+    monkeypatch.setattr(Path, "lstat", given_away)
 
 
 def test_the_cache_is_the_users(monkeypatch):
