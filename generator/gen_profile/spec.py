@@ -51,7 +51,7 @@ Name = Annotated[
 Positive = Annotated[float, Bounds(above=0.0)]
 NotNegative = Annotated[float, Bounds(least=0.0)]
 RelativeRange = Annotated[float, Bounds(above=0.0, most=0.9, meaning="(0.1 is 10 %)")]
-CycleTime = Annotated[float, Bounds(least=1e-5, most=1.0, meaning="s")]
+CycleTime = Annotated[float, Bounds(least=1e-5, most=1.0, meaning="s (4 ms are 0.004)")]
 Duration = Annotated[float, Bounds(least=1e-3, most=1e5, meaning="s")]
 Column = Literal["position", "velocity", "acceleration", "jerk"]
 Distance = Annotated[float, Bounds(least=-1e5, most=1e5, meaning="m (or rad)")]

@@ -14,9 +14,14 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec import Spec
 from gen_profile.spec_structure import Faults, Table, structure
 from gen_profile.spec_tables import complete
-from gen_profile.suggestion import suggestion
+from gen_profile.suggestion import listed, meant, number_meant, suggestion
 
 HERE = Path()
+SLIPS = {
+    r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
+    r"^\s*[\w.-]+\s*:": "; write = between a key and its value",
+    r"=\s*[A-Za-z_]": "; a text stands in quotes",
+}
 
 
 def read_spec(path: Path, overrides: Sequence[str] = ()) -> Spec:
@@ -45,7 +50,9 @@ def read_text(path: Path) -> str:
     try:
         return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
-        raise OutputError(f"Cannot read the spec {path}: {error.strerror}.") from error
+        near = meant(path.name, [other.name for other in path.parent.glob("*.toml")])
+        cure = f"; did you mean {listed(near)}?" if near and isinstance(error, FileNotFoundError) else "."
+        raise OutputError(f"Cannot read the spec {path}: {error.strerror}{cure}") from error
     except UnicodeDecodeError as error:
         raise SpecError(f"{path}: not UTF-8 text (byte {error.start}); save the spec as UTF-8.") from error
 
@@ -143,13 +150,22 @@ def _document(text: str, source: str) -> Table:
     except tomllib.TOMLDecodeError as error:
         last = text.split("\n")
         end = f"(at the end: line {len(last)}, column {len(last[-1]) + 1})"
-        raise SpecError(
-            f"{source}: not valid TOML: {re.sub(r'[(]at end of document[)]', end, str(error))}."
-        ) from error
+        problem = re.sub(r"[(]at end of document[)]", end, str(error))
+        raise SpecError(f"{source}: not valid TOML: {problem}{_slip(text, problem)}.") from error
     except RecursionError as error:
         raise SpecError(f"{source}: not valid TOML: arrays or tables nested too deeply.") from error
     except ValueError as error:
         raise SpecError(f"{source}: not valid TOML: a whole number of thousands of digits.") from error
+
+
+def _slip(text: str, problem: str) -> str:
+    """Continue a sentence about text that is no TOML by what its writer took for TOML, if that shows."""
+    line = text.split("\n")[int(found[1]) - 1] if (found := re.search(r"line (\d+)", problem)) else ""
+    values = re.findall(r"=\s*([^\s#,}\]=]+(?:,[0-9]+)?(?:\s*[A-Za-zµ°%][^\s#}]*)?)", line.partition("#")[0])
+    hints = filter(None, (number_meant(value) for value in values if not value[0].isalpha()))
+    if hint := next((hint for hint in hints if "quotes" not in hint), ""):
+        return hint
+    return next((hint for pattern, hint in SLIPS.items() if re.search(pattern, line)), "")
 
 
 def _override(document: Table, override: str) -> None:

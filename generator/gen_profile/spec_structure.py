@@ -19,7 +19,7 @@ from cattrs.errors import (
 from gen_profile.errors import SpecError
 from gen_profile.plants.machine_file import MachineFile
 from gen_profile.spec import Bounds, ForeignFmu, Pattern, Spec
-from gen_profile.suggestion import suggestion
+from gen_profile.suggestion import number_meant, suggestion
 
 Table = dict[str, Any]
 
@@ -95,7 +95,7 @@ def found(value: object) -> str:
         case int() | float():
             return repr(value)
         case str():
-            return f"text {value[:60]!r}"
+            return f"text {value[:60]!r}{number_meant(value)}"
         case dict():
             return "a table"
         case list():

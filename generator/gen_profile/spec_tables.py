@@ -6,7 +6,7 @@ Here stands whatever needs to know the machine (its parameters, axes and loads),
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,10 +17,21 @@ from gen_profile.errors import SpecError
 from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_machine_file
 from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile.plants.registry import find_plant, plant_types
-from gen_profile.spec import Spec
+from gen_profile.spec import (
+    ActuatorSpec,
+    CanSpec,
+    CostSpec,
+    ExportSpec,
+    LimitsSpec,
+    RobustnessSpec,
+    SolverSpec,
+    Spec,
+)
+from gen_profile.spec_check import KEYS as CHECK_KEYS
 from gen_profile.spec_check import check_table
+from gen_profile.spec_foreign import KEYS as FOREIGN_KEYS
 from gen_profile.spec_structure import Faults, Table, finite, found, place
-from gen_profile.suggestion import suggestion
+from gen_profile.suggestion import listed, meant, suggestion
 from gen_profile.units import UNITS
 
 TABLES = tuple(field.name for field in attrs.fields(Spec) if field.name != "name")
@@ -30,6 +41,15 @@ DEFAULT_NAME = "profile"
 PLACEHOLDER_DURATION = 1.0  # s, until the shortest duration is found
 LARGEST_ANGLE = 1.4  # rad, of a load at the start
 SHORTEST_MOVE = 1e-12  # m (or rad); squares of what is smaller come near to what floats can hold
+FLAT = {
+    "actuator": ActuatorSpec,
+    "robustness": RobustnessSpec,
+    "cost": CostSpec,
+    "solver": SolverSpec,
+    "limits": LimitsSpec,
+    "export": ExportSpec,
+    "can": CanSpec,
+}
 SMALL_SWING = 1e-3  # m (or rad), to compare forces with
 
 
@@ -50,6 +70,7 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     file, plant = (
         _own_machine(tables["plant"], folder, faults) if own else (None, _machine(tables["plant"], faults))
     )
+    _misplaced(document, plant, faults)
     tables["plant"] = {"file": file, **_plant(tables["plant"], plant, faults)}
     tables["move"] = _move(tables["move"], plant, faults)
     _still_at_speed(tables["move"], tables, plant, faults)
@@ -60,6 +81,26 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     _check_columns(tables["export"].get("csv_columns"), faults)
     tables["can"] = _can(tables["can"], plant, faults)
     return tables
+
+
+def _misplaced(document: Mapping[str, Any], plant: Plant | None, faults: Faults) -> None:
+    """Tell where a key belongs that stands in another table, or in none."""
+    keys: dict[str, Collection[str]] = {
+        "plant": ["type", *FILE_KEYS, *(plant.nominal() if plant else ())],
+        "move": MOVE_KEYS,
+        "check": [*CHECK_KEYS, *FOREIGN_KEYS],
+        **{name: [field.name for field in attrs.fields(class_)] for name, class_ in FLAT.items()},
+    }
+    stated = {"": document} | {
+        name: document[name] for name in keys if isinstance(document.get(name), Mapping)
+    }
+    for table, content in stated.items():
+        for key in content:
+            homes = [f"{name}.{key}" for name, own in keys.items() if key in own]
+            if plant and key in plant.nominal() and table in ("robustness", "check"):
+                homes = [f"{table}.uncertain.{key}"]
+            if homes and key not in (keys[table] if table else ("name", *TABLES)):
+                faults.add(place(table, key), f"unknown key; did you mean {listed(homes)}?")
 
 
 def _table(document: Mapping[str, Any], key: str, faults: Faults) -> Table:
@@ -186,7 +227,10 @@ def _duration(table: Table, faults: Faults) -> tuple[Table, bool]:
     if not isinstance(duration, str):
         return {}, False
     if duration != "minimum":
-        faults.add("move.duration", f'must be a number of seconds, or "minimum", found {found(duration)}')
+        near = "; did you mean 'minimum'?" * bool(meant(duration, ["minimum"]))
+        faults.add(
+            "move.duration", f'must be a number of seconds, or "minimum", found {found(duration)}{near}'
+        )
     return {"duration": PLACEHOLDER_DURATION}, duration == "minimum"
 
 
@@ -308,12 +352,10 @@ def _limits(table: Table, move: Table, plant: Plant | None, faults: Faults) -> T
             )
         where = f"limits.axis.{name}.travel" if "travel" in axes[name] else "limits.travel"
         travel = axes[name].get("travel", table.get("travel"))
-        if (
-            isinstance(travel, list)
-            and len(travel) == 2
-            and None not in (edges := [finite(e) for e in travel])
-        ):
-            low, high = edges
+        low, high = map(finite, travel) if isinstance(travel, list) and len(travel) == 2 else (None, None)
+        if low is not None and high is not None:
+            if low > high:
+                faults.add(where, f"must be two rising numbers, such as {[high, low]}, found {travel}")
             for key in ("start", "target"):
                 if not low <= move[key][column] <= high:
                     faults.add(where, f"must contain the move's {key}, found {travel}")

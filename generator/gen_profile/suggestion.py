@@ -1,4 +1,4 @@
-"""What a person may have meant by a word that is not known."""
+"""What a person may have meant by a word that is not known, or by a text where a number is wanted."""
 
 from __future__ import annotations
 
@@ -6,15 +6,108 @@ import difflib
 import re
 from collections.abc import Iterable
 
+MOST = 3  # names to suggest
+ALIKE = 0.65  # difflib's ratio from which on a word is a misspelling of another
+# other words for what is called so here, in the languages and the products that users come from
+MEANINGS = {
+    "velocity": "v vmax v_max max_velocity speed geschwindigkeit",
+    "acceleration": "a amax a_max max_acceleration beschleunigung",
+    "jerk": "j jmax j_max max_jerk ruck",
+    "travel": "range stroke position weg verfahrweg",
+    "distance": "dist length stroke weg fahrweg strecke",
+    "duration": "t time t_end tf zeit dauer fahrzeit",
+    "target": "end goal ziel",
+    "cycle_time": "cycle sample_time ts tick zykluszeit takt",
+    "residual_sway": "residual sway tolerance restpendeln",
+    "uncertain": "uncertainty tolerance toleranz",
+    "sway_weight": "beta weight",
+    "tau": "lag time_constant zeitkonstante",
+    "sensitivity": "robust desensitised desensitized",
+    "minimum": "min shortest fastest auto",
+    "L": "length rope rope_length seil seillaenge seillänge",
+    "L1": "length rope rope_length seil seillaenge seillänge",
+    "m": "mass load payload last masse",
+    "m1": "mass hook masse",
+    "m2": "mass load payload last masse",
+    "plant": "machine crane maschine kran",
+    "move": "motion bewegung",
+    "actuator": "drive motor antrieb",
+    "robustness": "uncertainty uncertainties uncertain robust tolerance",
+    "limits": "limit constraints grenzen grenzwerte",
+    "export": "output",
+    "design": "export plan solve generate",
+    "double-pendulum-crane": "crane bridge-crane overhead-crane kran brueckenkran brückenkran",
+    "gantry-crane": "crane bridge-crane overhead-crane kran portalkran brueckenkran brückenkran",
+    "single-pendulum-crane": "crane kran",
+    "tower-crane": "crane kran turmdrehkran",
+    "slosh-tank": "slosh sloshing liquid tank",
+    "plc": "iec iec61131 61131 structured-text structured_text txt",
+    "codesys": "codesys3 wago schneider festo",
+    "plcopen-xml": "xml plcopen",
+    "rockwell-l5x": "rockwell allen-bradley logix studio5000",
+    "siemens-scl": "siemens tia tia-portal step7 s7 s7-1200 s7-1500",
+    "twincat": "beckhoff twincat3 tc3 tcpou",
+    "csv": "excel xlsx xls table",
+    "can": "canopen cia402 candump",
+    "mm": "millimeter millimetre",
+    "um": "µm μm micron",
+    "deg": "° degree degrees grad",
+}
+
 
 def suggestion(word: str, known: Iterable[str]) -> str:
     """End a sentence: ``; did you mean 'x'?`` where something similar is known, else the list of what is."""
     known = list(known)
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"; did you mean {near[0]!r}?" if near else f" (known: {', '.join(known)})."
+    near = meant(word, known)
+    return f"; did you mean {listed(near)}?" if near else f" (known: {', '.join(known)})."
 
 
-def decimal_point(text: str) -> str:
-    """Continue a sentence about a number with a decimal comma: ``; write a decimal point: 6.0``."""
-    comma = re.fullmatch(r"\s*([+-]?[0-9]+),([0-9]+)\s*", text)
-    return f"; write a decimal point: {comma[1]}.{comma[2]}" if comma else ""
+def listed(names: Iterable[str]) -> str:
+    """Write ``'a', 'b' or 'c'``."""
+    *others, last = (repr(name) for name in names)
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def meant(word: str, known: Iterable[str]) -> list[str]:
+    """Find the names, `MOST` at most, that a person may mean: by meaning, by a part, or misspelt."""
+    names, word = list(known), word.strip().lower()
+    same = [name for name in names if name.lower() == word]
+    by_meaning = [name for name in names if word in MEANINGS.get(name, "").split()]
+    by_part = [
+        name
+        for name in names
+        if word in (*re.split(r"[-_. ]", name.lower()), name.lower().rstrip("0123456789"))
+        or (len(word) > 2 and name.lower().startswith(word))
+    ]
+    found = same or by_meaning or by_part if word else []
+    return found[:MOST] or _misspelt(word, names)
+
+
+def _misspelt(word: str, names: Iterable[str]) -> list[str]:
+    """Find the name most like a word, parts that both have aside: a tower crane is no bridge crane."""
+
+    def likeness(name: str) -> float:
+        parts = word.split("-"), name.lower().split("-")
+        rests = ["-".join(part for part in own if not all(part in each for each in parts)) for own in parts]
+        return difflib.SequenceMatcher(None, rests[0], rests[1]).ratio()
+
+    best = max(names, key=likeness, default="")
+    return [best] if best and likeness(best) >= ALIKE else []
+
+
+def number_meant(text: str) -> str:
+    """Continue a sentence about a text in a number's place: ``; write a decimal point: 6.0``."""
+    text = text.strip()
+    if comma := re.fullmatch(r"([+-]?[0-9]+),([0-9]+)", text):
+        return f"; write a decimal point: {comma[1]}.{comma[2]}"
+    if re.fullmatch(r"[+-]?[0-9.]+,[0-9]+|[+-]?[0-9,]+\.[0-9]+", text) and "," in text:
+        return "; write a decimal point, and nothing between thousands"
+    if share := re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*%", text):
+        return f"; write a share: {float(share[1]) / 100.0:g}"
+    if re.fullmatch(r"[+-]?(\.[0-9]+|[0-9]+\.)", text):
+        return "; write a digit on both sides of the decimal point"
+    if re.fullmatch(r"[+-]?[0-9.,]+\s*[A-Za-zµμ°][^0-9]*[23²³]?", text):
+        return "; write the number alone, in SI units (m, s, kg, rad)"
+    if re.fullmatch(r"[+-]?[0-9]+(\.[0-9]+)?", text):
+        return "; write it without quotes"
+    return ""

@@ -55,7 +55,7 @@ ARGUMENTS = {
     ),
     "decimal comma": (
         ["--cycle-time", "0,001"],
-        [r"export\.cycle_time: .*'0,001'\.", r"can\.sync_period: .*'0,001'\."],
+        [r"export\.cycle_time: .*'0,001'; write .* 0\.001\.", r"can\.sync_period: .*'0,001'; write .*\."],
     ),
     "cycle of nothing": (["--cycle-time", "0"], [r"export\.cycle_time: .*", r"can\.sync_period: .*"]),
     "comment end in the name": (["--set", "name=a*)b"], [r"name: .*'a\*\)b'\."]),

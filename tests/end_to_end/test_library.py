@@ -10,6 +10,7 @@ from command_line import run_here
 from gen_profile.errors import ExportError
 from gen_profile.spec_reading import preset_spec
 from gen_profile.workflows import profile_library
+from gen_profile.workflows.sweep_store import grid_of
 from gen_profile.workflows.sweep_table import read_table
 from gen_profile_exporters.block_source import take_apart
 from gen_profile_exporters.exporter import target_of
@@ -48,7 +49,7 @@ def library(swept, tmp_path_factory):
 
 def test_holds_the_profiles_that_passed_in_their_order(swept, library):
     path, document = library
-    rows = [row for row in read_table(swept).to_pylist() if row["status"] == "passed"]
+    rows = [row for row in read_table(swept, grid_of(swept)).to_pylist() if row["status"] == "passed"]
     assert 2 <= len(rows) < 8
     assert [entry["case"] for entry in document["profiles"]] == [row["case"] for row in rows]
     for number, (entry, row) in enumerate(zip(document["profiles"], rows, strict=True)):

@@ -10,6 +10,7 @@ from pyarrow import parquet
 
 from gen_profile.spec_reading import preset_spec
 from gen_profile.workflows.check import check_artefact
+from gen_profile.workflows.sweep_store import grid_of
 from gen_profile.workflows.sweep_table import read_table
 
 CYCLE = "export.cycle_time=0.01"
@@ -32,7 +33,7 @@ def looked_up(library, *words):
 
 def residual(library, case, asked_for, distance):
     """Worst sway that a case's file leaves on another machine, and whether that is allowed."""
-    row = read_table(library).to_pylist()[case]
+    row = read_table(library, grid_of(library)).to_pylist()[case]
     overrides = (CYCLE, f"plant.L1={asked_for}", f"move.distance={distance}", "check.residual_sway=0.003")
     check = check_artefact(library / row["folder"] / "paper.csv", preset_spec("paper", overrides)).check
     load, finding = check.worst
@@ -41,7 +42,7 @@ def residual(library, case, asked_for, distance):
 
 def test_what_was_swept_is_found_itself(library):
     found = looked_up(library, "--move.distance", "0.3", "--plant.L1", "0.35", "--solver.method", "auto")
-    row = read_table(library).to_pylist()[found["case"]]
+    row = read_table(library, grid_of(library)).to_pylist()[found["case"]]
     assert (row["move.distance"], row["plant.L1"], row["solver.method"]) == (0.3, 0.35, "auto")
     assert found["differences"] == {"move.distance": 0.0, "plant.L1": 0.0}
     assert found["artefact"]["manifest"] == "matches"
@@ -77,7 +78,7 @@ def test_a_nearer_profile_that_is_not_safe_there_is_passed_over(library):
 def test_nearness_counts_in_steps_of_the_grid(library, distance, length):
     found = looked_up(library, f"--move.distance={distance}", f"--plant.L1={length}", "--solver.method=auto")
     tried = [*(entry["case"] for entry in found["passed_over"]), found["case"]]
-    rows = [row for row in read_table(library).to_pylist() if row["status"] == "passed"]
+    rows = [row for row in read_table(library, grid_of(library)).to_pylist() if row["status"] == "passed"]
     rows = [row for row in rows if row["solver.method"] == "auto"]
     steps = {
         row["case"]: ((row["move.distance"] - distance) / 0.1) ** 2 + ((row["plant.L1"] - length) / 0.05) ** 2
@@ -118,7 +119,7 @@ def test_what_is_more_than_a_step_of_the_grid_away_is_no_answer(library, tmp_pat
     description = json.loads((library / "sweep.json").read_bytes())
     description["vary"]["move.distance"] = [0.3, 0.4, 0.5]
     (tmp_path / "copy" / "sweep.json").write_text(json.dumps(description), "utf-8")
-    rows = read_table(library).to_pylist()
+    rows = read_table(library, grid_of(library)).to_pylist()
     kept = [row for row in rows if row["move.distance"] == 0.3]
     parquet.write_table(pyarrow.Table.from_pylist(kept), tmp_path / "copy" / "sweep.parquet")
     outcome = run_here(

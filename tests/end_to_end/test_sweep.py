@@ -175,7 +175,9 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was(swept, tmp_path):
     assert (tmp_path / "sweep.parquet").read_bytes() == (swept[0] / "sweep.parquet").read_bytes()
 
 
-def test_ctrl_c_ends_it_quietly(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_quietly(tmp_path, number):
+    """Ctrl-C while it works; SIGTERM while its processes start, which Dask cannot stop then."""
     process = subprocess.Popen(
         [PROGRAM, "sweep", *QUICK, *AXES, "--out", tmp_path, "--workers", "1"],
         stdout=subprocess.PIPE,
@@ -183,8 +185,10 @@ def test_ctrl_c_ends_it_quietly(tmp_path):
         text=True,
         start_new_session=True,
     )
-    wait_for(lambda: stamps(tmp_path))
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all of them
+    assert process.stderr.readline() == "0 of 12 cases …\n"
+    if number == signal.SIGINT:
+        wait_for(lambda: stamps(tmp_path))
+    os.killpg(process.pid, number)  # as a terminal and a service manager do, to all of them
     out, err = process.communicate()
     assert process.returncode == 130
     assert out == ""

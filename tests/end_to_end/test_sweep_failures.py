@@ -16,7 +16,7 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec_reading import preset_text
 from gen_profile.workflows import sweep as workflow
 from gen_profile.workflows import sweep_case, sweep_plan
-from gen_profile.workflows.sweep_case import run_case
+from gen_profile.workflows.sweep_case import failed, run_case
 from gen_profile.workflows.sweep_grid import parse_grid
 from gen_profile.workflows.sweep_plan import prepare
 from gen_profile.workflows.sweep_store import opened
@@ -137,10 +137,14 @@ def test_a_folder_holds_one_sweep(tmp_path):
         raise AssertionError
 
 
+VARIED = [b"[]", b"{}", b'{"plant.L1": null}', b'{"plant.L1": []}']
 HEAD = b'{"format": "gen-profile sweep", "format_version": '
 
 
-@pytest.mark.parametrize("content", [b"", b"[]", HEAD + b"99}", HEAD + b'1, "vary": []}'])
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"[]", b"[" * 5000, HEAD + b"99}", *(HEAD + b'1, "vary": ' + vary + b"}" for vary in VARIED)],
+)
 def test_a_damaged_description_is_named(tmp_path, content):
     store = prepared(tmp_path, "move.duration=3,4")
     (tmp_path / "sweep.json").write_bytes(content)
@@ -246,7 +250,7 @@ def test_cells_are_numbers_or_texts_and_may_be_missing(tmp_path):
         "check": {"limit_m": 0.1},
     }
     write_table(tmp_path, grid, [RECORD, other])
-    none, some = read_table(tmp_path).to_pylist()
+    none, some = read_table(tmp_path, grid).to_pylist()
     assert (none["a"], none["b"], some["b"]) == (1.0, "[1, 2]", "x")
     assert (none["duration_s"], some["duration_s"], some["check_limit_m"]) == (None, 3.0, 0.1)
     assert none["artefacts"] == [] and none["spec_sha256"] is None and some["solver_defect"] is None
@@ -257,17 +261,52 @@ def test_batches_of_rows_make_one_table(tmp_path, monkeypatch):
     records = [{**RECORD, "case": n, "values": grid[n]} for n in range(4)]
     records[3]["figures"] = {"duration_s": 3.0}
     write_table(tmp_path, grid, records)
-    whole = read_table(tmp_path).to_pylist()
+    whole = read_table(tmp_path, grid).to_pylist()
     monkeypatch.setattr("gen_profile.workflows.sweep_table.BATCH", 1)
     write_table(tmp_path, grid, records)
-    assert read_table(tmp_path).to_pylist() == whole
+    assert read_table(tmp_path, grid).to_pylist() == whole
 
 
 def test_a_table_that_is_missing_or_damaged_is_named(tmp_path):
+    grid = parse_grid(["a=1", "b=x,y"])
     with pytest.raises(OutputError, match="finish the sweep first"):
-        read_table(tmp_path)
+        read_table(tmp_path, grid)
     (tmp_path / "sweep.parquet").write_bytes(b"PAR1")
     with pytest.raises(OutputError, match="damaged"):
-        read_table(tmp_path)
+        read_table(tmp_path, grid)
     with pytest.raises(OutputError, match="Cannot write"):
         write_table(tmp_path / "nowhere", parse_grid(["a=1", "b=[1, 2],[3, 4]"]), [RECORD])
+    write_table(tmp_path, grid, [{**RECORD, "values": {"a": 1, "b": "x"}}])
+    for other in (["a=1", "c=x,y"], ["a=x", "b=x,y"]):
+        with pytest.raises(OutputError, match="damaged"):
+            read_table(tmp_path, parse_grid(other))
+    path = tmp_path / "sweep.parquet"
+    path.write_bytes(path.read_bytes().replace(b"passed", b"parsed", 1))
+    with pytest.raises(OutputError, match="damaged"):
+        read_table(tmp_path, grid)
+    with pytest.raises(OutputError, match="a case's record was altered"):
+        write_table(tmp_path, grid, [RECORD, {**RECORD, "figures": {"duration_s": {}}}])
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b'{"case": 0, "valu',
+        b"[]",
+        b"\xff",
+        b'{"case": 0}',
+        b'{"case": 1, "values": {"move.duration": 3}, "status": "passed", "reason": ""}',
+        b'{"case": 0, "values": {"move.duration": 4}, "status": "passed", "reason": ""}',
+        b'{"case": 0, "values": {"move.duration": 3}, "status": "passed", "reason": "", "check": []}',
+    ],
+)
+def test_a_case_whose_record_is_damaged_is_not_finished(tmp_path, content):
+    store = prepared(tmp_path, "move.duration=3,4")
+    for case in range(2):
+        store.keep(case, failed(case, store.grid[case], "infeasible", "no"), followed=False)
+    assert store.is_finished(0) and store.is_finished(1)
+    (store.case_folder(0) / "case.json").write_bytes(content)
+    assert not store.is_finished(0) and store.is_finished(1)
+    with pytest.raises(OutputError, match=r"000.case.json: missing or damaged; sweep again\."):
+        list(store.records())

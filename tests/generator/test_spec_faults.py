@@ -74,11 +74,34 @@ FAULTS = [
     ("axis.cart.unit", "inch", r"axis\.cart\.unit: unknown value, found text 'inch' .known: m, mm, .*"),
     ("axis.cart.sign", 0, r"axis\.cart\.sign: unknown value, found 0 .known: 1, -1.\."),
     ("axis.cart.sign", True, r"axis\.cart\.sign: unknown value, found true .*"),
+    # words of other trades and products, and keys of other tables
+    ("limits.vel", 1.0, r"limits\.vel: unknown key; did you mean 'velocity'\?"),
+    ("limits.beschleunigung", 1.0, r"limits\.beschleunigung: unknown key; did you mean 'acceleration'\?"),
+    (
+        "plant.type",
+        "bridge-crane",
+        r"plant\.type: .*; did you mean 'double-pendulum-crane' or 'gantry-crane'\?",
+    ),
+    ("plant.l1", 6.0, r"plant\.l1: unknown key; did you mean 'L1'\?"),
+    ("plant.L", 6.0, r"plant\.L: unknown key; did you mean 'L1' or 'L2'\?"),
+    ("plant.seil", 6.0, r"plant\.seil: unknown key; did you mean 'L1'\?"),
+    ("L1", 6.0, r"L1: unknown key; did you mean 'plant\.L1'\?"),
+    ("distance", 6.0, r"distance: unknown key; did you mean 'move\.distance'\?"),
+    ("move.velocity", 6.0, r"move\.velocity: unknown key; did you mean 'limits\.velocity'\?"),
+    ("robustness.L1", 0.1, r"robustness\.L1: unknown key; did you mean 'robustness\.uncertain\.L1'\?"),
+    ("solver.method", "ZVD", r"solver\.method: unknown value, found text 'ZVD'; did you mean 'zvd'\?"),
+    ("move.duration", "min", r"move\.duration: .*, found text 'min'; did you mean 'minimum'\?"),
+    # numbers as people write them
+    ("plant.L1", "6,0", r"plant\.L1: .*, found text '6,0'; write a decimal point: 6\.0\."),
+    ("plant.L1", "1.000,5", r"plant\.L1: .*; write a decimal point, and nothing between thousands\."),
+    ("plant.L1", "6.0 m", r"plant\.L1: .*; write the number alone, in SI units \(m, s, kg, rad\)\."),
+    ("robustness.uncertain.L1", "10 %", r"robustness\.uncertain\.L1: .*; write a share: 0\.1\."),
+    ("plant.L1", ".5", r"plant\.L1: .*; write a digit on both sides of the decimal point\."),
     # numbers that are none, or too large, or too small
     ("move.target", 1e-300, r"move\.distance: must be zero, or at least 1e-12 m .or rad.\."),
     ("plant.m1", -0.2, r"plant\.m1: must be a number from 0\.0001 to 1e\+06 kg, found -0\.2\."),
     ("plant.m1", 0, r"plant\.m1: must be a number .*, found 0\."),
-    ("plant.L1", "0.47", r"plant\.L1: must be a number .*, found text '0\.47'\."),
+    ("plant.L1", "0.47", r"plant\.L1: must be a number .*, found text '0\.47'; write it without quotes\."),
     ("plant.L1", float("nan"), r"plant\.L1: must be a number .*, found nan\."),
     ("plant.L1", float("inf"), r"plant\.L1: must be a number .*, found inf\."),
     ("plant.L1", True, r"plant\.L1: must be a number .*, found true\."),
@@ -103,7 +126,7 @@ FAULTS = [
     (
         "move.duration",
         "3 s",
-        r"move\.duration: must be a number of seconds, or .minimum., found text '3 s'\.",
+        r"move\.duration: must be a number of seconds, or .minimum., found text '3 s'; write .*\.",
     ),
     ("move.duration", [3.0], r"move\.duration: must be a finite number, found an array\."),
     (
@@ -115,7 +138,11 @@ FAULTS = [
     ("limits.velocity", -1, r"limits\.velocity: must be greater than 0, found -1\.0\."),
     ("cost.sway_weight", -1, r"cost\.sway_weight: must be at least 0, found -1\.0\."),
     ("check.residual_sway", 0, r"check\.residual_sway: must be a finite number greater than 0, found 0\."),
-    ("check.residual_sway", "3 mm", r"check\.residual_sway: must be a finite number .*, found text '3 mm'\."),
+    (
+        "check.residual_sway",
+        "3 mm",
+        r"check\.residual_sway: must be a finite number .*, found text '3 mm'; write .*\.",
+    ),
     ("check.residual_sway.hook", -1, r"check\.residual_sway\.hook: must be a finite number .*, found -1\."),
     (
         "robustness.uncertain.L1",
@@ -127,8 +154,16 @@ FAULTS = [
         0.1,
         r"robustness\.uncertain\.c1: its value is 0, so a relative range is empty\.",
     ),
-    ("export.cycle_time", 0, r"export\.cycle_time: must be at least 1e-05 and at most 1 s, found 0\.0\."),
-    ("export.cycle_time", 4, r"export\.cycle_time: must be .* at most 1 s, found 4\.0\."),  # meant as ms
+    (
+        "export.cycle_time",
+        0,
+        r"export\.cycle_time: must be at least 1e-05 and at most 1 s \(4 ms are 0\.004\), found 0\.0\.",
+    ),
+    (
+        "export.cycle_time",
+        4,
+        r"export\.cycle_time: must be .* at most 1 s \(4 ms are 0\.004\), found 4\.0\.",
+    ),  # meant as ms
     ("can.node", 128, r"can\.node: must be at least 1 and at most 127, found 128\."),
     ("can.node", 1.5, r"can\.node: must be a whole number, found 1\.5\."),
     ("can.node", 10**400, r"can\.node: must be at least 1 .*, found a whole number of more than 18 digits\."),
@@ -145,6 +180,11 @@ FAULTS = [
     ("robustness.nominal_zero", 1, r"robustness\.nominal_zero: must be true or false, found 1\."),
     ("limits.travel", [0.0], r"limits\.travel: must be an array of 2 numbers, found an array\."),
     # what contradicts
+    (
+        "limits.travel",
+        [10, 0],
+        r"limits\.travel: must be two rising numbers, such as \[0\.0, 10\.0\], found \[10, 0\]\.",
+    ),
     ("move.shortest", True, r"move\.shortest: unknown key; write duration = \"minimum\"\."),
     ("limits.travel", [0.0, 0.2], r"limits\.travel: must contain the move's target, found \[0\.0, 0\.2\]\."),
     ("robustness.nominal_zero", True, r"robustness\.nominal_zero: only with method = \"range\"; .*\."),

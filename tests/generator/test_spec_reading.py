@@ -1,6 +1,7 @@
 """Specs from files, presets and overrides."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -89,8 +90,35 @@ def test_another_encoding(tmp_path):
     ],
 )
 def test_malformed_toml_is_located(text, where):
-    with pytest.raises(SpecError, match=rf"^bay\.toml: not valid TOML: .*{where}\)\.$"):
+    with pytest.raises(SpecError, match=rf"^bay\.toml: not valid TOML: .*{where}\)(; write .*)?\.$"):
         parse_spec(text, source="bay.toml")
+
+
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("L1 = 6,0", "; write a decimal point: 6.0."),
+        ("uncertain = { L1 = 0,1 }", "; write a decimal point: 0.1."),
+        ("uncertain = { L1 = 10 % }", "; write a share: 0.1."),
+        ("L1 = 6.0 m  # rope", "; write the number alone, in SI units (m, s, kg, rad)."),
+        ("L1 = .5", "; write a digit on both sides of the decimal point."),
+        ("L1: 6.0", "; write = between a key and its value."),
+        ("L1 = 6.0;", "; a comment begins with #."),
+        ("L1 = 6.0 // rope", "; a comment begins with #."),
+        ("type = tower-crane", "; a text stands in quotes."),
+        ("travel = [0, 1", "."),
+    ],
+)
+def test_what_was_taken_for_toml_is_told(line, hint):
+    with pytest.raises(SpecError) as caught:
+        parse_spec(f"[plant]\n{line}\n")
+    assert re.sub(r".*\(at [^)]*\)", "", str(caught.value)) == hint
+
+
+def test_a_mistyped_file_is_told(tmp_path):
+    (tmp_path / "bay-3.toml").write_text("", "utf-8")
+    with pytest.raises(OutputError, match=r"No such file or directory; did you mean 'bay-3\.toml'\?"):
+        read_spec(tmp_path / "bay-3.tml")
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,8 @@ class DefaultGroup(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments, the default command put in."""
+        if args[:1] == ["help"] and not Path("help").exists():
+            args = [*args[1:], "--help"]
         own = {option for parameter in self.get_params(ctx) for option in parameter.opts}
         completing_first_word = ctx.resilient_parsing and not args
         if not completing_first_word and (not args or (args[0] not in self.commands and args[0] not in own)):

@@ -15,7 +15,7 @@ from gen_profile.errors import CheckFailed, SpecError
 from gen_profile.manifest import FILENAME, parse_manifest
 from gen_profile.spec import Spec
 from gen_profile.spec_reading import overridden, spec_from_dict
-from gen_profile.suggestion import decimal_point, suggestion
+from gen_profile.suggestion import number_meant, suggestion
 from gen_profile.workflows.check import Judgement, check_artefact
 from gen_profile.workflows.sweep_case import PASSED
 from gen_profile.workflows.sweep_grid import Axis, Grid, overrides
@@ -120,7 +120,7 @@ def lookup(folder: Path, asked: Mapping[str, str], progress: Callable[[str], Non
     """
     grid = grid_of(folder)
     wanted = _wanted(grid, asked)
-    rows, nearest = _near(grid, read_table(folder), wanted)
+    rows, nearest = _near(grid, read_table(folder, grid), wanted)
     if nearest is None:
         raise CheckFailed(f"The sweep in {folder} has no profile that passed and could be used.")
     _spec_there(folder / nearest["folder"], wanted)  # may refuse what was asked for
@@ -173,7 +173,7 @@ def _value(axis: Axis, text: str | None) -> float | str:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise SpecError(f"--{axis.key}: must be a finite number, found {text[:60]!r}{decimal_point(text)}.")
+        raise SpecError(f"--{axis.key}: must be a finite number, found {text[:60]!r}{number_meant(text)}.")
     return value
 
 

@@ -85,10 +85,11 @@ def write_library(folder: Path, path: Path) -> Library:
     """
     format_ = container_of(path)
     container, stem = find_container(format_), path.name[: -len(formats()[format_].suffix)]
-    keys = [axis.key for axis in grid_of(folder).axes]
+    grid = grid_of(folder)
+    keys = [axis.key for axis in grid.axes]
     profiles: list[dict[str, Any]] = []
     entries, target = [], None
-    for row in _passed(read_table(folder)):
+    for row in _passed(read_table(folder, grid)):
         artefact = _block_of(row)
         content = read_swept(folder / row["folder"] / artefact["path"], artefact["sha256"])
         target = target or _target(folder / row["folder"], stem.removeprefix("FB_"))

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import logging
 import signal
+import sys
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -193,18 +195,12 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Client]:
 
     The latter speak TLS with a key of their own, as whoever reaches a scheduler can run what he likes.
     """
-    with ExitStack() as stack:
+    stack = ExitStack()
+    try:
         cluster: LocalCluster | str
         if scheduler is None:
-            cluster = LocalCluster(
-                n_workers=workers or CPU_COUNT,
-                threads_per_worker=1,
-                security=True,
-                dashboard_address=None,
-                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # of its health page, which stays
-                silence_logs=logging.CRITICAL,
-            )
-            stack.enter_context(cluster)
+            with _undisturbed():
+                cluster = stack.enter_context(_local_cluster(workers or CPU_COUNT))
         else:
             cluster = scheduler
         try:
@@ -215,6 +211,44 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         if scheduler is None:
             client.run(_ignore_interrupts)  # a terminal sends Ctrl-C to them, too; this process ends them
         yield client
+    finally:
+        with _undisturbed():
+            stack.close()
+
+
+def _local_cluster(workers: int) -> LocalCluster:
+    """Start processes of this computer, which never hear Ctrl-C where that can be had from the start."""
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # which tells of processes that are stopped
+    with ExitStack() as stack:
+        if sys.platform != "win32":
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            stack.callback(signal.pthread_sigmask, signal.SIG_SETMASK, before)
+        return LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            security=True,
+            dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # of its health page, which stays
+            silence_logs=logging.CRITICAL,
+        )
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Put interruptions off until the block is done: Dask cannot end processes that are about to start."""
+    came: list[int] = []
+    before: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if callable(signal.getsignal(number)):
+                before[number] = signal.signal(number, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        for stopping, handler in before.items():
+            signal.signal(stopping, handler)
+        for first in came[:1]:
+            signal.raise_signal(first)
 
 
 def _ignore_interrupts() -> None:

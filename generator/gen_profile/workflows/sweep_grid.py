@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gen_profile.errors import SpecError
+from gen_profile.suggestion import number_meant
 
 CHAIN = 10  # cases, at most, that are solved one after another, each from its neighbour's solution
 MOST_CASES = 10_000_000
@@ -111,7 +112,9 @@ def _axis(text: str) -> Axis:
     key, equals, stated = (part.strip() for part in text.partition("="))
     if not equals or not stated or not all(step.strip() for step in key.split(".")):
         raise SpecError(f"--vary {text!r}: write KEY=LO:HI:N or KEY=VALUE,VALUE,…")
-    values = _range(text, stated.split(":")) if stated.count(":") == 2 else _listed(stated)
+    parts = stated.split(":")
+    numbers = len(parts) > 1 and all(_is_number(part.replace(",", ".")) for part in parts)
+    values = _range(text, parts) if numbers or len(parts) == 3 else _listed(stated)
     try:
         different = {json.dumps(value, allow_nan=False) for value in values}
     except (TypeError, ValueError) as error:
@@ -122,14 +125,28 @@ def _axis(text: str) -> Axis:
 
 
 def _range(text: str, parts: Sequence[str]) -> list[float]:
+    if len(parts) < 3:
+        raise SpecError(f"--vary {text!r}: say how many values to take, as LO:HI:N, such as {text}:5.")
     try:
-        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+        first, last, number = parts
+        low, high, count = float(first), float(last), int(number)
     except ValueError as error:
-        raise SpecError(f"--vary {text!r}: LO:HI:N are two numbers and how many values to take.") from error
+        point = next(filter(None, map(number_meant, parts)), "")
+        raise SpecError(
+            f"--vary {text!r}: LO:HI:N are two numbers and how many values to take{point}."
+        ) from error
     if not 2 <= count <= MOST_CASES or not (math.isfinite(low) and math.isfinite(high)):
         raise SpecError(f"--vary {text!r}: take two values or more, from one finite number to another.")
     inner = [float(f"{value:.{DIGITS}g}") for value in np.linspace(low, high, count)[1:-1]]
     return [low, *inner, high]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _listed(stated: str) -> list[Any]:

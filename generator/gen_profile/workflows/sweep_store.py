@@ -31,6 +31,14 @@ from gen_profile.workflows.sweep_grid import Axis, Grid
 
 FORMAT, FORMAT_VERSION = "gen-profile sweep", 1
 DESCRIPTION, RECORD, TABLE, CASES = "sweep.json", "case.json", "sweep.parquet", "cases"
+RECORD_TYPES = {
+    "status": str,
+    "reason": str,
+    "artefacts": list,
+    "figures": dict,
+    "check": dict,
+    "solver": dict,
+}
 STARTS, LOCK = ".starts", ".lock"
 PER_FOLDER = 1000
 
@@ -61,8 +69,8 @@ class Store:
         return self.folder / case_path(case)
 
     def is_finished(self, case: int) -> bool:
-        """Whether a case's record is there."""
-        return (self.case_folder(case) / RECORD).is_file()
+        """Whether a case's record is there, and whole: a power cut may leave a part."""
+        return self._record(case) is not None
 
     def start(self, case: int) -> bytes | None:
         """Find what a case's neighbour left for it to begin at."""
@@ -92,9 +100,31 @@ class Store:
         shutil.rmtree(self.folder / STARTS, ignore_errors=True)
 
     def records(self) -> Iterator[dict[str, Any]]:
-        """Read the records of all cases, which must be finished, in their order."""
+        """Read the records of all cases in their order.
+
+        Raises
+        ------
+        OutputError
+            One is not finished.
+        """
         for case in range(len(self.grid)):
-            yield json.loads((self.case_folder(case) / RECORD).read_bytes())
+            record = self._record(case)
+            if record is None:
+                raise OutputError(f"{self.case_folder(case) / RECORD}: missing or damaged; sweep again.")
+            yield record
+
+    def _record(self, case: int) -> dict[str, Any] | None:
+        """Read a case's record, if it is there and one of this case."""
+        try:
+            record = json.loads((self.case_folder(case) / RECORD).read_bytes())
+        except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
+            return None
+        own = {"case": case, "values": self.grid[case]}
+        if not isinstance(record, dict) or any(record.get(key) != value for key, value in own.items()):
+            return None
+        whole: dict[str, Any] = {"artefacts": [], "figures": {}, "check": {}, "solver": {}} | record
+        sound = all(isinstance(whole.get(key), kind) for key, kind in RECORD_TYPES.items())
+        return record if sound else None
 
     def _start_path(self, case: int) -> Path:
         return self.folder / STARTS / f"{case}.npz"
@@ -200,9 +230,11 @@ def _description(folder: Path) -> dict[str, Any]:
             raise ValueError("another format")
     except OSError as error:
         raise OutputError(f"There is no sweep in {folder}: cannot read {path} ({error.strerror}).") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise OutputError(f"{path}: not a sweep of this version of gen-profile.") from error
-    if not isinstance(document.get("vary"), dict):
+    vary = document.get("vary")
+    values = vary.values() if isinstance(vary, dict) else ()
+    if not values or not all(isinstance(listed, list) and listed for listed in values):
         raise OutputError(f"{path}: damaged; sweep again.")
     return dict(document)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ ARTEFACTS = pa.list_(
         ]
     )
 )
+COLUMNS = {"case": pa.int64(), "status": pa.string(), "folder": pa.string()}
 
 
 def write_table(folder: Path, grid: Grid, records: Iterable[Mapping[str, Any]]) -> Path:
@@ -41,9 +42,23 @@ def write_table(folder: Path, grid: Grid, records: Iterable[Mapping[str, Any]]) 
     Raises
     ------
     OutputError
-        It cannot be written.
+        It cannot be written, or a record was altered.
     """
-    records = iter(records)
+    path = folder / TABLE
+    unfinished = path.with_name(f".{TABLE}")
+    try:
+        pq.write_table(_gathered(grid, iter(records)), unfinished, write_page_checksum=True)
+        unfinished.replace(path)
+    except OSError as error:
+        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
+    except pa.ArrowException as error:
+        raise OutputError(
+            f"{folder}: a case's record was altered ({error}); sweep to another folder."
+        ) from error
+    return path
+
+
+def _gathered(grid: Grid, records: Iterator[Mapping[str, Any]]) -> Table:
     parts = []
     while batch := list(islice(records, BATCH)):
         parts.append(_columns([_row(grid, record) for record in batch]))
@@ -51,18 +66,11 @@ def write_table(folder: Path, grid: Grid, records: Iterable[Mapping[str, Any]]) 
     for index, field in enumerate(table.schema):
         if pa.types.is_null(field.type):  # no case has it
             table = table.set_column(index, field.name, table.column(index).cast(pa.float64()))
-    path = folder / TABLE
-    unfinished = path.with_name(f".{TABLE}")
-    try:
-        pq.write_table(table, unfinished)
-        unfinished.replace(path)
-    except OSError as error:
-        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
-    return path
+    return table
 
 
-def read_table(folder: Path) -> Table:
-    """Read the table.
+def read_table(folder: Path, grid: Grid) -> Table:
+    """Read the table of a grid's cases.
 
     Raises
     ------
@@ -71,13 +79,18 @@ def read_table(folder: Path) -> Table:
     """
     path = folder / TABLE
     try:
-        return pq.read_table(path)
+        table = pq.read_table(path, page_checksum_verification=True)
+        columns = {axis.key: pa.float64() if axis.numeric else pa.string() for axis in grid.axes} | COLUMNS
+        for name, type_ in columns.items():
+            if table.schema.field(name).type != type_:
+                raise pa.ArrowInvalid(f"another type of {name}")
     except FileNotFoundError as error:
         raise OutputError(
             f"There is no {TABLE} in {folder}: finish the sweep first (the same gen-profile sweep goes on)."
         ) from error
-    except (OSError, pa.ArrowException) as error:
+    except (OSError, KeyError, pa.ArrowException) as error:
         raise OutputError(f"{path}: damaged ({error}); sweep again, which only gathers it anew.") from error
+    return table
 
 
 def cell(axis: Axis, value: Any) -> float | str:
