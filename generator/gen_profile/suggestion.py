@@ -87,8 +87,9 @@ def _misspelt(word: str, names: Iterable[str]) -> list[str]:
     """Find the name most like a word, parts that both have aside: a tower crane is no bridge crane."""
 
     def likeness(name: str) -> float:
-        parts = word.split("-"), name.lower().split("-")
-        rests = ["-".join(part for part in own if not all(part in each for each in parts)) for own in parts]
+        own, other = word.split("-"), name.lower().split("-")
+        shared = {*own} & {*other} if 2 * len({*own} & {*other}) <= len(own) else set[str]()
+        rests = ["-".join(part for part in parts if part not in shared) for parts in (own, other)]
         return difflib.SequenceMatcher(None, rests[0], rests[1]).ratio()
 
     best = max(names, key=likeness, default="")

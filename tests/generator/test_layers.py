@@ -78,6 +78,32 @@ def test_shapers_need_numpy_only(heavy):
     assert heavy not in loaded_by("gen_profile.shapers.shaped_move")
 
 
+FAULTY = """
+import sys
+from gen_profile.cli import main
+sys.argv = ["gen-profile", *{arguments!r}]
+try:
+    main()
+except SystemExit as stop:
+    print(stop.code, *sys.modules)
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--set", "plant.m1=-1"],
+        ["--export", "cvs"],
+        ["compare", "--set", "L1=5"],
+        ["fmu", "plant", "no.toml"],
+    ],
+)
+def test_a_fault_of_a_spec_waits_for_nothing_heavy(arguments):
+    code, *loaded = printed(FAULTY.format(arguments=arguments)).split()
+    assert code == "2"
+    assert not {"casadi", "scipy", "fmpy", "rich", "filelock", "lxml", "can"} & {*loaded}
+
+
 def test_that_test_would_see_casadi():
     assert "casadi" in loaded_by("gen_profile.problem.linearization")
 

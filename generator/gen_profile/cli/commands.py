@@ -1,4 +1,4 @@
-"""The commands. Each imports its workflow when it runs: ``--help`` must not wait for CasADi."""
+"""The commands. Each imports its workflow once its spec is read: no fault waits for CasADi, nor does ``--help``."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from gen_profile.cli.options import (
     export_option,
     json_option,
     plot_option,
+    require_formats,
     spec_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome, warn
@@ -68,11 +69,6 @@ def design(
     as_json: bool,
 ) -> None:
     """Design, export and verify (the default)."""
-    from gen_profile.cli import words
-    from gen_profile.cli.progress import progress
-    from gen_profile.manifest import FILENAME
-    from gen_profile.workflows.design import design as run
-
     columns = None if csv_columns is None else [name.strip() for name in csv_columns.split(",")]
     overrides += as_overrides(
         {
@@ -85,6 +81,12 @@ def design(
         }
     )
     spec = chosen_spec(spec_path, preset, overrides)
+    require_formats(formats)
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import progress
+    from gen_profile.manifest import FILENAME
+    from gen_profile.workflows.design import design as run
+
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
     print_outcome(outcome.to_dict(), words.design(outcome), as_json)
@@ -114,11 +116,11 @@ def compare(
     as_json: bool,
 ) -> None:
     """Compare optimal profiles with shapers."""
+    spec = chosen_spec(spec_path, preset, overrides + as_overrides({"solver.base": base}))
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.compare import compare as run
 
-    spec = chosen_spec(spec_path, preset, overrides + as_overrides({"solver.base": base}))
     if picture is not None:
         from gen_profile.workflows.comparison_plot import draw
         from gen_profile.workflows.picture import require_drawable
@@ -189,6 +191,10 @@ def check(
 
     The spec comes from the manifest beside the artefact unless one is named.
     """
+    given = spec_path is not None or preset is not None
+    if overrides and not given:
+        raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")
+    spec = chosen_spec(spec_path, preset, overrides) if given else None
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.check import check_artefact
@@ -197,10 +203,6 @@ def check(
 
     if table_path is not None:
         require_place(table_path)
-    given = spec_path is not None or preset is not None
-    if overrides and not given:
-        raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")
-    spec = chosen_spec(spec_path, preset, overrides) if given else None
     with progress() as tell:
         tell("checking by co-simulation")
         judgement = check_artefact(

@@ -59,17 +59,17 @@ def fmu(
     as_json: bool,
 ) -> None:
     """Write an FMU of a plant, of a profile, or of the system of both; or both FMUs as an SSP."""
+    if input_name is not None and kind not in {"plant", "ssp"}:
+        raise SpecError(f"--input: a {kind} has no inputs but its trigger; leave it out, or write a plant.")
+    if source_only and platform is not None:
+        raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
+    spec = chosen_spec(spec_path, preset, overrides)
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.fmu import export_fmu, platform_names
     from gen_profile_fmu.fmu_files import Version
     from gen_profile_fmu.model import AUTHOR
     from gen_profile_fmu.plant_variables import InputKind
 
-    if input_name is not None and kind not in {"plant", "ssp"}:
-        raise SpecError(f"--input: a {kind} has no inputs but its trigger; leave it out, or write a plant.")
-    if source_only and platform is not None:
-        raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
-    spec = chosen_spec(spec_path, preset, overrides)
     platforms = () if source_only else platform_names(platform or "host")
     with progress() as tell:
         made = export_fmu(

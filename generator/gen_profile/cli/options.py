@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -71,6 +71,19 @@ def export_option(what: str) -> Callable[[Command], Command]:
         shell_complete=_complete_formats,
         help=f"{what} (see gen-profile formats). Repeatable; csv by default.",
     )
+
+
+def require_formats(names: Iterable[str]) -> None:
+    """Refuse unknown formats.
+
+    Raises
+    ------
+    SpecError
+    """
+    from gen_profile_exporters.registry import find_exporter
+
+    for name in names:
+        find_exporter(name)
 
 
 plot_option = click.option(

@@ -60,6 +60,7 @@ def robustness(
     as_json: bool,
 ) -> None:
     """Show residual sway over one or two parameters, optimal motions beside shapers."""
+    spec = chosen_spec(spec_path, preset, overrides)
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
     from gen_profile.workflows.delivery import deliver, require_place
@@ -67,7 +68,6 @@ def robustness(
     from gen_profile.workflows.robustness import robustness as run
     from gen_profile.workflows.robustness_table import table
 
-    spec = chosen_spec(spec_path, preset, overrides)
     if picture is not None:
         require_drawable(picture)
     if path is not None:
