@@ -1,4 +1,4 @@
-"""The commands. Each imports its workflow once its spec is read: no fault waits for CasADi, nor does ``--help``."""
+"""The commands. Each imports its workflow once its spec is read: no fault and no ``--help`` waits for CasADi."""
 
 from __future__ import annotations
 
