@@ -89,9 +89,20 @@ def overridden(document: Mapping[str, Any], overrides: Sequence[str]) -> Table:
         An override makes no sense.
     """
     changed = copy.deepcopy(dict(document))
-    for override in overrides:
-        _override(changed, override)
+    overridden_in(changed, overrides)
     return changed
+
+
+def overridden_in(document: Table, overrides: Sequence[str]) -> None:
+    """Set keys such as ``plant.L1=0.5`` in nested plain values.
+
+    Raises
+    ------
+    SpecError
+        An override makes no sense.
+    """
+    for override in overrides:
+        _override(document, override)
 
 
 def presets() -> dict[str, str]:

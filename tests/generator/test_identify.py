@@ -142,6 +142,41 @@ def test_readings_beyond_what_the_machine_can_have():
     assert outcome.errors[-1] == "Error: --measured L1: must be from 0.01 to 200 m, found -0.47."
 
 
+EXTREMES = ("0", "-1", "1e308", "5e-324", "1e400", "99999999999999999999", "nan", "1.7", "0.47")
+COUNTS = ("", "/0", "/10", "/99999999999999999999", f"/{'9' * 400}")
+
+
+def extreme_words(random, folder):
+    """Readings, logs and options as a slip of the hand, or an enemy, writes them."""
+
+    def one(choices):
+        return str(random.choice(choices))
+
+    words = [f"--period={one(EXTREMES)}±{one(EXTREMES)}{one(COUNTS)}" for _ in range(random.integers(2))]
+    words += [f"--measured=L1={one(EXTREMES)}±{one(EXTREMES)}" for _ in range(random.integers(2))]
+    if random.random() < 0.4:
+        step, size = (
+            float(one(("0.1", "1e-9", "1e300"))),
+            float(one(("0", "0.1", "1e308", "1e-310", "inf", "nan"))),
+        )
+        rows = [f"{k * step!r};{size * (-1) ** k!r}" for k in range(20)]
+        (folder / "log.csv").write_text("\n".join(rows), "utf-8")
+        words += ["--swing", folder / "log.csv"]
+        words += one(
+            ("", "--at=nan", "--at=1e308", "--after=nan", "--unit=1e300deg", "--signal=sway")
+        ).split()
+    return [*words, "--free", one(("L1", "g", "c1"))]
+
+
+def test_whatever_is_typed_ends_in_a_sentence(tmp_path):
+    random = np.random.default_rng(12)
+    for _ in range(80):
+        words = extreme_words(random, tmp_path)
+        outcome = run_here("identify", "--preset", "paper", "--out", tmp_path / "o.toml", *words)
+        assert outcome.code in {0, 2, 3}, (words, outcome.errors)
+        assert outcome.code == 0 or outcome.errors[-1].endswith((".", "?"))
+
+
 @pytest.mark.parametrize("column", ["angel", "3", "0"])
 def test_columns_that_are_not_there(column):
     with pytest.raises(OutputError, match=f"there is no column '{column}'.*angle.*[.?]$"):
@@ -171,7 +206,8 @@ def test_an_identified_spec_is_designed_for(tmp_path, monkeypatch):
     assert spec.plant.parameters["L2"] == pytest.approx(document["parameters"]["L2"]["value"], abs=1e-4)
     for name, row in document["parameters"].items():
         share = row["half_range"] / row["value"]
-        assert share <= spec.robustness.uncertain[name] < 1.1 * share + 0.01
+        stated = preset_spec("paper").robustness.uncertain.get(name, 0.0)  # is never narrowed
+        assert max(share, stated) <= spec.robustness.uncertain[name] < max(1.1 * share + 0.01, stated + 1e-9)
     assert run_here("identified.toml", "--set", "check.residual_sway=0.02", "--no-check").code == 0
 
 
@@ -305,6 +341,42 @@ def test_an_unwritable_spec(tmp_path):
         write_spec(preset_spec("paper"), tmp_path / "file" / "spec.toml")
 
 
+SPEC = """\
+name = "bay" # ours
+
+[plant]
+type = "single-pendulum-crane"
+L0 = 2.6   # m, slings
+[move]
+distance = [4.0, 0.0]
+duration = 14.0 # s
+[robustness]
+uncertain = {L0 = 0.1} # of any sling
+"""
+
+
+def test_what_the_author_of_a_spec_wrote_stays(tmp_path):
+    """Comments, and a range that is wider than what one measurement leaves open."""
+    (tmp_path / "bay.toml").write_text(SPEC, "utf-8")
+    times = np.arange(0.0, 20.0, 0.1)
+    angle = swing(HOIST.nominal() | {"L0": 3.0}, times, [0.1, 0.0], (4.0, 0.0))
+    rows = "".join(f"{t:.1f};{v:.5f}\n" for t, v in zip(times, angle, strict=True))
+    (tmp_path / "log.csv").write_text(rows, "utf-8")
+    words = (
+        "identify", tmp_path / "bay.toml", "--set", "move.duration=15.0", "--swing", tmp_path / "log.csv",
+        "--free", "L0", "--out", tmp_path / "new.toml", "--plot", tmp_path / "fit.png",
+    )  # fmt: skip
+    found = run_here(*words)
+    assert (found.code, found.errors) == (0, [])
+    text = (tmp_path / "new.toml").read_text("utf-8")
+    length = read_spec(tmp_path / "new.toml").plant.parameters["L0"]
+    assert length == pytest.approx(3.0, abs=1e-3)
+    changed = SPEC.replace("L0 = 2.6", f"L0 = {length}").replace("14.0", "15.0")
+    assert text == changed
+    assert re.search(r"kept +the spec's range of L0, ±10", found.out)
+    assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize("preset", ["paper", "tower-crane", "mass-spring-chain"])
 def test_a_written_spec_reads_back_the_same(tmp_path, preset):
     spec = preset_spec(preset)
@@ -316,6 +388,10 @@ def test_other_ranges_of_the_spec_stay_as_they_are():
     spec = preset_spec("paper", ["robustness.uncertain={L2=0.2}", "robustness.method=none"])
     found = identify(spec, [parse_reading("L1=0.5±0.005")])
     assert dict(found.spec.robustness.uncertain) == {"L1": 0.026, "L2": 0.2}
+    stated = identify(
+        preset_spec("paper", ["robustness.uncertain={L1=0.1}"]), [parse_reading("L1=0.5±0.005")]
+    )
+    assert dict(stated.spec.robustness.uncertain) == {"L1": 0.1}
     assert found.spec.robustness.method == "none"
     bare = identify(
         preset_spec("paper", ["robustness.uncertain={}", "robustness.method=none"]),

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import chosen_spec, debug_option, json_option, spec_options
+from gen_profile.cli.options import chosen_text, debug_option, json_option, plot_option, spec_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
@@ -73,6 +73,7 @@ from gen_profile.errors import SpecError
     default=Path("identified.toml"),
     help="Spec to write; ./identified.toml by default.",
 )
+@plot_option
 @json_option
 @debug_option
 def identify(
@@ -91,16 +92,25 @@ def identify(
     free: tuple[str, ...],
     at: str | None,
     out: Path,
+    picture: Path | None,
     as_json: bool,
 ) -> None:
     """Find parameters from measurements on site, and write a spec."""
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
     from gen_profile.identification.measurements import Measurement, parse_period, parse_reading
+    from gen_profile.spec_reading import parse_spec
     from gen_profile.workflows.identify import identify as run
     from gen_profile.workflows.identify import read_swing, write_spec
+    from gen_profile.workflows.identify_plot import draw, require_drawable
+    from gen_profile.workflows.spec_text import changed_text
 
-    spec = chosen_spec(spec_path, preset, overrides)
+    text, source, folder = chosen_text(spec_path, preset)
+    spec = parse_spec(text, overrides, source, folder)
+    if picture is not None:
+        require_drawable(picture)
+        if log is None:
+            raise SpecError("--plot: draws a log and what is left of it: name one (--swing).")
     measurements: list[Measurement] = [*map(parse_reading, readings), *map(parse_period, periods)]
     with progress() as tell:
         tell("identifying")
@@ -119,7 +129,9 @@ def identify(
             )
             measurements.append(read)
         found = run(spec, measurements, free, None if at is None else _positions(at))
-        write_spec(found.spec, out)
+        if picture is not None:
+            draw(found, picture)
+        write_spec(found.spec, out, changed_text(text, overrides, spec, found.spec, folder))
     print_outcome({**found.to_dict(), "path": str(out)}, words.identification(found, out), as_json)
 
 

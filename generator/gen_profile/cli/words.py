@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from io import StringIO
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +35,8 @@ MANIFEST_WORDS = {
 
 COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
 COSTLY_OVERSHOOT = 0.1  # of the sway on the way, likewise
-UNREST = 2.0  # times farther off the model at a log's beginning than later from which on a warning is due
+NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
+RESTS = 0.5  # of a half-range, from which on 1 % of another parameter is worth a word
 
 # head → unit, figure, how many of the unit make one of the figure's
 COLUMNS = {
@@ -173,30 +174,64 @@ def identification(found: Identification, path: Path) -> str:
         what = row["parameter"] if "parameter" in row else f"period of mode {row['mode']}"
         read = row["value"] if "parameter" in row else row["seconds"]
         off = (read - row["model"]) / row["uncertainty"]
-        rows.append((f"read {what}", f"{read:.6g} ± {row['uncertainty']:.2g}, {off:+.1f} σ off the model"))
-    rows += [
-        (
-            f"log of {row['load']}",
-            f"{row['samples']} samples of its {row['quantity']}, noise {row['noise']:.2g}",
-        )
-        for row in document["logs"]
-    ]
-    rows += [
-        (
-            "BEWARE",
-            f"the log of {row['load']} is {row['unrest']:.2g} times farther off the model at first; "
-            "leave out what was logged before the axes stood still (--after)",
-        )
-        for row in document["logs"]
-        if row["unrest"] > UNREST
-    ]
+        size = f"{read:.6g} ± {row['uncertainty']:.2g} {row['unit']}"
+        rows.append((f"read {what}", f"{size}, {off:+.1f} σ off the model"))
+    for row in document["logs"]:
+        rows += _swing(row)
     if found.estimate.contradiction > 1.0:
         widened = (
             f"the readings contradict one another; ranges widened {found.estimate.contradiction:.2g} times"
         )
         rows.append(("BEWARE", widened))
+    rows += [*_stated_ranges(found), *_rests(found)]
     rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]
     return _block(found.spec.name, rows)
+
+
+def _swing(row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Tell of a logged swing, and what is wrong with it."""
+    from gen_profile.identification.estimation import UNREST
+
+    unit, name = row["unit"], f"log of {row['load']}"
+    sizes = f"swing ±{row['swing']:.2g} {unit}, noise {row['noise']:.2g} {unit}"
+    yield name, f"{row['samples']} samples of its {row['quantity']}, {sizes}"
+    if row["unrest"] > UNREST:
+        yield (
+            "BEWARE",
+            f"the {name} is {row['unrest']:.2g} times farther off the model at first; "
+            "leave out what was logged before the axes stood still (--after)",
+        )
+    if (left := row["misfit"]) is not None:
+        yield (
+            "BEWARE",
+            f"a swing of {left['rms']:.2g} {unit} RMS at {left['frequency_rad_per_s']:.3g} rad/s is left of "
+            f"the {name}, which no parameter of this machine explains; ranges that follow from it are "
+            f"{left['widened']:.2g} times wider (--plot shows it)",
+        )
+    if row["noise"] > NOISY * row["swing"]:
+        yield (
+            "BEWARE",
+            f"its noise is {row['noise'] / row['swing']:.0%} of the swing; look at --unit and --signal",
+        )
+
+
+def _stated_ranges(found: Identification) -> Iterator[tuple[str, str]]:
+    """Tell which range of the spec is wider than what the measurements leave open."""
+    for name, row in found.to_dict()["parameters"].items():
+        share = row["half_range"] / abs(row["value"] or 1.0)
+        if row["stated"] is not None and row["stated"] > share:
+            yield "kept", f"the spec's range of {name}, ±{row['stated']:.2%}: it may change in service"
+
+
+def _rests(found: Identification) -> Iterator[tuple[str, str]]:
+    """Tell what a result rests on that was not measured, where a per cent of that matters."""
+    uncertain = found.given.robustness.uncertain
+    for name, row in found.to_dict()["parameters"].items():
+        for other, moved in row["rests_on"].items():
+            if abs(moved) > RESTS * row["half_range"]:
+                range_ = f" (±{uncertain[other]:.2%})" if other in uncertain else ""
+                words = f"{other} as the spec states it{range_}: 1 % more makes {moved:+.2g} {row['unit']}"
+                yield f"{name} rests on", words
 
 
 def sweep(done: Sweep) -> str:

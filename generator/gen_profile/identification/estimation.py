@@ -12,13 +12,17 @@ import attrs
 import numpy as np
 from scipy.stats import norm
 
-from gen_profile.identification.fit import Fit, Machine
+from gen_profile.errors import InfeasibleProblem
+from gen_profile.identification.fit import Fit, Machine, fit_of
 from gen_profile.identification.measurements import DirectReading, Period, SwingLog
+from gen_profile.identification.misfit import Misfit, explanation, misfits
 from gen_profile.identification.swing_model import swing_model
-from gen_profile.identification.uncertainty import uncertainty
+from gen_profile.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.profile import Array
 
 CONFIDENCE = 0.99
+UNREST = 2.0  # times farther off at first, from which on the axes may still have moved then
+EARTH = "g"  # is known wherever a crane stands
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -41,6 +45,14 @@ class Estimate:
         axes still moved then.
     contradiction : float
         Birge ratio by which the uncertainties were widened; 1 where the readings agree.
+    misfits : tuple of Misfit or None
+        What swings in every log beside the machine.
+    widened : tuple of float
+        How many times wider ranges are that follow from every log, because of that.
+    rests_on : dict of str to dict of str to float
+        By how much every parameter found would change if another one, taken as exact, were 1 % greater.
+    swings : tuple of Array
+        What the identified machine would have shown instead of every log.
     """
 
     values: dict[str, float]
@@ -50,6 +62,10 @@ class Estimate:
     noise: tuple[float, ...]
     unrest: tuple[float, ...]
     contradiction: float
+    misfits: tuple[Misfit | None, ...]
+    widened: tuple[float, ...]
+    rests_on: dict[str, dict[str, float]]
+    swings: tuple[Array, ...]
 
 
 def estimate(
@@ -74,30 +90,89 @@ def estimate(
     InfeasibleProblem
         The measurements do not determine the parameters.
     """
-    table = {q.name: q for q in machine.plant.parameters}
-    scale = np.array([abs(machine.parameters[name]) or 1.0 for name in names])
-    fit = Fit(
-        machine=machine,
-        names=tuple(names),
-        scale=scale,
-        bounds=np.array([(table[name].lower, table[name].upper) for name in names]).T / scale,
-        readings=tuple(readings),
-        models=tuple(swing_model(machine.plant, machine.parameters, machine.q_a, log) for log in logs),
-    )
+    models = [swing_model(machine.plant, machine.parameters, machine.q_a, log) for log in logs]
+    fit = fit_of(machine, names, readings, models)
     unknowns, noise = fit.solve()
-    around = uncertainty(fit, unknowns, noise)
-    factor = float(norm.ppf((1.0 + CONFIDENCE ** (1.0 / len(names))) / 2.0))
+    around, found = uncertainty(fit, unknowns, noise), misfits(fit, unknowns)
+    if any(found):
+        _require_unexplained(fit, found)
+    effective = [
+        sigma if one is None else one.widened(sigma, len(model.log.times))
+        for one, sigma, model in zip(found, noise.tolist(), fit.models, strict=True)
+    ]
+    if any(found):
+        around = uncertainty(fit, unknowns, np.array(effective))
+    factor = float(norm.ppf((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
     half_ranges = around.half_ranges(factor)
 
     def by_name(relative: Array) -> dict[str, float]:
-        return dict(zip(names, map(float, relative * fit.scale), strict=True))
+        return dict(zip(fit.names, map(float, relative * fit.scale), strict=True))
 
     return Estimate(
-        values=by_name(unknowns[: len(names)]),
+        values=by_name(unknowns[: len(fit.names)]),
         standard_uncertainty=by_name(half_ranges / factor),
         half_range=by_name(half_ranges),
         model=tuple(map(float, fit.predicted(unknowns))),
         noise=tuple(map(float, noise)),
         unrest=around.unrest(),
         contradiction=around.contradiction,
+        misfits=found,
+        widened=tuple(wide / sigma for wide, sigma in zip(effective, noise.tolist(), strict=True)),
+        rests_on=_rests_on(around),
+        swings=tuple(
+            model.log.values + left for model, left in zip(fit.models, fit.left(unknowns), strict=True)
+        ),
     )
+
+
+def _taken_as_exact(fit: Fit) -> list[str]:
+    """Name the parameters that are neither identified nor known anyway."""
+    return [q.name for q in fit.machine.plant.parameters if q.name not in (*fit.names, EARTH)]
+
+
+def _require_unexplained(fit: Fit, found: Sequence[Misfit | None]) -> None:
+    """Refuse to identify some parameters by a log that tells that others are wrong.
+
+    The range of a wrong model holds nothing.
+    """
+    explained = explanation(fit, _taken_as_exact(fit))
+    if explained is None:
+        return
+    model, left = next((m, one) for m, one in zip(fit.models, found, strict=True) if one is not None)
+    units = {q.name: q.unit for q in fit.machine.plant.parameters}
+    values = ", ".join(f"{name} {value:.4g} {units[name]}" for name, value in explained.values.items())
+    flags = " ".join(f"--free {name}" for name in explained.freed)
+    cure = f"add {flags}, or measure {'it' if len(explained.freed) == 1 else 'them'} (--measured)"
+    if explained.instead:
+        others = " or ".join(explained.instead)
+        cure = (
+            f"another {others} would do as well: measure one of them (--measured), or free the one that is "
+            f"known least ({flags})"
+        )
+    raise InfeasibleProblem(
+        f"The log of {model.log.load} is not of this machine: a swing of {left.rms:.2g} {model.log.unit} "
+        f"RMS, {left.rms / left.noise:.2g} times the noise, is left of it, strongest at "
+        f"{left.frequency:.3g} rad/s. Nothing is left with another {' and '.join(explained.freed)} than the "
+        f"spec's ({values}); {cure}."
+    )
+
+
+def _rests_on(around: Uncertainty) -> dict[str, dict[str, float]]:
+    """Follow 1 % of every parameter that was taken as exact through the fit, for small swings."""
+    fit, exact = around.fit, _taken_as_exact(around.fit)
+    exact = [name for name in exact if fit.machine.parameters[name] != 0.0]
+    wider = fit.freed(exact).small()
+    places = {name: wider.names.index(name) for name in wider.names}
+    own = [places[name] for name in fit.names]
+    unknowns = np.concatenate([wider.expected, around.unknowns[len(fit.names) :]])
+    unknowns[own] = around.unknowns[: len(fit.names)]
+    _, slopes = wider.residuals(unknowns, around.noise)
+    starts = list(range(len(wider.names), slopes.shape[1]))
+    moved = {
+        name: np.linalg.lstsq(slopes[:, [*own, *starts]], -0.01 * slopes[:, places[name]], rcond=None)[0]
+        for name in exact
+    }
+    return {
+        name: {other: float(by[place] * fit.scale[place]) for other, by in moved.items()}
+        for place, name in enumerate(fit.names)
+    }

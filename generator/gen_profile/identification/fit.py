@@ -7,13 +7,15 @@ n (1 − ρ)/(1 + ρ), ρ their correlation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from itertools import pairwise
 
 import attrs
 import numpy as np
 from scipy.optimize import least_squares
 
+from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.identification.measurements import DirectReading, Period
 from gen_profile.identification.swing_model import STEP, SwingModel
 from gen_profile.plants.plant import Plant
@@ -23,6 +25,8 @@ from gen_profile.profile import Array
 NOISE_ROUNDS = 2
 HELD = 0.3  # relative, by which a parameter may leave the spec's while only a part of a log is looked at
 TOLERANCE = 1e-6  # relative, of the sum of squares: it has as many terms as the logs have samples
+HALF = 0.5  # of a swing, which is left where two have the same phase within a twelfth of a period
+STEPS = 60  # of a search; near a solution five are enough
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -69,11 +73,13 @@ class Fit:
 
         A long log has many local minima, one for every period that a wrong frequency can lose over it. So its
         first period is fitted first, and then as much again, until it is used up. What a part of the log does
-        not tell stays near the spec meanwhile.
+        not tell stays near the spec meanwhile. Small swings, which take no integration, are tried first.
         """
         names, guess = self.names, self.expected
         if not self.models:
             return self.improved(guess, np.empty(0)), np.empty(0)
+        if (near := self._as_of_small_swings()) is not None:
+            return self.near(near)
         until, longest = self.models[0].period, max(model.log.times[-1] for model in self.models)
         starts = [model.guess(self.machine.parameters, until) for model in self.models]
         unknowns = np.concatenate([guess, *starts])
@@ -82,10 +88,42 @@ class Fit:
             unknowns = self.improved(unknowns, noise, until)
             noise = self._noise(unknowns, until, len(names))
             until *= 2.0
+        return self.near(unknowns)
+
+    def _as_of_small_swings(self) -> Array | None:
+        """Find the unknowns of small swings, where the machine's own swing is hardly another one."""
+        if all(model.small for model in self.models):
+            return None
+        try:
+            unknowns, _ = self.small().solve()
+            left = self.left(unknowns)
+        except (InfeasibleProblem, CosimulationError, np.linalg.LinAlgError):
+            return None
+        alike = [
+            float(np.std(one)) < HALF * float(np.std(model.log.values))
+            for model, one in zip(self.models, left, strict=True)
+        ]
+        return unknowns if all(alike) else None
+
+    def near(self, unknowns: Array) -> tuple[Array, Array]:
+        """Find the unknowns that agree best with all that was logged, near a guess, and the noise."""
+        noise = self._noise(unknowns, np.inf, len(self.names))
         for _ in range(NOISE_ROUNDS):
             unknowns = self.improved(unknowns, noise)
-            noise = self._noise(unknowns, np.inf, len(names))
+            noise = self._noise(unknowns, np.inf, len(self.names))
         return unknowns, noise
+
+    def freed(self, more: Sequence[str]) -> Fit:
+        """Identify more parameters."""
+        return fit_of(self.machine, (*self.names, *more), self.readings, self.models)
+
+    def beginning(self, parameters: Mapping[str, float]) -> Fit:
+        """Begin the search at other parameters."""
+        return attrs.evolve(self, machine=attrs.evolve(self.machine, parameters=dict(parameters)))
+
+    def small(self) -> Fit:
+        """Take all swings to be small."""
+        return attrs.evolve(self, models=tuple(attrs.evolve(model, small=True) for model in self.models))
 
     def improved(self, guess: Array, noise: Array, until: float = np.inf) -> Array:
         """Find the unknowns that agree best up to a time in s, near a guess."""
@@ -98,6 +136,10 @@ class Fit:
         def at(place: bytes) -> tuple[Array, Array]:
             return self.residuals(np.frombuffer(place), noise, until)
 
+        if not (np.isfinite(guess).all() and np.isfinite(at(np.clip(guess, *inside).tobytes())[0]).all()):
+            raise InfeasibleProblem(
+                "No such machine swings like the measurements, nor near; look for a wrong reading or unit."
+            )
         solution = least_squares(
             lambda z: at(z.tobytes())[0],
             np.clip(guess, *inside),
@@ -105,7 +147,14 @@ class Fit:
             bounds=bounds,
             x_scale="jac",
             ftol=TOLERANCE,
+            max_nfev=STEPS,
         )
+        if solution.status == 0:
+            raise InfeasibleProblem(
+                f"The search for {' and '.join(self.names)} does not come to rest: no such machine swings "
+                "like the measurements; look for a wrong unit or signal, or start nearer, by --set "
+                "plant.NAME=VALUE."
+            )
         return np.asarray(solution.x)
 
     def residuals(self, unknowns: Array, noise: Array, until: float = np.inf) -> tuple[Array, Array]:
@@ -124,7 +173,7 @@ class Fit:
         first = p
         for model, sigma in zip(self.models, noise, strict=True):
             found, by = model.residuals(
-                self._parameters(unknowns),
+                self.parameters(unknowns),
                 self.names,
                 STEP * self.scale,
                 unknowns[first : first + model.unknowns],
@@ -144,7 +193,7 @@ class Fit:
 
     def predicted(self, unknowns: Array) -> Array:
         """Say what the readings would be on a machine."""
-        parameters = self._parameters(unknowns)
+        parameters = self.parameters(unknowns)
         linear = linearize(self.machine.plant, parameters, self.machine.q_a)
         damped = linear.frequencies * np.sqrt(np.maximum(1.0 - linear.damping_ratios**2, 1e-12))
         return np.array(
@@ -156,24 +205,48 @@ class Fit:
             ]
         )
 
-    def _parameters(self, unknowns: Array) -> dict[str, float]:
+    def parameters(self, unknowns: Array) -> dict[str, float]:
+        """Put the unknowns' parameters among the others, by name."""
         values = map(float, unknowns[: len(self.names)] * self.scale)
         return {**self.machine.parameters, **dict(zip(self.names, values, strict=True))}
 
+    def left(self, unknowns: Array, until: float = np.inf) -> list[Array]:
+        """Say what is left of every log up to a time in s, in rad or m."""
+        residuals, _ = self.residuals(unknowns, np.ones(len(self.models)), until)
+        counts = [len(self.readings), *(model.samples(until) for model in self.models)]
+        ends = np.cumsum(counts)
+        return [residuals[low:high] for low, high in pairwise(ends.tolist())]
+
     def _noise(self, unknowns: Array, until: float, parameters: int) -> Array:
         """Estimate every log's standard deviation, widened where neighbouring residuals are alike."""
-        residuals, _ = self.residuals(unknowns, np.ones(len(self.models)), until)
-        first, noise = len(self.readings), []
-        for model in self.models:
-            count = model.samples(until)
-            found = residuals[first : first + count]
-            first += count
+        noise = []
+        for model, found in zip(self.models, self.left(unknowns, until), strict=True):
+            count = len(found)
             square = found @ found
             alike = min(max(float(found[1:] @ found[:-1] / square), 0.0), 0.99) if square > 0.0 else 0.0
             freedom = max(count - model.unknowns - parameters, 1)
             resolution = np.ptp(model.log.values) * 1e-9 or 1e-12  # an exact log has no noise at all
             noise.append(max(np.sqrt(square / freedom * (1.0 + alike) / (1.0 - alike)), resolution))
         return np.array(noise)
+
+
+def fit_of(
+    machine: Machine,
+    names: Sequence[str],
+    readings: Sequence[DirectReading | Period],
+    models: Sequence[SwingModel],
+) -> Fit:
+    """Pose the problem for some of the machine's parameters, in the machine's order."""
+    asked = [q for q in machine.plant.parameters if q.name in names]
+    scale = np.array([abs(machine.parameters[q.name]) or 1.0 for q in asked])
+    return Fit(
+        machine=machine,
+        names=tuple(q.name for q in asked),
+        scale=scale,
+        bounds=np.array([(q.lower, q.upper) for q in asked]).T / scale,
+        readings=tuple(readings),
+        models=tuple(models),
+    )
 
 
 def _measured(reading: DirectReading | Period) -> float:

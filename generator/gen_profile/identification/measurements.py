@@ -20,6 +20,9 @@ from gen_profile.suggestion import suggestion
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
 _VALUE = rf"({_NUMBER})\s*(?:±|\+-|\+/-)\s*({_NUMBER})"
 LEAST_SAMPLES = 16
+GREATEST = 1e9  # s, swings or SI units of any reading
+FINEST = 1e-9  # of a value, to which no instrument reads it
+SI_UNITS = {"angle": "rad", "sway": "m"}  # of what may be logged of a load
 
 
 @attrs.frozen(kw_only=True)
@@ -69,6 +72,11 @@ class SwingLog:
     load: str
 
     @property
+    def unit(self) -> str:
+        """Of the values."""
+        return SI_UNITS[self.quantity]
+
+    @property
     def resolution(self) -> float:
         """Least step between different values, as of an encoder that counts; in rad or m."""
         return float(np.diff(np.unique(self.values)).min(initial=np.inf))
@@ -91,7 +99,7 @@ def parse_reading(text: str) -> DirectReading:
     return DirectReading(
         parameter=name,
         value=float(value),
-        uncertainty=_positive(f"--measured {text!r}", "uncertainty", float(uncertainty)),
+        uncertainty=_spread(f"--measured {text!r}", float(value), float(uncertainty)),
     )
 
 
@@ -109,11 +117,12 @@ def parse_period(text: str) -> Period:
             "swings, or 2:0.70±0.01 for the second mode (+- will do for ±)."
         )
     mode, seconds, uncertainty, swings = found.groups()
-    where, count = f"--period {text!r}", int(swings or 1)
+    where, total = f"--period {text!r}", float(seconds)
+    count = _positive(where, "number of swings", float(swings or 1))
     return Period(
         mode=int(_positive(where, "mode", float(mode or 1))),
-        seconds=_positive(where, "time", float(seconds)) / _positive(where, "number of swings", count),
-        uncertainty=_positive(where, "uncertainty", float(uncertainty)) / count,
+        seconds=_positive(where, "time", total) / count,
+        uncertainty=_spread(where, total, float(uncertainty)) / count,
     )
 
 
@@ -154,6 +163,8 @@ def parse_swing(
         The table cannot be read.
     """
     table = _numbers(read_table(text, source), columns, source) / (per_second, per_unit)
+    if np.abs(table).max(initial=0.0) > GREATEST:
+        raise OutputError(f"{source}: holds {np.abs(table).max():.3g}, which no sensor of a machine shows.")
     table = table[table[:, 0] >= after]
     if len(table) < LEAST_SAMPLES:
         raise OutputError(f"{source}: a swing needs at least {LEAST_SAMPLES} samples, found {len(table)}.")
@@ -197,6 +208,17 @@ def _column(column: str, names: Sequence[str], count: int, source: str) -> int:
 
 
 def _positive(where: str, what: str, value: float) -> float:
-    if not (np.isfinite(value) and value > 0.0):
+    if not value > 0.0:
         raise SpecError(f"{where}: the {what} must be greater than 0.")
+    if value > GREATEST:
+        raise SpecError(f"{where}: the {what} must be {GREATEST:g} at most.")
     return value
+
+
+def _spread(where: str, value: float, uncertainty: float) -> float:
+    """Hold an uncertainty to what an instrument may have."""
+    if abs(value) > GREATEST:
+        raise SpecError(f"{where}: the value must be {GREATEST:g} at most.")
+    if 0.0 < uncertainty < FINEST * abs(value):
+        raise SpecError(f"{where}: nothing is measured to {uncertainty:g} of {value:g}; state what is known.")
+    return _positive(where, "uncertainty", uncertainty)

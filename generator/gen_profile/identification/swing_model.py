@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 
@@ -17,6 +18,8 @@ from gen_profile.profile import Array
 from gen_profile.response import free_swing
 
 STEP = 1e-6  # relative, of numerical slopes
+WIDEST_SWING = math.pi / 4.0  # rad, beyond which nobody lets a load swing
+STILL = 1e-9  # m or rad, which no sensor tells from rest
 SHOWN = 1e-6  # relative size from which on a log shows a part of its start
 
 
@@ -38,6 +41,8 @@ class SwingModel:
         Which of q_u and q̇_u, one after the other, are unknowns; all others are zero.
     period : float
         Of the machine's slowest mode, roughly, in s.
+    small : bool
+        Whether swings are taken to be small, which is a hundred times faster.
     """
 
     plant: Plant
@@ -45,6 +50,7 @@ class SwingModel:
     log: SwingLog
     shown: NDArray[np.intp]
     period: float
+    small: bool = False
 
     @property
     def unknowns(self) -> int:
@@ -58,7 +64,7 @@ class SwingModel:
     def guess(self, parameters: Mapping[str, float], until: float) -> Array:
         """Find the start that the linear model agrees with best, up to a time in s."""
         count = self.samples(until)
-        columns = _linear_answers(self.plant, parameters, self.q_a, self.log)[:count, self.shown]
+        columns = _linear_answers(self.plant, parameters, self.q_a, self.log, count)[:, self.shown]
         design = np.column_stack([columns, np.ones(count)])
         size = np.linalg.norm(design, axis=0)
         start = np.linalg.lstsq(design / size, self.log.values[:count], rcond=1e-8)[0] / size
@@ -93,13 +99,28 @@ class SwingModel:
         starts = np.zeros((len(machines), 2 * len(self.plant.unactuated)))
         starts[:, self.shown] = start[:n]
         starts[1 + len(names) + np.arange(n), self.shown] += step
+        seen = self._seen(machines, starts, count)
+        slopes = (seen[1:] - seen[0]).T / np.concatenate([steps, np.full(n, step)])
+        return seen[0] + start[n] - self.log.values[:count], np.column_stack([slopes, np.ones(count)])
+
+    def _seen(self, machines: Array, starts: Array, count: int) -> Array:
+        """Say what the log would show of machines that begin so: (machines, count)."""
+        if self.small:
+            order = [q.name for q in self.plant.parameters]
+            return np.stack(
+                [
+                    _linear_answers(
+                        self.plant, dict(zip(order, map(float, row), strict=True)), self.q_a, self.log, count
+                    )
+                    @ start
+                    for row, start in zip(machines, starts, strict=True)
+                ]
+            )
         sway, angle = free_swing(
             self.plant, machines, q_a=self.q_a, starts=starts, times=self.log.times[:count]
         )
         load = self.plant.loads.index(self.log.load)
-        seen = (sway if self.log.quantity == "sway" else angle)[:, :, load]
-        slopes = (seen[1:] - seen[0]).T / np.concatenate([steps, np.full(n, step)])
-        return seen[0] + start[n] - self.log.values[:count], np.column_stack([slopes, np.ones(count)])
+        return np.asarray((sway if self.log.quantity == "sway" else angle)[:, :, load])
 
 
 def swing_model(
@@ -110,7 +131,7 @@ def swing_model(
     Raises
     ------
     InfeasibleProblem
-        The log is too short or too sparse to show the machine's swing.
+        The log is too short or too sparse to show the machine's swing, or shows a greater one than any.
     """
     period = 2.0 * np.pi / float(linearize(plant, parameters, q_a).frequencies[0])
     lasts, between = float(log.times[-1]), float(np.median(np.diff(log.times)))
@@ -119,21 +140,50 @@ def swing_model(
             f"The log lasts {lasts:.3g} s with a sample every {between:.3g} s, and this machine swings once "
             f"in {period:.3g} s: look at the unit of the log's times, log more of it, or mend the spec."
         )
+    _require_swing(plant, parameters, q_a, log)
     size = np.linalg.norm(_linear_answers(plant, parameters, q_a, log), axis=0)
     shown = np.flatnonzero(size > SHOWN * size.max())
     return SwingModel(plant=plant, q_a=q_a, log=log, shown=shown, period=period)
 
 
-def _linear_answers(
+def _require_swing(
     plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog
+) -> None:
+    """Refuse a log of swings that no machine makes: it is in another unit."""
+    modes = linearize(plant, parameters, q_a).modes
+    seen = _gain(plant, parameters, q_a, log) @ modes
+    angles = _gain(plant, parameters, q_a, attrs.evolve(log, quantity="angle")) @ modes
+    mode = int(np.argmax(np.abs(seen)))
+    swing = float(np.ptp(log.values)) / 2.0
+    if swing < STILL:
+        raise InfeasibleProblem(
+            f"The log's {log.quantity} does not swing; look at its columns (--columns), and at --after."
+        )
+    angle = swing * abs(angles[mode] / seen[mode]) if seen[mode] else 0.0
+    if angle > WIDEST_SWING:
+        raise InfeasibleProblem(
+            f"The log's {log.quantity} goes {swing:.3g} {log.unit} to either side, a swing of "
+            f"{math.degrees(angle):.0f}°: look at its unit (--unit), and at what it is of (--signal)."
+        )
+
+
+def _linear_answers(
+    plant: Plant,
+    parameters: Mapping[str, float],
+    q_a: tuple[float, ...],
+    log: SwingLog,
+    count: int | None = None,
 ) -> Array:
-    """Say what the log would show of a unit of each of q_u and q̇_u in the linear model: (samples, 2 n_u)."""
+    """Say what the log would show of a unit of each of q_u and q̇_u in the linear model: (samples, 2 n_u).
+
+    Of all of its samples, or of so many.
+    """
     linear = linearize(plant, parameters, q_a)
     n_u = len(linear.frequencies)
     system = np.block([[np.zeros((n_u, n_u)), np.eye(n_u)], [-linear.stiffness, -linear.damping]])
     rates, vectors = np.linalg.eig(system)
     seen = np.concatenate([_gain(plant, parameters, q_a, log), np.zeros(n_u)])
-    answers = (seen @ vectors) * np.exp(log.times[:, None] * rates) @ np.linalg.inv(vectors)
+    answers = (seen @ vectors) * np.exp(log.times[:count, None] * rates) @ np.linalg.inv(vectors)
     return np.asarray(answers.real)
 
 

@@ -14,7 +14,14 @@ import tomli_w
 from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
 from gen_profile.identification.estimation import CONFIDENCE, Estimate, estimate
 from gen_profile.identification.fit import Machine
-from gen_profile.identification.measurements import DirectReading, Measurement, Period, SwingLog, parse_swing
+from gen_profile.identification.measurements import (
+    GREATEST,
+    DirectReading,
+    Measurement,
+    Period,
+    SwingLog,
+    parse_swing,
+)
 from gen_profile.identification.uncertainty import WIDEST
 from gen_profile.log_table import decoded
 from gen_profile.plants.plant import Plant
@@ -37,6 +44,8 @@ class Identification:
     readings : tuple of DirectReading or Period
     logs : tuple of SwingLog
     estimate : Estimate
+    q_a : tuple of float
+        Where the axes stood, in m or rad.
     """
 
     given: Spec
@@ -44,6 +53,7 @@ class Identification:
     readings: tuple[DirectReading | Period, ...]
     logs: tuple[SwingLog, ...]
     estimate: Estimate
+    q_a: tuple[float, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -60,11 +70,18 @@ class Identification:
                     "value": value,
                     "standard_uncertainty": found.standard_uncertainty[name],
                     "half_range": found.half_range[name],
+                    "stated": self.given.robustness.uncertain.get(name),
+                    "uncertain": self.spec.robustness.uncertain.get(name),
+                    "rests_on": found.rests_on[name],
                 }
                 for name, value in found.values.items()
             },
             "readings": [
-                {**attrs.asdict(reading), "model": model}
+                {
+                    **attrs.asdict(reading),
+                    "model": model,
+                    "unit": units[reading.parameter] if isinstance(reading, DirectReading) else "s",
+                }
                 for reading, model in zip(self.readings, found.model, strict=True)
             ],
             "logs": [
@@ -72,10 +89,17 @@ class Identification:
                     "load": log.load,
                     "quantity": log.quantity,
                     "samples": len(log.times),
+                    "unit": log.unit,
+                    "swing": float(np.ptp(log.values)) / 2.0,
                     "noise": noise,
                     "unrest": unrest,
+                    "misfit": None
+                    if left is None
+                    else {"rms": left.rms, "frequency_rad_per_s": left.frequency, "widened": widened},
                 }
-                for log, noise, unrest in zip(self.logs, found.noise, found.unrest, strict=True)
+                for log, noise, unrest, left, widened in zip(
+                    self.logs, found.noise, found.unrest, found.misfits, found.widened, strict=True
+                )
             ],
         }
 
@@ -194,6 +218,8 @@ def identify(
     stood = tuple(spec.move.target if q_a is None else q_a)
     if len(stood) != len(plant.actuated):
         raise SpecError(f"--at: must hold one position per axis ({len(plant.actuated)}), found {len(stood)}.")
+    if not all(abs(place) <= GREATEST for place in stood):
+        raise SpecError(f"--at: must be places in m or rad, found {', '.join(f'{x:g}' for x in stood)}.")
     found = estimate(
         Machine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
         [q.name for q in plant.parameters if q.name in asked],
@@ -201,12 +227,24 @@ def identify(
         logs,
     )
     return Identification(
-        given=spec, spec=_identified(spec, found), readings=readings, logs=logs, estimate=found
+        given=spec,
+        spec=_identified(spec, found),
+        readings=readings,
+        logs=logs,
+        estimate=found,
+        q_a=stood,
     )
 
 
-def write_spec(spec: Spec, path: Path) -> None:
-    """Write a spec as TOML, complete, and the machine's file beside it where the user wrote one.
+def write_spec(spec: Spec, path: Path, text: str | None = None) -> None:
+    """Write a spec as TOML, and the machine's file beside it where the user wrote one.
+
+    Parameters
+    ----------
+    spec : Spec
+    path : Path
+    text : str, optional
+        That states it; by default it is written out in full.
 
     Raises
     ------
@@ -215,7 +253,7 @@ def write_spec(spec: Spec, path: Path) -> None:
     with staged(path.parent) as staging:
         if spec.plant.file is not None:
             staging.write(spec.plant.file.name, spec.plant.file.content)
-        staging.write(path.name, tomli_w.dumps(spec.to_dict()).encode("utf-8"))
+        staging.write(path.name, (text or tomli_w.dumps(spec.to_dict())).encode("utf-8"))
         staging.deliver()
 
 
@@ -260,7 +298,9 @@ def _identified(spec: Spec, found: Estimate) -> Spec:
     values = {name: _rounded(value, found.standard_uncertainty[name]) for name, value in found.values.items()}
     robustness = spec.robustness
     robust = robustness.method if robustness.uncertain else "sensitivity"
-    uncertain = {**robustness.uncertain, **{name: _rounded_up(share) for name, share in shares.items()}}
+    stated = robustness.uncertain  # what a rope does in service: that it was measured once narrows nothing
+    found_shares = {name: max(_rounded_up(share), stated.get(name, 0.0)) for name, share in shares.items()}
+    uncertain = {**stated, **found_shares}
     order = [name for name in spec.plant.parameters if name in uncertain]
     return attrs.evolve(
         spec,

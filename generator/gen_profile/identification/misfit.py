@@ -1,0 +1,224 @@
+"""What the best fit leaves of a log, and which parameter explains it.
+
+Noise has a smooth spectrum. Where the machine is another one than the spec says, the residuals hold lines:
+the swing of a wrong second mode, or of a damping that is not modelled. A line stands out of its neighbours in
+the periodogram (N. R. Lomb, 1976), whose ordinates are distributed exponentially where there is none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import attrs
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import lombscargle
+
+from gen_profile.errors import CosimulationError, InfeasibleProblem
+from gen_profile.identification.fit import Fit
+from gen_profile.identification.swing_model import SwingModel
+from gen_profile.identification.uncertainty import WIDEST, uncertainty
+from gen_profile.problem.linearization import linearize
+from gen_profile.profile import Array
+
+HARMONICS = 4.0  # times the fastest natural frequency up to which lines are looked for
+MOST_LINES = 2000
+FEWEST = 64.0  # ordinates, which tell what noise is
+NEIGHBOURS = 25  # ordinates whose median is the noise around a line
+CHANCE = 1e-4  # how rarely noise may look like a line
+DOUBT = 2.0  # by which a median of so few may be off
+ROUNDING = 0.35  # of a sensor's step: rounding errors repeat with the swing, and are seen to elsewhere
+EXACT = 1e-5  # of the swing, which is the integrator's business
+ALIKE = 1.1  # times the least sum of squares, within which parameters explain the same
+STARTS = (1.0, 0.5, 0.7, 1.4, 2.0)  # times a parameter of the spec, where it is looked for
+TRIED = 2  # parameters at once that may explain what is left
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Spectrum:
+    """Periodogram of a log's residuals.
+
+    Attributes
+    ----------
+    frequencies : (k,) array
+        rad/s, as many as are independent.
+    power : (k,) array
+        White noise has its variance everywhere.
+    background : (k,) array
+        What noise alone would have there.
+    """
+
+    frequencies: Array
+    power: Array
+    background: Array
+
+    @property
+    def threshold(self) -> Array:
+        """Power that noise does not reach, shape (k,)."""
+        return DOUBT * math.log(len(self.power) / CHANCE) * self.background
+
+
+@attrs.frozen(kw_only=True)
+class Misfit:
+    """Lines that the fit leaves of a log.
+
+    Attributes
+    ----------
+    rms : float
+        Root mean square of all of them together, in rad or m.
+    frequency : float
+        Of the strongest, in rad/s.
+    noise : float
+        Root mean square of the rest, in rad or m.
+    """
+
+    rms: float
+    frequency: float
+    noise: float
+
+    def widened(self, sigma: float, samples: int) -> float:
+        """Widen the samples' standard deviation by the misfit.
+
+        The lines may hide as much again at the swing's own frequency, where the fit took it for the swing.
+        Such an error does not average out: of n samples it counts √n times.
+        """
+        return math.hypot(sigma, math.sqrt(samples) * self.rms)
+
+
+def spectrum(times: Array, residuals: Array, fastest: float) -> Spectrum:
+    """Take the periodogram of residuals up to some harmonics of the fastest natural frequency in rad/s."""
+    apart = 2.0 * np.pi / float(times[-1] - times[0])
+    highest = min(max(HARMONICS * fastest, FEWEST * apart), np.pi / float(np.median(np.diff(times))))
+    count = min(max(int(highest / apart), 1), MOST_LINES)
+    frequencies = np.linspace(1.0, highest / apart, count) * apart
+    power = np.asarray(lombscargle(times, residuals - residuals.mean(), frequencies))
+    around = median_filter(power, min(NEIGHBOURS, len(power)), mode="reflect")
+    around = np.maximum(around, np.median(power)) / math.log(2.0)  # smooth noise may have deep valleys
+    return Spectrum(frequencies=frequencies, power=power, background=around)
+
+
+def misfit(model: SwingModel, parameters: Mapping[str, float], residuals: Array) -> Misfit | None:
+    """Look for lines in the residuals of a log, in rad or m; None where there is nothing but noise."""
+    log, fastest = model.log, linearize(model.plant, parameters, model.q_a).frequencies[-1]
+    found = spectrum(log.times, residuals, float(fastest))
+    lines = found.power > found.threshold
+    if not lines.any():
+        return None
+    share = 1.0 / len(found.power)
+    square = float(np.square(residuals - residuals.mean()).mean())
+    in_lines = 2.0 / len(residuals) * float((found.power - found.background)[lines].sum())
+    rms = math.sqrt(min(in_lines, (1.0 - share) * square))
+    if rms < max(ROUNDING * log.resolution, EXACT * float(np.ptp(log.values))):
+        return None
+    return Misfit(
+        rms=rms,
+        frequency=float(found.frequencies[np.argmax(np.where(lines, found.power, 0.0))]),
+        noise=math.sqrt(square - rms**2),
+    )
+
+
+def misfits(fit: Fit, unknowns: Array) -> tuple[Misfit | None, ...]:
+    """Look for lines in what is left of every log."""
+    parameters = fit.parameters(unknowns)
+    left = fit.left(unknowns)
+    return tuple(misfit(m, parameters, residuals) for m, residuals in zip(fit.models, left, strict=True))
+
+
+@attrs.frozen(kw_only=True)
+class Explanation:
+    """Parameters whose other values leave nothing but noise.
+
+    Attributes
+    ----------
+    freed : tuple of str
+        That were taken as known.
+    instead : tuple of str
+        That would do as well as the last of them.
+    values : dict of str to float
+        Of all that are then identified.
+    """
+
+    freed: tuple[str, ...]
+    instead: tuple[str, ...]
+    values: dict[str, float]
+
+
+def explanation(fit: Fit, more: Sequence[str]) -> Explanation | None:
+    """Find which parameters, identified as well, leave nothing but noise of every log.
+
+    They are taken up one by one, first the one with which small swings fit best, which is fast to find out.
+    Of those that fit as well the one is taken that has to leave the spec least.
+
+    Parameters
+    ----------
+    fit : Fit
+    more : sequence of str
+        Parameters that were taken as known.
+    """
+    freed: tuple[str, ...] = ()
+    for _ in range(min(TRIED, len(more))):
+        tried = {
+            name: _of_small_swings(fit.freed((*freed, name)), name) for name in more if name not in freed
+        }
+        least = min(one.squares for one in tried.values())
+        if not math.isfinite(least):
+            return None
+        alike = {name: one for name, one in tried.items() if one.squares <= ALIKE * least}
+        best = min(alike, key=lambda name: alike[name].moved)
+        freed = (*freed, best)
+        if (values := _nothing_left(alike[best].fit)) is not None:
+            return Explanation(
+                freed=freed, instead=tuple(name for name in alike if name not in freed), values=values
+            )
+    return None
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _SmallSwings:
+    """The best fit of small swings.
+
+    Attributes
+    ----------
+    fit : Fit
+        That begins where it is.
+    squares : float
+        Left of all logs; infinite where they do not tell the parameters.
+    moved : float
+        How far a parameter had to leave the spec for that, relative.
+    """
+
+    fit: Fit
+    squares: float = math.inf
+    moved: float = math.inf
+
+
+def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
+    """Find the best fit of small swings, from some values of one parameter around the spec's."""
+    stated = fit.machine.parameters
+    starts = [fit.beginning({**stated, name: share * stated[name]}) for share in STARTS if stated[name]]
+    found = [_SmallSwings(fit=fit)]
+    for start in starts or [fit]:
+        small = start.small()
+        try:
+            unknowns, noise = small.solve()
+            uncertainty(small, unknowns, noise)
+        except (InfeasibleProblem, np.linalg.LinAlgError):
+            continue
+        squares = float(sum(residuals @ residuals for residuals in small.left(unknowns)))
+        moved = float(np.abs(unknowns[: len(fit.names)] - fit.expected).max())
+        found.append(_SmallSwings(fit=fit.beginning(fit.parameters(unknowns)), squares=squares, moved=moved))
+    return min(found, key=lambda one: one.squares)
+
+
+def _nothing_left(fit: Fit) -> dict[str, float] | None:
+    """Identify the parameters; None where lines are left even so, or a range is of no use."""
+    try:
+        unknowns, noise = fit.solve()
+        around = uncertainty(fit, unknowns, noise)
+    except (InfeasibleProblem, CosimulationError, np.linalg.LinAlgError):
+        return None
+    values = unknowns[: len(fit.names)]
+    if any(misfits(fit, unknowns)) or (around.standard > WIDEST * np.abs(values)).any():
+        return None
+    return dict(zip(fit.names, map(float, values * fit.scale), strict=True))

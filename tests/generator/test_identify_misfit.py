@@ -1,0 +1,93 @@
+"""Logs that are not of the machine: told by what is left of them, and never answered with a narrow range."""
+
+import numpy as np
+import pytest
+from generator.free_swings import inside, swing
+
+from gen_profile.errors import InfeasibleProblem
+from gen_profile.identification.estimation import estimate
+from gen_profile.identification.fit import Machine
+from gen_profile.identification.measurements import Period, SwingLog
+from gen_profile.identification.misfit import spectrum
+from gen_profile.plants.registry import find_plant
+
+CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
+TIMES = np.arange(0.0, 15.0, 0.1)
+NOISE = np.random.default_rng(4).normal(0.0, 1e-3, len(TIMES))
+
+
+def log_of(values, quantity="angle", load="payload"):
+    return SwingLog(times=TIMES, values=values, quantity=quantity, load=load)
+
+
+def hoist(**changed):
+    return Machine(plant=HOIST, parameters=HOIST.nominal() | changed, q_a=(0.0, 4.0))
+
+
+def test_another_rope_that_is_wrong_is_named():
+    true = CRANE.nominal() | {"L1": 0.52, "L2": 0.40}
+    times = 0.5 * TIMES
+    exact = swing(true, times, [0.1, -0.05, 0.2, 0.3], (0.0,), "double-pendulum-crane")
+    log = SwingLog(times=times, values=exact + NOISE, quantity="angle", load="hook")
+    machine = Machine(plant=CRANE, parameters=true | {"L1": 0.47, "L2": 0.36}, q_a=(0.0,))
+    with pytest.raises(
+        InfeasibleProblem, match=r"rad RMS, .* is left of it, strongest at .*another .*L2"
+    ) as told:
+        estimate(machine, ["L1"], [], [log])
+    assert "--free" in str(told.value)
+    assert inside(estimate(machine, ["L1", "L2"], [], [log]), true)
+
+
+def test_a_damping_that_is_wrong_is_named():
+    exact = swing(HOIST.nominal() | {"c": 1500.0}, TIMES, [0.15, 0.0])
+    with pytest.raises(InfeasibleProblem, match=r"with another c than the spec's .*; add --free c"):
+        estimate(hoist(c=0.0), ["L0"], [], [log_of(exact + NOISE)])
+
+
+def test_what_no_parameter_explains_widens_the_range():
+    """As a wind that comes and goes, or a trolley that rocks."""
+    exact = swing(HOIST.nominal() | {"c": 300.0}, TIMES, [0.15, 0.0])
+    clean = estimate(hoist(c=300.0), ["L0"], [], [log_of(exact + NOISE)])
+    torn = estimate(hoist(c=300.0), ["L0"], [], [log_of(exact + NOISE + 0.005 * np.sin(3.1 * TIMES))])
+    assert clean.misfits == (None,) and clean.widened == (1.0,)
+    (left,) = torn.misfits
+    assert left.rms == pytest.approx(0.005 / np.sqrt(2.0), rel=0.1)
+    assert left.frequency == pytest.approx(3.1, abs=0.2)
+    assert torn.half_range["L0"] > 20.0 * clean.half_range["L0"]
+
+
+def test_noise_is_no_misfit():
+    """White, or alike from sample to sample: 100 spectra of each without a line."""
+    random = np.random.default_rng(8)
+    for width in (1, 4):
+        for _ in range(100):
+            noise = np.convolve(random.normal(size=len(TIMES) + width - 1), np.ones(width), "valid")
+            found = spectrum(TIMES, noise, 2.0)
+            assert (found.power < found.threshold).all()
+
+
+def test_a_spectrum_of_white_noise_is_its_variance():
+    noise = np.random.default_rng(9).normal(0.0, 0.3, len(TIMES))
+    found = spectrum(TIMES, noise, 100.0)
+    assert found.power.mean() == pytest.approx(np.var(noise), rel=0.05)
+
+
+@pytest.mark.parametrize(("quantity", "factor"), [("angle", 180.0 / np.pi), ("sway", 180.0 / np.pi)])
+def test_a_swing_that_nobody_lets_happen_is_in_another_unit(quantity, factor):
+    values = factor * swing(HOIST.nominal(), TIMES, [0.1, 0.0])
+    with pytest.raises(InfeasibleProblem, match=r"to either side, a swing of .*°: look at its unit"):
+        estimate(hoist(), ["L0"], [], [log_of(values, quantity)])
+
+
+def test_what_a_stopwatch_rests_on_is_told():
+    """T² of a simple pendulum goes with L0 + the hoist over g; its mass and drives do not matter."""
+    found = estimate(hoist(), ["L0"], [Period(mode=1, seconds=4.914, uncertainty=0.01)])
+    assert found.rests_on["L0"].get("m", 0.0) == pytest.approx(0.0, abs=1e-9)
+    crane = Machine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
+    watched = [Period(mode=1, seconds=1.73, uncertainty=0.01)]
+    found = estimate(crane, ["L1"], watched).rests_on["L1"]["L2"]
+    longer = Machine(
+        plant=CRANE, parameters=CRANE.nominal() | {"L2": 1.01 * CRANE.nominal()["L2"]}, q_a=(0.0,)
+    )
+    moved = estimate(longer, ["L1"], watched).values["L1"] - estimate(crane, ["L1"], watched).values["L1"]
+    assert found == pytest.approx(moved, rel=0.02)
