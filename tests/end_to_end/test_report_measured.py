@@ -165,3 +165,14 @@ def test_angles_that_do_not_tell_all_coordinates_are_compared_only(tmp_path, spe
     assert outcome.code == 0 and measured["sways"] == {} and set(measured["angles"]) == {"hook"}
     assert measured["angles"]["hook"]["deviation_peak_rad"] < 1e-4
     assert "Columns that were left alone: temperature." in page
+
+
+def test_the_angle_of_the_upper_rope_alone_tells_of_the_hook(tmp_path, spec, motion):
+    truth = log(tmp_path / "log.csv", motion, spec.plant.parameters, columns=("position", "angles"))
+    text = (tmp_path / "log.csv").read_text("utf-8")
+    rows = [row.rpartition(";")[0] for row in text.splitlines()]
+    (tmp_path / "log.csv").write_text("\n".join(rows), "utf-8")
+    _, measured, page = report(tmp_path)
+    assert list(measured["sways"]) == ["hook"]
+    assert 1e3 * measured["sways"]["hook"]["residual_m"] == pytest.approx(truth["hook"], abs=0.02)
+    assert "Not measured: the sway of the payload." in page

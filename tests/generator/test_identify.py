@@ -82,7 +82,7 @@ def test_logs_with_and_without_a_header(separator, decimal):
     [
         ("", "the log is empty"),
         ("t;a\n1;2\n", "needs at least 16 samples, found 1"),
-        ("t;a\n1;x\n", "row 2: expected numbers, found '1' and 'x'"),
+        ("t;a\n1;x\n", "row 2: a holds 'x', which is no number"),
         ("1;2\n1;\n", "needs at least 16 samples, found 1"),
         ("\n".join("0;1" for _ in range(20)), "the times must rise"),
     ],
@@ -301,7 +301,7 @@ def test_a_contradiction_is_told(tmp_path):
         (["--free", "L1", "--period", "3:1±0.1"], 2, "the machine has 2 modes, found mode 3"),
         (["--free", "L1", "--period", "1±0.1", "--at", "1,2"], 2, "one position per axis (1), found 2"),
         (["--free", "L1", "--period", "1±0.1", "--at", "x"], 2, "write one number per axis"),
-        (["--free", "L1", "--swing", "none.csv"], 2, "Cannot read the log none.csv"),
+        (["--free", "L1", "--swing", "none.csv"], 2, "cannot read the log none.csv"),
         (["--free", "L1", "--swing", "none.csv", "--signal", "speed"], 2, "unknown signal 'speed'"),
         (["--free", "L1", "--swing", "none.csv", "--signal", "angle:crate"], 2, "unknown load 'crate'"),
         (["--free", "L1", "--swing", "none.csv", "--unit", "mm"], 2, "'mm' does not measure angle"),

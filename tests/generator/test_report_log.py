@@ -93,7 +93,7 @@ def test_the_exported_table_is_such_a_log(tmp_path):
             "the times must rise from row to row, and do not after 0.38 s",
         ),
         (table(["time_s", "sway"], TIMES, TIMES) + "0.5,x\n", "row 22: sway holds 'x', which is no number"),
-        (table(["time_s", "sway"], TIMES, TIMES) + "0.5\n", "row 22: sway holds '', which is no number"),
+        (table(["time_s", "sway"], TIMES, TIMES) + "0.5,1e300\n", "row 22: sway holds '1e300', which is no"),
         (table(["time_s", "sway"], TIMES, TIMES) + "0.5,nan\n", "row 22: sway holds 'nan'"),
         ("time_s,sway\n0,0,5\n" * 9, "row 3: time_s holds 'time_s'"),
     ],
@@ -106,7 +106,7 @@ def test_what_is_no_such_table_is_refused_with_a_sentence(text, complaint):
 
 
 def test_a_file_that_cannot_be_read_is_refused_with_a_sentence(tmp_path):
-    with pytest.raises(OutputError, match=r"--measured: cannot read .*log\.csv: "):
+    with pytest.raises(OutputError, match=r"--measured: cannot read the log .*log\.csv: "):
         read_log(tmp_path / "log.csv", paper())
     (tmp_path / "log.csv").write_bytes(b"time_s,sway\n\xff\xfe,1\n")
     with pytest.raises(OutputError, match="row 2: time_s holds 'ÿþ', which is no number"):
@@ -114,7 +114,47 @@ def test_a_file_that_cannot_be_read_is_refused_with_a_sentence(tmp_path):
 
 
 def test_a_huge_file_is_refused_unread(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.workflows.report_log.MOST_BYTES", 10)
+    monkeypatch.setattr("gen_profile.log_table.MOST_BYTES", 10)
     (tmp_path / "log.csv").write_text("time_s,sway\n0,0\n", "utf-8")
     with pytest.raises(OutputError, match="cut the move out of it"):
         read_log(tmp_path / "log.csv", paper())
+
+
+@pytest.mark.parametrize("option", [("report", "--measured"), ("identify", "--free", "L1", "--swing")])
+def test_a_workbook_is_told_how_to_become_a_log(tmp_path, option):
+    (tmp_path / "log.xlsx").write_bytes(b"PK\x03\x04 and so on")
+    outcome = run_here(*option, tmp_path / "log.xlsx")
+    assert outcome.code == 2
+    assert outcome.errors[-1].endswith("open it and save the sheet as CSV.")
+
+
+def test_the_log_of_a_stream_is_such_a_log():
+    """Planned and actual side by side; nothing in the cycles in which no drive answered."""
+    rows = [f"{t},{t},{'' if k < 2 else t + 0.5}" for k, t in enumerate(TIMES)]
+    text = "\n".join(["time_s,cart_planned_m,cart_actual_m", *rows])
+    log = parse_log(text, "log.csv", paper())
+    np.testing.assert_allclose(log.positions["cart"], np.array(TIMES[2:]) + 0.5)
+    assert log.ignored == ("cart_planned_m",)
+
+
+@pytest.mark.parametrize(
+    ("head", "columns"),
+    [
+        (["Messung 3;;", "Zeit;Pendel 2;M", "[ms];[mm];Nm"], "time_ms=Zeit,payload_sway_mm=2"),
+        (["Logger 3;;", "Zeit;Payload Auslenkung;M", "[ms];[mm];Nm"], None),
+        (["Zeit [ms];payload Auslenkung [mm];M"], None),
+        ([], "time_ms=1,sway_mm=2"),
+    ],
+)
+def test_heads_in_other_languages_and_places(head, columns):
+    rows = [f"{1e3 * t:.0f};{5.5 + k};7".replace(".", ",") for k, t in enumerate(TIMES)]
+    text = "\n".join([*head, *rows]).replace("Payload", "payload")
+    log = parse_log(text, "log.csv", paper(), columns)
+    np.testing.assert_allclose(log.times, TIMES)
+    np.testing.assert_allclose(log.sways["payload"], 1e-3 * (5.5 + np.arange(20)))
+
+
+@pytest.mark.parametrize("columns", ["Zeit", "time_s=", "time_s=1,speed=2", "time_s=1,sway=9", "sway=2"])
+def test_columns_that_are_not_there(columns):
+    with pytest.raises(OutputError, match=r"(MEANING=COLUMN|nothing of this machine|no column).*[.]$"):
+        parse_log(table(["a", "b"], TIMES, TIMES), "log.csv", paper(), columns)

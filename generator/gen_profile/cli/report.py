@@ -36,6 +36,12 @@ from gen_profile.errors import OutputError
     type=float,
     help="When the move begins in the log; found by itself by default.",
 )
+@click.option(
+    "--columns",
+    "log_columns",
+    metavar="MEANING=COLUMN,…",
+    help="Which column of the log holds what, as in time_ms=Zeit,payload_sway_mm=4; by names by default.",
+)
 @click.option("--no-compare", is_flag=True, help="Leave other methods out, which takes less time.")
 @json_option
 @debug_option
@@ -47,6 +53,7 @@ def report(
     formats: tuple[str, ...],
     log: Path | None,
     log_start: float | None,
+    log_columns: str | None,
     no_compare: bool,
     as_json: bool,
 ) -> None:
@@ -62,7 +69,15 @@ def report(
         raise OutputError(f"--out {out}: name a file that ends in .html.")
     require_place(out)
     with progress() as tell:
-        made = run(spec, formats, log=log, log_start=log_start, compared=not no_compare, progress=tell)
+        made = run(
+            spec,
+            formats,
+            log=log,
+            log_start=log_start,
+            log_columns=log_columns,
+            compared=not no_compare,
+            progress=tell,
+        )
         deliver(out, made.content)
     print_outcome(made.to_dict(out), words.report(made, out), as_json)
     if faults := made.faults():

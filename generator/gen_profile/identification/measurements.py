@@ -5,17 +5,14 @@ Every uncertainty is one standard deviation.
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.log_table import LogTable, read_table
+from gen_profile.log_table import read_table
 from gen_profile.profile import Array, read_only
-from gen_profile.suggestion import suggestion
 
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
 _VALUE = rf"({_NUMBER})\s*(?:±|\+-|\+/-)\s*({_NUMBER})"
@@ -162,49 +159,17 @@ def parse_swing(
     OutputError
         The table cannot be read.
     """
-    table = _numbers(read_table(text, source), columns, source) / (per_second, per_unit)
-    if np.abs(table).max(initial=0.0) > GREATEST:
-        raise OutputError(f"{source}: holds {np.abs(table).max():.3g}, which no sensor of a machine shows.")
+    cells = read_table(text, source)
+    named = {column for column in columns if not column.isdecimal()}
+    head = next((row for row in range(len(cells.rows)) if named & set(cells.rows[row])), 0)
+    places = [cells.place(head, column, source) for column in columns]
+    table = cells.numbers(head, places, source) / (per_second, per_unit)
     table = table[table[:, 0] >= after]
     if len(table) < LEAST_SAMPLES:
         raise OutputError(f"{source}: a swing needs at least {LEAST_SAMPLES} samples, found {len(table)}.")
     if not (np.diff(table[:, 0]) > 0.0).all():
         raise OutputError(f"{source}: the times must rise from row to row.")
     return SwingLog(times=table[:, 0] - table[0, 0], values=table[:, 1], quantity=quantity, load=load)
-
-
-def _numbers(cells: LogTable, columns: tuple[str, str], source: str) -> Array:
-    """Read two columns as they stand, (rows, 2)."""
-    count = len(cells.rows)
-    named = {column for column in columns if not column.isdecimal()}
-    head = next((row for row in range(count) if named & set(cells.rows[row])), 0)
-    names = cells.rows[head]
-    headed = any(math.isnan(cells.number(head, place)) for place in range(len(names)))
-    time, value = (_column(column, names if headed else [], len(names), source) for column in columns)
-    below = range(head + headed, count)
-    first = next((row for row in below if not math.isnan(cells.seconds(row, time))), below.start)
-    rows = []
-    for row in range(first, count):
-        if not (cells.cell(row, time) and cells.cell(row, value)):
-            continue
-        numbers = cells.seconds(row, time), cells.number(row, value)
-        if not np.isfinite(numbers).all():
-            held = f"{cells.cell(row, time)!r} and {cells.cell(row, value)!r}"
-            raise OutputError(f"{source}, row {row + 1}: expected numbers, found {held}.")
-        rows.append(numbers)
-    table = np.array(rows).reshape(-1, 2)
-    if rows and math.isnan(cells.number(first, time)):  # a date
-        table[:, 0] -= table[0, 0]
-    return table
-
-
-def _column(column: str, names: Sequence[str], count: int, source: str) -> int:
-    if column in names:
-        return names.index(column)
-    if column.isdecimal() and 1 <= int(column) <= count:
-        return int(column) - 1
-    known = suggestion(column, names) if names else f"; there are {count}, without names."
-    raise OutputError(f"{source}: there is no column {column!r}{known}")
 
 
 def _positive(where: str, what: str, value: float) -> float:

@@ -25,9 +25,9 @@ from gen_profile.profile import Array
 HARMONICS = 4.0  # times the fastest natural frequency up to which lines are looked for
 MOST_LINES = 2000
 FEWEST = 64.0  # ordinates, which tell what noise is
-NEIGHBOURS = 25  # ordinates whose median is the noise around a line
+NEIGHBOURS = 33  # ordinates whose median is the noise around a line
 CHANCE = 1e-4  # how rarely noise may look like a line
-DOUBT = 2.0  # by which a median of so few may be off
+DOUBT = 1.5  # by which a median of so few may be off
 ROUNDING = 0.35  # of a sensor's step: rounding errors repeat with the swing, and are seen to elsewhere
 EXACT = 1e-5  # of the swing, which is the integrator's business
 ALIKE = 1.1  # times the least sum of squares, within which parameters explain the same

@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 import tomli_w
 
-from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
+from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.identification.estimation import CONFIDENCE, Estimate, estimate
 from gen_profile.identification.fit import Machine
 from gen_profile.identification.measurements import (
@@ -23,7 +23,7 @@ from gen_profile.identification.measurements import (
     parse_swing,
 )
 from gen_profile.identification.uncertainty import WIDEST
-from gen_profile.log_table import decoded
+from gen_profile.log_table import read_text
 from gen_profile.plants.plant import Plant
 from gen_profile.spec import Spec
 from gen_profile.suggestion import suggestion
@@ -147,12 +147,8 @@ def read_swing(
     if load not in loads:
         raise SpecError(f"--signal: unknown load {load!r}{suggestion(load, loads)}")
     per_unit = _per_unit(unit or si_units[quantity], quantity, si_units[quantity])
-    try:
-        text = decoded(path.read_bytes())
-    except OSError as error:
-        raise OutputError(f"Cannot read the log {path}: {error.strerror}.") from error
     log = parse_swing(
-        text,
+        read_text(path, "--swing"),
         str(path),
         columns=columns,
         per_second=TIME_UNITS[time_unit],

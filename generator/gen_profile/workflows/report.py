@@ -77,6 +77,7 @@ def report(
     *,
     log: Path | None = None,
     log_start: float | None = None,
+    log_columns: str | None = None,
     compared: bool = True,
     progress: Progress = lambda _: None,
 ) -> Report:
@@ -91,6 +92,8 @@ def report(
         What the machine really did, as a table; see `gen_profile.workflows.report_log`.
     log_start : float, optional
         When the move begins in it, in s; the start that fits best by default.
+    log_columns : str, optional
+        Which of its columns holds what; see `gen_profile.workflows.report_log.read_log`.
     compared : bool
         Whether other methods are tried as well.
     progress : callable
@@ -101,7 +104,7 @@ def report(
     GenProfileError
     """
     require_pages()
-    read = None if log is None else read_log(log, spec)
+    read = None if log is None else read_log(log, spec, log_columns)
     with TemporaryDirectory(prefix="gen-profile-") as folder:
         outcome = design(spec, formats, Path(folder), keep_failed=True, progress=progress)
     arrival = _checked(outcome).arrival

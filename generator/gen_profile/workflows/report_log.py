@@ -5,9 +5,9 @@
     time_s;cart_position_mm;payload_sway_mm;hook_angle_deg
     0,000;0,0;0,2;0,01
 
-Columns are called as those of the exported CSV: a position may leave its axis out where there is only one, a
-sway or an angle its load where the end load is meant. Units stand behind the quantity, with an underscore, a
-space or in brackets; without one an axis counts in its own unit, and everything else in SI units. Columns are
+Columns are called as those of the exported CSV, or of the log of a stream, in one of some languages: a position
+may leave its axis out where there is only one, a sway or an angle its load where the end load is meant. Units stand behind the quantity, with an underscore, a
+space or in brackets, or in the row below; without one an axis counts in its own unit, and everything else in SI units. Columns are
 separated by semicolons, tabs or commas; where not by commas, a decimal comma is understood, too. Columns of
 other names are left alone.
 """
@@ -23,15 +23,25 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError
-from gen_profile.log_table import LogTable, decoded, read_table
+from gen_profile.log_table import LogTable, read_table, read_text
 from gen_profile.profile import Array, read_only
 from gen_profile.spec import Spec
 from gen_profile.units import COUNTS, UNITS
 
 LEAST_SAMPLES = 16
-MOST_BYTES = 200_000_000
+# what loggers in some countries write, `gen-profile stream --log` among them: in English, German, French,
+# Italian and Spanish; the longest first, lest a part of one be taken for another
+WORDS = {
+    **dict.fromkeys(
+        ("position_actual", "actual_position", "istposition", "position", "posizione"), "position"
+    ),
+    **dict.fromkeys(("posición", "actual", "weg"), "position"),
+    **dict.fromkeys(("time", "zeit", "temps", "tempo", "tiempo"), "time"),
+    **dict.fromkeys(("sway", "auslenkung", "oscillation", "oscillazione", "oscilación"), "sway"),
+    **dict.fromkeys(("angle", "winkel", "angolo", "ángulo"), "angle"),
+}
 _COLUMN = re.compile(
-    r"(?:(?P<owner>\S.*?)[ _.])?(?P<quantity>time|position|sway|angle)"
+    r"(?:(?P<owner>\S.*?)[ _.])?(?P<quantity>" + "|".join(WORDS) + r")"
     r"(?:[ _]?[\[(]?(?P<unit>s|ms|m|mm|um|rad|deg|counts)[\])]?)?",
     re.IGNORECASE,
 )
@@ -71,26 +81,25 @@ class _Column:
     divisor: float
 
 
-def read_log(path: Path, spec: Spec) -> MeasuredLog:
+def read_log(path: Path, spec: Spec, columns: str | None = None) -> MeasuredLog:
     """Read a log of a spec's machine.
+
+    Parameters
+    ----------
+    path : Path
+    spec : Spec
+    columns : str, optional
+        Which column holds what, as in ``time_ms=Zeit,payload_sway_mm=4``; told by their names by default.
 
     Raises
     ------
     OutputError
         The file cannot be read, or is no such table.
     """
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise OutputError(
-                f"--measured {path}: more than {MOST_BYTES // 10**6} MB; cut the move out of it."
-            )
-        text = decoded(path.read_bytes())
-    except OSError as error:
-        raise OutputError(f"--measured: cannot read {path}: {error.strerror}.") from error
-    return parse_log(text, path.name, spec)
+    return parse_log(read_text(path, "--measured"), path.name, spec, columns)
 
 
-def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
+def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) -> MeasuredLog:
     """Read a table's text.
 
     Parameters
@@ -99,6 +108,8 @@ def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
     source : str
         Name of the file, for errors.
     spec : Spec
+    columns : str, optional
+        See `read_log`.
 
     Raises
     ------
@@ -106,14 +117,23 @@ def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
         It is no such table.
     """
     table = read_table(text, f"--measured {source}")
-    names = list(table.rows[0])
-    columns = {name: _column(name, spec, source) for name in names}
-    known = {name: column for name, column in columns.items() if column is not None}
-    _require(known, names, spec, source)
-    places = {name: names.index(name) for name in known}
-    numbers = _numbers(table, places, source)
+    head = _head(table, spec, source, {} if columns is None else _chosen(columns))
+    names = list(table.rows[head])
+    if columns is None:
+        units = table.rows[head + 1] if head + 1 < len(table.rows) else []
+        told = {name: _column(_with_unit(name, unit), spec, source) for name, unit in _pairs(names, units)}
+        known = {name: column for name, column in told.items() if column is not None}
+        _require(known, names, spec, source)
+        places = [names.index(name) for name in known]
+    else:
+        chosen = _chosen(columns)
+        known = {meaning: _required(meaning, spec, source) for meaning in chosen}
+        _require(known, list(chosen), spec, source)
+        places = [table.place(head, column, f"--measured {source}") for column in chosen.values()]
+    order = sorted(range(len(places)), key=lambda place: list(known.values())[place].quantity != "time")
+    numbers = table.numbers(head, [places[place] for place in order], f"--measured {source}")
     signals = {
-        (column.quantity, column.owner): numbers[:, place] / column.divisor
+        (column.quantity, column.owner): numbers[:, order.index(place)] / column.divisor
         for place, column in enumerate(known.values())
     }
     times = signals.pop(("time", ""))
@@ -134,8 +154,56 @@ def parse_log(text: str, source: str, spec: Spec) -> MeasuredLog:
         positions=by_quantity["position"],
         sways=by_quantity["sway"],
         angles=by_quantity["angle"],
-        ignored=tuple(name for name in names if name not in known),
+        ignored=tuple(name for place, name in enumerate(names) if place not in places),
     )
+
+
+def _chosen(columns: str) -> dict[str, str]:
+    """Read ``time_ms=Zeit,payload_sway_mm=4``: what is meant, and the column that holds it."""
+    pairs = [part.partition("=") for part in columns.split(",")]
+    if not all(meaning.strip() and column.strip() for meaning, _, column in pairs):
+        raise OutputError(
+            f"--columns {columns!r}: write MEANING=COLUMN for each, such as time_ms=Zeit,payload_sway_mm=4."
+        )
+    return {meaning.strip(): column.strip() for meaning, _, column in pairs}
+
+
+def _required(meaning: str, spec: Spec, source: str) -> _Column:
+    found = _column(meaning, spec, source)
+    if found is None:
+        plant = spec.machine()
+        raise OutputError(
+            f"--columns: {meaning!r} is nothing of this machine; write time_s, "
+            f"{plant.actuated[0].name}_position, "
+            f"{plant.loads[-1]}_sway or {plant.loads[-1]}_angle, with a unit behind such as _mm or _deg."
+        )
+    return found
+
+
+def _head(table: LogTable, spec: Spec, source: str, chosen: Mapping[str, str]) -> int:
+    """Find the row of names, below whatever a logger wrote above it."""
+    for row, cells in enumerate(table.rows):
+        if chosen:
+            found = len(set(cells) & set(chosen.values()))
+        else:
+            found = sum(_COLUMN.fullmatch(cell) is not None for cell in cells) - 1
+        if found > 0:
+            return row
+        if row > 0 and table.is_head(row - 1) and not table.is_head(row):
+            break
+    return 0
+
+
+def _pairs(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, str]]:
+    return [(name, units[place] if place < len(units) else "") for place, name in enumerate(names)]
+
+
+def _with_unit(name: str, below: str) -> str:
+    """Put the unit that stands in the row below a name behind it, where the name has none."""
+    found, unit = _COLUMN.fullmatch(name), below.strip("[]() ")
+    if found is None or found["unit"] or not _COLUMN.fullmatch(f"time_{unit}"):
+        return name
+    return f"{name}_{unit}"
 
 
 def _column(name: str, spec: Spec, source: str) -> _Column | None:
@@ -143,7 +211,8 @@ def _column(name: str, spec: Spec, source: str) -> _Column | None:
     found = _COLUMN.fullmatch(name)
     if found is None:
         return None
-    owner, quantity, unit = found["owner"] or "", found["quantity"].lower(), (found["unit"] or "").lower()
+    owner, unit = found["owner"] or "", (found["unit"] or "").lower()
+    quantity = WORDS[found["quantity"].lower()]
     if quantity == "time":
         seconds = {"": 1.0, "s": 1.0, "ms": 1e3}
         return (
@@ -204,16 +273,3 @@ def _require(known: Mapping[str, _Column], names: Sequence[str], spec: Spec, sou
             f"--measured {source}: there is no column of this machine ({examples}, with units behind "
             f"such as _mm or _deg); found {', '.join(names)[:200]}."
         )
-
-
-def _numbers(table: LogTable, places: Mapping[str, int], source: str) -> Array:
-    values = np.empty((len(table.rows) - 1, len(places)))
-    for row in range(1, len(table.rows)):
-        for column, (name, place) in enumerate(places.items()):
-            value = values[row - 1, column] = table.number(row, place)
-            if math.isnan(value):
-                held = table.cell(row, place)[:40]
-                raise OutputError(
-                    f"--measured {source}, row {row + 1}: {name} holds {held!r}, which is no number."
-                )
-    return values

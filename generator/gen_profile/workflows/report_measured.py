@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 from scipy.integrate import trapezoid
+from scipy.linalg import null_space
 from scipy.optimize import minimize_scalar
 
 from gen_profile.errors import OutputError
@@ -21,6 +22,7 @@ from gen_profile.workflows.report_log import MeasuredLog
 
 STARTS = 400  # starts of the move that are tried before the best is refined
 MOST_FITTED = 4000  # samples
+ANYTHING = 0.1  # rad, of what no angle tells
 PERIODS = 1.0  # of the slowest mode that a log must hold after the arrival for a residual to be judged
 
 
@@ -111,6 +113,8 @@ class Measured:
         By load, of the nominal machine.
     nearest : int or None
         Which of the trial's machines swings most like it; None where no swing was logged.
+    loads : tuple of str
+        Of the machine, whether they were logged or not.
     """
 
     log: MeasuredLog
@@ -120,6 +124,7 @@ class Measured:
     sways: Mapping[str, MeasuredSway]
     angles: Mapping[str, Signal]
     nearest: int | None
+    loads: tuple[str, ...]
 
     @property
     def passed(self) -> bool | None:
@@ -186,6 +191,7 @@ def compare_measured(
         },
         angles=_signals(move.times, move.angles, responses[0].angle, dict.fromkeys(loads, "rad")),
         nearest=_nearest(move, responses, loads),
+        loads=tuple(loads),
     )
 
 
@@ -301,22 +307,33 @@ def _best_start(trial: Trial, log: MeasuredLog) -> float:
 
 
 def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Array]:
-    """Compute the sway of every load from the ropes' angles, where those tell all coordinates.
+    """Compute the sway of the loads that the ropes' angles tell of.
 
-    The angles are taken to be linear in the coordinates, as ropes' are.
+    The angles are taken to be linear in the coordinates, as ropes' are. What no angle tells of may be anything:
+    a load whose sway depends on that has none.
     """
     plant = spec.machine()
     p, n_u = SimpleNamespace(**spec.plant.parameters), len(plant.unactuated)
     still = list(map(float, q_a[-1]))
     rows = [plant.loads.index(name) for name in move.angles]
+    if not rows:
+        return {}
     columns = [plant.outputs(list(unit), still, p).angle for unit in np.eye(n_u)]
     gain = np.array(columns, dtype=np.float64).T[rows].reshape(-1, n_u)
-    if len(rows) < n_u or np.linalg.matrix_rank(gain) < n_u:
+    if not gain.any():
         return {}
     measured = np.stack(list(move.angles.values()))
     q_u = np.linalg.lstsq(gain, measured, rcond=None)[0]
-    sways = plant.outputs(list(q_u), list(q_a.T), p).sway
+    unknown = null_space(gain).sum(axis=1)[:, None]
+    told, other = (
+        [
+            np.broadcast_to(np.asarray(sway, dtype=np.float64), len(q_a)).copy()
+            for sway in plant.outputs(list(q), list(q_a.T), p).sway
+        ]
+        for q in (q_u, q_u + ANYTHING * unknown)
+    )
     return {
-        name: np.broadcast_to(np.asarray(sway, dtype=np.float64), len(q_a)).copy()
-        for name, sway in zip(plant.loads, sways, strict=True)
+        name: sway
+        for name, sway, same in zip(plant.loads, told, other, strict=True)
+        if np.allclose(sway, same, rtol=1e-9, atol=1e-12)
     }

@@ -25,21 +25,25 @@ def measured_verdict(measured: Measured) -> Verdict:
     """Say whether the machine did as it should."""
     judged = {load: sway for load, sway in measured.sways.items() if sway.residual is not None}
     if not judged:
+        alone = measured.angles and not measured.sways
         return Verdict(
             word="Measured, not judged.",
             passed=None,
             sentences=(
-                f"{measured.log.source} holds no sway for as long as one slow swing after the arrival.",
+                f"{measured.log.source} tells no sway for as long as one slow swing after the arrival"
+                + (", nor do the angles in it alone: log those of all ropes." if alone else "."),
             ),
         )
     load, worst = max(judged.items(), key=lambda pair: _share(pair[1]))
     passed = bool(measured.passed)
+    others = [name for name in measured.loads if name not in judged]
     return Verdict(
         word="Measured: kept." if passed else "Measured: exceeded.",
         passed=passed,
         sentences=(
             f"On the machine the {load} swings by {mm(worst.residual or 0.0)} after the arrival, "
             f"and {mm(worst.limit)} are allowed ({measured.log.source}).",
+            *([f"Not measured: the sway of the {' and the '.join(others)}."] if others else []),
         ),
     )
 
