@@ -69,6 +69,14 @@ class Browser:
         yield
         self._driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 
+    @contextmanager
+    def emulated(self, scheme: str) -> Iterator[None]:
+        """Prefer dark or light colours."""
+        preferred = [{"name": "prefers-color-scheme", "value": scheme}]
+        self._driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": preferred})
+        yield
+        self._driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
     def pdf(self) -> bytes:
         """Print the page."""
         return base64.b64decode(self._driver.print_page())

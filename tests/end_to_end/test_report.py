@@ -13,6 +13,7 @@ from command_line import run_here, run_process
 
 from gen_profile.errors import OutputError
 from gen_profile.report.page import NEEDED, require_pages
+from gen_profile.report.print import printed
 from gen_profile.spec_reading import preset_spec
 from gen_profile.workflows.compare import compare
 from gen_profile.workflows.design import design
@@ -126,11 +127,11 @@ def test_maps_are_over_the_parameters_that_matter(tmp_path):
     assert all(f"errors of {name} tried" in text for name in ("m1", "m2", "g"))
 
 
-@pytest.mark.parametrize("name", ["page.pdf", "page"])
+@pytest.mark.parametrize("name", ["page.doc", "page"])
 def test_a_page_that_no_browser_would_open_is_refused(tmp_path, name):
     outcome = run_here("report", "--out", tmp_path / name)
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
-    assert outcome.errors == [f"Error: --out {tmp_path / name}: name a file that ends in .html."]
+    assert outcome.errors == [f"Error: --out {tmp_path / name}: name a file that ends in .html or .pdf."]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -200,6 +201,31 @@ def test_limits_stand_beside_what_the_motion_takes(tmp_path):
 def test_designs_of_every_kind_are_reported(tmp_path, words, expected):
     outcome, _, text = report(tmp_path, *QUICK, *words, "--set", "check.residual_sway=0.01")
     assert outcome.code == 0 and expected in text
+
+
+def test_a_report_is_printed_the_same_twice_and_says_what_else_it_shall(tmp_path):
+    """Once by the program, once by the browser of the tests' own from the page that the program writes."""
+    words = (*QUICK, "--set", "axis.unit=mm", "--field", "Customer=A & B", "--field", "Signature, operator")
+    _, content, text = report(tmp_path, *words)
+    assert "Customer A & B" in text and "Signature, operator" in text and "cart 300 mm in 3 s" in text
+    assert '"text":"position (mm)"' in content
+    page = (tmp_path / "report.html").read_bytes()
+    first, again = printed(page), printed(page)
+    assert first == again and first.startswith(b"%PDF")
+    assert first.count(b"/Type /Page\n") >= 4
+
+
+def test_without_a_browser_the_sentence_tells_what_prints(tmp_path, monkeypatch):
+    monkeypatch.setattr("gen_profile.report.print.shutil.which", lambda _: None)
+    outcome = run_here("report", "--out", tmp_path / "page.pdf")
+    assert outcome.code == 2
+    assert outcome.errors[-1].endswith("install one, or write a .html and print it from a browser.")
+
+
+def test_a_browser_that_prints_nothing_is_a_sentence(monkeypatch):
+    monkeypatch.setattr("gen_profile.report.print.BROWSERS", ("false",))
+    with pytest.raises(OutputError, match=r"false printed nothing .*; write a .html"):
+        printed(b"<p>")
 
 
 def test_several_axes_are_told_apart(tmp_path):

@@ -235,6 +235,36 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(browser, paper):
     )  # a finger scrolls
 
 
+def test_on_a_phone_every_cell_of_a_table_is_on_the_screen(browser, paper):
+    browser.open(paper, width=390, mobile=True)
+    cut = """
+        return [...document.querySelectorAll('td')].filter((cell) => cell.textContent).filter((cell) => {
+            const box = cell.getBoundingClientRect();
+            return box.left < 0 || box.right > 390 || cell.scrollWidth > cell.clientWidth + 1;
+        }).map((cell) => cell.textContent)"""
+    assert browser.run(cut) == []
+
+
+def test_in_the_dark_words_and_curves_stand_out_and_paper_stays_white(browser, paper):
+    def shades():
+        return browser.run(
+            """
+            const plot = document.querySelector('.plot')._fullLayout;
+            return [getComputedStyle(document.body).backgroundColor, plot.paper_bgcolor, plot.font.color]"""
+        )
+
+    dark = ["rgb(20, 25, 30)", "#14191e", "#e3e8ed"]
+    with browser.emulated("dark"):
+        browser.open(paper)
+        assert shades() == dark
+        browser.run("dispatchEvent(new Event('beforeprint'))")
+        browser.wait("return document.querySelector('.plot')._fullLayout.paper_bgcolor === '#fff'")
+        assert browser.run("return [...document.querySelectorAll('details')].every((part) => part.open)")
+        browser.run("dispatchEvent(new Event('afterprint'))")
+        browser.wait("return document.querySelector('.plot')._fullLayout.paper_bgcolor === '#14191e'")
+    browser.wait("return document.querySelector('.plot')._fullLayout.paper_bgcolor === '#fff'")
+
+
 def test_on_paper_plots_fit_their_places_and_on_screen_again_afterwards(browser, paper):
     browser.open(paper)
     fits = """

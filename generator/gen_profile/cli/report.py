@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import attrs
 import click
 
 from gen_profile.cli.commands import cli
@@ -17,9 +18,16 @@ from gen_profile.errors import OutputError
 @click.option(
     "--out",
     "path",
-    metavar="FILE.html",
+    metavar="FILE",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="File to write; named after the spec in this folder by default.",
+    help="File to write, .html or .pdf; an .html named after the spec in this folder by default.",
+)
+@click.option(
+    "--field",
+    "fields",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="What the page shall also say, as Customer=ACME; without a value, a line to sign. Repeatable.",
 )
 @export_option("Format whose file is checked and told by its hash")
 @click.option(
@@ -50,6 +58,7 @@ def report(
     preset: str | None,
     overrides: tuple[str, ...],
     path: Path | None,
+    fields: tuple[str, ...],
     formats: tuple[str, ...],
     log: Path | None,
     log_start: float | None,
@@ -60,13 +69,17 @@ def report(
     """Write everything about a design into one HTML file."""
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
+    from gen_profile.report.print import printed, require_browser
     from gen_profile.workflows.delivery import deliver, require_place
     from gen_profile.workflows.report import report as run
 
     spec = chosen_spec(spec_path, preset, overrides)
     out = path or Path(f"{spec.name}.html")
-    if out.suffix.lower() not in {".html", ".htm"}:
-        raise OutputError(f"--out {out}: name a file that ends in .html.")
+    on_paper = out.suffix.lower() == ".pdf"
+    if not on_paper and out.suffix.lower() not in {".html", ".htm"}:
+        raise OutputError(f"--out {out}: name a file that ends in .html or .pdf.")
+    if on_paper:
+        require_browser()
     require_place(out)
     with progress() as tell:
         made = run(
@@ -76,8 +89,14 @@ def report(
             log_start=log_start,
             log_columns=log_columns,
             compared=not no_compare,
+            fields=[
+                (name.strip(), value.strip()) for name, _, value in (one.partition("=") for one in fields)
+            ],
             progress=tell,
         )
+        if on_paper:
+            tell("printing")
+            made = attrs.evolve(made, content=printed(made.content))
         deliver(out, made.content)
     print_outcome(made.to_dict(out), words.report(made, out), as_json)
     if faults := made.faults():

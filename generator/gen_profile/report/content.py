@@ -140,6 +140,10 @@ class Page:
     sections : sequence of Section
     colophon : str
         What made the page.
+    papers : sequence of (str, str)
+        What whoever files the page wants to have on it, such as a customer.
+    signatures : sequence of str
+        Lines to be filled in by hand.
     """
 
     title: str
@@ -148,6 +152,8 @@ class Page:
     facts: Sequence[tuple[str, str]]
     sections: Sequence[Section]
     colophon: str
+    papers: Sequence[tuple[str, str]] = ()
+    signatures: Sequence[str] = ()
 
     @property
     def figures(self) -> list[Figure]:

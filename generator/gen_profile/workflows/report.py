@@ -79,6 +79,7 @@ def report(
     log_start: float | None = None,
     log_columns: str | None = None,
     compared: bool = True,
+    fields: Sequence[tuple[str, str]] = (),
     progress: Progress = lambda _: None,
 ) -> Report:
     """Design, check and compare, and put what was found on one page.
@@ -96,6 +97,9 @@ def report(
         Which of its columns holds what; see `gen_profile.workflows.report_log.read_log`.
     compared : bool
         Whether other methods are tried as well.
+    fields : sequence of (str, str)
+        Names and values that the page shall also hold, such as a customer; those without a value are lines
+        to sign.
     progress : callable
         Told what is being done.
 
@@ -113,7 +117,11 @@ def report(
         measured = compare_measured(outcome.spec, outcome.plan.trial, read, arrival, log_start)
     comparison = compare(spec, progress) if compared else None
     progress("writing the report")
-    page = _page(outcome, comparison, measured)
+    page = attrs.evolve(
+        _page(outcome, comparison, measured),
+        papers=[(name, value) for name, value in fields if value],
+        signatures=[name for name, value in fields if not value],
+    )
     return Report(design=outcome, comparison=comparison, measured=measured, content=render(page))
 
 

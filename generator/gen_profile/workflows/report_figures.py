@@ -18,7 +18,7 @@ from gen_profile.workflows.method_styles import method_styles
 from gen_profile.workflows.planning import RESIDUAL_SAMPLES, Trial
 from gen_profile.workflows.scenarios import extremes
 from gen_profile.workflows.spectrum import DECADES, natural_frequencies, spectrum
-from gen_profile.workflows.wording import machine
+from gen_profile.workflows.wording import machine, place_unit
 
 SAMPLES = 800
 COMPARED = 500  # samples of each curve where there are many methods
@@ -65,18 +65,23 @@ def motion_figure(spec: Spec, trial: Trial) -> Figure:
     lagging = trial.command is not trial.motion
     panels = []
     for column, axis in enumerate(spec.machine().actuated):
+        place, factor = place_unit(spec, column)
         for order, (quantity, unit) in enumerate(ORDERS):
             lines = [_derivative("command", trial.command, order, column)]
             if lagging:
                 lines.append(_derivative("motion of the axis", trial.motion, order, column, FOLLOWED))
             greatest = max(float(np.abs(line.y).max()) for line in lines)
+            levels = tuple(_limits(spec, column, order, NEAR * greatest))
+            if order == 0:
+                lines = [attrs.evolve(line, y=factor * line.y) for line in lines]
+                levels = tuple(attrs.evolve(level, value=factor * level.value) for level in levels)
             panels.append(
                 Panel(
                     title=f"{quantity} of {axis.name}",
                     x_label=TIME,
-                    y_label=f"{quantity.lower()} ({unit.format(axis.unit)})",
+                    y_label=f"{quantity.lower()} ({unit.format(axis.unit if order else place)})",
                     lines=lines,
-                    levels=tuple(_limits(spec, column, order, NEAR * greatest)),
+                    levels=levels,
                 )
             )
     drawn = "The command of each drive leads its lag" if lagging else "The drives follow it as it is"

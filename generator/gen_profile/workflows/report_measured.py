@@ -309,8 +309,8 @@ def _best_start(trial: Trial, log: MeasuredLog) -> float:
 def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Array]:
     """Compute the sway of the loads that the ropes' angles tell of.
 
-    The angles are taken to be linear in the coordinates, as ropes' are. What no angle tells of may be anything:
-    a load whose sway depends on that has none.
+    The angles are taken to be linear in the coordinates, as ropes' are. What no angle tells of may be
+    anything: a load whose sway depends on that has none.
     """
     plant = spec.machine()
     p, n_u = SimpleNamespace(**spec.plant.parameters), len(plant.unactuated)

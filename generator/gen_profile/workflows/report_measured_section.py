@@ -13,7 +13,7 @@ from gen_profile.spec import Spec
 from gen_profile.workflows.planning import Trial
 from gen_profile.workflows.report_figures import TIME, sway_levels
 from gen_profile.workflows.report_measured import Measured, MeasuredSway, Signal
-from gen_profile.workflows.wording import machine, mm, number
+from gen_profile.workflows.wording import machine, mm, number, place_unit
 
 DRAWN = 1500  # samples of a log that are drawn; all of them are judged
 PLANNED = Style(colour=PALETTE[0], width=2.0)
@@ -95,13 +95,15 @@ def _share(sway: MeasuredSway) -> float:
 
 def _panels(spec: Spec, trial: Trial, measured: Measured) -> Iterator[Panel]:
     arrival = Band(low=measured.arrival, high=measured.arrival)
+    names = [axis.name for axis in spec.machine().actuated]
     for axis, signal in measured.positions.items():
         times, position, planned, deviation = _thinned(signal)
+        unit, factor = place_unit(spec, names.index(axis))
         yield Panel(
             title=f"Position of {axis}",
             x_label=TIME,
-            y_label=f"position ({signal.unit})",
-            lines=[_planned(times, planned), _measured(times, position)],
+            y_label=f"position ({unit})",
+            lines=[_planned(times, factor * planned), _measured(times, factor * position)],
             bands=[arrival],
         )
         yield Panel(

@@ -30,7 +30,7 @@ from gen_profile.workflows.report_figures import (
 from gen_profile.workflows.report_measured import Measured
 from gen_profile.workflows.report_measured_section import measured_section
 from gen_profile.workflows.report_robustness import robustness_section
-from gen_profile.workflows.wording import bound, machine, mm, number
+from gen_profile.workflows.wording import bound, machine, mm, number, place_unit
 
 UNITS_OF_TIME = ("s", "s²", "s³")
 QUANTITIES = ("velocity", "acceleration", "jerk")
@@ -146,15 +146,16 @@ def _axis_limits(spec: Spec, trial: Trial) -> Iterator[Row]:
             else:
                 yield _limit(name, taken, allowed, unit)
         if limits.travel is not None:
-            low, high = limits.travel
-            least, most = extremes(trial.command, 0, column)
+            unit, factor = place_unit(spec, column)
+            low, high = (factor * end for end in limits.travel)
+            least, most = (factor * end for end in extremes(trial.command, 0, column))
             margin = min(least - low, high - most)
             yield Row(
                 cells=(
                     f"travel of {axis.name}",
-                    f"{number(least)} to {number(most)} {axis.unit}",
-                    f"{number(low)} to {number(high)} {axis.unit}",
-                    f"{number(margin)} {axis.unit}",
+                    f"{number(least)} to {number(most)} {unit}",
+                    f"{number(low)} to {number(high)} {unit}",
+                    f"{number(margin)} {unit}",
                     "",
                 ),
             )

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 
 from gen_profile.spec import Spec
+from gen_profile.units import UNITS
 
 SMALLEST, LARGEST = 1e-4, 1e4  # beyond, four digits would need a power of ten
 
@@ -45,12 +46,25 @@ def machine(name: str) -> str:
     return re.sub(r"-(?=[0-9.])", "−", name).replace(" %", "\N{NO-BREAK SPACE}%")
 
 
+def place_unit(spec: Spec, column: int) -> tuple[str, float]:
+    """Say in which unit an axis's places are told, its controller's, and how many of it make one SI unit.
+
+    Counts of an encoder tell nobody anything; they are told in SI units.
+    """
+    scale, axis = spec.axis_scales()[column], spec.machine().actuated[column]
+    if scale.unit not in UNITS:
+        return axis.unit, 1.0
+    return scale.unit, UNITS[scale.unit][1]
+
+
 def move(spec: Spec) -> str:
     """Say what moves, how far, and in what time."""
     axes = spec.machine().actuated
     distances = " and ".join(
-        f"{axis.name} {number(distance)} {axis.unit}"
-        for axis, distance in zip(axes, spec.move.distance, strict=True)
+        f"{axis.name} {number(factor * distance)} {unit}"
+        for axis, distance, (unit, factor) in zip(
+            axes, spec.move.distance, (place_unit(spec, column) for column in range(len(axes))), strict=True
+        )
     )
     return f"{distances} in {number(spec.move.duration)} s"
 

@@ -6,12 +6,12 @@
   const LOOKS = {
     rail: { stroke: "#8a949d", "stroke-width": 2 },
     plumb: { stroke: "#9aa4ad", "stroke-width": 1, "stroke-dasharray": "4 3" },
-    rope: { stroke: "#17212b", "stroke-width": 1.6 },
-    spring: { stroke: "#17212b", "stroke-width": 1.6 },
-    frame: { stroke: "#17212b", "stroke-width": 3 },
+    rope: { stroke: "currentColor", "stroke-width": 1.6 },
+    spring: { stroke: "currentColor", "stroke-width": 1.6 },
+    frame: { stroke: "currentColor", "stroke-width": 3 },
     liquid: { fill: "#7fb6de", stroke: "none" },
     body: { fill: "#5a6672" },
-    hook: { fill: "#17212b" },
+    hook: { fill: "currentColor" },
   };
   const COILS = 6;
 
@@ -87,7 +87,7 @@
       const points = actor.sway_mm.map((sway, frame) => `${x(frame * animation.step).toFixed(2)},${y(sway).toFixed(2)}`);
       element(svg, "polyline", { ...fine, points: points.join(" "), stroke: actor.colour, "stroke-width": 1.5 });
     }
-    const cursor = element(svg, "path", { ...fine, stroke: "#17212b", "stroke-width": 1.5 });
+    const cursor = element(svg, "path", { ...fine, stroke: "currentColor", "stroke-width": 1.5 });
     return (time) => cursor.setAttribute("d", `M${x(time)} 0V100`);
   }
 

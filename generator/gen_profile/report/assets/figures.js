@@ -3,10 +3,18 @@
 (() => {
   const figures = JSON.parse(document.getElementById("data").textContent).figures;
   const coarse = matchMedia("(pointer: coarse)").matches; // a finger must be able to scroll the page
-  const axis = {
-    gridcolor: "#e6eaee", zerolinecolor: "#c3cbd2", linecolor: "#c3cbd2", showline: true,
-    ticks: "outside", tickcolor: "#c3cbd2", automargin: true, exponentformat: "power",
-  };
+  const axis = { showline: true, ticks: "outside", automargin: true, exponentformat: "power" };
+  const dark = matchMedia("screen and (prefers-color-scheme: dark)");
+  const LIGHT = { ink: "#17212b", paper: "#fff", grid: "#e6eaee", line: "#c3cbd2", limit: "#b3261e" };
+  const DARK = { ink: "#e3e8ed", paper: "#14191e", grid: "#2b343c", line: "#4a5661", limit: "#ff8a80" };
+  let shade = dark.matches ? DARK : LIGHT;
+
+  /** Put another shade's colours for those of light paper, wherever a trace or a shape names them. */
+  const shaded = (part) =>
+    JSON.parse(JSON.stringify(part), (_, value) => {
+      const name = Object.keys(LIGHT).find((key) => LIGHT[key] === value);
+      return name ? shade[name] : value;
+    });
   const MARGIN = { l: 56, r: 12, t: 28, b: 40 }; // the buttons stand above the curves
   const config = {
     displaylogo: false,
@@ -18,18 +26,19 @@
 
   function layoutOf(panel) {
     const { xaxis, yaxis, ...rest } = panel.layout;
+    const lined = { ...axis, gridcolor: shade.grid, zerolinecolor: shade.line, linecolor: shade.line, tickcolor: shade.line };
     return {
-      font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: "#17212b" },
+      font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: shade.ink },
       margin: MARGIN,
       showlegend: false,
       hovermode: "x unified",
       dragmode: coarse ? false : "zoom",
-      hoverlabel: { namelength: 40 },
-      paper_bgcolor: "#fff",
-      plot_bgcolor: "#fff",
-      ...rest,
-      xaxis: { ...axis, ...xaxis, title: { ...xaxis.title, standoff: 6 } },
-      yaxis: { ...axis, ...yaxis, title: { ...yaxis.title, standoff: 6 } },
+      hoverlabel: { namelength: 40, bgcolor: shade.paper },
+      paper_bgcolor: shade.paper,
+      plot_bgcolor: shade.paper,
+      ...shaded(rest),
+      xaxis: { ...lined, ...xaxis, title: { ...xaxis.title, standoff: 6 } },
+      yaxis: { ...lined, ...yaxis, title: { ...yaxis.title, standoff: 6 } },
     };
   }
 
@@ -87,7 +96,7 @@
     for (const [index, figure] of figures.entries()) {
       const plots = [...hosts[index].querySelectorAll(".plot")];
       for (const [place, panel] of figure.panels.entries()) {
-        await Plotly.newPlot(plots[place], panel.data, layoutOf(panel), config);
+        await Plotly.newPlot(plots[place], shaded(panel.data), layoutOf(panel), config);
         await new Promise((done) => setTimeout(done)); // let the reader scroll meanwhile
       }
       link(plots);
@@ -96,13 +105,41 @@
     document.documentElement.dataset.drawn = "true";
   }
 
+  /** Draw in another shade; what a reader zoomed or hid stays. */
+  function reshade(to) {
+    if (to === shade) return;
+    shade = to;
+    const hosts = document.querySelectorAll("figure.curves");
+    for (const [index, figure] of figures.entries()) {
+      const plots = hosts[index].querySelectorAll(".plot");
+      for (const [place, panel] of figure.panels.entries()) {
+        const plot = plots[place];
+        if (!plot.layout) continue;
+        const { font, paper_bgcolor, plot_bgcolor, hoverlabel, shapes, xaxis, yaxis } = layoutOf(panel);
+        const change = { font, paper_bgcolor, plot_bgcolor, hoverlabel, shapes };
+        for (const [name, lines] of Object.entries({ xaxis, yaxis })) {
+          for (const key of ["gridcolor", "zerolinecolor", "linecolor", "tickcolor"]) change[`${name}.${key}`] = lines[key];
+        }
+        Plotly.relayout(plot, change);
+        shaded(panel.data).forEach((trace, curve) => Plotly.restyle(plot, { "line.color": trace.line.color }, [curve]));
+      }
+    }
+  }
+  dark.addEventListener("change", () => reshade(dark.matches ? DARK : LIGHT));
+
   // A browser lays out for paper only after it has asked the page to get ready: sizes are those of page.css.
   const PAPER = { width: (90 * 96) / 25.4, height: (54 * 96) / 25.4, margin: 6 };
   const resize = (size) => document.querySelectorAll(".js-plotly-plot").forEach((plot) => Plotly.relayout(plot, size));
+  let folded = [];
   addEventListener("beforeprint", () => {
+    folded = [...document.querySelectorAll("details:not([open])")];
+    for (const part of folded) part.open = true; // paper cannot be unfolded
+    reshade(LIGHT);
     resize({ width: PAPER.width, height: PAPER.height, "margin.t": PAPER.margin, autosize: false });
   });
   addEventListener("afterprint", () => {
+    for (const part of folded) part.open = false;
+    reshade(dark.matches ? DARK : LIGHT);
     resize({ width: null, height: null, "margin.t": MARGIN.t, autosize: true });
   });
   draw();
