@@ -5,9 +5,9 @@
     time_s;cart_position_mm;payload_sway_mm;hook_angle_deg
     0,000;0,0;0,2;0,01
 
-Columns are called as those of the exported CSV or of a stream's log, in one of some languages: a position may
-leave its axis out where there is only one, a sway or an angle its load where the end load is meant. Units stand
-behind the quantity, with an underscore, a space or in brackets, or in the row below; without one an axis
+Columns are called as those of the exported CSV or of a stream's log, in one of some languages: a position
+may leave its axis out where there is one only, a sway or an angle its load where the end load is meant. Units
+stand behind the quantity, with an underscore, a space, in brackets, or in the row below; without one an axis
 counts in its own unit, and everything else in SI units. Columns are separated by semicolons, tabs or commas;
 where not by commas, a decimal comma is understood, too. Columns of other names are left alone.
 """
