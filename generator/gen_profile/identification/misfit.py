@@ -92,7 +92,7 @@ def spectrum(times: Array, residuals: Array, fastest: float) -> Spectrum:
     highest = min(max(HARMONICS * fastest, FEWEST * apart), np.pi / float(np.median(np.diff(times))))
     count = min(max(int(highest / apart), 1), MOST_LINES)
     frequencies = np.linspace(1.0, highest / apart, count) * apart
-    power = np.asarray(lombscargle(times, residuals - residuals.mean(), frequencies))
+    power = np.asarray(lombscargle(np.array(times), residuals - residuals.mean(), frequencies))
     around = median_filter(power, min(NEIGHBOURS, len(power)), mode="reflect")
     around = np.maximum(around, np.median(power)) / math.log(2.0)  # smooth noise may have deep valleys
     return Spectrum(frequencies=frequencies, power=power, background=around)
