@@ -38,7 +38,9 @@ def cache_folders() -> Iterator[Path]:
     preferred = Path(named).absolute() if named else _users_folder()
     if preferred is not None:
         yield preferred
-    user = "user" if sys.platform == "win32" else os.geteuid()
+    user = "user"
+    if sys.platform != "win32":
+        user = str(os.geteuid())
     yield Path(tempfile.gettempdir()) / f"gen-profile-{user}"
 
 
