@@ -23,12 +23,14 @@ from gen_profile_exporters.can.cia402 import FAULTS, MOVING, Controlword, State,
 from gen_profile_exporters.can.clock import NANOSECONDS
 from gen_profile_exporters.can.link import Link
 from gen_profile_exporters.can.scaling import Setpoints, magnitude_counts
-from gen_profile_exporters.can.startup import MODES, Entry, startup_lists
+from gen_profile_exporters.can.startup import AT_ONCE, MODES, Entry, startup_lists
 from gen_profile_exporters.exporter import Target
 
 CIA_402 = 402  # low word of 1000h
 NOT_THERE = {0x0602_0000, 0x0609_0011}  # SDO abort codes: no such object, no such subindex
-PDO_COB_IDS = range(0x1400, 0x1C00)
+# what drives say as well of an object that they need not have: general error, not available, no data
+NOT_GIVEN = NOT_THERE | {0x0800_0000, 0x060A_0023, 0x0800_0024}
+PDO_PARAMETERS = {*range(0x1400, 0x1600), *range(0x1800, 0x1A00)}
 COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it was set
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
@@ -212,7 +214,10 @@ def _set(link: Link, node: Node, entries: Sequence[Entry]) -> None:
 
 def _differing(link: Link, node: Node, final: Mapping[Place, Entry]) -> list[tuple[Entry, bytes | None]]:
     wanted = {place: entry.data for place, entry in final.items()}
-    held = {place: _upload(link, node, *place, entry.bits) for place, entry in final.items()}
+    held = {
+        place: _upload(link, node, *place, entry.bits, optional=entry.optional)
+        for place, entry in final.items()
+    }
     same = {place for place, entry in final.items() if _same(entry, held[place])}
     if _interpolation_period(held) == _interpolation_period(wanted):  # 40 × 0.1 ms are 4 × 1 ms, too
         same |= {PERIOD_DIGITS, PERIOD_EXPONENT}
@@ -222,9 +227,11 @@ def _differing(link: Link, node: Node, final: Mapping[Place, Entry]) -> list[tup
 def _same(entry: Entry, data: bytes | None) -> bool:
     if data is None:
         return entry.optional
-    if entry.index in PDO_COB_IDS and entry.sub == 1 and entry.index & 0x0200 == 0:
+    if entry.index in PDO_PARAMETERS and entry.sub == 1:
         apart = int.from_bytes(data, "little") ^ int.from_bytes(entry.data, "little")
         return not apart & COB_ID_BITS
+    if entry.index in PDO_PARAMETERS and entry.sub == 2 and entry.value in AT_ONCE:
+        return data[0] in AT_ONCE
     return data == entry.data
 
 
@@ -245,7 +252,7 @@ def _require_window(link: Link, node: Node) -> None:
 
 
 def _require_travel(link: Link, node: Node, motion: Setpoints) -> None:
-    ends = [_upload(link, node, 0x607D, sub) for sub in (1, 2)]
+    ends = [_upload(link, node, 0x607D, sub, optional=True) for sub in (1, 2)]
     if ends[0] is None or ends[1] is None:
         return
     low, high = (int.from_bytes(end, "little", signed=True) for end in ends if end is not None)
@@ -289,12 +296,14 @@ def _read(link: Link, node: Node, index: int, sub: int = 0, bits: int = 32) -> i
     return int.from_bytes(data, "little")
 
 
-def _upload(link: Link, node: Node, index: int, sub: int, bits: int = 32) -> bytes | None:
+def _upload(
+    link: Link, node: Node, index: int, sub: int, bits: int = 32, *, optional: bool = False
+) -> bytes | None:
     """Read an object of so many bits, whose answer may have room for more; None where the drive has none."""
     try:
         data: bytes = link.sdo(node.number).upload(index, sub)
     except SdoAbortedError as error:
-        if error.code in NOT_THERE:
+        if error.code in (NOT_GIVEN if optional else NOT_THERE):
             return None
         raise StreamAborted(
             f"axis {node.name}: the drive refuses to tell {index:04X}h:{sub:02X} ({error})."

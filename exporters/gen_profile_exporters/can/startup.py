@@ -35,6 +35,7 @@ RAMP_THEN_DISABLE = 2  # 605Ah
 OFF = 1 << 31  # of a PDO's COB-ID
 NO_REMOTE_REQUEST = 1 << 30
 ON_SYNC, ON_EVENT = 1, 255  # transmission types
+AT_ONCE = {254, ON_EVENT}  # event-driven, as the maker or the device profile defines it: alike for an RPDO
 # PDOs that are not always used: their parameters, and COB-ID of node 0
 OTHERS = {0x1402: frames.RPDO3, 0x1403: 0x500, 0x1801: 0x280, 0x1802: 0x380, 0x1803: 0x480}
 SHORTEST_TIMEOUT = 0.02  # s, unless the spec asks for less

@@ -4,6 +4,7 @@ import re
 
 import attrs
 import pytest
+from canopen import SdoAbortedError
 from exporters.can.bench import OTHER_MAKE, Bench
 from motions import quintic, target
 
@@ -178,6 +179,34 @@ def test_an_object_that_drives_need_not_have():
     with Bench() as bench:
         drop(bench, 0x1006)
         assert bench.run().phase is Phase.DONE
+
+
+@pytest.mark.parametrize(("index", "fits"), [(0x1006, True), (0x607D, True), (0x6007, False)])
+def test_a_general_error_tells_of_an_object_that_is_not_there(index, fits):
+    def refuse(**of):
+        if of["index"] == index:
+            raise SdoAbortedError(0x0800_0000)
+
+    with Bench() as bench:
+        for sub in (1, 2):
+            bench.drive.value(0x607D, sub)  # which it knows itself
+        bench.drive.local.add_read_callback(refuse)
+        bench.drive.local.add_write_callback(refuse)
+        if fits:
+            assert bench.run().phase is Phase.DONE
+        else:
+            refused(bench, r"refuses to tell 6007h:00")
+
+
+@pytest.mark.parametrize(("kind", "fits"), [(254, True), (1, False)])
+def test_the_transmission_type_of_a_controlword_may_be_either_that_is_event_driven(kind, fits):
+    with Bench() as bench:
+        bench.drive.store(0x1400, 2, kind)
+        bench.drive.local.object_dictionary[0x1400][2].access_type = "ro"
+        if fits:
+            assert bench.run().phase is Phase.DONE
+        else:
+            refused(bench, r"1400h:02 \(controlword: at once\) must hold FFh, but the drive keeps 1h there")
 
 
 def test_an_object_that_may_not_be_read():
