@@ -23,14 +23,13 @@ from gen_profile_exporters.can.cia402 import FAULTS, MOVING, Controlword, State,
 from gen_profile_exporters.can.clock import NANOSECONDS
 from gen_profile_exporters.can.link import Link
 from gen_profile_exporters.can.scaling import Setpoints, magnitude_counts
-from gen_profile_exporters.can.startup import AT_ONCE, MODES, Entry, startup_lists
+from gen_profile_exporters.can.startup import AT_ONCE, MODES, PDO_PARAMETERS, Entry, startup_lists
 from gen_profile_exporters.exporter import Target
 
 CIA_402 = 402  # low word of 1000h
 NOT_THERE = {0x0602_0000, 0x0609_0011}  # SDO abort codes: no such object, no such subindex
 # what drives say as well of an object that they need not have: general error, not available, no data
 NOT_GIVEN = NOT_THERE | {0x0800_0000, 0x060A_0023, 0x0800_0024}
-PDO_PARAMETERS = {*range(0x1400, 0x1600), *range(0x1800, 0x1A00)}
 COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it was set
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h

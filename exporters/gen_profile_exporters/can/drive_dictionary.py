@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from io import StringIO
+from typing import Any
 
 import attrs
 import canopen
 from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
+from canopen.objectdictionary.eds import export_eds
 
-from gen_profile_exporters.can.startup import OFF
+from gen_profile_exporters.can.startup import OFF, PDO_PARAMETERS
 
 U8, U16, U32 = datatypes.UNSIGNED8, datatypes.UNSIGNED16, datatypes.UNSIGNED32
 I8, I16, I32 = datatypes.INTEGER8, datatypes.INTEGER16, datatypes.INTEGER32
 PDOS = range(4)
 MAPPED = 8  # entries of a mapping
-VENDOR, PRODUCT = 0x0000_02E5, 0x4750_0001
+VENDOR, PRODUCT, REVISION = 0x0000_02E5, 0x4750_0001, 1
+BIT_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)  # kbit/s; it takes every one that CiA 306 names
+# what a PDO may carry: the drive's commands, setpoints, and what it tells of itself
+MAPPABLE = {0x6040, 0x6041, 0x6060, 0x6061, 0x6064, 0x607A, 0x60B1, 0x60B2, 0x60C1, 0x60FF}
 WINDOW = 1 << 31  # counts; a drive's own following error window, wide open but watched
 
 
@@ -56,9 +61,7 @@ def dictionary(node: int, make: Make) -> canopen.ObjectDictionary:
     """Build the object dictionary of one node."""
     found = canopen.ObjectDictionary()
     found.node_id = node
-    information = found.device_information
-    information.vendor_name, information.product_name = "gen-profile", "simulated CiA 402 drive"
-    information.vendor_number, information.product_number = make.vendor, make.product
+    _identify(found.device_information, make)
     for index, name, of, access, value in _variables(make):
         found.add_object(_variable(index, 0, name, of, access=access, value=value))
     for index, name, kind, access, values in _records(node, make):
@@ -73,11 +76,45 @@ def dictionary(node: int, make: Make) -> canopen.ObjectDictionary:
     return found
 
 
-def eds(node: int, make: Make) -> str:
-    """Render the electronic data sheet (CiA 306)."""
+def eds(node: int, make: Make, file_name: str = "drive.eds") -> str:
+    """Render the electronic data sheet (CiA 306), the same at any time."""
+    about = {
+        "FileName": file_name,
+        "FileVersion": 1,
+        "FileRevision": REVISION,
+        "EdsVersion": "4.0",
+        "Description": "Simulated CiA 402 drive",
+        "CreatedBy": "gen-profile",
+        "ModifiedBy": "gen-profile",
+    }
+    for change in ("Creation", "Modification"):
+        about |= {f"{change}Date": "01-01-2026", f"{change}Time": "12:00AM"}
+    found = dictionary(node, make)
+    for variable in _variables_of(found):
+        value = variable.default
+        if variable.index in PDO_PARAMETERS and variable.subindex == 1:
+            variable.default_raw = f"$NODEID+0x{value - node:X}"
+        elif value < 0:  # decimal: two's complement in hexadecimal is read as a positive number by some
+            variable.default_raw = str(value)
     text = StringIO()
-    canopen.export_od(dictionary(node, make), text, "eds")
+    export_eds(found, text, about)
     return text.getvalue()
+
+
+def _variables_of(found: canopen.ObjectDictionary) -> Iterator[Any]:
+    for entry in found.values():
+        yield from [entry] if isinstance(entry, ODVariable) else entry.values()
+
+
+def _identify(information: Any, make: Make) -> None:
+    information.vendor_name, information.vendor_number = "gen-profile", make.vendor
+    information.product_name, information.product_number = "simulated CiA 402 drive", make.product
+    information.revision_number, information.order_code = REVISION, "drive-sim"
+    information.allowed_baudrates = {1000 * rate for rate in BIT_RATES}
+    information.nr_of_RXPDO = information.nr_of_TXPDO = len(PDOS)
+    information.granularity, information.simple_boot_up_slave = 8, True  # PDOs are mapped by whole bytes
+    information.simple_boot_up_master = information.group_messaging = information.LSS_supported = False
+    information.dynamic_channels_supported = False
 
 
 def _variables(make: Make) -> Iterator[tuple[int, str, int, str, int]]:
@@ -104,7 +141,7 @@ def _variables(make: Make) -> Iterator[tuple[int, str, int, str, int]]:
 
 def _records(node: int, make: Make) -> Iterator[tuple[int, str, int | dict[int, int], str, tuple[int, ...]]]:
     yield 0x1016, "Consumer heartbeat time", U32, "rw", (0,)
-    yield 0x1018, "Identity object", U32, "ro", (make.vendor, make.product, 1, 1)
+    yield 0x1018, "Identity object", U32, "ro", (make.vendor, make.product, REVISION, 1)
     yield 0x607D, "Software position limit", I32, "rw", (0, 0)
     for index, name in (
         (0x608F, "Position encoder resolution"),
@@ -150,5 +187,5 @@ def _count(index: int, values: tuple[int, ...]) -> ODVariable:
 def _variable(index: int, sub: int, name: str, kind: int, *, access: str, value: int) -> ODVariable:
     variable = ODVariable(name, index, sub)
     variable.data_type, variable.access_type, variable.default = kind, access, value
-    variable.pdo_mappable = index >= 0x6000
+    variable.pdo_mappable = index in MAPPABLE and (index != 0x60C1 or sub == 1)
     return variable

@@ -34,6 +34,7 @@ QUICK_STOP_ON_LOST_CONNECTION = 3  # 6007h
 RAMP_THEN_DISABLE = 2  # 605Ah
 OFF = 1 << 31  # of a PDO's COB-ID
 NO_REMOTE_REQUEST = 1 << 30
+PDO_PARAMETERS = {*range(0x1400, 0x1600), *range(0x1800, 0x1A00)}
 ON_SYNC, ON_EVENT = 1, 255  # transmission types
 AT_ONCE = {254, ON_EVENT}  # event-driven, as the maker or the device profile defines it: alike for an RPDO
 # PDOs that are not always used: their parameters, and COB-ID of node 0

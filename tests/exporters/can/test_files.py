@@ -251,12 +251,18 @@ class TestStartup:
             files(timeout=0.005)
 
     def test_eds_is_read_by_canopen(self):
-        file = io.StringIO(eds(7, Make()))
-        file.name = "drive.eds"
-        found = canopen.import_od(file, 7)
-        assert found[0x60C2][2].data_type == canopen.objectdictionary.datatypes.INTEGER8
-        assert found[0x1000].default == 0x0002_0192
-        assert found[0x1018][1].default == Make().vendor
+        written = eds(7, Make(), "axis.eds")
+        file = io.StringIO(written)
+        file.name = "axis.eds"
+        found, own = canopen.import_od(file, 7), dictionary(7, Make())
+        for index, entry in own.items():
+            for sub in getattr(entry, "subindices", [0]):
+                ours, theirs = own.get_variable(index, sub), found.get_variable(index, sub)
+                assert (theirs.data_type, theirs.default) == (ours.data_type, ours.default)
+        assert found.device_information.allowed_baudrates >= {125_000, 250_000, 500_000, 1_000_000}
+        assert found.device_information.order_code
+        assert "FileName=axis.eds\n" in written
+        assert "=0x-" not in written
 
 
 def concise(content):
