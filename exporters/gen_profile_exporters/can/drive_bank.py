@@ -89,6 +89,7 @@ class DriveBank:
         self._network.send_due(now)
         for drive in self.drives:
             drive.watch(now)
+            self._tell(drive.events(now))
         period = round(max(drive.period for drive in self.drives) * NANOSECONDS)
         if self._moving and now - self._synced > period + period // 2:
             self._synced += period
@@ -104,8 +105,7 @@ class DriveBank:
         if message.arbitration_id == frames.SYNC:
             self._synced = self._clock.now()
             for drive in self.drives:  # where they are now; then they set out for the next SYNC
-                for cob_id, told in drive.feedback():
-                    self._network.send_message(cob_id, told)
+                self._tell(drive.feedback())
             self._advance()
             return
         data = bytearray(message.data)
@@ -114,6 +114,10 @@ class DriveBank:
         if (message.arbitration_id == frames.NMT and len(data) == 2) or self._is_request(message):
             with suppress(struct.error):  # canopen cannot refuse a request that goes on with none
                 self._network.notify(message.arbitration_id, data, message.timestamp)
+
+    def _tell(self, pdos: Sequence[tuple[int, bytes]]) -> None:
+        for cob_id, data in pdos:
+            self._network.send_message(cob_id, data)
 
     def _is_request(self, message: can.Message) -> bool:
         nodes = {drive.node for drive in self.drives}

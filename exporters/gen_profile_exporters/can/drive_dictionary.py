@@ -1,8 +1,8 @@
-"""Object dictionary of the simulated drive, and its EDS."""
+"""Object dictionary of the simulated drive, its EDS, and what may not be written to it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import StringIO
 from typing import Any
 
@@ -11,7 +11,7 @@ import canopen
 from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
 from canopen.objectdictionary.eds import export_eds
 
-from gen_profile_exporters.can.startup import OFF, PDO_PARAMETERS
+from gen_profile_exporters.can.startup import AT_ONCE, OFF, PDO_PARAMETERS
 
 U8, U16, U32 = datatypes.UNSIGNED8, datatypes.UNSIGNED16, datatypes.UNSIGNED32
 I8, I16, I32 = datatypes.INTEGER8, datatypes.INTEGER16, datatypes.INTEGER32
@@ -21,6 +21,11 @@ VENDOR, PRODUCT, REVISION = 0x0000_02E5, 0x4750_0001, 1
 BIT_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)  # kbit/s; it takes every one that CiA 306 names
 # what a PDO may carry: the drive's commands, setpoints, and what it tells of itself
 MAPPABLE = {0x6040, 0x6041, 0x6060, 0x6061, 0x6064, 0x607A, 0x60B1, 0x60B2, 0x60C1, 0x60FF}
+PDO_BITS = 64  # what a frame carries
+# SDO abort codes of CiA 301
+NOT_MAPPABLE, PDO_TOO_LONG = 0x0604_0041, 0x0604_0042
+OUT_OF_RANGE, WRONG_STATE = 0x0609_0030, 0x0800_0022
+TRANSMISSION_TYPES = {*range(241), *AT_ONCE}  # the others are reserved, or wait for remote requests
 WINDOW = 1 << 31  # counts; a drive's own following error window, wide open but watched
 
 
@@ -101,6 +106,57 @@ def eds(node: int, make: Make, file_name: str = "drive.eds") -> str:
     return text.getvalue()
 
 
+def refusal(
+    found: canopen.ObjectDictionary, held: Callable[[int, int], int], index: int, sub: int, value: int
+) -> int | None:
+    """Tell by which SDO abort code a drive refuses to be set so, or None.
+
+    Parameters
+    ----------
+    found : canopen.ObjectDictionary
+    held : callable
+        What an object (index, subindex) holds.
+    index, sub, value : int
+        An object that is there, and what somebody writes to it, unsigned.
+    """
+    if index == 0x6060:
+        return None if value == 0 or supports(held(0x6502, 0), value) else OUT_OF_RANGE
+    if index in PDO_PARAMETERS:
+        return _refusal_of_parameter(index, held(index, 1), sub, value)
+    if index - 0x200 in PDO_PARAMETERS:
+        if not held(index - 0x200, 1) & OFF or (sub and held(index, 0)):
+            return WRONG_STATE
+        entries = [value] if sub else [held(index, n) for n in range(1, min(value, MAPPED) + 1)]
+        if (not sub and value > MAPPED) or sum(entry & 0xFF for entry in entries) > PDO_BITS:
+            return PDO_TOO_LONG
+        if not all(_may_carry(found, index, entry) for entry in entries):
+            return NOT_MAPPABLE
+    return None
+
+
+def supports(modes: int, mode: int) -> bool:
+    """Tell whether 6502h lists a mode of 6060h."""
+    return 1 <= mode <= 32 and bool(modes >> (mode - 1) & 1)
+
+
+def _refusal_of_parameter(index: int, cob_id: int, sub: int, value: int) -> int | None:
+    exists = not cob_id & OFF
+    renamed = sub == 1 and not value & OFF and (cob_id ^ value) & 0x1FFF_FFFF
+    if exists and (renamed or sub == 3):  # inhibit time
+        return WRONG_STATE
+    acyclic = index >= 0x1800 and value == 0  # a TPDO on SYNC after a change, which this drive does not do
+    return OUT_OF_RANGE if sub == 2 and (acyclic or value not in TRANSMISSION_TYPES) else None
+
+
+def _may_carry(found: canopen.ObjectDictionary, mapping: int, entry: int) -> bool:
+    """Tell whether a PDO may carry an object: one that is there, whole, and to be written by an RPDO."""
+    sub, bits = entry >> 8 & 0xFF, entry & 0xFF
+    variable = found.get_variable(entry >> 16, sub)
+    if variable is None or variable.subindex != sub or len(variable) != bits:
+        return False
+    return bool(variable.pdo_mappable and (variable.writable or mapping >= 0x1A00))
+
+
 def _variables_of(found: canopen.ObjectDictionary) -> Iterator[Any]:
     for entry in found.values():
         yield from [entry] if isinstance(entry, ODVariable) else entry.values()
@@ -160,7 +216,7 @@ def _records(node: int, make: Make) -> Iterator[tuple[int, str, int | dict[int, 
             (0x1800, 0x180, sent, "TPDO"),
         ):
             used = cob_id + 0x100 * pdo + node if mapping else OFF | cob_id + 0x100 * pdo + node
-            kinds = {1: U32, 2: U8, 5: U16}
+            kinds = {1: U32, 2: U8, 3: U16, 5: U16}
             yield base + pdo, f"{word} {pdo + 1} parameter", kinds, "rw", (used, 255, 0, 0, 0)
             entries = (*mapping, *(0,) * (MAPPED - len(mapping)))
             yield base + 0x200 + pdo, f"{word} {pdo + 1} mapping", U32, "rw", entries

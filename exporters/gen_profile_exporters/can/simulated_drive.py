@@ -7,6 +7,7 @@ clock.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import canopen
@@ -23,11 +24,13 @@ from gen_profile_exporters.can.cia402 import (
     State,
 )
 from gen_profile_exporters.can.clock import NANOSECONDS
-from gen_profile_exporters.can.drive_dictionary import MAPPED, PDOS, Make, dictionary
-from gen_profile_exporters.can.startup import MODES, OFF
+from gen_profile_exporters.can.drive_dictionary import MAPPED, PDOS, Make, dictionary, refusal, supports
+from gen_profile_exporters.can.startup import AT_ONCE, MODES, OFF
 
 HEARTBEAT_LOST, SETPOINT_LOST = 0x8130, 0x8250  # EMCY codes of CiA 301
 FOLLOWING, SYNC_LOST = 0x8611, 0x8700  # and of CiA 402
+MOST_SYNCS = 240  # a transmission type up to this is the number of SYNCs from one TPDO to the next
+INHIBIT_UNIT = NANOSECONDS // 10_000
 SETPOINTS = {0x607A, 0x60C1, 0x60FF}
 POWERED = {State.SWITCHED_ON, State.ENABLED, State.QUICK_STOP, State.FAULT_REACTION}
 
@@ -54,7 +57,9 @@ class SimulatedDrive:
         self._values: dict[tuple[int, int], int] = {}  # as `value` read them, until they are written
         self._setpoint_heard: int | None = None
         self._master_heard: int | None = None
-        self.local: Any = canopen.LocalNode(node, dictionary(node, make))
+        self._syncs = 0
+        self._told: dict[int, tuple[int, bytes]] = {}  # by TPDO that is sent on change: when, and what
+        self.local: Any = _Node(node, dictionary(node, make), self.value)
         self.local.add_write_callback(self._written)
         self._pack_feedback()
 
@@ -92,6 +97,7 @@ class SimulatedDrive:
         self._values.clear()
         self.local.nmt.stop_heartbeat()
         self._setpoint_heard = self._master_heard = None
+        self._syncs = 0
         self.boot()
 
     def receive(self, cob_id: int, data: bytes, now: int) -> None:
@@ -138,12 +144,23 @@ class SimulatedDrive:
         self._pack_feedback()
 
     def feedback(self) -> list[tuple[int, bytes]]:
-        """List the TPDOs due after a SYNC."""
-        sent = []
-        for pdo in PDOS:
-            cob_id, kind = self.value(0x1800 + pdo, 1), self.value(0x1800 + pdo, 2)
-            if self.operational and not cob_id & OFF and kind == 1:
-                sent.append((cob_id & 0x7FF, self._packed(self._mapping(0x1A00 + pdo))))
+        """List the TPDOs due after a SYNC: every one, or every so many."""
+        self._syncs += 1
+        due = self._tpdos(lambda kind: 0 < kind <= MOST_SYNCS and self._syncs % kind == 0)
+        return [(cob_id, data) for _, cob_id, data in due]
+
+    def events(self, now: int) -> list[tuple[int, bytes]]:
+        """List the TPDOs due at an event: a change, but for the inhibit time, or the event timer's end."""
+        sent, told = [], self._told
+        self._told = {}
+        for pdo, cob_id, data in self._tpdos(AT_ONCE.__contains__):
+            inhibit, timer = self.value(0x1800 + pdo, 3), self.value(0x1800 + pdo, 5)
+            at, last = told.get(pdo, (now, None))
+            changed = data != last and now - at >= inhibit * INHIBIT_UNIT
+            if last is None or changed or (timer and _over(now, at, timer)):
+                sent.append((cob_id, data))
+                at, last = now, data
+            self._told[pdo] = at, last
         return sent
 
     def fault(self, code: int) -> None:
@@ -159,7 +176,9 @@ class SimulatedDrive:
         if index == 0x6040:
             self._obey(int.from_bytes(data, "little"))
         elif index == 0x6060:
-            self.store(0x6061, 0, int.from_bytes(data, "little", signed=True))
+            mode = int.from_bytes(data, "little", signed=True)
+            if mode == 0 or supports(self.value(0x6502), mode):
+                self.store(0x6061, 0, mode)
 
     def _obey(self, word: int) -> None:
         """Change state as a controlword commands (CiA 402-2, table of transitions)."""
@@ -256,6 +275,15 @@ class SimulatedDrive:
         self.store(0x6041, 0, self.state.bits | follows | voltage | REMOTE | self._flags)
         self.store(0x6064, 0, _int32(round(self.actual)))
 
+    def _tpdos(self, due: Callable[[int], bool]) -> Iterator[tuple[int, int, bytes]]:
+        """Go through the TPDOs that are on and whose transmission type is due: number, COB-ID, content."""
+        for pdo in PDOS if self.operational else ():
+            cob_id = self.value(0x1800 + pdo, 1)
+            if cob_id & OFF or not due(self.value(0x1800 + pdo, 2)):
+                continue
+            if mapping := self._mapping(0x1A00 + pdo):
+                yield pdo, cob_id & 0x7FF, self._packed(mapping)
+
     def _mapping(self, index: int) -> list[int]:
         return [self.value(index, sub) for sub in range(1, min(self.value(index), MAPPED) + 1)]
 
@@ -265,6 +293,27 @@ class SimulatedDrive:
             data = self.local.get_data(entry >> 16, entry >> 8 & 0xFF)
             parts.append(data[: (entry & 0xFF) // 8])
         return b"".join(parts)
+
+
+class _Node(canopen.LocalNode):
+    """canopen's node, which refuses by SDO what a drive does."""
+
+    def __init__(self, node: int, found: canopen.ObjectDictionary, held: Callable[[int, int], int]) -> None:
+        super().__init__(node, found)
+        self._held = held
+
+    def set_data(self, index: int, subindex: int, data: bytes, check_writable: bool = False) -> None:
+        if check_writable:
+            self._require_taken(index, subindex, data)
+        super().set_data(index, subindex, data, check_writable)
+
+    def _require_taken(self, index: int, sub: int, data: bytes) -> None:
+        entry = self.object_dictionary.get_variable(index, sub)
+        if entry is None or len(entry) != 8 * len(data):
+            return  # which canopen refuses by itself
+        code = refusal(self.object_dictionary, self._held, index, sub, int.from_bytes(data, "little"))
+        if code is not None:
+            raise canopen.SdoAbortedError(code)
 
 
 def _unpacked(mapping: list[int], data: bytes) -> list[tuple[int, int, int]]:

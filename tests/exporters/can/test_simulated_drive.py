@@ -1,16 +1,18 @@
 """The simulated drive by itself: states, faults, and what it does when nobody feeds it."""
 
 import gc
+import itertools
 import os
 import struct
 
 import can
+import canopen
 import pytest
 from exporters.can.bench import Bench
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can.cia402 import Controlword, State, state_of
-from gen_profile_exporters.can.drive_dictionary import Make
+from gen_profile_exporters.can.drive_dictionary import Make, dictionary
 from gen_profile_exporters.can.realtime import real_time
 from gen_profile_exporters.can.simulated_drive import SimulatedDrive
 
@@ -159,6 +161,119 @@ class TestBus:
         bench.drive_end.receiving = down
         with pytest.raises(StreamAborted, match="simulated drives failed"):
             bench.drives.run(lambda: False)
+
+
+class TestEvents:
+    def test_canopens_own_master_sees_the_state(self, bench):
+        """Without a SYNC, and with the PDOs as they come."""
+        network, node = canopen.Network(), canopen.BaseNode402(1, dictionary(1, Make()))
+        network.add_node(node)
+        node.pdo.read(from_od=True)
+        node.setup_402_state_machine(read_pdos=False)
+        bench.say(0x000, b"\x01\x01")
+        for word, state in ((b"\x00", "SWITCH ON DISABLED"), (b"\x06", "READY TO SWITCH ON")):
+            bench.say(0x201, word + b"\x00")
+            bench.wait(2)
+            for frame in bench.heard:
+                network.notify(frame.cob_id, bytearray(frame.data), frame.at / 1e3)
+            assert node.state == state
+
+    def test_each_change_is_told_once(self, bench):
+        bench.say(0x000, b"\x01\x01")
+        bench.wait(20)
+        assert [frame.data for frame in bench.of(0x181)] == [b"\x40\x02"]
+        bench.say(0x201, b"\x06\x00")
+        bench.wait(20)
+        assert [frame.data for frame in bench.of(0x181)] == [b"\x40\x02", b"\x21\x02"]
+        assert [frame.data for frame in bench.of(0x281)] == [b"\x40\x02\x00", b"\x21\x02\x00"]
+
+    def test_the_inhibit_time_keeps_changes_apart(self, bench):
+        bench.drive.store(0x1800, 3, 50)  # of 0.1 ms
+        bench.say(0x000, b"\x01\x01")
+        for word in (b"\x06\x00", b"\x00\x00") * 10:
+            bench.say(0x201, word)
+            bench.wait(1.25)
+        at = [frame.at for frame in bench.of(0x181)]
+        assert len(at) > 3
+        assert min(after - before for before, after in itertools.pairwise(at)) >= 5
+        assert len(bench.of(0x281)) > 15
+
+    def test_the_event_timer_repeats(self, bench):
+        bench.drive.store(0x1800, 5, 10)  # ms
+        bench.say(0x000, b"\x01\x01")
+        bench.wait(50)
+        assert len(bench.of(0x181)) == 5
+        assert len(bench.of(0x281)) == 1
+
+    def test_every_third_sync(self, bench):
+        bench.drive.store(0x1800, 2, 3)
+        bench.say(0x000, b"\x01\x01")
+        for _ in range(12):
+            bench.say(0x080)
+            bench.wait(1)
+        assert len(bench.of(0x181)) == 4
+
+
+def answer(bench, index, sub, data):
+    """Write by SDO; the abort code, or 0."""
+    bench.heard.clear()
+    bench.say(0x601, struct.pack("<BHB", 0x23 | 4 - len(data) << 2, index, sub) + data.ljust(4, b"\0"))
+    bench.wait(1)
+    (told,) = bench.of(0x581)
+    return struct.unpack("<I", told.data[4:])[0] if told.data[0] == 0x80 else 0
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("off", "entries", "count", "code"),
+        [
+            (False, [], 0, 0x0800_0022),
+            (True, [0x6040_0010, 0x607A_0020], 2, 0),
+            (True, [0x2345_0010], 1, 0x0604_0041),  # is not there
+            (True, [0x607A_0120], 1, 0x0604_0041),  # has no subindex
+            (True, [0x607A_0010], 1, 0x0604_0041),  # is longer
+            (True, [0x6041_0010], 1, 0x0604_0041),  # cannot be written
+            (True, [0x6502_0020], 1, 0x0604_0041),  # fits no PDO
+            (True, [0x607A_0020] * 3, 3, 0x0604_0042),
+            (True, [], 9, 0x0604_0042),
+        ],
+    )
+    def test_mappings(self, bench, off, entries, count, code):
+        if off:
+            assert answer(bench, 0x1400, 1, b"\x01\x02\x00\x80") == 0
+            assert answer(bench, 0x1600, 0, bytes(1)) == 0
+        codes = [
+            answer(bench, 0x1600, sub, entry.to_bytes(4, "little"))
+            for sub, entry in enumerate(entries, start=1)
+        ]
+        codes.append(answer(bench, 0x1600, 0, bytes([count])))
+        assert next(filter(None, codes), 0) == code
+
+    @pytest.mark.parametrize(
+        ("index", "sub", "data", "code"),
+        [
+            (0x6060, 0, b"\x08", 0),
+            (0x6060, 0, b"\x06", 0x0609_0030),  # homing, which 6502h does not list
+            (0x6060, 0, b"\xff", 0x0609_0030),
+            (0x1400, 2, b"\xf5", 0x0609_0030),  # reserved
+            (0x1800, 2, b"\x00", 0x0609_0030),  # on SYNC after a change
+            (0x1400, 2, b"\xfe", 0),
+            (0x1400, 2, b"\x00", 0),
+            (0x1400, 1, b"\x02\x02\x00\x00", 0x0800_0022),  # another COB-ID while the PDO is on
+            (0x1800, 3, b"\x02\x00", 0x0800_0022),
+            (0x1600, 1, b"\x20\x00\x7a\x60", 0x0800_0022),
+            (0x1600, 9, b"\x20\x00\x7a\x60", 0x0609_0011),
+            (0x6060, 0, b"\x08\x00", 0x0607_0010),
+        ],
+    )
+    def test_single_objects(self, bench, index, sub, data, code):
+        assert answer(bench, index, sub, data) == code
+
+    def test_a_mode_that_comes_by_pdo_is_not_shown(self, bench):
+        bench.say(0x000, b"\x01\x01")
+        bench.say(0x301, b"\x06\x00\x06")
+        bench.wait(1)
+        assert bench.drive.value(0x6061) == 0
 
 
 class TestRealTime:
