@@ -143,7 +143,7 @@ def drive_sim(
     spec = chosen_spec(spec_path, preset, overrides)
     make = drive_dictionary.Make(miss=miss, own_mapping=own_mapping)
     if eds is not None:
-        deliver(eds, drive_dictionary.eds(spec.can.node, make).encode("utf-8"))
+        deliver(eds, drive_dictionary.eds(spec.can.node, make, eds.name).encode("utf-8"))
         return
     port = Port(**_port(interface, channel, False))
     with (
