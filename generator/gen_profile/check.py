@@ -92,6 +92,8 @@ class Check:
         Allowed sway of the end load at any time in m.
     searched : int
         Number of machines that were looked at for the worst ones in the ranges.
+    doubts : tuple of str
+        What the spec states and hardly means, a sentence each.
     """
 
     limit: Mapping[str, float]
@@ -103,6 +105,7 @@ class Check:
     strict: bool = False
     sway_limit: float | None = None
     searched: int = 0
+    doubts: tuple[str, ...] = ()
 
     @property
     def groups(self) -> dict[str, tuple[Finding, ...]]:
@@ -162,10 +165,10 @@ class Check:
         return (*self._sentences(self.judged), *self.faults)
 
     def warnings(self) -> tuple[str, ...]:
-        """Say what fails without counting: sway on the way, and too much sway under faults of timing."""
+        """Say what is wrong without counting: doubtful values, sway on the way, faults of timing."""
         timing = () if self.strict else self.groups.get(TIMING, ())
         late = (f"{sentence} It counts with --strict." for sentence in self._sentences(timing))
-        return (*self._sentences_on_the_way(), *late)
+        return (*self.doubts, *self._sentences_on_the_way(), *late)
 
     def _sentences(self, findings: Sequence[Finding]) -> Iterator[str]:
         """Say which limit the worst of some scenarios breaks."""

@@ -12,6 +12,7 @@ from typing import Any
 
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec import Spec
+from gen_profile.spec_plausibility import refuse_implausible
 from gen_profile.spec_structure import Faults, Table, structure
 from gen_profile.spec_tables import complete
 from gen_profile.suggestion import listed, meant, number_meant, suggestion
@@ -151,7 +152,9 @@ def spec_from_dict(document: Mapping[str, Any], folder: Path = HERE) -> Spec:
         With one sentence for every fault found.
     """
     faults = Faults()
-    return structure(complete(document, folder, faults), faults)
+    spec = structure(complete(document, folder, faults), faults)
+    refuse_implausible(spec)
+    return spec
 
 
 def _document(text: str, source: str) -> Table:

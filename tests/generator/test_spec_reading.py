@@ -220,6 +220,7 @@ def test_faulty_overrides(override, sentence):
 # ── there and back ──────────────────────────────────────────────────────────────────────────────────────
 
 POSITIVE = st.floats(1e-3, 1e3)
+SMALL = st.floats(1e-6, 0.1)
 OVERRIDES = st.fixed_dictionaries(
     {},
     optional={
@@ -230,8 +231,8 @@ OVERRIDES = st.fixed_dictionaries(
         "actuator": POSITIVE.map(lambda tau: f'{{ type = "first-order", tau = {tau!r} }}'),
         "robustness.uncertain": st.floats(0.01, 0.9).map(lambda r: f"{{ L2 = {r!r}, m1 = {r!r} }}"),
         "cost.sway_scale": st.one_of(st.just('"auto"'), POSITIVE),
-        "limits.velocity": POSITIVE,
-        "check.residual_sway": st.one_of(POSITIVE, POSITIVE.map(lambda limit: f"{{ hook = {limit!r} }}")),
+        "limits.velocity": st.floats(1e-3, 100.0),
+        "check.residual_sway": st.one_of(SMALL, SMALL.map(lambda limit: f"{{ hook = {limit!r} }}")),
         "axis.unit": st.sampled_from(["mm", "um", "counts"]),
         "export.cycle_time": st.floats(1e-4, 1.0),
     },

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
+from gen_profile.cli.outcome import beware
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
@@ -105,11 +106,14 @@ def as_overrides(values: Mapping[str, object]) -> tuple[str, ...]:
 
 
 def chosen_spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
-    """Read the spec that the command line names, or the default preset."""
+    """Read the spec that the command line names, or the default preset; doubt its values aloud."""
+    from gen_profile.spec_plausibility import doubts
     from gen_profile.spec_reading import parse_spec
 
     text, source, folder = chosen_text(path, preset)
-    return parse_spec(text, overrides, source, folder)
+    spec = parse_spec(text, overrides, source, folder)
+    beware(doubts(spec))
+    return spec
 
 
 def chosen_text(path: Path | None, preset: str | None) -> tuple[str, str, Path]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -36,9 +36,17 @@ def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
 
 
 def warn(check: Check | None) -> None:
-    """Say what fails without counting."""
-    for sentence in () if check is None else check.warnings():
-        click.echo(f"Beware: {sentence}", err=True)
+    """Say what is wrong without counting."""
+    beware(() if check is None else check.warnings())
+
+
+def beware(sentences: Iterable[str]) -> None:
+    """Say what a user should know, once in a run."""
+    said = click.get_current_context().meta.setdefault(f"{__name__}.said", set())
+    for sentence in sentences:
+        if sentence not in said:
+            click.echo(f"Beware: {sentence}", err=True)
+        said.add(sentence)
 
 
 def fail(reasons: Sequence[str], consequence: str = "") -> NoReturn:

@@ -11,6 +11,7 @@ from gen_profile.check import TIMING, Check, Finding, Scenario
 from gen_profile.metrics import peak
 from gen_profile.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.spec import ForeignFmu, Spec
+from gen_profile.spec_plausibility import doubts
 from gen_profile.workflows.many_machines import Feed
 from gen_profile.workflows.monte_carlo import standstill
 from gen_profile.workflows.planning import STANDSTILL, watch_time
@@ -64,6 +65,7 @@ def judge_foreign(
         arrival=arrival(spec, setpoints),
         findings=tuple(findings),
         faults=implausibilities(spec, setpoints),
+        doubts=doubts(spec),
     )
 
 

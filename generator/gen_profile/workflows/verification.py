@@ -12,6 +12,7 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.profile import Array, SampledProfile
 from gen_profile.response import Response
 from gen_profile.spec import Spec
+from gen_profile.spec_plausibility import doubts
 from gen_profile.workflows.planning import RESIDUAL_SAMPLES, STANDSTILL, modal_amplitudes, watch_time
 from gen_profile.workflows.plausibility import implausibilities
 from gen_profile_fmu.cosimulation import PlantCosimulation
@@ -109,6 +110,7 @@ def judge(
         sway_limit=spec.limits.sway,
         directions=spec.machine().directions,
         faults=implausibilities(spec, setpoints),
+        doubts=doubts(spec),
     )
 
 
