@@ -73,9 +73,26 @@ def test_a_picture_of_unknown_kind_is_refused_before_the_work(tmp_path, name):
     assert outcome.errors == [f"Error: --plot {tmp_path / name}: name a file that ends in .png, .svg, .pdf."]
 
 
-def test_a_folder_that_is_not_there_is_made_for_a_picture(tmp_path):
-    assert run_here("compare", *FEW, "--plot", tmp_path / "new" / "picture.png").code == 0
-    assert [path.name for path in tmp_path.rglob("*.*")] == ["picture.png"]
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [
+        (("compare",), "--plot"),
+        (("check", "paper.csv"), "--csv"),
+        (("report",), "--out"),
+        (("fmu", "plant"), "--out"),
+        (("library", "swept"), "--out"),
+        (("identify",), "--out"),
+        (("stream", "paper.log"), "--log"),
+        (("drive-sim",), "--eds"),
+        (("presets", "paper"), "--out"),
+    ],
+)
+def test_a_folder_that_is_not_there_is_told_before_the_work(tmp_path, words, option):
+    path = tmp_path / "new" / "deep" / "file.html"
+    outcome = run_here(*words, option, path)
+    sentence = f"Error: {option} {path}: there is no folder {path.parent}; make it, or name another one."
+    assert (outcome.code, outcome.err.splitlines()) == (2, [sentence])
+    assert not (tmp_path / "new").exists()
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ def rows(path):
 
 
 def test_every_row_is_the_scenario_of_the_json_document(checked, tmp_path):
-    path = tmp_path / "new" / "rows.csv"
+    path = tmp_path / "rows.csv"
     document = run_here("check", checked / "paper.csv", "--csv", path, "--json").document["check"]
     found = rows(path)
     assert len(found) == sum(group["rows"] for group in document["groups"]) == 3 + (2 * 3 + 1) + 8 + 20

@@ -246,6 +246,22 @@ class TestArtefact:
         outcome = run_here("stream", deployed / "paper.log", *bus)
         assert (outcome.code, "cannot be opened" in outcome.err) == (2, True)
 
+    @pytest.mark.parametrize(
+        ("interface", "cure"),
+        [
+            ("socketcan", "ip link set nowhere0 up type can"),
+            ("pcan", "install PEAK's PCAN-Basic library"),
+            ("kvaser", "install Kvaser's CANlib"),
+            ("sockedcan", "did you mean 'socketcan'?"),
+        ],
+    )
+    def test_a_spec_without_its_bus_before_anything_is_solved(self, interface, cure):
+        outcome = run_here("stream", "--preset", "paper", "--interface", interface, "--channel", "nowhere0")
+        assert outcome.code == 2
+        assert outcome.err.splitlines()[-1].startswith("Error: --interface")
+        assert cure in outcome.err
+        assert "solving" not in outcome.err
+
 
 def test_nobody_on_the_bus(deployed, tmp_path, full_disk):
     bus = ("--interface", "virtual", "--channel", "empty")

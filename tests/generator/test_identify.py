@@ -398,3 +398,16 @@ def test_other_ranges_of_the_spec_stay_as_they_are():
         [parse_reading("L1=0.5±0.005")],
     )
     assert bare.spec.robustness.method == "sensitivity"
+
+
+@pytest.mark.parametrize(
+    ("parse", "text", "cure"),
+    [
+        (parse_reading, "L1=6,20±0,05", "; write decimal points: L1=6.20±0.05."),
+        (parse_period, "17,3±0.2/10", "; write decimal points: 17.3±0.2/10."),
+    ],
+)
+def test_decimal_commas_are_told(parse, text, cure):
+    with pytest.raises(SpecError) as refused:
+        parse(text)
+    assert str(refused.value).endswith(cure)

@@ -298,6 +298,7 @@ def test_equations_that_lose_their_symbols(tmp_path, function, line):
 
 
 def test_an_identified_spec_takes_its_machine_along(folder, tmp_path):
+    (tmp_path / "new").mkdir()
     found = run_here(
         "identify", folder / "own.toml", "--measured", "L=2.1±0.01", "--out", tmp_path / "new" / "spec.toml"
     )

@@ -13,7 +13,7 @@ from gen_profile.workflows.planning import plan
 
 @pytest.mark.parametrize("name", presets())
 def test_a_preset_that_is_written_reads_back_as_the_same_spec(tmp_path, name):
-    path = tmp_path / "new" / "bay.toml"
+    path = tmp_path / "bay.toml"
     assert run_here("presets", name, "--out", path).code == 0
     spec = read_spec(path)
     assert spec == preset_spec(name)

@@ -75,7 +75,10 @@ def test_the_exported_table_is_such_a_log(tmp_path):
         ("", "the log is empty"),
         ("\n \n", "the log is empty"),
         (f"time_s,{'x' * 200_000}\n", "it is no table (field larger than field limit"),
-        (table(["position", "sway"], TIMES, TIMES), "there is no column time_s; found position, sway"),
+        (
+            table(["position", "sway"], TIMES, TIMES),
+            "there is no column time_s (or time_ms); found position, sway; name the column of times, as",
+        ),
         (table(["time_s", "velocity"], TIMES, TIMES), "there is no column of this machine (cart_position, "),
         (
             table(["time_s", "sway_deg"], TIMES, TIMES),

@@ -8,6 +8,7 @@ import click
 
 from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import (
+    OutputFile,
     as_overrides,
     chosen_spec,
     complete_presets,
@@ -167,7 +168,7 @@ def compare(
     "--csv",
     "table_path",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     help="Write all scenarios as a table, one row each.",
 )
 @json_option
@@ -278,7 +279,7 @@ def plants(as_json: bool) -> None:
     "--out",
     "path",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     help="Write it to a new file, in place of stdout.",
 )
 @json_option

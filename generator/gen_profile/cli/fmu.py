@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import chosen_spec, debug_option, json_option, spec_options
+from gen_profile.cli.options import OutputFile, chosen_spec, debug_option, json_option, spec_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
@@ -39,7 +39,7 @@ PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86
     "--out",
     "path",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     help="FMU or SSP to write; named after the spec in this folder by default.",
 )
 @click.option("--author", metavar="NAME", help="Who made the model; gen-profile by default.")

@@ -7,7 +7,14 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import chosen_text, debug_option, json_option, plot_option, spec_options
+from gen_profile.cli.options import (
+    OutputFile,
+    chosen_text,
+    debug_option,
+    json_option,
+    plot_option,
+    spec_options,
+)
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
@@ -69,7 +76,7 @@ from gen_profile.errors import SpecError
 @click.option(
     "--out",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     default=Path("identified.toml"),
     help="Spec to write; ./identified.toml by default.",
 )

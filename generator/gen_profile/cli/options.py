@@ -20,6 +20,32 @@ DEFAULT_PRESET = "paper"
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
+class OutputFile(click.Path):
+    """A file to write, in a folder that exists; refused before there is any work to lose."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Take the path.
+
+        Raises
+        ------
+        OutputError
+            Its folder is not there, or it cannot be written.
+        """
+        from gen_profile.workflows.delivery import require_place
+
+        path = Path(str(super().convert(value, param, ctx)))
+        if ctx is not None and ctx.resilient_parsing:  # of a line that is still being typed
+            return path
+        if not path.parent.exists():
+            option = "" if param is None else f"{param.opts[0]} {path}: "
+            raise OutputError(f"{option}there is no folder {path.parent}; make it, or name another one.")
+        require_place(path)
+        return path
+
+
 def _complete_formats(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import formats
 
@@ -91,7 +117,7 @@ plot_option = click.option(
     "--plot",
     "picture",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     help="Draw it (png, svg or pdf).",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")

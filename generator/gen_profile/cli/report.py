@@ -8,7 +8,14 @@ import attrs
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import chosen_spec, debug_option, export_option, json_option, spec_options
+from gen_profile.cli.options import (
+    OutputFile,
+    chosen_spec,
+    debug_option,
+    export_option,
+    json_option,
+    spec_options,
+)
 from gen_profile.cli.outcome import fail, print_outcome
 from gen_profile.errors import OutputError
 
@@ -19,7 +26,7 @@ from gen_profile.errors import OutputError
     "--out",
     "path",
     metavar="FILE",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     help="File to write, .html or .pdf; an .html named after the spec in this folder by default.",
 )
 @click.option(

@@ -7,7 +7,14 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import chosen_spec, debug_option, json_option, plot_option, spec_options
+from gen_profile.cli.options import (
+    OutputFile,
+    chosen_spec,
+    debug_option,
+    json_option,
+    plot_option,
+    spec_options,
+)
 from gen_profile.cli.outcome import print_outcome
 
 
@@ -41,9 +48,7 @@ from gen_profile.cli.outcome import print_outcome
     help="Errors tried per parameter; 61 of a curve, 25 of a map by default.",
 )
 @plot_option
-@click.option(
-    "--csv", "path", metavar="FILE", type=click.Path(path_type=Path), help="Write the numbers as a table."
-)
+@click.option("--csv", "path", metavar="FILE", type=OutputFile(), help="Write the numbers as a table.")
 @json_option
 @debug_option
 def robustness(

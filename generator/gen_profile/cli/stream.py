@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import as_overrides, chosen_spec, debug_option, json_option, spec_options
+from gen_profile.cli.options import (
+    OutputFile,
+    as_overrides,
+    chosen_spec,
+    debug_option,
+    json_option,
+    spec_options,
+)
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import OutputError, SpecError, StreamAborted
 
@@ -51,7 +58,7 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
     "--log",
     "table",
     metavar="CSV",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     help="Write planned and actual positions side by side.",
 )
 @json_option
@@ -85,7 +92,19 @@ def stream(
     run.require_extra()
     overrides += as_overrides({"can.mode": mode, "can.node": node})
     with progress() as tell:
-        source = _source(spec_path, preset, overrides, accept_unverified, tell)
+
+        def require_bus(bitrate: int) -> None:
+            if not dry_run:
+                Port(**_port(interface, channel, simulate_drive)).open(bitrate).shutdown()
+
+        source = _source(
+            spec_path,
+            preset,
+            overrides,
+            accept_unverified=accept_unverified,
+            require_bus=require_bus,
+            tell=tell,
+        )
         if dry_run:
             plan = run.summary(source)
             print_outcome(plan, _plan_words(plan, _units(source)), as_json)
@@ -112,7 +131,7 @@ def stream(
     "--miss", type=click.Choice(_MISSES), default="extrapolate", help="What it does without a setpoint."
 )
 @click.option("--own-mapping", is_flag=True, help="Start with another PDO mapping than CiA 402 proposes.")
-@click.option("--eds", metavar="FILE", type=click.Path(path_type=Path), help="Write its EDS, and end.")
+@click.option("--eds", metavar="FILE", type=OutputFile(), help="Write its EDS, and end.")
 @json_option
 @debug_option
 def drive_sim(
@@ -220,10 +239,12 @@ def _source(
     path: Path | None,
     preset: str | None,
     overrides: tuple[str, ...],
+    *,
     accept_unverified: bool,
+    require_bus: Callable[[int], None],
     tell: Callable[[str], None],
 ) -> Source:
-    """Take an artefact, or design one for a spec."""
+    """Take an artefact, or design one for a spec, once there is a bus for it."""
     from gen_profile.workflows.stream import require_rest, verified
 
     if path is not None and path.suffix.lower() != ".toml":
@@ -237,6 +258,7 @@ def _source(
 
     spec = chosen_spec(path, preset, overrides)
     require_rest(spec)
+    require_bus(spec.can.bitrate)
     with TemporaryDirectory(prefix="gen-profile-") as folder:
         outcome = design(spec, ("can",), Path(folder), progress=tell)
         if not outcome.artefacts:

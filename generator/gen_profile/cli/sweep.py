@@ -7,7 +7,14 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import chosen_text, debug_option, export_option, json_option, spec_options
+from gen_profile.cli.options import (
+    OutputFile,
+    chosen_text,
+    debug_option,
+    export_option,
+    json_option,
+    spec_options,
+)
 from gen_profile.cli.outcome import print_outcome
 
 
@@ -117,7 +124,7 @@ def lookup(words: tuple[str, ...], as_json: bool) -> None:
     "--out",
     "path",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     default=Path("library.st"),
     help="File to write: its name is the block's, its suffix tells the format; ./library.st by default.",
 )

@@ -91,7 +91,10 @@ def parse_reading(text: str) -> DirectReading:
     """
     found = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", text)
     if found is None:
-        raise SpecError(f"--measured {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-).")
+        comma = _decimal_points(text)
+        raise SpecError(
+            f"--measured {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-){comma}."
+        )
     name, value, uncertainty = found.groups()
     return DirectReading(
         parameter=name,
@@ -111,7 +114,7 @@ def parse_period(text: str) -> Period:
     if found is None:
         raise SpecError(
             f"--period {text!r}: write SECONDS±UNCERTAINTY, such as 1.73±0.02, or 17.3±0.2/10 for ten "
-            "swings, or 2:0.70±0.01 for the second mode (+- will do for ±)."
+            f"swings, or 2:0.70±0.01 for the second mode (+- will do for ±){_decimal_points(text)}."
         )
     mode, seconds, uncertainty, swings = found.groups()
     where, total = f"--period {text!r}", float(seconds)
@@ -121,6 +124,12 @@ def parse_period(text: str) -> Period:
         seconds=_positive(where, "time", total) / count,
         uncertainty=_spread(where, total, float(uncertainty)) / count,
     )
+
+
+def _decimal_points(text: str) -> str:
+    """Continue a sentence about a reading with decimal commas."""
+    pointed = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", text)
+    return f"; write decimal points: {pointed}" if pointed != text else ""
 
 
 def parse_swing(

@@ -267,7 +267,10 @@ def _require(known: Mapping[str, _Column], names: Sequence[str], spec: Spec, sou
     plant = spec.machine()
     examples = f"{plant.actuated[0].name}_position, {plant.loads[-1]}_sway, {plant.loads[-1]}_angle"
     if ("time", "") not in held:
-        raise OutputError(f"--measured {source}: there is no column time_s; found {', '.join(names)[:200]}.")
+        raise OutputError(
+            f"--measured {source}: there is no column time_s (or time_ms); found {', '.join(names)[:200]}; "
+            "name the column of times, as --columns time_s=1 does."
+        )
     if len(held) < 2:
         raise OutputError(
             f"--measured {source}: there is no column of this machine ({examples}, with units behind "
