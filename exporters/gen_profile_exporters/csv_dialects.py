@@ -124,7 +124,7 @@ def _inner(dialect: Dialect, rows: list[Row]) -> list[Row]:
     if not dialect.mark:
         return points
     for line, cells in points:
-        if cells[-1].strip() != dialect.mark[1:]:
+        if not cells or cells[-1].strip() != dialect.mark[1:]:  # none on an empty line
             raise ExportError(f"line {line}: {dialect.mark[1:]} is missing; export the table again.")
     return [(line, cells[:-1]) for line, cells in points]
 

@@ -48,6 +48,7 @@ TIME = "time_s"
 QUANTITIES = {"position": "", "velocity": "_per_s", "acceleration": "_per_s2", "jerk": "_per_s3"}
 GRID_TOLERANCE = 1e-9  # relative, of a time
 
+GREATEST = 1e100  # of any cell: its differences over a cycle squared must stay finite
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 
 
@@ -226,9 +227,9 @@ def _numbers(line: int, cells: Sequence[str], header: Sequence[str]) -> list[flo
         )
     numbers = [float(cell) if _NUMBER.fullmatch(cell) else math.nan for cell in cells]
     for number, cell, name in zip(numbers, cells, header, strict=True):
-        if not math.isfinite(number):
+        if not abs(number) <= GREATEST:
             raise ExportError(
-                f"line {line}: {name.strip()} holds {cell[:40]!r}, which is no finite number; "
+                f"line {line}: {name.strip()} holds {cell[:40]!r}, which is no finite number of a motion; "
                 "export the table again."
             )
     return numbers

@@ -1,5 +1,8 @@
 import csv
 import io
+import random
+import warnings
+from contextlib import suppress
 
 import attrs
 import numpy as np
@@ -179,3 +182,50 @@ class TestSpec:
         spec = parse_spec(SPEC + "csv_columns = ['velocity', 'position']")
         assert spec.export.csv_columns == ("velocity", "position")
         assert spec.to_dict()["export"]["csv_columns"] == ["velocity", "position"]
+
+
+JUNK = [
+    "",
+    "nan",
+    "inf",
+    "1e308",
+    "1e-320",
+    "9" * 400,
+    "\x00",
+    '"',
+    ";",
+    ",",
+    "\t",
+    "\r",
+    "\n",
+    "--",
+    "٣",
+    "−1",
+]
+
+
+def altered(text, draw):
+    """A table with some characters or lines lost, doubled or replaced; line ends are kept."""
+    for _ in range(draw.randint(1, 3)):
+        lines = text.splitlines(keepends=True) or [""]
+        row, at = draw.randrange(len(lines)), draw.randrange(len(text) + 1)
+        changed = [
+            [*lines[:row], *lines[row + 1 :]],
+            [*lines[:row], lines[draw.randrange(len(lines))], *lines[row:]],
+            lines[: draw.randrange(4)],
+            [text[:at], draw.choice(JUNK), text[at + draw.randint(0, 8) :]],
+            [*lines[:row], "\r\n", *lines[row:]],
+        ]
+        text = "".join(draw.choice(changed))
+    return text
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_an_altered_table_is_read_or_refused_in_a_sentence(dialect):
+    text, draw = encoded(dialect), random.Random(7)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for _ in range(150):
+            with suppress(ExportError):
+                setpoints = csv_table.replay(altered(text, draw).encode("utf-8"), goal_of(dialect))
+                assert np.isfinite(np.diff(setpoints.position, 2, axis=0) / setpoints.cycle_time**2).all()

@@ -240,5 +240,5 @@ class TestReplayRefuses:
 
     def test_numbers_too_large_for_the_scale(self):
         with pytest.raises(ExportError, match="too large to convert"):
-            lines = lines_of(encoded(unit="counts", counts_per_si=1e-3).content)
-            replayed([*lines[:2], "0.01,0,1e308,0,0"], unit="counts", counts_per_si=1e-3)
+            lines = lines_of(encoded(unit="counts", counts_per_si=1e-300).content)
+            replayed([*lines[:2], "0.01,0,1e99,0,0"], unit="counts", counts_per_si=1e-300)
