@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from itertools import count
 
 import attrs
 
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.problem import Problem
+from gen_profile.progress import Progress, untold
 from gen_profile.solvers import direct, indirect, worst_case
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.cures import Trial, cures
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.relaxation import relaxed
-from gen_profile.solvers.solution import Solution
+from gen_profile.solvers.solution import Solution, Status
 from gen_profile.solvers.transient_sway import sway_on_the_way
 from gen_profile.spec import LimitsSpec, SolverName
+from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]
+SHORTEST = "looking for the shortest duration"
+SOLVING = 5.0  # s of work
 
 
 def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
@@ -69,14 +75,32 @@ def remedy(problem: Problem, method: SolverName = "auto", welcome: Judge = lambd
 def attempt(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
     """Solve a problem without finding out what would help where that fails."""
     if problem.worst_case is not None:
-        return worst_case.solve(problem)
+        return _in_time(worst_case.solve, problem)
     if method == "direct":
-        return _direct(problem)
-    solution = indirect.solve(problem, near)
+        return _in_time(_direct, problem)
+    solution = _in_time(partial(indirect.solve, near=near), problem)
     if method == "indirect" or keeps_limits(solution):
         return solution
-    other = _direct(problem)
+    other = _in_time(_direct, problem)
     return solution if other.optimum is None and solution.optimum is None else other
+
+
+def _in_time(solve: Callable[[Problem], Solution], problem: Problem) -> Solution:
+    """Solve a problem, or give it up."""
+    try:
+        with budget(SOLVING):
+            return solve(problem)
+    except OutOfWork:
+        spend(0.0)
+        return Solution(
+            status=Status.GIVEN_UP,
+            method="none",
+            problem=problem,
+            optimum=None,
+            iterations=0,
+            residual=float("inf"),
+            cure="See whether all numbers of the spec are in its units; else change the duration or limits.",
+        )
 
 
 def _direct(problem: Problem) -> Solution:
@@ -94,11 +118,16 @@ def requirements(problem: Problem) -> str:
     return cures(problem, trial, in_time=True)
 
 
-def minimum_time(problem: Problem) -> float | None:
+def minimum_time(problem: Problem, progress: Progress = untold) -> float | None:
     """Find the shortest duration in s for a problem's limits and robustness; None where none was found."""
-    if problem.worst_case is None:
-        return shortest_duration(problem, direct.solve)
-    return shortest_duration(problem, worst_case.solve_within_limits)
+    solve = direct.solve if problem.worst_case is None else worst_case.solve_within_limits
+    tries = count(1)
+
+    def attempted(other: Problem) -> Solution:
+        progress(SHORTEST, remark=f"trying {other.duration:.3g} s ({next(tries)})")
+        return _in_time(solve, other)
+
+    return shortest_duration(problem, attempted)
 
 
 def keeps_limits(solution: Solution) -> bool:

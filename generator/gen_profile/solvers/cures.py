@@ -16,9 +16,11 @@ from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.relaxation import least_duration, relaxed
 from gen_profile.solvers.solution import Solution
+from gen_profile.work import OutOfWork, budget, spend
 
 FACTORS = (1.01, 1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
 NEAR = 1.05  # how many times a value that will not do the one that is named may be
+LONGER, WIDER, LESS_ROBUST = 4.0, 4.0, 2.0  # s of work to look for a duration, limits, and robustness
 FARTHER = 1.7  # times the least value with a solution, up to which one that is welcome is looked for
 
 
@@ -84,34 +86,39 @@ def cures(problem: Problem, trial: Trial, *, in_time: bool = False) -> str:
         Look for what would do in the duration asked for only.
     """
     sentences = []
-    longer = None if in_time else _longer(problem, trial)
-    if longer is not None:
+    if not in_time and (longer := _in_time(LONGER, lambda: _longer(problem, trial))):
         within = "With these limits it" if problem.limits.stated() else "It"
         sentences.append(f"{within} takes at least {longer} s (move.duration).")
-    instead = list(_wider(problem, trial)) or list(_less_robust(problem, trial))
+    instead = list(_wider(problem, trial))
+    if not instead and (less := _in_time(LESS_ROBUST, lambda: _less_robust(problem, trial))):
+        instead = [less]
     if instead:
         sentences.append(f"In {problem.duration:g} s it would do with {', or with '.join(instead)}.")
     return " ".join(sentences)
 
 
-def _longer(problem: Problem, trial: Trial) -> str | None:
-    """Find the least duration that will do, in s, rounded up to three digits."""
+def _longer(problem: Problem, trial: Trial) -> str:
+    """Find the least duration that will do, in s, rounded up to three digits; empty where there is none."""
     enough = least_duration(problem)
     if enough is None:
-        return None
+        return ""
 
     def lasting(factor: float) -> Problem:
         return attrs.evolve(problem, duration=float(rounded_up(factor * enough)))
 
     factor = trial.least(lasting)
-    return None if factor is None else rounded_up(factor * enough)
+    return "" if factor is None else rounded_up(factor * enough)
 
 
 def _wider(problem: Problem, trial: Trial) -> Iterator[str]:
     """Widen one limit by itself as little as will do; all of them alike where one is not enough."""
     stated = problem.limits.stated()
-    alone = [found for place, value in stated.items() if (found := _widened(problem, {place: value}, trial))]
-    if not alone and len(stated) > 1 and (together := _widened(problem, stated, trial)):
+
+    def widened(limits: Mapping[str, Any]) -> str:
+        return _in_time(WIDER / (len(stated) + 1), lambda: _widened(problem, limits, trial))
+
+    alone = [found for place, value in stated.items() if (found := widened({place: value}))]
+    if not alone and len(stated) > 1 and (together := widened(stated)):
         alone = [together]
     yield from alone
 
@@ -132,12 +139,23 @@ def _widened(problem: Problem, limits: Mapping[str, Any], trial: Trial) -> str:
     return " and ".join(f"{place} = {_written(value)}" for place, value in wider(factor).items())
 
 
-def _less_robust(problem: Problem, trial: Trial) -> Iterator[str]:
+def _less_robust(problem: Problem, trial: Trial) -> str:
     """Ask for less robustness."""
     if problem.order > 1 and trial.pleases(attrs.evolve(problem, order=1)):
-        yield "robustness.order = 1"
-    elif problem.desensitized and trial.pleases(attrs.evolve(problem, desensitized=(), order=1)):
-        yield 'robustness.method = "none"'
+        return "robustness.order = 1"
+    if problem.desensitized and trial.pleases(attrs.evolve(problem, desensitized=(), order=1)):
+        return 'robustness.method = "none"'
+    return ""
+
+
+def _in_time(seconds: float, find: Callable[[], str]) -> str:
+    """Find words for a cure in a share of the work; none where that is not enough."""
+    try:
+        with budget(seconds):
+            return find()
+    except OutOfWork:
+        spend(0.0)
+        return ""
 
 
 def _times(value: Any, share: float) -> Any:
