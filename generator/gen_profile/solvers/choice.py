@@ -25,7 +25,7 @@ from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]
 SHORTEST = "looking for the shortest duration"
-SOLVING = 5.0  # s of work
+SOLVING = 5.0  # s of work for one method; twice that where there is no other
 
 
 def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
@@ -75,20 +75,20 @@ def remedy(problem: Problem, method: SolverName = "auto", welcome: Judge = lambd
 def attempt(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
     """Solve a problem without finding out what would help where that fails."""
     if problem.worst_case is not None:
-        return _in_time(worst_case.solve, problem)
+        return _in_time(worst_case.solve, problem, 2.0 * SOLVING)
     if method == "direct":
-        return _in_time(_direct, problem)
-    solution = _in_time(partial(indirect.solve, near=near), problem)
+        return _in_time(_direct, problem, 2.0 * SOLVING)
+    solution = _in_time(partial(indirect.solve, near=near), problem, SOLVING)
     if method == "indirect" or keeps_limits(solution):
         return solution
-    other = _in_time(_direct, problem)
+    other = _in_time(_direct, problem, SOLVING)
     return solution if other.optimum is None and solution.optimum is None else other
 
 
-def _in_time(solve: Callable[[Problem], Solution], problem: Problem) -> Solution:
+def _in_time(solve: Callable[[Problem], Solution], problem: Problem, seconds: float) -> Solution:
     """Solve a problem, or give it up."""
     try:
-        with budget(SOLVING):
+        with budget(seconds):
             return solve(problem)
     except OutOfWork:
         spend(0.0)
@@ -125,7 +125,7 @@ def minimum_time(problem: Problem, progress: Progress = untold) -> float | None:
 
     def attempted(other: Problem) -> Solution:
         progress(SHORTEST, remark=f"trying {other.duration:.3g} s ({next(tries)})")
-        return _in_time(solve, other)
+        return _in_time(solve, other, SOLVING)
 
     return shortest_duration(problem, attempted)
 
