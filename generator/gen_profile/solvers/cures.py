@@ -20,7 +20,7 @@ from gen_profile.work import OutOfWork, budget, spend
 
 FACTORS = (1.01, 1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
 NEAR = 1.05  # how many times a value that will not do the one that is named may be
-LONGER, WIDER, LESS_ROBUST = 8.0, 8.0, 2.0  # s of work to look for a duration, limits, and robustness
+LONGER, WIDER, LESS_ROBUST = 8.0, 14.0, 2.0  # s of work to look for a duration, limits, and robustness
 FARTHER = 1.7  # times the least value with a solution, up to which one that is welcome is looked for
 
 
