@@ -14,7 +14,7 @@ from contextvars import ContextVar
 
 import attrs
 
-CLOCK = 3.0  # times the budget by the processor's clock, after which the counted work is not believed
+CLOCK = 10.0  # times the budget by the processor's clock, after which the counted work is not believed
 LOOK = 0.05  # s of work between looks at the clock, which take time themselves
 
 
