@@ -11,7 +11,7 @@ from gen_profile.solvers import choice
 from gen_profile.solvers.conic import ConicProgram
 from gen_profile.solvers.interrupts import interrupts_collected
 from gen_profile.solvers.solution import Status
-from gen_profile.work import OutOfWork, budget, spend
+from gen_profile.work import OutOfWork, budget, left, spend
 
 
 def test_a_budget_within_another_takes_from_both():
@@ -24,6 +24,18 @@ def test_a_budget_within_another_takes_from_both():
 
 def test_work_without_a_budget_is_free():
     spend(1e9)
+
+
+def test_the_clock_counts_only_where_counted_work_is_far_off(monkeypatch):
+    now = 0.0
+    monkeypatch.setattr("gen_profile.work.time.thread_time", lambda: now)
+    with budget(2.0):
+        now = 19.0  # a processor that is nearly ten times as slow
+        spend(1.0)
+        assert left() == 1.0
+        now = 21.0
+        with pytest.raises(OutOfWork):
+            spend(0.5)
 
 
 def test_a_search_that_costs_too_much_is_given_up(monkeypatch):

@@ -14,7 +14,7 @@ from gen_profile.problem.problem import Problem
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import direct, indirect, worst_case
 from gen_profile.solvers.collocation import Trajectory
-from gen_profile.solvers.cures import Trial, cures
+from gen_profile.solvers.cures import WORK, Trial, cures
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.relaxation import relaxed
@@ -26,6 +26,7 @@ from gen_profile.work import OutOfWork, budget, spend
 Judge = Callable[[Solution], bool]
 SHORTEST = "looking for the shortest duration"
 SOLVING = 5.0  # s of work for one method; twice that where there is no other
+RANGE = 2.0  # times the work for a whole range
 
 
 def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
@@ -65,11 +66,22 @@ def explained(solution: Solution, method: SolverName = "auto", welcome: Judge = 
 
 def remedy(problem: Problem, method: SolverName = "auto", welcome: Judge = lambda _: True) -> str:
     """Say which other values would let a method find a motion within the limits; nothing where none will."""
-    trial = Trial(solve=lambda other: attempt(other, method), keeps=keeps_limits, welcome=welcome)
+    trial = Trial(
+        solve=lambda other: attempt(other, method),
+        keeps=keeps_limits,
+        welcome=welcome,
+        work=WORK * patience(problem),
+    )
     found = cures(problem, trial)
-    if method == "indirect" and keeps_limits(attempt(problem)):
+    elsewhere = method == "indirect" and problem.worst_case is None
+    if elsewhere and keeps_limits(_in_time(_direct, problem, SOLVING)):
         return f'With solver.method = "auto" the limits are kept. {found}'.strip()
     return found
+
+
+def patience(problem: Problem) -> float:
+    """Tell how many times the usual work a problem may take."""
+    return 1.0 if problem.worst_case is None else RANGE
 
 
 def attempt(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
@@ -88,7 +100,7 @@ def attempt(problem: Problem, method: SolverName = "auto", near: Trajectory | No
 def _in_time(solve: Callable[[Problem], Solution], problem: Problem, seconds: float) -> Solution:
     """Solve a problem, or give it up."""
     try:
-        with budget(seconds):
+        with budget(seconds * patience(problem)):
             return solve(problem)
     except OutOfWork:
         spend(0.0)

@@ -6,7 +6,7 @@ Values are solved for (see `solvers.relaxation`), rounded to the safe side, and 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
@@ -16,11 +16,12 @@ from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.relaxation import least_duration, relaxed
 from gen_profile.solvers.solution import Solution
-from gen_profile.work import OutOfWork, budget, spend
+from gen_profile.work import OutOfWork, budget, left, spend
 
 FACTORS = (1.01, 1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
 NEAR = 1.05  # how many times a value that will not do the one that is named may be
-LONGER, WIDER, LESS_ROBUST = 8.0, 14.0, 2.0  # s of work to look for a duration, limits, and robustness
+WORK = 20.0  # s to look for all cures
+SHARE = 0.5  # of the work that is left, which one cure may take
 FARTHER = 1.7  # times the least value with a solution, up to which one that is welcome is looked for
 
 
@@ -35,11 +36,14 @@ class Trial:
         Whether it is one that will do.
     welcome : Solution → bool
         Whether it is one that is better named than others near by.
+    work : float
+        In s, that it may take to look for all cures.
     """
 
     solve: Callable[[Problem], Solution]
     keeps: Callable[[Solution], bool]
     welcome: Callable[[Solution], bool]
+    work: float = WORK
 
     def pleases(self, problem: Problem) -> bool:
         """Whether a problem has a solution that will do and is welcome."""
@@ -86,12 +90,14 @@ def cures(problem: Problem, trial: Trial, *, in_time: bool = False) -> str:
         Look for what would do in the duration asked for only.
     """
     sentences = []
-    if not in_time and (longer := _in_time(LONGER, lambda: _longer(problem, trial))):
+    with budget(trial.work):
+        longer = "" if in_time else _in_time(lambda: _longer(problem, trial))
+        instead = _wider(problem, trial)
+        if not instead and (less := _in_time(lambda: _less_robust(problem, trial))):
+            instead = [less]
+    if longer:
         within = "With these limits it" if problem.limits.stated() else "It"
         sentences.append(f"{within} takes at least {longer} s (move.duration).")
-    instead = list(_wider(problem, trial))
-    if not instead and (less := _in_time(LESS_ROBUST, lambda: _less_robust(problem, trial))):
-        instead = [less]
     if instead:
         sentences.append(f"In {problem.duration:g} s it would do with {', or with '.join(instead)}.")
     return " ".join(sentences)
@@ -110,17 +116,17 @@ def _longer(problem: Problem, trial: Trial) -> str:
     return "" if factor is None else rounded_up(factor * enough)
 
 
-def _wider(problem: Problem, trial: Trial) -> Iterator[str]:
+def _wider(problem: Problem, trial: Trial) -> list[str]:
     """Widen one limit by itself as little as will do; all of them alike where one is not enough."""
     stated = problem.limits.stated()
 
     def widened(limits: Mapping[str, Any]) -> str:
-        return _in_time(WIDER / (len(stated) + 1), lambda: _widened(problem, limits, trial))
+        return _in_time(lambda: _widened(problem, limits, trial))
 
     alone = [found for place, value in stated.items() if (found := widened({place: value}))]
     if not alone and len(stated) > 1 and (together := widened(stated)):
         alone = [together]
-    yield from alone
+    return alone
 
 
 def _widened(problem: Problem, limits: Mapping[str, Any], trial: Trial) -> str:
@@ -148,10 +154,10 @@ def _less_robust(problem: Problem, trial: Trial) -> str:
     return ""
 
 
-def _in_time(seconds: float, find: Callable[[], str]) -> str:
-    """Find words for a cure in a share of the work; none where that is not enough."""
+def _in_time(find: Callable[[], str]) -> str:
+    """Find words for a cure in a share of the work that is left; none where that is not enough."""
     try:
-        with budget(seconds):
+        with budget(SHARE * left()):
             return find()
     except OutOfWork:
         spend(0.0)

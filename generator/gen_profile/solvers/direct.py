@@ -249,7 +249,8 @@ def _mesh(problem: Problem) -> Array:
     """Choose relative lengths of intervals: resolve the fastest mode and, for snap, layers at the ends."""
     fastest = linearize(problem.plant, problem.parameters, problem.target).frequencies[-1]
     enough = fastest * problem.duration / RADIANS_PER_INTERVAL
-    longest = 1.0 / float(np.clip(np.ceil(enough), INTERVALS, MAX_INTERVALS))
+    bends = problem.effort == "snap" and bool(problem.limits.stated())  # where limits begin to bind, too
+    longest = 1.0 / float(np.clip(np.ceil(enough), (1 + bends) * INTERVALS, MAX_INTERVALS))
     shortest = SNAP_TIME / problem.duration if problem.effort == "snap" else longest
     graded = longest * GROWTH ** -np.arange(1.0, MAX_GRADED)
     graded = graded[graded > shortest / GROWTH][::-1]

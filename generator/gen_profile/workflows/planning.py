@@ -113,7 +113,7 @@ def timed(spec: Spec, progress: Progress = untold) -> Spec:
     if spec.solver.shaper is not None:
         return _lasting(spec, shaped_motion(spec, spec.solver.shaper).duration)
     try:
-        with budget(SEARCHING):
+        with budget(SEARCHING * choice.patience(problem_of(spec))):
             return _shortest(spec, progress)
     except OutOfWork as error:
         raise SolverDiverged(
