@@ -62,7 +62,7 @@ def progress() -> Iterator[Progress]:
 
 
 class _InLog:
-    """A line for every stage, and for one that lasts further ones, ever more rarely."""
+    """A line for every stage and its end, and for one that lasts further ones, ever more rarely."""
 
     def __init__(self) -> None:
         self._step, self._lock, self._over = _Step(), threading.Lock(), threading.Event()
@@ -78,8 +78,10 @@ class _InLog:
 
     def tell(self, stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
         with self._lock:
-            if self._step.take(stage, done, total, remark):
+            new = self._step.take(stage, done, total, remark)
+            if new:
                 self._pause = FIRST_LINE
+            if new or 0 < total == done:
                 self._print()
 
     def _print(self) -> None:

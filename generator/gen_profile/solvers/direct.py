@@ -399,7 +399,8 @@ def _optimum(setup: Setup, found: Found, sway_cost: SwayCost) -> Optimum:
     intervals, axes = transcription.intervals, len(reach)
     local = found.iterate.local.reshape(intervals, axes, piece.size)
     lengths = duration * piece.length
-    knots = np.append(0.0, np.cumsum(lengths))
+    shares = np.append(0.0, np.cumsum(piece.length))
+    knots = duration * (shares / shares[-1])  # the last one is the duration, to the last bit
     control = np.einsum("pb,kab->kpa", power_basis(3), local[:, :, piece.order :])
     stages, machine = found.iterate.stages[0], transcription.machines[0]
     points = stages.reshape(-1, stages.shape[2])
