@@ -184,7 +184,7 @@ def test_a_signal_ends_it_quietly(tmp_path, number):
         text=True,
         start_new_session=True,
     )
-    assert process.stderr.readline() == "0 of 12 cases …\n"
+    assert process.stderr.readline() == "designing cases, 0 of 12 …\n"
     if number == signal.SIGINT:
         wait_for(lambda: stamps(tmp_path))
     os.killpg(process.pid, number)  # as a terminal and a service manager do, to all of them
