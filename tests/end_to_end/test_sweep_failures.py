@@ -11,6 +11,7 @@ import pytest
 from command_line import run_here
 from distributed import LocalCluster
 
+from gen_profile.cli.progress import counting
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec_reading import preset_text
 from gen_profile.workflows import sweep as workflow
@@ -221,6 +222,15 @@ def test_workers_that_cannot_work_stop_the_sweep(tmp_path, monkeypatch, raised, 
         pytest.raises(seen, match=sentence),
     ):
         workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler=cluster.scheduler_address)
+
+
+def test_counts_on_a_terminal(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with counting("cases") as tell:
+        tell(3, 10, "")
+        tell(10, 10, "2 failed")
+    shown = capsys.readouterr().err
+    assert "cases" in shown and "10/10" in shown and "2 failed" in shown
 
 
 # Its table

@@ -6,12 +6,10 @@ import pytest
 from generator.crane_problems import EFFORTS, crane_problem
 
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import choice, direct, indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 from gen_profile.spec import LimitsSpec
-from gen_profile.spec_reading import preset_spec
 
 LIMITS = {"velocity": 0.15, "acceleration": 0.4, "jerk": 6.0}
 
@@ -110,12 +108,3 @@ def test_programs_that_overshoot_back_and_forth_settle(weight):
     problem = crane_problem(machine, target=(1.0,), duration=5.5, sway_scale=None, sway_weight=weight)
     one, other = direct.solve(problem).raise_for_status(), indirect.solve(problem).raise_for_status()
     assert one.cost == pytest.approx(other.cost, rel=1e-6 if weight == 0.0 else 3e-5)
-
-
-def test_snap_within_a_limit_of_the_sway_takes_few_programs_and_intervals(monkeypatch):
-    task = ["cost.effort=snap", "move.duration=6.0", "limits.sway=0.003"]
-    few = direct.solve(problem_of(preset_spec("slosh-tank", task)))
-    assert few.iterations <= 20
-    monkeypatch.setattr(direct, "INTERVALS", 60)  # of which there are twice as many, with limits
-    many = direct.solve(problem_of(preset_spec("slosh-tank", task)))
-    assert many.raise_for_status().cost == pytest.approx(few.raise_for_status().cost, rel=0.01)

@@ -24,7 +24,6 @@ from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import OutputError, SpecError, StreamAborted
 
 if TYPE_CHECKING:
-    from gen_profile.progress import Progress
     from gen_profile.workflows.stream_outcome import Outcome, Source
     from gen_profile_exporters.can.lateness import Lateness
 
@@ -243,7 +242,7 @@ def _source(
     *,
     accept_unverified: bool,
     require_bus: Callable[[int], None],
-    tell: Progress,
+    tell: Callable[[str], None],
 ) -> Source:
     """Take an artefact, or design one for a spec, once there is a bus for it."""
     from gen_profile.workflows.stream import require_rest, verified

@@ -12,13 +12,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gen_profile.profile import Array
-from gen_profile.solvers.interrupts import interrupts_collected
-from gen_profile.work import spend
 
 Matrix = Any  # scipy.sparse matrix or array
 TOLERANCE = 1e-10
 MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
-POSING, ITERATION = 5e-7, 1e-7  # s of work for each entry of the constraints, and for each of an iteration's
 
 
 class Verdict(Enum):
@@ -90,10 +87,7 @@ class ConicProgram:
         self._add(*self._giving(matrix, side, gives), clarabel.SecondOrderConeT(len(side)))
 
     def solve(self, quadratic: Matrix, linear: Array) -> ConicSolution:
-        """Solve for a cost, P given whole and symmetric; it should be of the order of 1 or more.
-
-        What is much smaller is not minimised: programs end when the cost is right to the tolerance.
-        """
+        """Solve for a cost, P given whole and symmetric."""
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_iter = MAX_ITERATIONS
@@ -101,21 +95,22 @@ class ConicProgram:
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
         units = sparse.diags(self._units)
         scaled, slope = sparse.triu(units @ quadratic @ units, format="csc"), self._units * linear
-        matrix = (sparse.vstack(self._rows) @ units).tocsc()
-        spend(POSING * matrix.nnz)
+        size = max(float(np.abs(scaled.data).max(initial=0.0)), float(np.abs(slope).max()))
         solver = clarabel.DefaultSolver(
-            scaled, slope, matrix, np.concatenate(self._sides), self._cones, settings
+            scaled / size,
+            slope / size,
+            (sparse.vstack(self._rows) @ units).tocsc(),
+            np.concatenate(self._sides),
+            self._cones,
+            settings,
         )
-        with interrupts_collected() as came:
-            solver.set_termination_callback(lambda _: bool(came))
-            solution = solver.solve()
-        spend(ITERATION * (matrix.nnz + scaled.nnz) * solution.iterations)
+        solution = solver.solve()
         ends = np.cumsum([len(side) for side in self._sides])[:-1]
         return ConicSolution(
             verdict=_VERDICTS.get(str(solution.status), Verdict.FAILED),
             exact=str(solution.status) == "Solved",
             x=self._units * np.array(solution.x),
-            multipliers=np.split(np.array(solution.z), ends),
+            multipliers=np.split(size * np.array(solution.z), ends),
         )
 
     def _giving(self, matrix: Matrix, side: Array, gives: Array) -> tuple[Matrix, Array]:

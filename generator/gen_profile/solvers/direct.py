@@ -41,7 +41,6 @@ from gen_profile.spec import LimitsSpec
 METHOD = "direct"
 INTERVALS = 40
 MAX_INTERVALS = 480
-GROWTH, MAX_GRADED = 1.4, 30  # of intervals from the ends on, and how many there are at most
 RADIANS_PER_INTERVAL = 1.5  # of the fastest mode, which Gauss collocation then follows to 1e-7 of the cost
 STEP_TOLERANCE = 1e-8  # of the motion's coordinates, relative
 STALLED = 1e-5  # step that is still taken for the programs' own tolerance when it ceases to shrink
@@ -61,7 +60,7 @@ class Setup:
     ----------
     problem : Problem
     transcription : Transcription
-    forms : tuple of (intervals, size, size) arrays
+    forms : tuple of (size, size) arrays
         Twice the effort of every axis, in units of `cost_scale`.
     cost_scale : float
         Of the running cost.
@@ -181,9 +180,11 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     )
     jerks = [problem.limits.of(axis).jerk for axis in range(system.layout.m)]
     commands_jerk = problem.tau is not None and any(jerk is not None for jerk in jerks)
-    piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=_mesh(problem))
+    intervals = _intervals(problem)
+    piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=1.0 / intervals)
     reach = axis_reach(problem)
     transcription = Transcription(
+        intervals=intervals,
         piece=piece,
         axes=axes_map(piece, np.array(problem.start), reach, problem.duration),
         duration=problem.duration,
@@ -191,8 +192,7 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
         final_velocity=np.array(problem.final_velocity) * problem.duration / reach,
         machines=machines,
     )
-    form, usual = goals.effort_form(problem, piece), goals.usual_effort(problem)
-    cost_scale = canonical.data.cost_scale * usual
+    form, cost_scale = goals.effort_form(problem, piece), canonical.data.cost_scale
     unit = canonical.data.effort_weights * reach**2 / problem.duration**6 / cost_scale
     setup = Setup(
         problem=problem,
@@ -245,18 +245,13 @@ def _amplitudes(
     )
 
 
-def _mesh(problem: Problem) -> Array:
-    """Choose relative lengths of intervals: resolve the fastest mode and, for snap, layers at the ends."""
+def _intervals(problem: Problem) -> int:
+    """Resolve the fastest mode and, for snap, the layers at the ends in which it acts."""
     fastest = linearize(problem.plant, problem.parameters, problem.target).frequencies[-1]
     enough = fastest * problem.duration / RADIANS_PER_INTERVAL
-    bends = problem.effort == "snap" and bool(problem.limits.stated())  # where limits begin to bind, too
-    longest = 1.0 / float(np.clip(np.ceil(enough), (1 + bends) * INTERVALS, MAX_INTERVALS))
-    shortest = SNAP_TIME / problem.duration if problem.effort == "snap" else longest
-    graded = longest * GROWTH ** -np.arange(1.0, MAX_GRADED)
-    graded = graded[graded > shortest / GROWTH][::-1]
-    rest = 1.0 - 2.0 * graded.sum()
-    middle = np.ceil(rest / longest * (1.0 - 1e-9))
-    return np.concatenate([graded, np.full(int(middle), rest / middle), graded[::-1]])
+    if problem.effort == "snap":
+        enough = max(enough, problem.duration / SNAP_TIME)
+    return int(np.clip(np.ceil(enough), INTERVALS, MAX_INTERVALS))
 
 
 def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
@@ -398,9 +393,7 @@ def _optimum(setup: Setup, found: Found, sway_cost: SwayCost) -> Optimum:
     piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
     intervals, axes = transcription.intervals, len(reach)
     local = found.iterate.local.reshape(intervals, axes, piece.size)
-    lengths = duration * piece.length
-    shares = np.append(0.0, np.cumsum(piece.length))
-    knots = duration * (shares / shares[-1])  # the last one is the duration, to the last bit
+    knots = duration * np.arange(intervals + 1) / intervals
     control = np.einsum("pb,kab->kpa", power_basis(3), local[:, :, piece.order :])
     stages, machine = found.iterate.stages[0], transcription.machines[0]
     points = stages.reshape(-1, stages.shape[2])
@@ -413,7 +406,7 @@ def _optimum(setup: Setup, found: Found, sway_cost: SwayCost) -> Optimum:
         hamiltonian=None,
         top_derivative=control
         * (reach / duration**piece.order)
-        / lengths[:, None, None] ** np.arange(control.shape[1])[:, None],
+        / (duration / intervals) ** np.arange(control.shape[1])[:, None],
         top_order=piece.order,
         sway=machine.equations.sway(points, felt, machine.parameters)[:, :, 0],
         angle=greatest_angle(setup, found.iterate),
@@ -440,7 +433,7 @@ def _nodes(setup: Setup, found: Found) -> tuple[Array, Array]:
         transcription.machines[0].scale,
     )
     local = x[: intervals * transcription.breadth].reshape(intervals, axes, piece.size)
-    last = np.stack([piece.derivative(order)[-1, -1] for order in range(orders)])
+    last = np.stack([piece.derivative(order)[-1] for order in range(orders)])
     moved = np.concatenate([local[:, :, :orders], (local[-1:] @ last.T)])
     moved_costates = np.concatenate([-multipliers[0], multipliers[1]]).reshape(intervals + 1, axes, orders)
     units = reach[:, None] / duration ** np.arange(orders)
@@ -472,7 +465,7 @@ def _cost(setup: Setup, iterate: Iterate, sway_cost: SwayCost) -> float:
     transcription, duration = setup.transcription, setup.problem.duration
     local = iterate.local.reshape(transcription.intervals, len(setup.forms), -1)
     effort = sum(
-        0.5 * float(np.einsum("ka,kab,kb->", local[:, axis], form, local[:, axis]))
+        0.5 * float(np.einsum("ka,ab,kb->", local[:, axis], form, local[:, axis]))
         for axis, form in enumerate(setup.forms)
     )
     sway = transcription.end_sway_found(iterate)

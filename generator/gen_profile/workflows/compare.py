@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import attrs
 
 from gen_profile.errors import GenProfileError, InfeasibleProblem
-from gen_profile.progress import Progress, untold
 from gen_profile.spec import Spec
 from gen_profile.workflows.contenders import Contender, contenders
 from gen_profile.workflows.planning import Trial, figures, keeps_residual_sway, try_motion
 from gen_profile.workflows.recommendation import Recommendation, efficient, recommend
 from gen_profile.workflows.wording import mm
+
+Progress = Callable[[str], None]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -77,7 +79,7 @@ class Comparison:
         }
 
 
-def compare(spec: Spec, progress: Progress = untold) -> Comparison:
+def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
     """Try every shaper and variants of the optimal motion on the machines of a spec.
 
     Parameters
@@ -89,9 +91,8 @@ def compare(spec: Spec, progress: Progress = untold) -> Comparison:
     rows: list[Row] = []
     left_out: dict[str, str] = {}
     impossible: dict[str, str] = {}
-    listed = tuple(contenders(spec))
-    for done, contender in enumerate(listed):
-        progress("comparing", done, len(listed), contender.method)
+    for contender in contenders(spec):
+        progress(contender.method)
         try:
             if contender.requirements in impossible:
                 left_out[contender.method] = impossible[contender.requirements]

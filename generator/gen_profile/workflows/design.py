@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
@@ -15,19 +15,19 @@ from gen_profile.check import Check
 from gen_profile.errors import OutputError
 from gen_profile.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256
 from gen_profile.profile import Profile, SampledProfile
-from gen_profile.progress import Progress, untold
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec import Spec
 from gen_profile.workflows.delivery import Staging, staged
 from gen_profile.workflows.foreign_check import judge_foreign
 from gen_profile.workflows.monte_carlo import with_further
-from gen_profile.workflows.planning import Plan, plan
+from gen_profile.workflows.planning import Plan, plan, timed
 from gen_profile.workflows.scenarios import further_scenarios
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
 from gen_profile.workflows.worst_machines import worst_machines
 from gen_profile_exporters.exporter import Exporter, target_of
 from gen_profile_exporters.registry import find_exporter, format_named, require_end
 
+Progress = Callable[[str], None]
 LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")
 
 
@@ -123,7 +123,7 @@ def design(
     check: bool = True,
     keep_failed: bool = False,
     near: Trajectory | None = None,
-    progress: Progress = untold,
+    progress: Progress = lambda _: None,
 ) -> Design:
     """Solve, export, replay what was written, co-simulate, and deliver what passes.
 
@@ -150,8 +150,9 @@ def design(
     """
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
     require_end(exporters, stops=spec.move.stops)
-    planned = plan(spec, near, progress)
-    spec = planned.spec
+    progress("solving")
+    spec = timed(spec)
+    planned = plan(spec, near)
     with staged(folder) as staging:
         progress("exporting")
         artefacts, replayed = _export(spec, planned.trial.command, exporters, staging)
@@ -228,7 +229,7 @@ def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progre
                 setpoints,
                 check,
                 [*further, *worst.machines],
-                lambda done, total: progress("checking by co-simulation", done, total),
+                lambda done, total: progress(f"checking by co-simulation, {done} of {total} scenarios"),
             )
         )
     return max(checks, key=lambda check: check.demand)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,9 @@ import numpy as np
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.problem.linearization import linearize
 from gen_profile.profile import Profile
-from gen_profile.progress import Progress, untold
 from gen_profile.spec import Spec
 from gen_profile.workflows.delivery import deliver
-from gen_profile.workflows.planning import plan
+from gen_profile.workflows.planning import plan, timed
 from gen_profile_fmu.building import build_fmu
 from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.model import AUTHOR, Model, identifier_of, plant_model, profile_model, system_model
@@ -72,7 +71,7 @@ def export_fmu(
     platforms: tuple[str, ...],
     path: Path | None,
     author: str = AUTHOR,
-    progress: Progress = untold,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Export:
     """Write an FMU, or a system of two.
 
@@ -125,11 +124,12 @@ def platform_names(choice: str) -> tuple[str, ...]:
     return (choice,)
 
 
-def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Progress) -> Model:
+def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Callable[[str], None]) -> Model:
     name = identifier_of(f"{spec.name} {kind}")
     if kind == "plant":
         return plant_model(_machine(spec, _rough_nominals(spec)), input_kind, name)
-    trial = plan(spec, progress=progress).trial
+    progress("solving")
+    trial = plan(timed(spec)).trial
     if kind == "profile":
         return profile_model(name, spec.machine().actuated, trial.command)
     return system_model(name, _machine(spec, _nominals(spec, trial.motion)), trial.command)

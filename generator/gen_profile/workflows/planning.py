@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.check import Scenario
-from gen_profile.errors import InfeasibleProblem, LimitViolation, SolverDiverged
+from gen_profile.errors import InfeasibleProblem, LimitViolation
 from gen_profile.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.actuator import lag_compensated
@@ -19,7 +19,6 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import problem_of
 from gen_profile.profile import Array, Profile, grid_length, grid_times
-from gen_profile.progress import Progress, untold
 from gen_profile.response import TRANSIENT_SAMPLES, Response, Swing
 from gen_profile.solvers import choice
 from gen_profile.solvers.collocation import Trajectory
@@ -27,7 +26,6 @@ from gen_profile.solvers.minimum_time import least_beyond
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec import Spec
-from gen_profile.work import OutOfWork, budget
 from gen_profile.workflows.scenarios import scenarios
 from gen_profile.workflows.shaping import shaped_motion
 
@@ -38,8 +36,6 @@ COARSE_SAMPLES = 501  # of machines all over the ranges, between which the great
 ACCURACY = 1e-6  # of their integration, relative
 SLOW = 5.0  # periods of the slowest mode, which are time enough where no duration keeps the limits
 CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
-EXPLAINING = "looking for what would do"
-SEARCHING = 14.0  # s of work to find the shortest duration
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
@@ -77,8 +73,6 @@ class Plan:
 
     Attributes
     ----------
-    spec : Spec
-        What was planned, its duration found where the shortest was asked for.
     solution : Solution or None
         What the solver found; None where a shaper made the motion.
     solver_time : float
@@ -88,14 +82,13 @@ class Plan:
     figures : dict of str to float
     """
 
-    spec: Spec
     solution: Solution | None
     solver_time: float
     trial: Trial
     figures: dict[str, float]
 
 
-def timed(spec: Spec, progress: Progress = untold) -> Spec:
+def timed(spec: Spec) -> Spec:
     """Find the shortest duration where a spec asks for it; it ends on a cycle of the controller.
 
     An optimal motion takes longer than its limits make it where it would otherwise leave more sway than the
@@ -105,26 +98,13 @@ def timed(spec: Spec, progress: Progress = untold) -> Spec:
     ------
     InfeasibleProblem
         No duration was found to do.
-    SolverDiverged
-        None was found in the work that a search may take.
     """
     if not spec.move.shortest:
         return spec
     if spec.solver.shaper is not None:
         return _lasting(spec, shaped_motion(spec, spec.solver.shaper).duration)
-    try:
-        with budget(SEARCHING * choice.patience(problem_of(spec))):
-            return _shortest(spec, progress)
-    except OutOfWork as error:
-        raise SolverDiverged(
-            "move.duration: the search for the shortest duration was given up, for it took too long; "
-            "state a duration in s, or fewer limits."
-        ) from error
-
-
-def _shortest(spec: Spec, progress: Progress) -> Spec:
     problem = problem_of(spec)
-    shortest = choice.minimum_time(problem, progress)
+    shortest = choice.minimum_time(problem)
     if shortest is None:
         slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
         slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * 2.0 * np.pi / slowest)))
@@ -135,12 +115,7 @@ def _shortest(spec: Spec, progress: Progress) -> Spec:
     quickest = _lasting(spec, shortest)
     if _calms(quickest):
         return quickest
-
-    def calms(duration: float) -> bool:
-        progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
-        return _calms(_lasting(spec, duration))
-
-    calm = least_beyond(calms, shortest, LONGEST * shortest)
+    calm = least_beyond(lambda time: _calms(_lasting(spec, time)), shortest, LONGEST * shortest)
     if calm is None:
         raise InfeasibleProblem(
             "check.residual_sway: no duration leaves so little sway on every machine of "
@@ -181,7 +156,7 @@ def _afterwards(trial: Trial) -> tuple[Response, ...]:
     return (*named, *others)
 
 
-def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold) -> Plan:
+def plan(spec: Spec, near: Trajectory | None = None) -> Plan:
     """Solve a spec, or shape a move for it, and try the motion on all machines.
 
     Parameters
@@ -189,21 +164,16 @@ def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold
     spec : Spec
     near : Trajectory, optional
         Of a similar spec's solution, to begin at.
-    progress : Progress
 
     Raises
     ------
     InfeasibleProblem, SolverDiverged, LimitViolation
     """
-    spec = timed(spec, progress)
-    progress("solving")
     began = time.perf_counter()
     if spec.solver.shaper is not None:
         solution, motion = None, shaped_motion(spec, spec.solver.shaper)
     else:
         attempt = choice.attempt(problem_of(spec), spec.solver.solver, near)
-        if attempt.optimum is None:
-            progress(EXPLAINING)
         solution = choice.explained(attempt, spec.solver.solver, partial(_is_calm, spec))
         motion = optimal_profile(solution)
     solver_time = time.perf_counter() - began
@@ -212,10 +182,9 @@ def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold
     broken = breaches(spec.limits, trial.command, found["sway_transient_peak_m"])
     if broken:
         sentences = [breach.sentence() for breach in broken]
-        progress(EXPLAINING)
         cure = choice.remedy(problem_of(spec), spec.solver.solver, partial(_is_calm, spec))
         raise LimitViolation("\n".join([*sentences, cure]).strip())
-    return Plan(spec=spec, solution=solution, solver_time=solver_time, trial=trial, figures=found)
+    return Plan(solution=solution, solver_time=solver_time, trial=trial, figures=found)
 
 
 def try_motion(spec: Spec, motion: Profile) -> Trial:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,7 +12,6 @@ import attrs
 
 from gen_profile.check import Check
 from gen_profile.manifest import sha256
-from gen_profile.progress import Progress, untold
 from gen_profile.report.content import Page
 from gen_profile.report.page import render, require_pages
 from gen_profile.spec import Spec
@@ -23,6 +22,8 @@ from gen_profile.workflows.report_measured import Measured, compare_measured
 from gen_profile.workflows.report_measured_section import measured_verdict
 from gen_profile.workflows.report_sections import facts, sections, verdict
 from gen_profile.workflows.wording import move, uncertain
+
+Progress = Callable[[str], None]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -79,7 +80,7 @@ def report(
     log_columns: str | None = None,
     compared: bool = True,
     fields: Sequence[tuple[str, str]] = (),
-    progress: Progress = untold,
+    progress: Progress = lambda _: None,
 ) -> Report:
     """Design, check and compare, and put what was found on one page.
 

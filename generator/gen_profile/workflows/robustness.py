@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -13,12 +13,13 @@ from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.linearization import linearize
 from gen_profile.profile import Array, Profile, grid_length, grid_times, read_only
-from gen_profile.progress import Progress, untold
 from gen_profile.spec import Spec
 from gen_profile.suggestion import suggestion
 from gen_profile.workflows.contenders import contenders
 from gen_profile.workflows.many_machines import Feed, many_machines, residual_peaks
 from gen_profile.workflows.planning import SHORTEST_WATCH, STANDSTILL
+
+Progress = Callable[[str], None]
 
 POINTS = {1: 61, 2: 25}  # per parameter, of a curve and of a map
 USUAL_RANGE = 0.3  # relative, of a parameter that the spec takes for certain
@@ -128,7 +129,7 @@ def robustness(
     methods: Sequence[str] = (),
     points: int | None = None,
     half_range: float | None = None,
-    progress: Progress = untold,
+    progress: Progress = lambda _: None,
 ) -> Robustness:
     """Try shapers and variants of the optimal motion over errors of one or two parameters.
 
@@ -158,9 +159,8 @@ def robustness(
     for method in methods:
         if method not in listed:
             raise SpecError(f"--method {method[:60]}: unknown method{suggestion(method, list(listed))}")
-    chosen = methods or list(listed)
-    for done, method in enumerate(chosen):
-        progress("designing", done, len(chosen), method)
+    for method in methods or listed:
+        progress(method)
         try:
             motions[method] = listed[method].design()
         except GenProfileError as error:
