@@ -54,7 +54,7 @@ class Response:
 
 
 class Swing:
-    """Machines whose axes follow one profile exactly, integrated all at once.
+    """Machines whose axes follow one profile exactly, integrated all at once to nearly rounding accuracy.
 
     Parameters
     ----------
@@ -67,8 +67,6 @@ class Swing:
     initial : mapping of str to float, optional
         What swings at time 0, on all machines; see `gen_profile.problem.initial_state`. All hang at rest by
         default.
-    accuracy : float, optional
-        Of a step, relative; to nearly rounding accuracy by default.
 
     Raises
     ------
@@ -85,8 +83,6 @@ class Swing:
         machines: Sequence[Mapping[str, float]],
         until: float,
         initial: Mapping[str, float] = AT_REST,
-        *,
-        accuracy: float = RELATIVE_TOLERANCE,
     ) -> None:
         acceleration, self._outputs = _functions(plant)
         self.plant, self._profile = plant, profile
@@ -109,8 +105,8 @@ class Swing:
             np.repeat(initial_state(plant, initial).reshape(2, 1, -1), len(machines), axis=1).ravel(),
             method="DOP853",
             dense_output=True,
-            rtol=accuracy,
-            atol=ABSOLUTE_TOLERANCE / RELATIVE_TOLERANCE * accuracy,
+            rtol=RELATIVE_TOLERANCE,
+            atol=ABSOLUTE_TOLERANCE,
             max_step=longest,
         )
         if not integral.success:

@@ -25,7 +25,6 @@ FIGURES = {
     "sway_residual_peak_m",
     "sway_residual_peak_perturbed_m",
     "sway_residual_worst_m",
-    "sway_transient_worst_m",
 }
 
 

@@ -21,7 +21,6 @@ from gen_profile.workflows.monte_carlo import Progress, with_further
 from gen_profile.workflows.motion_variant import parse_variant, varied
 from gen_profile.workflows.scenarios import further_scenarios, scenarios
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
-from gen_profile.workflows.worst_machines import worst_machines
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
@@ -113,30 +112,25 @@ def check_artefact(
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     judged = varied(spec, setpoints, variant) if variant.told() else (spec, setpoints)
-    rows, searched = _rows(*judged, row)
-    check = _verdict(*judged, rows, on_build, progress)
+    check = _verdict(*judged, _rows(judged[0], row), on_build, progress)
     faults = (*check.faults, *_alterations(path, standing))
-    check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
+    check = attrs.evolve(check, strict=strict, faults=faults)
     return Judgement(
         path=path, format=format_, spec=spec, check=check, manifest=standing, variant=variant.told()
     )
 
 
-def _rows(spec: Spec, setpoints: SampledProfile, row: int | None) -> tuple[tuple[Scenario, ...], int]:
-    """List all scenarios, or the one of a number, and say how many machines were looked at for the worst."""
+def _rows(spec: Spec, row: int | None) -> tuple[Scenario, ...]:
+    """List all scenarios, or the one of a number."""
     machines = scenarios(spec)
     rows = (*machines, *further_scenarios(spec, machines))
-    if row is not None and 0 <= row < len(rows):
-        return (rows[row],), 0
-    worst = worst_machines(spec, setpoints, rows)
-    rows = (*rows, *worst.machines)
     if row is None:
-        return rows, worst.tried
+        return rows
     if not 0 <= row < len(rows):
         raise SpecError(
             f"--scenario {row}: the scenarios of this spec are numbered from 0 to {len(rows) - 1}."
         )
-    return (rows[row],), worst.tried
+    return (rows[row],)
 
 
 def _verdict(
@@ -161,7 +155,7 @@ def _verdict(
     followed = _of_even_cycles(setpoints, spec)
     found = cosimulate(spec, followed, machines, output_step=spacing, on_build=on_build)
     expected = cosimulate(spec, _every_other(followed), machines, output_step=spacing)
-    check = judge(spec, setpoints, machines, found, expected, followed=followed)
+    check = judge(spec, setpoints, machines, found, expected)
     check = attrs.evolve(check, error_bound=check.error_bound + resolution)
     if len(rows) == len(further):
         check = attrs.evolve(check, findings=())

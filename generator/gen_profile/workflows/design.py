@@ -23,7 +23,6 @@ from gen_profile.workflows.monte_carlo import with_further
 from gen_profile.workflows.planning import Plan, plan, timed
 from gen_profile.workflows.scenarios import further_scenarios
 from gen_profile.workflows.verification import cosimulate, judge, sample_spacing
-from gen_profile.workflows.worst_machines import worst_machines
 from gen_profile_exporters.exporter import Exporter, target_of
 from gen_profile_exporters.registry import find_exporter, format_named, require_end
 
@@ -57,21 +56,13 @@ class Design:
         """Whether no check failed."""
         return self.check is None or self.check.passed
 
-    @property
-    def figures(self) -> dict[str, float]:
-        """Figures of the plan, and the worst residual sway that the check's search has found."""
-        if self.check is None:
-            return self.plan.figures
-        worst = "sway_residual_worst_m"
-        return self.plan.figures | {worst: max(self.plan.figures[worst], self.check.worst_in_ranges)}
-
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
             "solver": self._solver(),
-            "figures": self.figures,
+            "figures": self.plan.figures,
             "check": None if self.check is None else self.check.to_dict(),
             "artefacts": [
                 {
@@ -208,11 +199,8 @@ def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progre
     further = further_scenarios(spec, machines)
     checks = []
     for setpoints in replayed:
-        worst = worst_machines(spec, setpoints, [*machines, *further])
         if spec.check.foreign is not None:
-            rows = [*machines, *further, *worst.machines]
-            check = judge_foreign(spec, spec.check.foreign, setpoints, rows)
-            checks.append(attrs.evolve(check, searched=worst.tried))
+            checks.append(judge_foreign(spec, spec.check.foreign, setpoints, [*machines, *further]))
             continue
         found = cosimulate(
             spec,
@@ -222,13 +210,13 @@ def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progre
             on_build=lambda: progress("compiling the plant's FMU, once"),
         )
         expected = planned.trial.swing.at(found[0].times)
-        check = attrs.evolve(judge(spec, setpoints, machines, found, expected), searched=worst.tried)
+        check = judge(spec, setpoints, machines, found, expected)
         checks.append(
             with_further(
                 spec,
                 setpoints,
                 check,
-                [*further, *worst.machines],
+                further,
                 lambda done, total: progress(f"checking by co-simulation, {done} of {total} scenarios"),
             )
         )

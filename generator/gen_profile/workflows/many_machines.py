@@ -64,7 +64,6 @@ def residual_peaks(
     tau: Array,
     max_step: Array,
     since: float,
-    on_the_way: bool = False,
 ) -> Array:
     """Feed every machine, and find the greatest sway of every load once the axes stand.
 
@@ -83,12 +82,10 @@ def residual_peaks(
         Longest integration step in s.
     since : float
         When the axes stand, in s.
-    on_the_way : bool
-        Whether the end load's greatest sway at any time is one more column.
 
     Returns
     -------
-    (runs, loads) or (runs, loads + 1) array
+    (runs, loads) array
         m.
 
     Raises
@@ -107,9 +104,7 @@ def residual_peaks(
     inputs = {
         f"{axis.name}.setpoint": feed.position[..., 1:, column] for column, axis in enumerate(plant.actuated)
     }
-    outputs = [f"sway.{load}" for load in plant.loads]
-    components = plant.directions if on_the_way else 0
-    return runs.peaks(feed.times, inputs, values, outputs, since=since, components=components)
+    return runs.peaks(feed.times, inputs, values, [f"sway.{load}" for load in plant.loads], since=since)
 
 
 def _present() -> int:

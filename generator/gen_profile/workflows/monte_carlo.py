@@ -13,7 +13,7 @@ from gen_profile.spec import Spec
 from gen_profile.workflows.many_machines import Feed, many_machines, parameter_rows, residual_peaks
 from gen_profile.workflows.planning import STANDSTILL, watch_time
 from gen_profile.workflows.scenarios import scenarios
-from gen_profile.workflows.transmission import delay, followed_up, follows_exactly, lag_of, transmitted
+from gen_profile.workflows.transmission import delay, followed_up, lag_of, transmitted
 from gen_profile.workflows.verification import STEP_PHASE, longest_step
 from gen_profile_fmu.many_runs import ManyRuns
 
@@ -89,8 +89,7 @@ def _batch(
     spec: Spec, setpoints: SampledProfile, rows: Sequence[Scenario], runs: ManyRuns
 ) -> tuple[Array, float]:
     """Peaks of some rows, shape (rows, loads), and the error bound of them all in m."""
-    plant, since, after = spec.machine(), standstill(spec, setpoints), watched(spec, setpoints)
-    on_the_way = spec.limits.sway is not None
+    plant, since, after = spec.machine(), standstill(spec, setpoints), _watched(spec, setpoints)
     max_step = np.array([longest_step(spec, row) for row in rows])
     tau = np.array([lag_of(spec, row) for row in rows])
 
@@ -103,13 +102,12 @@ def _batch(
             tau=tau,
             max_step=steps,
             since=since,
-            on_the_way=on_the_way,
         )
 
     feed = transmitted(spec, setpoints, rows)
     found = peaks(feed, max_step)
     straight = rows[0].group == "samples" and spec.check.path.between == "linear"
-    if straight or follows_exactly(rows[0]):
+    if straight or rows[0].group == "corners":
         other = peaks(_every_other(feed), max_step)
     else:
         other = peaks(feed, 0.5 * np.minimum(max_step, setpoints.cycle_time))
@@ -117,17 +115,11 @@ def _batch(
     return found, float(np.abs(found - other).max()) + between
 
 
-def watched(spec: Spec, setpoints: SampledProfile, phase: float = SAMPLE_PHASE) -> Array:
-    """Choose times in s after the last setpoint, alike for all rows: no row depends on another.
-
-    Parameters
-    ----------
-    phase : float
-        rad of the fastest mode between two of them.
-    """
+def _watched(spec: Spec, setpoints: SampledProfile) -> Array:
+    """Choose times in s after the last setpoint, alike for all rows: no row depends on another."""
     machines = scenarios(spec)
     begin = float(setpoints.times[-1]) + setpoints.cycle_time + delay(spec.check.path)
-    spacing = phase / STEP_PHASE * min(longest_step(spec, machine) for machine in machines)
+    spacing = SAMPLE_PHASE / STEP_PHASE * min(longest_step(spec, machine) for machine in machines)
     until = standstill(spec, setpoints) + watch_time(spec, machines)
     return begin + grid_times(grid_length(until - begin, spacing), spacing)
 
@@ -140,6 +132,5 @@ def _every_other(feed: Feed) -> Feed:
 
 def _finding(spec: Spec, row: Scenario, peaks: Array) -> Finding:
     """Take the peaks; amplitudes of modes are known of the machines' trajectories only."""
-    residual = dict(zip(spec.machine().loads, map(float, peaks), strict=False))
-    transient = None if spec.limits.sway is None else float(peaks[-1])
-    return Finding(scenario=row, residual=residual, modal=residual, on_the_way=transient)
+    residual = dict(zip(spec.machine().loads, map(float, peaks), strict=True))
+    return Finding(scenario=row, residual=residual, modal=residual)

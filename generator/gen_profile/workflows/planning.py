@@ -16,7 +16,6 @@ from gen_profile.plants.plant import Plant
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches, rounded_down, rounded_up
 from gen_profile.problem.linearization import linearize
-from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import problem_of
 from gen_profile.profile import Array, Profile, grid_length, grid_times
 from gen_profile.response import TRANSIENT_SAMPLES, Response, Swing
@@ -32,8 +31,6 @@ from gen_profile.workflows.shaping import shaped_motion
 SHORTEST_WATCH = 4.0  # s; a residual is watched for this long, or for two of the slowest periods
 STANDSTILL = 10.0  # time constants after which a lagging drive counts as standing: its speed is down to e⁻¹⁰
 RESIDUAL_SAMPLES = 4001
-COARSE_SAMPLES = 501  # of machines all over the ranges, between which the greatest is a parabola's
-ACCURACY = 1e-6  # of their integration, relative
 SLOW = 5.0  # periods of the slowest mode, which are time enough where no duration keeps the limits
 CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
@@ -53,8 +50,6 @@ class Trial:
         Nominal first.
     swing : Swing
         Of these machines.
-    everywhere : Swing
-        Of machines all over the ranges, less accurately; of the same where nothing has a range.
     watch : float
         How long a residual is watched, in s.
     """
@@ -63,7 +58,6 @@ class Trial:
     command: Profile
     machines: tuple[Scenario, ...]
     swing: Swing
-    everywhere: Swing
     watch: float
 
 
@@ -145,15 +139,8 @@ def _is_calm(spec: Spec, solution: Solution) -> bool:
 def keeps_residual_sway(spec: Spec, trial: Trial, share: float = 1.0) -> bool:
     """Whether every load keeps a share of its limit of residual sway on all machines."""
     limits = share * np.array(list(spec.check.residual_sway.values()))
-    return all(bool((peak(response.sway) <= limits).all()) for response in _afterwards(trial))
-
-
-def _afterwards(trial: Trial) -> tuple[Response, ...]:
-    """Response after the motion of the trial's machines, and of others all over the ranges."""
-    begin, watch = trial.motion.duration, trial.watch
-    named = trial.swing.at(np.linspace(begin, begin + watch, RESIDUAL_SAMPLES))
-    others = trial.everywhere.at(np.linspace(begin, begin + watch, COARSE_SAMPLES))
-    return (*named, *others)
+    after = trial.swing.at(trial.motion.duration + np.linspace(0.0, trial.watch, RESIDUAL_SAMPLES))
+    return all(bool((peak(response.sway) <= limits).all()) for response in after)
 
 
 def plan(spec: Spec, near: Trajectory | None = None) -> Plan:
@@ -202,22 +189,8 @@ def try_motion(spec: Spec, motion: Profile) -> Trial:
     until = motion.duration + settle + watch
     _require_room(spec, until)
     swing = Swing(plant, motion, [m.parameters for m in machines], until, spec.move.initial)
-    known = np.array([list(machine.parameters.values()) for machine in machines])
-    inside = [
-        values
-        for values in machines_inside(problem_of(spec), spec.checked_ranges())
-        if not np.isclose(known, [values[name] for name in machines[0].parameters], 1e-9).all(axis=1).any()
-    ]
-    everywhere = swing
-    if inside:
-        everywhere = Swing(plant, motion, inside, until, spec.move.initial, accuracy=ACCURACY)
     return Trial(
-        motion=motion,
-        command=lag_compensated(motion, tau),
-        machines=machines,
-        swing=swing,
-        everywhere=everywhere,
-        watch=watch,
+        motion=motion, command=lag_compensated(motion, tau), machines=machines, swing=swing, watch=watch
     )
 
 
@@ -247,15 +220,9 @@ def figures(trial: Trial) -> dict[str, float]:
     """Measure a trial: first axis, end load; sway during the move of the nominal machine, after it of all."""
     motion, command, duration = trial.motion, trial.command, trial.motion.duration
     end_load = trial.swing.plant.end_load
-    on_the_way = [
-        length(response.sway[:, end_load])
-        for response in (
-            *trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES)),
-            *trial.everywhere.at(np.linspace(0.0, duration, COARSE_SAMPLES)),
-        )
-    ]
-    during = on_the_way[0]
-    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in _afterwards(trial)]
+    during = length(trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES))[0].sway[:, end_load])
+    after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
+    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in after]
     names = ("velocity", "acceleration", "jerk")
     units = ("m_per_s", "m_per_s2", "m_per_s3")
     table = {"duration_s": duration}
@@ -265,10 +232,9 @@ def figures(trial: Trial) -> dict[str, float]:
             table[f"{name}_rms_{unit}"] = root_mean_square(motion, order)
     table |= {
         "sway_transient_peak_m": float(peak(during)[0]),
-        "sway_transient_worst_m": max(float(peak(sway)[0]) for sway in on_the_way),
         "sway_transient_rms_m": float(mean_square_root(during)[0]),
         "sway_residual_peak_m": residuals[0],
-        "sway_residual_peak_perturbed_m": residuals[min(1, len(trial.machines) - 1)],
+        "sway_residual_peak_perturbed_m": residuals[min(1, len(residuals) - 1)],
         "sway_residual_worst_m": max(residuals),
     }
     if command is not motion:

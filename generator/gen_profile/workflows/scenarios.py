@@ -87,15 +87,15 @@ def _off_nominal(spec: Spec, corners: Sequence[Mapping[str, int]]) -> Iterator[S
     ranges, nominal = spec.checked_ranges(), spec.plant.parameters
     for corner in corners:
         shifted = {name: ranges[name][end] for name, end in corner.items()}
-        words = [named(spec, name, value) for name, value in shifted.items()]
+        words = [_offset(spec, name, value) for name, value in shifted.items()]
         yield Scenario(name=", ".join(words), parameters={**nominal, **shifted})
 
 
-def named(spec: Spec, name: str, value: float, digits: int = 6) -> str:
+def _offset(spec: Spec, name: str, value: float) -> str:
     """Name a parameter's value relative to the nominal one, but where it is stated as it is."""
     if name in spec.check.spans:
-        return f"{name} {value:.{digits}g}"
-    return f"{name} {100.0 * (value / spec.plant.parameters[name] - 1.0):+.{digits}g} %"
+        return f"{name} {value:.6g}"
+    return f"{name} {100.0 * (value / spec.plant.parameters[name] - 1.0):+.6g} %"
 
 
 def _draws(spec: Spec) -> list[Scenario]:

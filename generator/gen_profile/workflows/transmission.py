@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from gen_profile.check import SEARCH, TIMING, Scenario
+from gen_profile.check import TIMING, Scenario
 from gen_profile.errors import SpecError
 from gen_profile.profile import Array, SampledProfile
 from gen_profile.spec import PathSpec, Spec
@@ -67,7 +67,7 @@ def lag_of(spec: Spec, scenario: Scenario) -> float:
 
 def follows_exactly(scenario: Scenario) -> bool:
     """Whether the drives follow the setpoints as the artefact has them."""
-    return scenario.group in ("machines", "corners", SEARCH)
+    return scenario.group in ("machines", "corners")
 
 
 def delay(path: PathSpec) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from gen_profile.check import Check, Finding, Scenario
-from gen_profile.metrics import length, peak
+from gen_profile.metrics import peak
 from gen_profile.problem.linearization import linearize
 from gen_profile.profile import Array, SampledProfile
 from gen_profile.response import Response
@@ -46,7 +46,7 @@ def cosimulate(
     Returns
     -------
     tuple of Response
-        One per machine, from the first setpoint on.
+        One per machine, from the standstill of the axes on.
 
     Raises
     ------
@@ -56,15 +56,18 @@ def cosimulate(
     tau = spec.actuator.tau or 0.0
     with PlantCosimulation(spec.machine(), on_build) as fmu:
         return tuple(
-            fmu.run(
-                setpoints,
-                machine.parameters,
-                tau=tau,
-                max_step=max_step(spec, machine),
-                settle=STANDSTILL * tau + watch_time(spec, machines),
-                output_step=output_step,
-                initial=spec.move.initial,
-                final_velocity=spec.move.final_velocity,
+            _from(
+                fmu.run(
+                    setpoints,
+                    machine.parameters,
+                    tau=tau,
+                    max_step=max_step(spec, machine),
+                    settle=STANDSTILL * tau + watch_time(spec, machines),
+                    output_step=output_step,
+                    initial=spec.move.initial,
+                    final_velocity=spec.move.final_velocity,
+                ),
+                arrival(spec, setpoints),
             )
             for machine in machines
         )
@@ -76,8 +79,6 @@ def judge(
     machines: Sequence[Scenario],
     found: Sequence[Response],
     expected: Sequence[Response],
-    *,
-    followed: SampledProfile | None = None,
 ) -> Check:
     """Compare what swings on with what is allowed.
 
@@ -86,38 +87,24 @@ def judge(
     found : sequence of Response
         Of `cosimulate`, one per machine.
     expected : sequence of Response
-        Of another simulation, at some of the same times, such that how far the two are apart bounds the error
-        of `found`.
-    followed : SampledProfile, optional
-        What `found` followed, where it goes on for longer than the setpoints.
+        Of another simulation at the same times, such that how far the two are apart bounds the error of
+        `found`.
     """
-    standing = arrival(spec, followed or setpoints)
-    after = [_from(response, standing) for response in found]
-    since = standing if spec.limits.sway is None else 0.0
-    error = max(_distance(one, _from(other, since)) for one, other in zip(found, expected, strict=True))
-    between = max(above_samples(response.sway) for response in after)
-    if spec.limits.sway is not None:  # until the last setpoint samples are farther apart
-        moving = len(setpoints.times)
-        between = max(between, *(above_samples(response.sway[:moving]) for response in found))
+    error = max(
+        float(np.abs(one.sway - other.sway).max()) for one, other in zip(found, expected, strict=True)
+    )
+    between = max(above_samples(one.sway) for one in found)
     return Check(
         limit=dict(spec.check.residual_sway),
         error_bound=error + between + ERROR_FLOOR,
         arrival=arrival(spec, setpoints),
         findings=tuple(
-            _finding(spec, machine, response, standing)
-            for machine, response in zip(machines, found, strict=True)
+            _finding(spec, machine, response) for machine, response in zip(machines, found, strict=True)
         ),
-        sway_limit=spec.limits.sway,
         directions=spec.machine().directions,
         faults=implausibilities(spec, setpoints),
         doubts=doubts(spec),
     )
-
-
-def _distance(found: Response, expected: Response) -> float:
-    """Greatest difference of sways in m at the times of the second response, which the first one has, too."""
-    middles = 0.5 * (found.times[:-1] + found.times[1:])
-    return float(np.abs(found.sway[np.searchsorted(middles, expected.times)] - expected.sway).max())
 
 
 def sample_spacing(spec: Spec, setpoints: SampledProfile, machines: Sequence[Scenario]) -> float:
@@ -147,9 +134,9 @@ def longest_step(spec: Spec, machine: Scenario) -> float:
     return STEP_PHASE / float(fastest)
 
 
-def _from(response: Response, since: float) -> Response:
+def _from(response: Response, arrival: float) -> Response:
     """Cut what comes before."""
-    kept = response.times >= since * (1.0 - 1e-12)
+    kept = response.times >= arrival * (1.0 - 1e-12)
     return Response(
         times=response.times[kept],
         position=response.position[kept],
@@ -161,13 +148,11 @@ def _from(response: Response, since: float) -> Response:
     )
 
 
-def _finding(spec: Spec, machine: Scenario, response: Response, arrival: float) -> Finding:
-    plant, standing = spec.machine(), _from(response, arrival)
-    modal = modal_amplitudes(plant, machine, standing)
-    end_load = length(response.sway[:, plant.end_load])
+def _finding(spec: Spec, machine: Scenario, response: Response) -> Finding:
+    plant = spec.machine()
+    modal = modal_amplitudes(plant, machine, response)
     return Finding(
         scenario=machine,
-        residual=dict(zip(plant.loads, map(float, peak(standing.sway)), strict=True)),
+        residual=dict(zip(plant.loads, map(float, peak(response.sway)), strict=True)),
         modal=dict(zip(plant.loads, map(float, modal), strict=True)),
-        on_the_way=None if spec.limits.sway is None else float(np.abs(end_load).max()),
     )
