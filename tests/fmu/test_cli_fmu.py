@@ -112,7 +112,7 @@ def test_choices_are_those_of_the_workflow():
         (("fmu", "profile", "--input", "velocity"), 2, "--input: a profile has no inputs but its trigger"),
         (("fmu", "plant", "--source-only", "--platform", "all"), 2, "--source-only puts no binary in"),
         (("fmu", "plant", "--set", "plant.L1=-1"), 2, "plant.L1: must be a number"),
-        (("fmu", "plant", "--out", "/proc/none/a.fmu"), 2, "Cannot write to the folder /proc/none"),
+        (("fmu", "plant", "--out", "/proc/none/a.fmu"), 2, "there is no folder /proc/none; make it"),
     ],
 )
 def test_bad_input_ends_in_sentences(arguments, code, words):

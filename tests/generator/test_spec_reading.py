@@ -227,7 +227,7 @@ OVERRIDES = st.fixed_dictionaries(
         "name": st.from_regex(r"\A[A-Za-z][A-Za-z0-9_-]{0,20}\Z").map(lambda text: f'"{text}"'),
         "plant.L1": st.floats(0.2, 20.0),
         "move.distance": st.floats(-40.0, 40.0).filter(lambda far: abs(far) > 1e-12),
-        "move.duration": st.floats(0.1, 100.0),
+        "move.duration": st.floats(0.5, 100.0),  # at no speed beyond all machines
         "actuator": POSITIVE.map(lambda tau: f'{{ type = "first-order", tau = {tau!r} }}'),
         "robustness.uncertain": st.floats(0.01, 0.9).map(lambda r: f"{{ L2 = {r!r}, m1 = {r!r} }}"),
         "cost.sway_scale": st.one_of(st.just('"auto"'), POSITIVE),
