@@ -6,9 +6,9 @@ python examples/01_design_and_check.py [FOLDER]
 import sys
 from pathlib import Path
 
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.check import check_artefact
-from gen_profile.workflows.design import design
+from gen_profile.design.design import design
+from gen_profile.spec.reading import preset_spec
+from gen_profile.verification.check import check_artefact
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "gen-profile-out")
 

@@ -9,14 +9,14 @@ import attrs
 import matplotlib
 import numpy as np
 
-from gen_profile.metrics import peak
+from gen_profile.evaluation.simulation import Swing
+from gen_profile.motion.metrics import peak
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
-from gen_profile.response import Swing
 from gen_profile.shapers.shaped_move import shaped_move
-from gen_profile.solvers import indirect
+from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
-from gen_profile.spec_reading import preset_spec
+from gen_profile.spec.reading import preset_spec
 
 matplotlib.use("Agg")
 from matplotlib import pyplot

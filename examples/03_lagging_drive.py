@@ -8,10 +8,10 @@ time, and asks the drive for much more acceleration.
 
 import numpy as np
 
-from gen_profile.metrics import greatest, peak
-from gen_profile.profile import sample
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.planning import plan
+from gen_profile.design.plan import plan
+from gen_profile.motion.metrics import greatest, peak
+from gen_profile.motion.profile import sample
+from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.cosimulation import PlantCosimulation
 
 TAU = 0.1

@@ -8,9 +8,9 @@ swing on. The optimal motion follows the equations, and uses the hoist as a seco
 
 import numpy as np
 
+from gen_profile.comparison.compare import compare
 from gen_profile.problem.linearization import linearize
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.compare import compare
+from gen_profile.spec.reading import preset_spec
 
 spec = preset_spec("single-pendulum-crane")
 for word, q_a in (("start", spec.move.start), ("target", spec.move.target)):

@@ -7,11 +7,11 @@ Here the measurements come from a simulated crane with noise; on site they come 
 
 import numpy as np
 
+from gen_profile.design.plan import plan
+from gen_profile.evaluation.simulation import free_swing
+from gen_profile.identification.identify import identify
 from gen_profile.identification.measurements import SwingLog, parse_period, parse_reading
-from gen_profile.response import free_swing
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.identify import identify
-from gen_profile.workflows.planning import plan
+from gen_profile.spec.reading import preset_spec
 
 spec = preset_spec("single-pendulum-crane")  # where the search starts: L0 = 3 m, c = 200 N m s/rad
 stood = (0.0, 4.0)  # the hoist had paid out 4 m while periods and swings were measured

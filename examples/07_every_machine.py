@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from gen_profile.spec_reading import preset_spec, presets
-from gen_profile.workflows.design import Design, design
+from gen_profile.design.design import Design, design
+from gen_profile.spec.reading import preset_spec, presets
 
 AGREEMENT = 2e-6  # relative, of the costs
 

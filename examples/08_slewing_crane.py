@@ -9,8 +9,8 @@ rest together.
 
 import numpy as np
 
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.compare import compare
+from gen_profile.comparison.compare import compare
+from gen_profile.spec.reading import preset_spec
 
 spec = preset_spec(
     "tower-crane", ["move.start=[0.0, 25.0]", "move.target=[1.745, 25.0]", "move.duration=25.0"]

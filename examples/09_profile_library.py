@@ -8,12 +8,12 @@ The same as `gen-profile sweep`, `gen-profile lookup` and `gen-profile library`;
 import sys
 from pathlib import Path
 
-from gen_profile.spec_reading import preset_text
-from gen_profile.workflows.lookup import lookup
-from gen_profile.workflows.profile_library import write_library
-from gen_profile.workflows.sweep import sweep
-from gen_profile.workflows.sweep_grid import parse_grid
-from gen_profile.workflows.sweep_plan import prepare
+from gen_profile.spec.reading import preset_text
+from gen_profile.sweep.grid import parse_grid
+from gen_profile.sweep.library import write_library
+from gen_profile.sweep.lookup import lookup
+from gen_profile.sweep.plan import prepare
+from gen_profile.sweep.run import sweep
 
 
 def main(folder: Path) -> None:

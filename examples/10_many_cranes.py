@@ -5,9 +5,9 @@ python examples/10_many_cranes.py
 
 import numpy as np
 
-from gen_profile.profile import sample
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.planning import plan
+from gen_profile.design.plan import plan
+from gen_profile.motion.profile import sample
+from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.many_runs import ManyRuns
 from gen_profile_fmu.plant_fmu import plant_fmu

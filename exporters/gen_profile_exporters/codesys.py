@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from lxml import etree
 
-from gen_profile.profile import Profile
+from gen_profile.motion.profile import Profile
 from gen_profile_exporters import plcopen_xml
 from gen_profile_exporters.axis_wrapper import CODESYS, axis_wrapper
 from gen_profile_exporters.block_source import BlockSource, Variable, take_apart

@@ -28,7 +28,7 @@ from decimal import Decimal
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import Array, Profile, SampledProfile, grid_times
+from gen_profile.motion.profile import Array, Profile, SampledProfile, grid_times
 from gen_profile.units import AXIS_UNITS, COUNTS, AxisScale
 from gen_profile_exporters import csv_dialects
 from gen_profile_exporters.csv_dialects import DIALECTS, Dialect, Row

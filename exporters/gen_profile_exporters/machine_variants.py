@@ -24,9 +24,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
-from gen_profile.profile import Array
-from gen_profile.spec import Spec
+from gen_profile.spec.model import Spec
 
 STATES = 4
 SWING = 0.1  # rad (or m), of the loads in these states

@@ -27,7 +27,7 @@ from itertools import count
 import attrs
 import numpy as np
 
-from gen_profile.profile import Array
+from gen_profile.motion.profile import Array
 
 # Below these an axis counts as standing still: relative to the greatest of all axes, and at all.
 SMALLEST_SHARE, SMALLEST_VELOCITY = 1e-12, 1e-30

@@ -15,7 +15,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import Array, Profile, SampledProfile
+from gen_profile.motion.profile import Array, Profile, SampledProfile
 from gen_profile.units import COUNTS, AxisScale
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.machine_variants import AxisVariants

@@ -12,7 +12,7 @@ import attrs
 from lxml import etree
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import Profile, SampledProfile
+from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile_exporters.block_source import BlockSource, Variable, take_apart
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.structured_text import block_text, read_block

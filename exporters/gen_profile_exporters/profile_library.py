@@ -15,7 +15,7 @@ from itertools import accumulate
 import attrs
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import SampledProfile
+from gen_profile.motion.profile import SampledProfile
 from gen_profile_exporters.block_source import BlockSource, Variable
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback_table import MOST_SAMPLES

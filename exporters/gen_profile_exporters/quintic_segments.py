@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile.profile import Array, read_only
+from gen_profile.motion.profile import Array, read_only
 
 POSITION_ERROR = 1e-9  # m (or rad), of a segment at the cycles inside it
 ACCELERATION_ERROR = 1e-6  # m/s²

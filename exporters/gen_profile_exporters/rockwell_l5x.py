@@ -14,7 +14,7 @@ import numpy as np
 from lxml import etree
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import Array, Profile, SampledProfile, grid_times
+from gen_profile.motion.profile import Array, Profile, SampledProfile, grid_times
 from gen_profile.units import COUNTS, AxisScale
 from gen_profile_exporters.cam_points import play_spline, spline_cycles, spline_error
 from gen_profile_exporters.exporter import File, Target

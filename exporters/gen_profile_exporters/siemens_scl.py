@@ -15,7 +15,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import Profile, SampledProfile, sample
+from gen_profile.motion.profile import Profile, SampledProfile, sample
 from gen_profile_exporters.axis_wrapper import SIEMENS, axis_wrapper
 from gen_profile_exporters.block_source import BlockSource, Variable, ordered, take_apart
 from gen_profile_exporters.cam_points import spline_cycles, spline_error

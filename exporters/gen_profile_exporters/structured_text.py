@@ -22,7 +22,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import Array, Profile, SampledProfile
+from gen_profile.motion.profile import Array, Profile, SampledProfile
 from gen_profile.units import AxisScale
 from gen_profile_exporters import playback_block
 from gen_profile_exporters.block_source import BlockSource, take_apart

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_profile.profile import Array
+from gen_profile.motion.profile import Array
 
 PRIME, BASE = 2**31 - 1, 1_999_993
 UPPER, LOWER = 2.0**26, 2.0**27

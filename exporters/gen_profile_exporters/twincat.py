@@ -12,7 +12,7 @@ from uuid import NAMESPACE_URL, uuid5
 from lxml import etree
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import Profile, SampledProfile
+from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile_exporters.axis_wrapper import TWINCAT, axis_wrapper
 from gen_profile_exporters.block_source import BlockSource, take_apart
 from gen_profile_exporters.cam_points import QuinticPoints, quintic_points

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from gen_profile.motion.profile import Profile
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import Dynamics
 from gen_profile.problem.symbolic import Function
-from gen_profile.profile import Profile
 from gen_profile_fmu.variables import DERIVATIVES, STATES, Kind, Type, Variable, VariableTable
 
 FOLDER = Path(__file__).parent / "c"

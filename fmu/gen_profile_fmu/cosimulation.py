@@ -14,9 +14,9 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2True
 
 from gen_profile.errors import CosimulationError
+from gen_profile.evaluation.simulation import AT_REST, Response
+from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.plants.plant import Plant
-from gen_profile.profile import Array, SampledProfile, grid_length, grid_times
-from gen_profile.response import AT_REST, Response
 from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.instances import slave
 from gen_profile_fmu.plant_fmu import plant_fmu

@@ -9,9 +9,9 @@ from html import escape
 
 import numpy as np
 
+from gen_profile.evaluation.simulation import Swing
+from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Coordinate, Plant
-from gen_profile.profile import Array, Profile
-from gen_profile.response import Swing
 from gen_profile_fmu.nominals import smooth_move
 from gen_profile_fmu.plant_variables import InputKind, Machine
 from gen_profile_fmu.variables import VariableTable

@@ -19,7 +19,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2OK
 
 from gen_profile.errors import CosimulationError
-from gen_profile.profile import Array
+from gen_profile.motion.profile import Array
 from gen_profile_fmu.safe_archive import unpack
 
 LONGEST_MESSAGE = 300  # characters, of what somebody else's FMU says

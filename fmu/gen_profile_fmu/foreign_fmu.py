@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import CosimulationError
-from gen_profile.profile import Array
+from gen_profile.motion.profile import Array
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -16,7 +16,7 @@ import fmpy
 import numpy as np
 
 from gen_profile.errors import CosimulationError
-from gen_profile.profile import Array
+from gen_profile.motion.profile import Array
 from gen_profile_fmu.building import compile_texts
 from gen_profile_fmu.c_sources import FOLDER
 from gen_profile_fmu.cache import cached

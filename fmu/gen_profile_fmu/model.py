@@ -8,9 +8,9 @@ from functools import partial
 
 import attrs
 
+from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Coordinate
 from gen_profile.problem.dynamics import dynamics
-from gen_profile.profile import Profile
 from gen_profile_fmu.c_sources import (
     equations_source,
     hand_written,

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from gen_profile.evaluation.simulation import AT_REST, Swing
+from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Plant
-from gen_profile.profile import Array, Profile
-from gen_profile.response import AT_REST, Swing
 from gen_profile_fmu.variables import variable_name
 
 _SAMPLES = 401

@@ -8,8 +8,8 @@ from enum import Enum
 
 import attrs
 
+from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Coordinate, Plant
-from gen_profile.profile import Profile
 from gen_profile_fmu.variables import (
     DERIVATIVES,
     STATES,

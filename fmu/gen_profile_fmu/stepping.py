@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 import attrs
 import numpy as np
 
+from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.plants.plant import Plant
-from gen_profile.profile import Array, SampledProfile
 from gen_profile_fmu.cosimulation import PlantCosimulation, Steps
 from gen_profile_fmu.plant_variables import MAX_STEP, TAU
 

@@ -5,9 +5,9 @@ from time import perf_counter
 import numpy as np
 from fmpy import simulate_fmu
 
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.check import check_artefact
-from gen_profile.workflows.design import design
+from gen_profile.design.design import design
+from gen_profile.spec.reading import preset_spec
+from gen_profile.verification.check import check_artefact
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter
 from gen_profile_fmu.plant_fmu import plant_fmu

@@ -16,8 +16,10 @@ from scipy.integrate import solve_bvp
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers import direct, homotopy, indirect
-from gen_profile.solvers.canonical import canonical_problem
+from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.indirect import homotopy
+from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.solvers.indirect.boundary_value_problem import canonical_problem
 
 JERK_AT_START = 25.867416  # m/s³, β = 50
 REPEATS = 15

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import psutil
 
-from gen_profile.spec_reading import preset_text
-from gen_profile.workflows.sweep import sweep
-from gen_profile.workflows.sweep_grid import parse_grid
-from gen_profile.workflows.sweep_plan import prepare
+from gen_profile.spec.reading import preset_text
+from gen_profile.sweep.grid import parse_grid
+from gen_profile.sweep.plan import prepare
+from gen_profile.sweep.run import sweep
 
 AXES = ("move.distance=0.1:0.3:20", "plant.L1=0.4:0.5:20")
 FORMATS = ("csv", "plc")

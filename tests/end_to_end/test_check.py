@@ -9,8 +9,8 @@ import pytest
 from command_line import run_here, run_process
 from fmu import absolute_angle_crane as oracle
 
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.scenarios import scenarios
+from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.spec.reading import preset_spec
 
 CYCLE = 0.004
 

@@ -7,9 +7,9 @@ import pytest
 from command_line import run_here
 
 from gen_profile.cli import words
+from gen_profile.comparison.compare import compare
 from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.compare import compare
+from gen_profile.spec.reading import preset_spec
 
 FEW = ("--set", "robustness={}")
 FIGURES = (

@@ -6,16 +6,16 @@ import attrs
 import numpy as np
 import pytest
 
+from gen_profile.comparison.candidates import contenders
+from gen_profile.comparison.compare import compare
+from gen_profile.design.plan import figures, try_motion
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.spec import CheckSpec, LimitsSpec, RobustnessSpec
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.compare import compare
-from gen_profile.workflows.contenders import contenders
-from gen_profile.workflows.planning import figures, try_motion
+from gen_profile.spec.model import CheckSpec, LimitsSpec, RobustnessSpec
+from gen_profile.spec.reading import preset_spec
 
 PAPER = preset_spec("paper")
 TIGHT = LimitsSpec(velocity=0.3, acceleration=0.5, jerk=8.0)
@@ -100,7 +100,7 @@ def test_the_spec_s_own_motion_is_designed_once(monkeypatch):
         calls.append(method)
         raise InfeasibleProblem("limits.velocity: too little.")
 
-    monkeypatch.setattr("gen_profile.workflows.contenders.choice.solve", solve)
+    monkeypatch.setattr("gen_profile.comparison.candidates.choice.solve", solve)
     loads = CheckSpec(residual_sway={"hook": 0.01, "payload": 0.003})
     found = compare(attrs.evolve(PAPER, robustness=RobustnessSpec(), check=loads))
     assert len(calls) == 1  # what is impossible for β = 0 is so for any β

@@ -8,10 +8,10 @@ import pytest
 from command_line import run_here
 
 from gen_profile.errors import ExportError
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows import profile_library
-from gen_profile.workflows.sweep_store import grid_of
-from gen_profile.workflows.sweep_table import read_table
+from gen_profile.spec.reading import preset_spec
+from gen_profile.sweep import library as profile_library
+from gen_profile.sweep.store import grid_of
+from gen_profile.sweep.table import read_table
 from gen_profile_exporters.block_source import take_apart
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.profile_library import read_library

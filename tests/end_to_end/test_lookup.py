@@ -8,10 +8,10 @@ import pytest
 from command_line import run_here
 from pyarrow import parquet
 
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.check import check_artefact
-from gen_profile.workflows.sweep_store import grid_of
-from gen_profile.workflows.sweep_table import read_table
+from gen_profile.spec.reading import preset_spec
+from gen_profile.sweep.store import grid_of
+from gen_profile.sweep.table import read_table
+from gen_profile.verification.check import check_artefact
 
 CYCLE = "export.cycle_time=0.01"
 AXES = ("--vary", "solver.method=auto,zv", "--vary", "move.distance=0.3,0.4", "--vary", "plant.L1=0.3,0.35")

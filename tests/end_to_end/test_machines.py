@@ -8,11 +8,11 @@ from command_line import run_here
 from generator.lagrangian_machines import Lagrange
 from scipy.integrate import solve_ivp
 
-from gen_profile.metrics import greatest, peak
-from gen_profile.spec_reading import preset_spec, presets
-from gen_profile.workflows.contenders import contenders
-from gen_profile.workflows.planning import figures, plan, watch_time
-from gen_profile.workflows.scenarios import scenarios
+from gen_profile.comparison.candidates import contenders
+from gen_profile.design.plan import figures, plan, watch_time
+from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.motion.metrics import greatest, peak
+from gen_profile.spec.reading import preset_spec, presets
 
 PRESETS = [name for name in presets() if not name.startswith("paper")]
 

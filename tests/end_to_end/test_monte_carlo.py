@@ -14,16 +14,16 @@ from command_line import run_here
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from gen_profile.check import MOST_LISTED
-from gen_profile.metrics import peak
-from gen_profile.profile import SampledProfile, sample
-from gen_profile.response import Swing
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.check import _verdict, check_artefact
-from gen_profile.workflows.monte_carlo import standstill
-from gen_profile.workflows.planning import plan, watch_time
-from gen_profile.workflows.scenarios import further_scenarios, scenarios
-from gen_profile.workflows.transmission import transmitted
+from gen_profile.design.plan import plan, watch_time
+from gen_profile.evaluation.scenarios import further_scenarios, scenarios
+from gen_profile.evaluation.simulation import Swing
+from gen_profile.motion.metrics import peak
+from gen_profile.motion.profile import SampledProfile, sample
+from gen_profile.spec.reading import preset_spec
+from gen_profile.verification.check import _verdict, check_artefact
+from gen_profile.verification.monte_carlo import standstill
+from gen_profile.verification.setpoint_path import transmitted
+from gen_profile.verification.verdict import MOST_LISTED
 
 RANGES = "check.uncertain={L1=0.2, m2=0.15, L2=0.1}"
 DAMPING = "check.spans={c1=[0.0, 0.004], c2=[0.0, 0.002]}"

@@ -14,13 +14,13 @@ import pytest
 from command_line import run_here, run_process
 from matplotlib import image, pyplot
 
+from gen_profile.charts.comparison import draw
+from gen_profile.charts.method_styles import method_styles
+from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.errors import OutputError
+from gen_profile.evaluation.phrases import number
 from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.compare import Comparison, compare
-from gen_profile.workflows.comparison_plot import draw
-from gen_profile.workflows.method_styles import method_styles
-from gen_profile.workflows.wording import number
+from gen_profile.spec.reading import preset_spec
 
 FEW = ("--set", "cost.sway_weight=0", "--set", "robustness={}")
 
@@ -121,7 +121,7 @@ def kept(figures, path, salt, size):
 def drawn(request):
     """The figure of a comparison, laid out as it would be in a file."""
     comparison, figures = compare(preset_spec(request.param)), []
-    with patch("gen_profile.workflows.comparison_plot.picture", partial(kept, figures)):
+    with patch("gen_profile.charts.comparison.picture", partial(kept, figures)):
         draw(comparison, Path("picture.png"))
     (figure,) = figures
     figure.canvas.draw()
@@ -195,7 +195,7 @@ INSTALL = "Error: --plot needs Matplotlib: pip install 'gen-profile[plot]'."
 
 
 def test_without_matplotlib_the_sentence_tells_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.workflows.picture.find_spec", lambda _: None)
+    monkeypatch.setattr("gen_profile.charts.picture.find_spec", lambda _: None)
     outcome = run_here("compare", *FEW, "--plot", tmp_path / "picture.png")
     assert (outcome.code, outcome.errors) == (2, [INSTALL])
 

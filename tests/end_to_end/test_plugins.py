@@ -12,7 +12,7 @@ TEXT = Format(module="plugin_text", summary="positions, one a line", proof="unte
 """
 EXPORTER = """
 import numpy as np
-from gen_profile.profile import SampledProfile, sample
+from gen_profile.motion.profile import SampledProfile, sample
 from gen_profile_exporters.exporter import File
 
 def encode(profile, target):

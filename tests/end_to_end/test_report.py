@@ -11,14 +11,14 @@ import pytest
 import tomli_w
 from command_line import run_here, run_process
 
+from gen_profile.charts.curves import other_methods
+from gen_profile.comparison.compare import compare
+from gen_profile.design.design import design
 from gen_profile.errors import OutputError
 from gen_profile.report.page import NEEDED, require_pages
 from gen_profile.report.print import printed
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.compare import compare
-from gen_profile.workflows.design import design
-from gen_profile.workflows.report_figures import other_methods
-from gen_profile.workflows.report_sections import sections
+from gen_profile.report.sections import sections
+from gen_profile.spec.reading import preset_spec
 
 QUICK = ("--set", "cost.sway_weight=0", "--no-compare")
 LIMITS = "{velocity=0.3, acceleration=0.8, travel=[-0.1, 0.5], sway=0.04}"

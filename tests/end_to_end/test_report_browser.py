@@ -9,10 +9,10 @@ import pytest
 from command_line import run_here
 from headless import browser as start
 
+from gen_profile.charts.figure import Figure, Line, Map, Panel
 from gen_profile.report.content import Listing, Page, Row, Section, Share, Table, Terms, Verdict
-from gen_profile.report.figures import Figure, Line, Map, Panel
 from gen_profile.report.page import render
-from gen_profile.spec_reading import presets
+from gen_profile.spec.reading import presets
 
 DRAWN = "path.js-line[d]"
 CURVES = f"""

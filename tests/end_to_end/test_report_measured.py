@@ -7,8 +7,8 @@ import pytest
 from command_line import run_here
 from scipy.integrate import solve_ivp
 
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.planning import plan
+from gen_profile.design.plan import plan
+from gen_profile.spec.reading import preset_spec
 
 STEP = 0.01
 OFFSET, SENSOR = 1.234, 0.004  # s by which the log begins earlier; m by which a sensor's zero is off

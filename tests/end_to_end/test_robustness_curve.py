@@ -8,12 +8,12 @@ import pytest
 from command_line import run_here
 from matplotlib import image
 
+from gen_profile.comparison.robustness import Robustness, error_grid, robustness
+from gen_profile.design.shape import shaped_motion
 from gen_profile.errors import SpecError
-from gen_profile.metrics import peak
-from gen_profile.response import Swing
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.robustness import Robustness, error_grid, robustness
-from gen_profile.workflows.shaping import shaped_motion
+from gen_profile.evaluation.simulation import Swing
+from gen_profile.motion.metrics import peak
+from gen_profile.spec.reading import preset_spec
 
 SPEC = preset_spec("paper")
 METHODS = ("--method", "zvd", "--method", "nzv")

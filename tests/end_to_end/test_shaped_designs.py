@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from command_line import run_here
 
+from gen_profile.design.plan import plan, timed
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.spec import ShaperName, SolverSpec
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.planning import plan, timed
+from gen_profile.spec.model import ShaperName, SolverSpec
+from gen_profile.spec.reading import preset_spec
 
 SIX_SECONDS = ("--set", "move.duration=6.0")  # longer than any delay
 LOOSE = ("--set", "check.residual_sway=0.1")  # what matters is that the sway found is the shaper's own

@@ -18,9 +18,9 @@ import canopen
 import pytest
 from command_line import PROGRAM, run_here, run_process
 
-from gen_profile.manifest import parse_manifest
-from gen_profile.workflows import delivery
-from gen_profile.workflows import stream as workflow
+from gen_profile.artefacts import writing as delivery
+from gen_profile.artefacts.manifest import parse_manifest
+from gen_profile.streaming import stream as workflow
 from gen_profile_exporters.can.clock import SystemClock
 from gen_profile_exporters.can.pacer import Pacer
 from gen_profile_exporters.can.streamer import Streamer

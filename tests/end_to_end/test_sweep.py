@@ -14,12 +14,12 @@ import pytest
 from command_line import PROGRAM, run_here, run_process
 from distributed import Client
 
-from gen_profile.spec_reading import preset_spec, preset_text
-from gen_profile.workflows import sweep as workflow
-from gen_profile.workflows.check import check_artefact
-from gen_profile.workflows.design import design
-from gen_profile.workflows.sweep_grid import parse_grid
-from gen_profile.workflows.sweep_plan import prepare
+from gen_profile.design.design import design
+from gen_profile.spec.reading import preset_spec, preset_text
+from gen_profile.sweep import run as workflow
+from gen_profile.sweep.grid import parse_grid
+from gen_profile.sweep.plan import prepare
+from gen_profile.verification.check import check_artefact
 
 AXES = ("--vary", "move.distance=0.1,0.3,1e6", "--vary", "plant.L1=0.4:0.5:4")
 QUICK = ("--preset", "paper", "--set", "export.cycle_time=0.01")

@@ -13,14 +13,15 @@ from distributed import LocalCluster
 
 from gen_profile.cli.progress import counting
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.spec_reading import preset_text
-from gen_profile.workflows import sweep as workflow
-from gen_profile.workflows import sweep_case, sweep_plan
-from gen_profile.workflows.sweep_case import failed, run_case
-from gen_profile.workflows.sweep_grid import parse_grid
-from gen_profile.workflows.sweep_plan import prepare
-from gen_profile.workflows.sweep_store import opened
-from gen_profile.workflows.sweep_table import read_table, write_table
+from gen_profile.spec.reading import preset_text
+from gen_profile.sweep import case as sweep_case
+from gen_profile.sweep import plan as sweep_plan
+from gen_profile.sweep import run as workflow
+from gen_profile.sweep.case import failed, run_case
+from gen_profile.sweep.grid import parse_grid
+from gen_profile.sweep.plan import prepare
+from gen_profile.sweep.store import opened
+from gen_profile.sweep.table import read_table, write_table
 
 LOOPBACK = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
 QUICK = ("--preset", "paper-beta0", "--set", "export.cycle_time=0.01")
@@ -262,7 +263,7 @@ def test_batches_of_rows_make_one_table(tmp_path, monkeypatch):
     records[3]["figures"] = {"duration_s": 3.0}
     write_table(tmp_path, grid, records)
     whole = read_table(tmp_path, grid).to_pylist()
-    monkeypatch.setattr("gen_profile.workflows.sweep_table.BATCH", 1)
+    monkeypatch.setattr("gen_profile.sweep.table.BATCH", 1)
     write_table(tmp_path, grid, records)
     assert read_table(tmp_path, grid).to_pylist() == whole
 

@@ -7,7 +7,7 @@ import pytest
 from motions import quintic, target
 from vendor_axes import VENDORS, Bench
 
-from gen_profile.profile import sample
+from gen_profile.motion.profile import sample
 from gen_profile_exporters import codesys, siemens_scl, twincat
 from gen_profile_exporters.block_source import take_apart
 from gen_profile_exporters.structured_text import block_text

@@ -1,4 +1,4 @@
-from gen_profile.spec_reading import parse_spec, preset_spec
+from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile_exporters.exporter import target_of
 
 

@@ -6,8 +6,8 @@ import pytest
 from motions import quintic, target
 from playing import checked, start
 
-from gen_profile.response import Swing
-from gen_profile.spec_reading import preset_spec
+from gen_profile.evaluation.simulation import Swing
+from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters import structured_text
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.machine_variants import AxisVariants, machine_variants

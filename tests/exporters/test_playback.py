@@ -8,7 +8,7 @@ from motions import bang_bang, quintic, target
 from playing import QUANTITIES, checked, column, play, start
 from st_interpreter import FunctionBlock
 
-from gen_profile.profile import sample
+from gen_profile.motion.profile import sample
 from gen_profile_exporters import structured_text
 from gen_profile_exporters.playback_table import tabulate
 

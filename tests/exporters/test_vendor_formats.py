@@ -14,7 +14,7 @@ from playing import checked, column, play, start
 from system_parts import missing
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import sample
+from gen_profile.motion.profile import sample
 from gen_profile_exporters import codesys, plcopen_xml, rockwell_l5x, siemens_scl, structured_text, twincat
 from gen_profile_exporters.axis_wrapper import CODESYS, SIEMENS, TWINCAT, axis_wrapper
 from gen_profile_exporters.block_source import take_apart

@@ -7,9 +7,9 @@ import pytest
 from fmu.slave import FMU2LoggedModel, FMU2LoggedSlave, open_slave
 from system_parts import missing
 
+from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
-from gen_profile.profile import Profile
 from gen_profile_fmu.cosimulation import PlantCosimulation
 from gen_profile_fmu.plant_fmu import PlantFmu, plant_fmu
 

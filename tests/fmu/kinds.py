@@ -5,8 +5,8 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
+from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Plant
-from gen_profile.profile import Profile
 from gen_profile_fmu.model import Model, plant_model, profile_model, system_model
 from gen_profile_fmu.plant_variables import InputKind, Machine
 

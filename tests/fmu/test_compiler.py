@@ -11,8 +11,8 @@ from fmu.kinds import KINDS, model_of
 from system_parts import program
 
 from gen_profile.errors import CosimulationError
+from gen_profile.motion.profile import sample
 from gen_profile.plants.registry import BUILT_IN, find_plant
-from gen_profile.profile import sample
 from gen_profile_fmu import platforms
 from gen_profile_fmu.c_sources import FOLDER
 from gen_profile_fmu.compiler import compile_library, find_compiler

@@ -10,7 +10,7 @@ from fmu.caches import share_zig
 from fmu.hoisting_pendulum import PLANT as WINCH
 
 from gen_profile.errors import CosimulationError
-from gen_profile.profile import SampledProfile, sample
+from gen_profile.motion.profile import SampledProfile, sample
 from gen_profile_fmu.cosimulation import PlantCosimulation
 from gen_profile_fmu.plant_fmu import plant_fmu
 

@@ -13,16 +13,16 @@ from fmu.kinds import machine_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gen_profile.artefacts.manifest import FILENAME
+from gen_profile.design.design import design
 from gen_profile.errors import CosimulationError, SpecError
-from gen_profile.manifest import FILENAME
 from gen_profile.plants.registry import find_plant
-from gen_profile.spec_reading import preset_spec, spec_from_dict
-from gen_profile.workflows import foreign_check
-from gen_profile.workflows.check import check_artefact
-from gen_profile.workflows.design import design
-from gen_profile.workflows.foreign_check import _axis_inputs
-from gen_profile.workflows.many_machines import Feed
-from gen_profile.workflows.stream import verified
+from gen_profile.spec.reading import preset_spec, spec_from_dict
+from gen_profile.streaming.stream import verified
+from gen_profile.verification import external_fmu as foreign_check
+from gen_profile.verification.batch import Feed
+from gen_profile.verification.check import check_artefact
+from gen_profile.verification.external_fmu import _axis_inputs
 from gen_profile_fmu import foreign_child, safe_archive
 from gen_profile_fmu.building import build_fmu
 from gen_profile_fmu.fmu_files import Version, sources
@@ -442,7 +442,7 @@ def test_any_scenario_can_be_replayed_on_a_foreign_fmu(tmp_path, group):
 
 def test_scenarios_that_share_setpoints_share_a_process(tmp_path, monkeypatch):
     write_fmu(tmp_path / "customer.fmu")
-    monkeypatch.setattr("gen_profile.workflows.scenarios.FEWEST_TIMINGS", 1)
+    monkeypatch.setattr("gen_profile.evaluation.scenarios.FEWEST_TIMINGS", 1)
     started = []
     run = foreign_check.run_foreign
     monkeypatch.setattr(

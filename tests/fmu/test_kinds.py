@@ -11,8 +11,8 @@ from fmu.drivers import Instance, advance, cosimulate, exchange
 from fmu.kinds import model_of, motion
 from scipy.integrate import solve_ivp
 
+from gen_profile.motion.profile import Profile
 from gen_profile.plants.registry import find_plant
-from gen_profile.profile import Profile
 from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.model import profile_model, system_model
 from gen_profile_fmu.plant_fmu import cached_fmu

@@ -9,8 +9,8 @@ from fmu.hoisting_pendulum import PLANT as WINCH
 from fmu.kinds import model_of, motion
 from generator.lagrangian_machines import MACHINES, Lagrange
 
+from gen_profile.evaluation.simulation import Swing
 from gen_profile.plants.registry import BUILT_IN, find_plant
-from gen_profile.response import Swing
 from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.plant_fmu import cached_fmu
 from gen_profile_fmu.variables import variable_name

@@ -6,11 +6,11 @@ import pytest
 from generator.crane_problems import crane_problem
 
 from gen_profile.problem.pontryagin import optimality_system
-from gen_profile.solvers.arclength import follow
-from gen_profile.solvers.canonical import canonical_problem
 from gen_profile.solvers.collocation import GAUSS, sampled
-from gen_profile.solvers.continuation import advance
-from gen_profile.solvers.newton import solve_newton
+from gen_profile.solvers.indirect.arclength import follow
+from gen_profile.solvers.indirect.boundary_value_problem import canonical_problem
+from gen_profile.solvers.indirect.continuation import advance
+from gen_profile.solvers.indirect.newton import solve_newton
 
 HORIZONTAL = np.pi / 2.0
 

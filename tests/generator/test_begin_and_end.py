@@ -7,10 +7,12 @@ from generator.crane_problems import CRANE, EFFORTS, crane_problem
 from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost
 
 from gen_profile.problem.problem import WorstCase, problem_of
-from gen_profile.solvers import choice, direct, indirect
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
-from gen_profile.spec import LimitsSpec
-from gen_profile.spec_reading import preset_spec
+from gen_profile.spec.model import LimitsSpec
+from gen_profile.spec.reading import preset_spec
 
 SWUNG = {"theta1": 0.06, "theta2": -0.04, "theta1.rate": -0.1, "theta2.rate": 0.15}
 SOLVERS = pytest.mark.parametrize("solver", [indirect, direct], ids=lambda module: module.METHOD)

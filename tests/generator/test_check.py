@@ -3,7 +3,7 @@
 import attrs
 import pytest
 
-from gen_profile.check import Check, Finding, Scenario
+from gen_profile.verification.verdict import Check, Finding, Scenario
 
 LIMIT = {"hook": 0.004, "payload": 0.002}
 

@@ -7,12 +7,14 @@ import attrs
 import numpy as np
 import pytest
 
+from gen_profile.design.plan import plan, timed
 from gen_profile.errors import InfeasibleProblem, LimitViolation
 from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import choice, direct, relaxation
-from gen_profile.solvers.cures import Trial, cures
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.planning import plan, timed
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct import relaxation
+from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.infeasibility import Trial, cures
+from gen_profile.spec.reading import preset_spec
 
 HOIST = "limits.axis.hoist={travel=[0.9, 7.1], acceleration=0.3}"
 LAG = "actuator={type='first-order', tau=0.1}"

@@ -6,10 +6,12 @@ import pytest
 from generator.crane_problems import EFFORTS, crane_problem
 
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.solvers import choice, direct, indirect
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
-from gen_profile.spec import LimitsSpec
+from gen_profile.spec.model import LimitsSpec
 
 LIMITS = {"velocity": 0.15, "acceleration": 0.4, "jerk": 6.0}
 

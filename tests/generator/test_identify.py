@@ -10,6 +10,8 @@ from generator.lagrangian_machines import Lagrange
 from scipy.integrate import solve_ivp
 
 from gen_profile.errors import CosimulationError, OutputError, SpecError
+from gen_profile.evaluation.simulation import free_swing
+from gen_profile.identification.identify import identify, write_spec
 from gen_profile.identification.measurements import (
     DirectReading,
     Period,
@@ -18,9 +20,7 @@ from gen_profile.identification.measurements import (
     parse_swing,
 )
 from gen_profile.plants.registry import find_plant
-from gen_profile.response import free_swing
-from gen_profile.spec_reading import preset_spec, read_spec
-from gen_profile.workflows.identify import identify, write_spec
+from gen_profile.spec.reading import preset_spec, read_spec
 
 CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
 

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from gen_profile.errors import InfeasibleProblem, SolverDiverged
 from gen_profile.plants.plant import Coordinate, Equations, Outputs, Parameter, Plant
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers.indirect import solve
+from gen_profile.solvers.indirect.solver import solve
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 
@@ -117,7 +117,7 @@ SCRIPT = """
 import sys
 sys.path.insert(0, {tests!r})
 from generator.crane_problems import crane_problem
-from gen_profile.solvers.indirect import solve
+from gen_profile.solvers.indirect.solver import solve
 from gen_profile.solvers.motion import optimal_profile
 print(optimal_profile(solve(crane_problem(desensitized=("L1", "L2")))).payload_hash())
 """

@@ -69,7 +69,7 @@ def loaded_by(*imported):
 @pytest.mark.parametrize("heavy", ["casadi", "scipy", "fmpy", "matplotlib"])
 def test_reading_a_spec_or_an_artefact_loads_nothing_heavy(heavy):
     assert heavy not in loaded_by(
-        "gen_profile.spec_reading", "gen_profile_exporters.registry", "gen_profile.profile"
+        "gen_profile.spec.reading", "gen_profile_exporters.registry", "gen_profile.motion.profile"
     )
 
 

@@ -12,10 +12,10 @@ from scipy.integrate import solve_ivp
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers.bezier import bernstein
 from gen_profile.solvers.collocation import GAUSS
-from gen_profile.solvers.direct import set_up
-from gen_profile.solvers.transcription import Iterate
+from gen_profile.solvers.direct.bezier import bernstein
+from gen_profile.solvers.direct.solver import set_up
+from gen_profile.solvers.direct.transcription import Iterate
 
 STEP = 1e-2
 STENCIL = {-2: 1.0 / 12.0, -1: -2.0 / 3.0, 1: 2.0 / 3.0, 2: -1.0 / 12.0}

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from generator.crane_problems import crane_problem
 
-from gen_profile.metrics import extremes, greatest, overshoot
-from gen_profile.profile import Profile
-from gen_profile.solvers.indirect import solve
+from gen_profile.motion.metrics import extremes, greatest, overshoot
+from gen_profile.motion.profile import Profile
+from gen_profile.solvers.indirect.solver import solve
 from gen_profile.solvers.motion import optimal_profile
 
 

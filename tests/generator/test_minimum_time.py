@@ -7,10 +7,10 @@ from generator.oracles.crane_linear_program import feasible, modes
 from scipy.linalg import eigvalsh
 
 from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import choice
+from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.minimum_time import PRECISION, least_beyond
-from gen_profile.spec import LimitsSpec
-from gen_profile.spec_reading import preset_spec
+from gen_profile.spec.model import LimitsSpec
+from gen_profile.spec.reading import preset_spec
 
 
 def shortest(frequencies, distances, guess, desensitized, **limits):

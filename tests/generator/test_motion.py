@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import PPoly
 
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.solvers.indirect import solve
+from gen_profile.solvers.indirect.solver import solve
 from gen_profile.solvers.motion import optimal_profile
 
 START, TARGET = 0.137, 0.437

@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 
 from gen_profile.errors import SpecError
-from gen_profile.metrics import greatest, length
+from gen_profile.motion.metrics import greatest, length
 from gen_profile.problem.axis_reach import axis_reach, effort_weights
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import choice, direct, indirect
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
-from gen_profile.spec_reading import parse_spec, preset_spec, spec_from_dict
+from gen_profile.spec.reading import parse_spec, preset_spec, spec_from_dict
 
 
 def fault_of(preset, *overrides):

@@ -18,7 +18,7 @@ from gen_profile.plants.plant import Coordinate, Equations, Mechanics
 from gen_profile.plants.registry import BUILT_IN, find_plant
 from gen_profile.plants.soundness import faults_of
 from gen_profile.problem.dynamics import dynamics
-from gen_profile.spec_reading import parse_spec, read_spec, spec_from_dict
+from gen_profile.spec.reading import parse_spec, read_spec, spec_from_dict
 
 PENDULUM = '''"""A load on a rope, and nothing else."""
 

@@ -7,8 +7,8 @@ import attrs
 import pytest
 from command_line import run_here
 
-from gen_profile.spec_reading import parse_spec, preset_spec, preset_text, presets, read_spec
-from gen_profile.workflows.planning import plan
+from gen_profile.design.plan import plan
+from gen_profile.spec.reading import parse_spec, preset_spec, preset_text, presets, read_spec
 
 
 @pytest.mark.parametrize("name", presets())

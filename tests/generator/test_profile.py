@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
 from gen_profile.errors import GenProfileError
-from gen_profile.profile import Profile, SampledProfile, grid_length, grid_times, sample
+from gen_profile.motion.profile import Profile, SampledProfile, grid_length, grid_times, sample
 
 NUMBERS = st.floats(-10.0, 10.0, allow_subnormal=False)
 EXACT_DECIMALS = st.integers(1, 10**6).map(lambda n: n / 10**6)
@@ -125,7 +125,7 @@ def test_the_hash_tells_motions_apart_and_nothing_else(profile):
 def test_the_hash_is_the_same_in_every_process():
     profile, setpoints = quintic(), sample(quintic(), 0.01)
     known = (
-        "import numpy as np; from gen_profile.profile import Profile, sample;"
+        "import numpy as np; from gen_profile.motion.profile import Profile, sample;"
         "shape = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0]) * 0.3 / 3.0 ** np.arange(6);"
         "p = Profile(knots=[0.0, 3.0], coefficients=shape[None, :, None], target=[0.3], method='quintic');"
         "print(p.payload_hash(), sample(p, 0.01).payload_hash())"

@@ -7,7 +7,7 @@ from generator.crane_problems import crane_problem
 from scipy.interpolate import PPoly
 
 from gen_profile.problem.reachability import independent_states
-from gen_profile.solvers.indirect import solve
+from gen_profile.solvers.indirect.solver import solve
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from gen_profile.solvers.indirect import solve
+from gen_profile.solvers.indirect.solver import solve
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 

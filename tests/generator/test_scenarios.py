@@ -4,8 +4,8 @@ from itertools import product
 
 import pytest
 
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.scenarios import scenarios
+from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.spec.reading import preset_spec
 
 
 def machines(uncertain):

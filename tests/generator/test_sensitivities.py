@@ -8,7 +8,7 @@ from generator.crane_problems import EFFORTS, crane_problem
 from scipy.interpolate import PPoly
 
 from gen_profile.problem.pontryagin import optimality_system
-from gen_profile.solvers.indirect import solve
+from gen_profile.solvers.indirect.solver import solve
 from gen_profile.solvers.motion import optimal_profile
 
 STEP = 1e-4

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from numpy.polynomial import polynomial
 
 from gen_profile.errors import SpecError
-from gen_profile.metrics import greatest
+from gen_profile.motion.metrics import greatest
 from gen_profile.shapers.base_moves import BASES, QUINTIC, SEPTIC, jerk_limited
 from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.shapers.shaped_move import shaped_move
-from gen_profile.spec import AxisLimitsSpec, LimitsSpec
+from gen_profile.spec.model import AxisLimitsSpec, LimitsSpec
 
 FREQUENCIES = (3.64, 9.017)
 LIMITS = (0.3, 1.0, 4.0)

@@ -8,11 +8,12 @@ from generator.crane_problems import EFFORTS, crane_problem
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers import indirect, simplified_newton
-from gen_profile.solvers.canonical import canonical_problem, independence, quintic
 from gen_profile.solvers.collocation import LONG_GAUSS
-from gen_profile.solvers.homotopy import solve_by_homotopy
-from gen_profile.solvers.simplified_newton import solve_simplified
+from gen_profile.solvers.indirect import simplified_newton
+from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.solvers.indirect.boundary_value_problem import canonical_problem, independence, quintic
+from gen_profile.solvers.indirect.homotopy import solve_by_homotopy
+from gen_profile.solvers.indirect.simplified_newton import solve_simplified
 
 
 def posed(problem):

@@ -4,8 +4,8 @@ import pytest
 from command_line import run_here
 
 from gen_profile.errors import SpecError
-from gen_profile.spec_plausibility import doubts
-from gen_profile.spec_reading import preset_spec, presets
+from gen_profile.spec.plausibility import doubts
+from gen_profile.spec.reading import preset_spec, presets
 
 CRANE = "double-pendulum-crane"
 QUAY = ("plant.L1=50", "plant.m1=9000", "plant.m2=40000")

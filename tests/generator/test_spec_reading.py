@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.spec_reading import parse_spec, preset_spec, presets, read_spec, spec_from_dict
+from gen_profile.spec.reading import parse_spec, preset_spec, presets, read_spec, spec_from_dict
 
 LEAST = """
 [plant]
@@ -270,7 +270,7 @@ def test_whole_numbers_are_the_same_numbers():
 
 @pytest.mark.parametrize("seed", ["0", "1", "4711"])
 def test_the_hash_does_not_hang_on_pythons_hash_seed(seed):
-    script = "from gen_profile.spec_reading import preset_spec; print(preset_spec('paper').sha256())"
+    script = "from gen_profile.spec.reading import preset_spec; print(preset_spec('paper').sha256())"
     printed = subprocess.run(
         [sys.executable, "-c", script],
         env={**os.environ, "PYTHONHASHSEED": seed},

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gen_profile.errors import SpecError
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.sweep_grid import CHAIN, Axis, overrides, parse_grid
+from gen_profile.spec.reading import preset_spec
+from gen_profile.sweep.grid import CHAIN, Axis, overrides, parse_grid
 
 
 def test_the_last_axis_changes_fastest():

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gen_profile.errors import SpecError
-from gen_profile.spec_reading import preset_spec
+from gen_profile.spec.reading import preset_spec
 from gen_profile.units import AXIS_UNITS, COUNTS, UNITS, axis_factor
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from gen_profile.profile import sample
-from gen_profile.response import Response
-from gen_profile.spec_reading import preset_spec
-from gen_profile.workflows.planning import plan
-from gen_profile.workflows.scenarios import scenarios
-from gen_profile.workflows.verification import judge
+from gen_profile.design.plan import plan
+from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.evaluation.simulation import Response
+from gen_profile.motion.profile import sample
+from gen_profile.spec.reading import preset_spec
+from gen_profile.verification.cosimulation import judge
 
 SPEC = preset_spec("paper", ["robustness={}", "cost.sway_weight=0"])
 

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import choice, indirect
-from gen_profile.spec_reading import preset_spec
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.spec.reading import preset_spec
 
 
 def problem(*overrides):

@@ -7,10 +7,11 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import least_worst_sway
 
 from gen_profile.problem.problem import WorstCase
-from gen_profile.solvers import choice, worst_case
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct import worst_case
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
-from gen_profile.spec import LimitsSpec
+from gen_profile.spec.model import LimitsSpec
 
 ZVD_ACCELERATION = 0.7067  # m/s²: what the paper's ZVD motion takes
 

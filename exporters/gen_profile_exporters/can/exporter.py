@@ -15,7 +15,7 @@ from struct import Struct
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import Profile, SampledProfile
+from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile_exporters.can import candump, database, frames, startup, traces
 from gen_profile_exporters.can.candump import Frame
 from gen_profile_exporters.can.frames import MICROSECONDS, SYNC

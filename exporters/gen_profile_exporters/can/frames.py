@@ -27,7 +27,7 @@ from can import Message
 from numpy.typing import NDArray
 
 from gen_profile.errors import ExportError
-from gen_profile.spec import CanSpec
+from gen_profile.spec.model import CanSpec
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.setpoints import two_digits_up
 

@@ -9,7 +9,7 @@ import can
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import SampledProfile
+from gen_profile.motion.profile import SampledProfile
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.exporter import read_setpoints, replay
 from gen_profile_exporters.can.frames import Integers, SetpointFrame, message

@@ -13,8 +13,8 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import Array, SampledProfile
-from gen_profile.spec import CanSpec
+from gen_profile.motion.profile import Array, SampledProfile
+from gen_profile.spec.model import CanSpec
 from gen_profile.units import AxisScale
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.frames import Field, Integers

@@ -83,10 +83,10 @@ def design(
     )
     spec = chosen_spec(spec_path, preset, overrides)
     require_formats(formats)
+    from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.manifest import FILENAME
-    from gen_profile.workflows.design import design as run
+    from gen_profile.design.design import design as run
 
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
@@ -120,11 +120,11 @@ def compare(
     spec = chosen_spec(spec_path, preset, overrides + as_overrides({"solver.base": base}))
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.workflows.compare import compare as run
+    from gen_profile.comparison.compare import compare as run
 
     if picture is not None:
-        from gen_profile.workflows.comparison_plot import draw
-        from gen_profile.workflows.picture import require_drawable
+        from gen_profile.charts.comparison import draw
+        from gen_profile.charts.picture import require_drawable
 
         require_drawable(picture)
     with progress() as tell:
@@ -196,11 +196,11 @@ def check(
     if overrides and not given:
         raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")
     spec = chosen_spec(spec_path, preset, overrides) if given else None
+    from gen_profile.artefacts.writing import deliver, require_place
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.workflows.check import check_artefact
-    from gen_profile.workflows.delivery import deliver, require_place
-    from gen_profile.workflows.scenario_table import table
+    from gen_profile.verification.check import check_artefact
+    from gen_profile.verification.scenario_table import table
 
     if table_path is not None:
         require_place(table_path)
@@ -286,8 +286,8 @@ def plants(as_json: bool) -> None:
 @debug_option
 def presets(name: str | None, path: Path | None, as_json: bool) -> None:
     """List the built-in specs, or print one to begin your own with."""
-    from gen_profile.spec_reading import preset_text
-    from gen_profile.spec_reading import presets as known
+    from gen_profile.spec.reading import preset_text
+    from gen_profile.spec.reading import presets as known
 
     if name is None:
         if path is not None:
@@ -302,7 +302,7 @@ def presets(name: str | None, path: Path | None, as_json: bool) -> None:
 
 
 def _write_new(path: Path, text: str) -> None:
-    from gen_profile.workflows.delivery import deliver
+    from gen_profile.artefacts.writing import deliver
 
     if path.exists():
         raise OutputError(f"Cannot write {path}: it exists already; choose another name.")

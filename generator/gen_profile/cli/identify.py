@@ -103,14 +103,14 @@ def identify(
     as_json: bool,
 ) -> None:
     """Find parameters from measurements on site, and write a spec."""
+    from gen_profile.charts.identification import draw, require_drawable
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
+    from gen_profile.identification.identify import identify as run
+    from gen_profile.identification.identify import read_swing, write_spec
     from gen_profile.identification.measurements import Measurement, parse_period, parse_reading
-    from gen_profile.spec_reading import parse_spec
-    from gen_profile.workflows.identify import identify as run
-    from gen_profile.workflows.identify import read_swing, write_spec
-    from gen_profile.workflows.identify_plot import draw, require_drawable
-    from gen_profile.workflows.spec_text import changed_text
+    from gen_profile.spec.reading import parse_spec
+    from gen_profile.spec.text import changed_text
 
     text, source, folder = chosen_text(spec_path, preset)
     spec = parse_spec(text, overrides, source, folder)

@@ -13,7 +13,7 @@ from gen_profile.cli.outcome import beware
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
-    from gen_profile.spec import Spec
+    from gen_profile.spec.model import Spec
 
 DEFAULT_PRESET = "paper"
 
@@ -34,7 +34,7 @@ class OutputFile(click.Path):
         OutputError
             Its folder is not there, or it cannot be written.
         """
-        from gen_profile.workflows.delivery import require_place
+        from gen_profile.artefacts.writing import require_place
 
         path = Path(str(super().convert(value, param, ctx)))
         if ctx is not None and ctx.resilient_parsing:  # of a line that is still being typed
@@ -58,7 +58,7 @@ def _complete_formats(_: click.Context, __: click.Parameter, incomplete: str) ->
 
 def complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Offer presets with their summaries."""
-    from gen_profile.spec_reading import presets
+    from gen_profile.spec.reading import presets
 
     return [
         CompletionItem(name, help=text) for name, text in presets().items() if name.startswith(incomplete)
@@ -133,8 +133,8 @@ def as_overrides(values: Mapping[str, object]) -> tuple[str, ...]:
 
 def chosen_spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
     """Read the spec that the command line names, or the default preset; doubt its values aloud."""
-    from gen_profile.spec_plausibility import doubts
-    from gen_profile.spec_reading import parse_spec
+    from gen_profile.spec.plausibility import doubts
+    from gen_profile.spec.reading import parse_spec
 
     text, source, folder = chosen_text(path, preset)
     spec = parse_spec(text, overrides, source, folder)
@@ -144,7 +144,7 @@ def chosen_spec(path: Path | None, preset: str | None, overrides: tuple[str, ...
 
 def chosen_text(path: Path | None, preset: str | None) -> tuple[str, str, Path]:
     """Read the text of that spec; also give its source, and the folder that its files are relative to."""
-    from gen_profile.spec_reading import HERE, preset_text, read_text
+    from gen_profile.spec.reading import HERE, preset_text, read_text
 
     if path is not None and preset is not None:
         raise SpecError("--preset: name either a spec file or a preset, not both.")

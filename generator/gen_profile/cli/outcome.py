@@ -14,7 +14,7 @@ import click
 from gen_profile.errors import CheckFailed, GenProfileError, OutputError
 
 if TYPE_CHECKING:
-    from gen_profile.check import Check
+    from gen_profile.verification.verdict import Check
 
 INTERRUPTED = 128 + signal.SIGINT  # as shells count it
 

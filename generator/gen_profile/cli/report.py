@@ -74,11 +74,11 @@ def report(
     as_json: bool,
 ) -> None:
     """Write everything about a design into one HTML file."""
+    from gen_profile.artefacts.writing import deliver, require_place
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
+    from gen_profile.report.build import report as run
     from gen_profile.report.print import printed, require_browser
-    from gen_profile.workflows.delivery import deliver, require_place
-    from gen_profile.workflows.report import report as run
 
     spec = chosen_spec(spec_path, preset, overrides)
     out = path or Path(f"{spec.name}.html")

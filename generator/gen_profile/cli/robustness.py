@@ -66,12 +66,12 @@ def robustness(
 ) -> None:
     """Show residual sway over one or two parameters, optimal motions beside shapers."""
     spec = chosen_spec(spec_path, preset, overrides)
+    from gen_profile.artefacts.writing import deliver, require_place
+    from gen_profile.charts.picture import require_drawable
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.workflows.delivery import deliver, require_place
-    from gen_profile.workflows.picture import require_drawable
-    from gen_profile.workflows.robustness import robustness as run
-    from gen_profile.workflows.robustness_table import table
+    from gen_profile.comparison.robustness import robustness as run
+    from gen_profile.comparison.robustness_table import table
 
     if picture is not None:
         require_drawable(picture)
@@ -80,7 +80,7 @@ def robustness(
     with progress() as tell:
         found = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
         if picture is not None:
-            from gen_profile.workflows.robustness_plot import draw
+            from gen_profile.charts.robustness import draw
 
             tell("drawing")
             draw(found, picture)

@@ -24,7 +24,7 @@ from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import OutputError, SpecError, StreamAborted
 
 if TYPE_CHECKING:
-    from gen_profile.workflows.stream_outcome import Outcome, Source
+    from gen_profile.streaming.outcome import Outcome, Source
     from gen_profile_exporters.can.lateness import Lateness
 
 VIRTUAL = ("virtual", "gen-profile")
@@ -84,9 +84,9 @@ def stream(
     Takes the log that --export can wrote, with its manifest beside it, or a spec, which is designed and
     checked first. No safety function: emergency stop and STO stay in hardware.
     """
+    from gen_profile.artefacts.writing import require_place
     from gen_profile.cli.progress import progress
-    from gen_profile.workflows import stream as run
-    from gen_profile.workflows.delivery import require_place
+    from gen_profile.streaming import stream as run
     from gen_profile_exporters.can.port import Port
 
     run.require_extra()
@@ -150,12 +150,12 @@ def drive_sim(
     Ends after one stream, when all drives have been switched off again, and tells how far the load sways.
     """
     from gen_profile.cli.progress import progress
-    from gen_profile.workflows import stream as run
+    from gen_profile.streaming import stream as run
 
     run.require_extra()
-    from gen_profile.workflows.crane_load import CraneLoad
-    from gen_profile.workflows.delivery import deliver
-    from gen_profile.workflows.wording import mm, number
+    from gen_profile.artefacts.writing import deliver
+    from gen_profile.evaluation.phrases import mm, number
+    from gen_profile.streaming.load import CraneLoad
     from gen_profile_exporters.can import drive_dictionary
     from gen_profile_exporters.can.port import Port
 
@@ -195,7 +195,7 @@ def _conclude(outcome: Outcome, table: Path | None, as_json: bool) -> None:
     """Report what became of a stream, by every way that still takes it, and end in the exit code of that."""
     import attrs
 
-    from gen_profile.workflows.delivery import deliver
+    from gen_profile.artefacts.writing import deliver
 
     code, complaints = (0, []) if outcome.done else (StreamAborted.exit_code, [_aborted(outcome)])
     if table is not None:
@@ -245,7 +245,7 @@ def _source(
     tell: Callable[[str], None],
 ) -> Source:
     """Take an artefact, or design one for a spec, once there is a bus for it."""
-    from gen_profile.workflows.stream import require_rest, verified
+    from gen_profile.streaming.stream import require_rest, verified
 
     if path is not None and path.suffix.lower() != ".toml":
         if preset is not None or overrides:
@@ -253,8 +253,8 @@ def _source(
                 f"{path}: an artefact is streamed as it is; --preset, --set, --mode and --node are for specs."
             )
         return verified(path, accept_unverified=accept_unverified)
+    from gen_profile.design.design import design
     from gen_profile.errors import CheckFailed
-    from gen_profile.workflows.design import design
 
     spec = chosen_spec(path, preset, overrides)
     require_rest(spec)
@@ -306,7 +306,7 @@ def _lateness_words(late: Lateness) -> str:
 
 
 def _outcome_words(outcome: Outcome) -> str:
-    from gen_profile.workflows.wording import mm, number
+    from gen_profile.evaluation.phrases import mm, number
 
     told, late = outcome.to_dict(), outcome.record.lateness
     lines = [f"{told['state']}: {told['cycles_sent']} of {told['cycles_planned']} setpoints sent"]

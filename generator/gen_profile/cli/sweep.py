@@ -72,13 +72,13 @@ def sweep(
     """
     from gen_profile.cli import words
     from gen_profile.cli.progress import counting
-    from gen_profile.workflows.sweep_grid import parse_grid
-    from gen_profile.workflows.sweep_plan import prepare, require_libraries
+    from gen_profile.sweep.grid import parse_grid
+    from gen_profile.sweep.plan import prepare, require_libraries
 
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers is for processes of this computer; a scheduler has its own.")
     require_libraries()
-    from gen_profile.workflows.sweep import sweep as run
+    from gen_profile.sweep.run import sweep as run
 
     text = chosen_text(spec_path, preset)
     store = prepare(text, overrides, parse_grid(axes), formats, folder)
@@ -107,10 +107,10 @@ def lookup(words: tuple[str, ...], as_json: bool) -> None:
     """
     from gen_profile.cli import words as tables
     from gen_profile.cli.progress import progress
-    from gen_profile.workflows.sweep_plan import require_libraries
+    from gen_profile.sweep.plan import require_libraries
 
     require_libraries()
-    from gen_profile.workflows.lookup import lookup as run
+    from gen_profile.sweep.lookup import lookup as run
 
     folder, asked = _folder_and_values(words)
     with progress() as tell:
@@ -136,10 +136,10 @@ def library(folder: Path, path: Path, as_json: bool) -> None:
     An input of the block selects the profile.
     """
     from gen_profile.cli import words as tables
-    from gen_profile.workflows.sweep_plan import require_libraries
+    from gen_profile.sweep.plan import require_libraries
 
     require_libraries()
-    from gen_profile.workflows.profile_library import write_library
+    from gen_profile.sweep.library import write_library
 
     written = write_library(folder, path)
     print_outcome(written.to_dict(), tables.library(written), as_json)

@@ -10,22 +10,22 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from gen_profile.workflows.wording import mm, named, number
+from gen_profile.evaluation.phrases import mm, named, number
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from gen_profile.check import Check
-    from gen_profile.spec import Spec
-    from gen_profile.workflows.check import Judgement
-    from gen_profile.workflows.compare import Comparison
-    from gen_profile.workflows.design import Design
-    from gen_profile.workflows.identify import Identification
-    from gen_profile.workflows.lookup import Found
-    from gen_profile.workflows.profile_library import Library
-    from gen_profile.workflows.report import Report
-    from gen_profile.workflows.robustness import Robustness
-    from gen_profile.workflows.sweep import Sweep
+    from gen_profile.comparison.compare import Comparison
+    from gen_profile.comparison.robustness import Robustness
+    from gen_profile.design.design import Design
+    from gen_profile.identification.identify import Identification
+    from gen_profile.report.build import Report
+    from gen_profile.spec.model import Spec
+    from gen_profile.sweep.library import Library
+    from gen_profile.sweep.lookup import Found
+    from gen_profile.sweep.run import Sweep
+    from gen_profile.verification.check import Judgement
+    from gen_profile.verification.verdict import Check
 
 MANIFEST_WORDS = {
     "matches": "the file is the one that was exported",
@@ -313,7 +313,7 @@ def _move(spec: Spec) -> str:
 
 
 def _peaks(outcome: Design) -> list[tuple[str, str]]:
-    from gen_profile.metrics import greatest
+    from gen_profile.motion.metrics import greatest
 
     kind = "peak motion" if outcome.spec.actuator.tau is None else "peak command"
     axes, command = outcome.spec.machine().actuated, outcome.plan.trial.command

@@ -18,7 +18,7 @@ from gen_profile.identification.measurements import DirectReading, Period, Swing
 from gen_profile.identification.misfit import Misfit, explanation, misfits
 from gen_profile.identification.swing_model import swing_model
 from gen_profile.identification.uncertainty import Uncertainty, uncertainty
-from gen_profile.profile import Array
+from gen_profile.motion.profile import Array
 
 CONFIDENCE = 0.99
 UNREST = 2.0  # times farther off at first, from which on the axes may still have moved then

@@ -18,9 +18,9 @@ from scipy.optimize import least_squares
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.identification.measurements import DirectReading, Period
 from gen_profile.identification.swing_model import STEP, SwingModel
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.linearization import linearize
-from gen_profile.profile import Array
 
 NOISE_ROUNDS = 2
 HELD = 0.3  # relative, by which a parameter may leave the spec's while only a part of a log is looked at

@@ -11,8 +11,8 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.log_table import read_table
-from gen_profile.profile import Array, read_only
+from gen_profile.identification.log_table import read_table
+from gen_profile.motion.profile import Array, read_only
 
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
 _VALUE = rf"({_NUMBER})\s*(?:±|\+-|\+/-)\s*({_NUMBER})"

@@ -19,8 +19,8 @@ from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.identification.fit import Fit
 from gen_profile.identification.swing_model import SwingModel
 from gen_profile.identification.uncertainty import WIDEST, uncertainty
+from gen_profile.motion.profile import Array
 from gen_profile.problem.linearization import linearize
-from gen_profile.profile import Array
 
 HARMONICS = 4.0  # times the fastest natural frequency up to which lines are looked for
 MOST_LINES = 2000

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.errors import InfeasibleProblem
+from gen_profile.evaluation.simulation import free_swing
 from gen_profile.identification.measurements import SwingLog
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.linearization import linearize
-from gen_profile.profile import Array
-from gen_profile.response import free_swing
 
 STEP = 1e-6  # relative, of numerical slopes
 WIDEST_SWING = math.pi / 4.0  # rad, beyond which nobody lets a load swing

@@ -23,7 +23,7 @@ from scipy.stats import chi2
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.fit import Fit
 from gen_profile.identification.measurements import DirectReading
-from gen_profile.profile import Array
+from gen_profile.motion.profile import Array
 
 WIDEST = 0.9  # relative half-range beyond which it is of no use: a spec cannot state it
 IMPOSSIBLE = 10.0  # standard deviations off a reading, which no chance brings about

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import attrs
 import numpy as np
 
-from gen_profile.profile import Array
+from gen_profile.motion.profile import Array
 
 Kind = Literal["rail", "rope", "spring", "plumb", "frame", "body", "load", "hook", "liquid"]
 

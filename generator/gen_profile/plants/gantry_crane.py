@@ -17,9 +17,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, hanging, level, stacked, travel
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
-from gen_profile.profile import Array
 
 
 def equations(

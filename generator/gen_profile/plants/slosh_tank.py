@@ -25,9 +25,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, stacked, travel
 from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
-from gen_profile.profile import Array
 
 ODD = (1, 3)  # 2n − 1 of the modes
 SURFACE = 17  # points of the liquid's drawn surface

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from numpy.polynomial import polynomial
 
-from gen_profile.profile import Profile
+from gen_profile.motion.profile import Profile
 
 
 def lag_compensated(profile: Profile, tau: float | None) -> Profile:

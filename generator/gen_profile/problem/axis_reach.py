@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from gen_profile.motion.profile import Array
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem
-from gen_profile.profile import Array
 
 HELD = 0.01  # of the longest move
 

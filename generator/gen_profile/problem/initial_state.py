@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
-from gen_profile.profile import Array
 
 RATE = ".rate"
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import attrs
 
-from gen_profile.metrics import extremes, greatest
-from gen_profile.profile import Profile
-from gen_profile.spec import LimitsSpec
+from gen_profile.motion.metrics import extremes, greatest
+from gen_profile.motion.profile import Profile
+from gen_profile.spec.model import LimitsSpec
 
 ROUNDING = 1e-6  # share of its width by which travel may be left: a move may begin and end at its edges
 

@@ -8,7 +8,7 @@ from typing import Literal
 import attrs
 
 from gen_profile.plants.plant import Plant
-from gen_profile.spec import LimitsSpec, Spec
+from gen_profile.spec.model import LimitsSpec, Spec
 
 Effort = Literal["jerk", "snap", "reference"]
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from gen_profile.motion.profile import Array
 from gen_profile.one_thread import one_thread
-from gen_profile.profile import Array
 
 SAMPLES = 256
 

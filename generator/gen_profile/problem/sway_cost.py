@@ -5,7 +5,7 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from gen_profile.profile import Array
+from gen_profile.motion.profile import Array
 
 STEEPEST = 50.0  # exponent beyond which the cost is steep enough
 

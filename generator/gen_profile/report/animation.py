@@ -9,9 +9,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from gen_profile.charts.figure import rounded
+from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing
-from gen_profile.profile import Array
-from gen_profile.report.figures import rounded
 
 PLACE_DIGITS, SWING_DIGITS = 4, 6  # of the picture's size; a swing can be drawn larger than it is
 MARGIN = 0.06  # around a picture, of its size

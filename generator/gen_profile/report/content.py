@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import attrs
 
+from gen_profile.charts.figure import Figure
 from gen_profile.report.animation import Animation
-from gen_profile.report.figures import Figure
 
 LEAST_SHARE = 1e-3
 

@@ -11,9 +11,9 @@ from functools import partial
 
 import numpy as np
 
+from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, hanging, level, stacked
 from gen_profile.plants.plant import Plant
-from gen_profile.profile import Array
 
 BODY = 0.05  # half width of a trolley, as a share of the picture's size
 

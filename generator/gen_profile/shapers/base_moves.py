@@ -10,8 +10,8 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.profile import Array, read_only
-from gen_profile.spec import LimitsSpec
+from gen_profile.motion.profile import Array, read_only
+from gen_profile.spec.model import LimitsSpec
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -21,7 +21,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import InfeasibleProblem
-from gen_profile.profile import Array, read_only
+from gen_profile.motion.profile import Array, read_only
 
 TOLERATED = 0.05  # share of the vibration that extra-insensitive shapers trade for a wider range
 UNITY_MAGNITUDE_DAMPING = 0.3  # ratio up to which trains of unity magnitude are known

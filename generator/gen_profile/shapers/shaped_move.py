@@ -10,8 +10,8 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from gen_profile.errors import InfeasibleProblem
+from gen_profile.motion.profile import Array, Profile
 from gen_profile.problem.limits import rounded_up
-from gen_profile.profile import Array, Profile
 from gen_profile.shapers.base_moves import QUINTIC, BaseMove
 from gen_profile.shapers.impulses import SHAPERS, Impulses, convolve
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.special import roots_jacobi
 
+from gen_profile.motion.profile import Array
 from gen_profile.one_thread import one_thread
-from gen_profile.profile import Array
 
 STAGES = 4  # of the schemes for fine meshes
 

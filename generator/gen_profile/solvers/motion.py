@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.polynomial import polynomial
 
-from gen_profile.profile import Array, Profile
+from gen_profile.motion.profile import Array, Profile
 from gen_profile.solvers.solution import Solution
 
 

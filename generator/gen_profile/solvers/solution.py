@@ -7,8 +7,8 @@ from enum import Enum
 import attrs
 
 from gen_profile.errors import GenProfileError, InfeasibleProblem, SolverDiverged
+from gen_profile.motion.profile import Array
 from gen_profile.problem.problem import Problem
-from gen_profile.profile import Array
 from gen_profile.solvers.collocation import Trajectory
 
 

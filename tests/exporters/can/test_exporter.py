@@ -7,7 +7,7 @@ from motions import quintic, target
 from system_parts import program
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import sample
+from gen_profile.motion.profile import sample
 from gen_profile_exporters.can import exporter, frames
 
 MOVE = quintic((0.1, 0.4))

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from motions import quintic, target
 
 from gen_profile.errors import ExportError
-from gen_profile.profile import sample
-from gen_profile.spec_reading import preset_spec
+from gen_profile.motion.profile import sample
+from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.can import frames, scaling, startup
 from gen_profile_exporters.can.candump import read
 from gen_profile_exporters.can.drive_dictionary import Make, dictionary, eds

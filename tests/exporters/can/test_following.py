@@ -8,7 +8,7 @@ import pytest
 from exporters.can.bench import Bench, RigidLoad
 from motions import quintic
 
-from gen_profile.workflows.stream_outcome import Outcome
+from gen_profile.streaming.outcome import Outcome
 from gen_profile_exporters.can.drive_dictionary import Make
 from gen_profile_exporters.can.following import standstills
 

@@ -1,0 +1,156 @@
+"""``manifest.json``, the record beside the artefacts: spec, versions, hashes and check of every export."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+from attrs.validators import instance_of
+
+from gen_profile.errors import OutputError
+
+FILENAME = "manifest.json"
+FORMAT = "gen-profile manifest"
+FORMAT_VERSION = 1
+UNVERIFIED = "unverified"
+SEAL = "manifest_sha256"  # of everything else in it, so that nobody changes a limit or a verdict by hand
+
+
+@attrs.frozen(kw_only=True)
+class Artefact:
+    """One exported file.
+
+    Attributes
+    ----------
+    format : str
+    path : str
+        Relative to the manifest's folder.
+    sha256 : str
+        Of the file's bytes.
+    bytes : int
+    payload_sha256 : str
+        Of the setpoints that the file carries, whatever its form; empty for a file that carries none.
+    """
+
+    format: str
+    path: str
+    sha256: str = attrs.field(validator=instance_of(str))
+    bytes: int
+    payload_sha256: str = ""
+
+
+@attrs.frozen(kw_only=True)
+class Manifest:
+    """What was designed, from what, by what, and how it was judged.
+
+    Attributes
+    ----------
+    name : str
+    spec : mapping
+        The whole spec, as `gen_profile.spec.model.Spec.to_dict` gives it.
+    spec_sha256 : str
+    profile_sha256 : str
+        Of the continuous profile.
+    versions : mapping of str to str
+        Of this program and the libraries that shape the numbers.
+    artefacts : tuple of Artefact
+    check : mapping or None
+        `gen_profile.verification.verdict.Check.to_dict` of the artefact that came off worst; None when none was checked.
+    earlier : tuple of Manifest
+        Of exports into the same folder before, with those of their artefacts that were not replaced since.
+    """
+
+    name: str
+    spec: Mapping[str, Any] = attrs.field(validator=instance_of(dict))
+    spec_sha256: str
+    profile_sha256: str
+    versions: Mapping[str, str]
+    artefacts: tuple[Artefact, ...]
+    check: Mapping[str, Any] | None
+    earlier: tuple[Manifest, ...] = ()
+
+    def after(self, previous: Manifest) -> Manifest:
+        """Keep what a previous manifest says of artefacts that this export does not replace."""
+        replaced = {artefact.path for artefact in self.artefacts}
+        remaining = (
+            attrs.evolve(
+                one, artefacts=tuple(kept for kept in one.artefacts if kept.path not in replaced), earlier=()
+            )
+            for one in (previous, *previous.earlier)
+        )
+        return attrs.evolve(self, earlier=tuple(one for one in remaining if one.artefacts))
+
+    def covering(self, name: str, digest: str) -> Manifest:
+        """Find the export that a file comes from: by its SHA-256, else by its name, else the latest."""
+        every = (self, *self.earlier)
+        by_content = [one for one in every if any(known.sha256 == digest for known in one.artefacts)]
+        by_name = [one for one in every if any(known.path == name for known in one.artefacts)]
+        return (by_content or by_name or [self])[0]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            **attrs.asdict(self),
+            "check": self.check or UNVERIFIED,
+            "earlier": [one.to_dict() for one in self.earlier],
+        }
+
+    def to_json(self) -> bytes:
+        """Render, UTF-8."""
+        document = {"format": FORMAT, "format_version": FORMAT_VERSION, **self.to_dict()}
+        document[SEAL] = _seal(document)
+        return (json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")
+
+
+def parse_manifest(content: bytes, source: str) -> Manifest:
+    """Read a manifest.
+
+    Parameters
+    ----------
+    content : bytes
+    source : str
+        Where it comes from, for the error.
+
+    Raises
+    ------
+    OutputError
+        It is none, of another version, or was altered.
+    """
+    try:
+        document = json.loads(content.decode("utf-8"))
+        seal, found = document.pop(SEAL, None), _seal(document)
+        if (document.pop("format"), document.pop("format_version")) != (FORMAT, FORMAT_VERSION):
+            raise ValueError("another format")
+        manifest = _from_dict(document)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise OutputError(
+            f"{source}: not a manifest of this version of gen-profile; export again, or give the spec."
+        ) from error
+    if seal != found:
+        raise OutputError(
+            f"{source} was altered after it was written, or comes from an earlier version ({SEAL} does not "
+            "fit), so it vouches for nothing; export again."
+        )
+    return manifest
+
+
+def _seal(document: Mapping[str, Any]) -> str:
+    """Hash a document, whatever its order and layout."""
+    return sha256(json.dumps(document, sort_keys=True, separators=(",", ":")).encode("ascii"))
+
+
+def _from_dict(document: dict[str, Any]) -> Manifest:
+    artefacts = tuple(Artefact(**artefact) for artefact in document.pop("artefacts"))
+    earlier = tuple(map(_from_dict, document.pop("earlier", ())))
+    check = document.pop("check")
+    return Manifest(
+        artefacts=artefacts, earlier=earlier, check=None if check == UNVERIFIED else check, **document
+    )
+
+
+def sha256(content: bytes) -> str:
+    """Hash bytes, in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()

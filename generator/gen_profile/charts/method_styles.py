@@ -1,0 +1,44 @@
+"""How the curves of every method look: the same in all pictures, whoever else takes part."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+from gen_profile.charts.figure import PALETTE, Dash, Style
+from gen_profile.shapers.impulses import SHAPERS
+
+THICK, THIN = 2.6, 1.4  # pixels
+
+OPTIMAL = (
+    *(f"optimal-beta{weight}" for weight in (0, 20, 50)),
+    *(f"optimal{kind}" for kind in ("", "-range", "-order1", "-order2")),
+)
+# methods that share their dashes differ in colour, by their place, the first of which has this one
+GROUPS: tuple[tuple[Dash, int, tuple[str, ...]], ...] = (
+    ("solid", 0, OPTIMAL),
+    ("dash", 5, tuple(name for name in SHAPERS if "ei" not in name)),
+    ("dot", 3, tuple(name for name in SHAPERS if "ei" in name)),
+)
+
+
+def method_styles(methods: Iterable[str], thick: Collection[str | None] = ()) -> dict[str, Style]:
+    """Draw optimal motions solid, shapers dashed, and extra-insensitive ones dotted.
+
+    Parameters
+    ----------
+    methods : iterable of str
+        As a comparison names them.
+    thick : collection of str
+        Those that matter most.
+    """
+    looks: dict[str, tuple[str, Dash]] = {
+        method: (PALETTE[(first + place) % len(PALETTE)], dash)
+        for dash, first, group in GROUPS
+        for place, method in enumerate(group)
+    }
+    other: tuple[str, Dash] = (PALETTE[len(OPTIMAL)], "solid")  # the spec's own β
+    styles = {}
+    for method in methods:
+        colour, dash = looks.get(method, other)
+        styles[method] = Style(colour=colour, dash=dash, width=THICK if method in thick else THIN)
+    return styles

@@ -1,0 +1,135 @@
+"""Who takes part in a comparison: every shaper, and variants of the optimal motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, partial
+from typing import Any
+
+import attrs
+
+from gen_profile.design.plan import timed
+from gen_profile.design.shape import shaped_motion
+from gen_profile.errors import GenProfileError, InfeasibleProblem
+from gen_profile.motion.metrics import greatest
+from gen_profile.motion.profile import Profile
+from gen_profile.problem.actuator import lag_compensated
+from gen_profile.problem.problem import problem_of
+from gen_profile.shapers.impulses import SHAPERS
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.direct import worst_case
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.spec.model import Spec
+
+SWAY_WEIGHTS = (0.0, 20.0, 50.0)  # the paper's
+# what a robustness method is called, and its keys in the spec
+ROBUST: dict[str, Mapping[str, Any]] = {
+    "order1": {"method": "sensitivity", "order": 1},
+    "order2": {"method": "sensitivity", "order": 2},
+    "range": {"method": "range"},
+}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Contender:
+    """A method that takes part.
+
+    Attributes
+    ----------
+    method : str
+    design : () → Profile
+        Raises a `GenProfileError` where the method has no motion for the move.
+    requirements : str
+        Contenders of the same requirements have a motion all or none; empty where that says nothing.
+    """
+
+    method: str
+    design: Callable[[], Profile]
+    requirements: str = ""
+
+
+def own_method(spec: Spec) -> str:
+    """Name the spec's own method as a comparison does."""
+    if spec.solver.shaper is not None:
+        return spec.solver.shaper
+    # β means the same as in the paper only together with a γ
+    return "optimal" if spec.cost.sway_scale is None else f"optimal-beta{spec.cost.sway_weight:g}"
+
+
+def contenders(spec: Spec) -> Iterator[Contender]:
+    """List shapers, then optimal motions.
+
+    Parameters
+    ----------
+    spec : Spec
+        Each method takes the spec's duration, or its own shortest one where the spec asks for that; every
+        shaper is fed with the spec's base move.
+    """
+    for name in SHAPERS:
+        yield Contender(method=name, design=partial(shaped_motion, spec, name))
+    if spec.solver.shaper is not None:
+        spec = attrs.evolve(spec, solver=attrs.evolve(spec.solver, method="auto"))
+    once = cache(partial(timed, spec))  # the shortest duration does not depend on β
+    own = cache(partial(_attempt, once))
+    weight = spec.cost.sway_weight
+    for other in sorted({*SWAY_WEIGHTS, weight}):
+        name = own_method(spec) if other == weight else f"optimal-beta{other:g}"
+        design = partial(_result, own) if other == weight else partial(_weighed, once, other)
+        yield Contender(method=name, design=design, requirements="the spec's own")
+    for kind, keys in _other_robustness(spec).items():
+        robust = attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, **keys))
+        yield Contender(method=f"optimal-{kind}", design=partial(_optimal_within, robust, own))
+
+
+def _other_robustness(spec: Spec) -> dict[str, Mapping[str, Any]]:
+    """Choose from `ROBUST` what the spec does not ask for anyway."""
+    asked = spec.robustness
+    different = {kind: keys for kind, keys in ROBUST.items() if attrs.evolve(asked, **keys) != asked}
+    return different if asked.uncertain else {}
+
+
+def _optimal(spec: Spec) -> Profile:
+    return optimal_profile(choice.solve(problem_of(spec), spec.solver.solver))
+
+
+def _weighed(timed_spec: Callable[[], Spec], sway_weight: float) -> Profile:
+    spec = timed_spec()
+    return _optimal(attrs.evolve(spec, cost=attrs.evolve(spec.cost, sway_weight=sway_weight)))
+
+
+def _optimal_within(spec: Spec, own: Callable[[], Profile | GenProfileError]) -> Profile:
+    """Design an optimal motion with β = 0 at no more acceleration than the spec's own design takes.
+
+    Nothing else would keep the least residual of the worst machine from taking any acceleration.
+    """
+    spec = attrs.evolve(spec, cost=attrs.evolve(spec.cost, sway_weight=0.0))
+    motion = own()
+    if spec.move.shortest or isinstance(motion, GenProfileError):
+        return _optimal(timed(spec))
+    command = lag_compensated(motion, spec.actuator.tau)
+    taken = max(greatest(command, 2, axis) for axis in range(command.axes))
+    problem = problem_of(attrs.evolve(spec, limits=attrs.evolve(spec.limits, acceleration=taken)))
+    solution = direct.solve(problem) if problem.worst_case is None else worst_case.solve(problem)
+    if solution.optimum is None:
+        unit = spec.machine().actuated[0].unit
+        raise InfeasibleProblem(
+            f"With no more acceleration than the spec's own design takes ({taken:.3g} {unit}/s²) "
+            f"there is no such motion in {spec.move.duration:g} s."
+        )
+    return optimal_profile(solution)
+
+
+def _attempt(timed_spec: Callable[[], Spec]) -> Profile | GenProfileError:
+    """Design the spec's own motion, or say why there is none: it is asked for more than once."""
+    try:
+        return _optimal(timed_spec())
+    except GenProfileError as error:
+        return error
+
+
+def _result(attempt: Callable[[], Profile | GenProfileError]) -> Profile:
+    outcome = attempt()
+    if isinstance(outcome, GenProfileError):
+        raise outcome
+    return outcome

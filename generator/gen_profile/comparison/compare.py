@@ -1,0 +1,134 @@
+"""Optimal motions and shapers side by side, on the same machines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+
+from gen_profile.comparison.candidates import Contender, contenders
+from gen_profile.comparison.recommendation import Recommendation, efficient, recommend
+from gen_profile.design.plan import Trial, figures, keeps_residual_sway, try_motion
+from gen_profile.errors import GenProfileError, InfeasibleProblem
+from gen_profile.evaluation.phrases import mm
+from gen_profile.spec.model import Spec
+
+Progress = Callable[[str], None]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Row:
+    """A method that has a motion for the move.
+
+    Attributes
+    ----------
+    method : str
+    trial : Trial
+    figures : dict of str to float
+    safe : bool
+        Whether every load keeps its limit of residual sway on all machines.
+    """
+
+    method: str
+    trial: Trial
+    figures: dict[str, float]
+    safe: bool
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Comparison:
+    """All methods, and which to take.
+
+    Attributes
+    ----------
+    spec : Spec
+    rows : tuple of Row
+    left_out : dict of str to str
+        Methods without a motion for the move, and why.
+    efficient : frozenset of str
+        Methods on the Pareto front.
+    recommended : dict of str to Recommendation
+        ``fastest`` and ``gentlest``.
+    """
+
+    spec: Spec
+    rows: tuple[Row, ...]
+    left_out: dict[str, str]
+    efficient: frozenset[str]
+    recommended: dict[str, Recommendation]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON; see the command-line contract."""
+        return {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "base": self.spec.solver.base,
+            "rows": [
+                {
+                    "method": row.method,
+                    "figures": row.figures,
+                    "keeps_residual_sway": row.safe,
+                    "pareto": row.method in self.efficient,
+                }
+                for row in self.rows
+            ],
+            "left_out": [{"method": method, "reason": reason} for method, reason in self.left_out.items()],
+            "recommended": {kind: advice.method for kind, advice in self.recommended.items()},
+            "reasons": {kind: advice.reason for kind, advice in self.recommended.items()},
+        }
+
+
+def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
+    """Try every shaper and variants of the optimal motion on the machines of a spec.
+
+    Parameters
+    ----------
+    spec : Spec
+    progress : callable
+        Told what is being done.
+    """
+    rows: list[Row] = []
+    left_out: dict[str, str] = {}
+    impossible: dict[str, str] = {}
+    for contender in contenders(spec):
+        progress(contender.method)
+        try:
+            if contender.requirements in impossible:
+                left_out[contender.method] = impossible[contender.requirements]
+            else:
+                rows.append(_row(spec, contender))
+        except GenProfileError as error:
+            left_out[contender.method] = str(error)
+            if contender.requirements and isinstance(error, InfeasibleProblem):
+                impossible[contender.requirements] = str(error)
+    found = {row.method: row.figures for row in rows}
+    return Comparison(
+        spec=spec,
+        rows=tuple(rows),
+        left_out=left_out,
+        efficient=efficient(found),
+        recommended=recommend(
+            {row.method: row.figures for row in rows if row.safe},
+            limit=_limit_in_words(spec),
+            unit=spec.machine().actuated[0].unit,
+            optimal=[method for method in found if method.startswith("optimal")],
+        ),
+    )
+
+
+def _row(spec: Spec, contender: Contender) -> Row:
+    trial = try_motion(spec, contender.design())
+    return Row(
+        method=contender.method,
+        trial=trial,
+        figures=figures(trial),
+        safe=keeps_residual_sway(spec, trial),
+    )
+
+
+def _limit_in_words(spec: Spec) -> str:
+    limits = spec.check.residual_sway
+    if len(set(limits.values())) == 1:
+        return mm(next(iter(limits.values())))
+    return ", ".join(f"{mm(limit)} ({load})" for load, limit in limits.items())

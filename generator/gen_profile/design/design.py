@@ -1,0 +1,244 @@
+"""The main job: from a spec to artefacts that were proved by co-simulation before anyone can take them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256
+from gen_profile.artefacts.writing import Staging, staged
+from gen_profile.design.plan import Plan, plan, timed
+from gen_profile.errors import OutputError
+from gen_profile.evaluation.scenarios import further_scenarios
+from gen_profile.motion.profile import Profile, SampledProfile
+from gen_profile.solvers.collocation import Trajectory
+from gen_profile.spec.model import Spec
+from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
+from gen_profile.verification.external_fmu import judge_foreign
+from gen_profile.verification.monte_carlo import with_further
+from gen_profile.verification.verdict import Check
+from gen_profile_exporters.exporter import Exporter, target_of
+from gen_profile_exporters.registry import find_exporter, format_named, require_end
+
+Progress = Callable[[str], None]
+LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Design:
+    """Outcome of the main job.
+
+    Attributes
+    ----------
+    spec : Spec
+    plan : Plan
+    check : Check or None
+        Of the artefact that came off worst; None when no check was asked for.
+    artefacts : tuple of Artefact
+        What was delivered, paths relative to `folder`; empty when the check failed.
+    folder : Path
+    """
+
+    spec: Spec
+    plan: Plan
+    check: Check | None
+    artefacts: tuple[Artefact, ...]
+    folder: Path
+
+    @property
+    def passed(self) -> bool:
+        """Whether no check failed."""
+        return self.check is None or self.check.passed
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON; see the command-line contract."""
+        return {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "solver": self._solver(),
+            "figures": self.plan.figures,
+            "check": None if self.check is None else self.check.to_dict(),
+            "artefacts": [
+                {
+                    "format": artefact.format,
+                    "path": os.path.relpath(self.folder / artefact.path),
+                    "sha256": artefact.sha256,
+                    "bytes": artefact.bytes,
+                }
+                for artefact in self.artefacts
+            ],
+        }
+
+    def _solver(self) -> dict[str, Any]:
+        """Tell how the motion was found; what a shaper has not is null."""
+        solution, seconds = self.plan.solution, self.plan.solver_time
+        if solution is None:
+            return {
+                "status": "shaped",
+                "method": self.spec.solver.method,
+                "base": self.spec.solver.base,
+                "iterations": 0,
+                "residual": None,
+                "time_s": seconds,
+                "cost": None,
+            }
+        optimum = solution.raise_for_status()
+        return {
+            "status": solution.status.name.lower(),
+            "method": solution.method,
+            "iterations": solution.iterations,
+            "residual": solution.residual,
+            "time_s": seconds,
+            "cost": optimum.cost,
+            "sway_weight": optimum.sway_weight,
+            "sway_scale_per_m": optimum.sway_scale,
+            "intervals": len(optimum.knots) - 1,
+            "defect": optimum.defect,
+            "hamiltonian_variation": optimum.hamiltonian_variation,
+            "redundant": list(solution.redundant),
+            "worst_case_bound_m": solution.worst_case_bound,
+        }
+
+
+def design(
+    spec: Spec,
+    formats: Sequence[str],
+    folder: Path,
+    *,
+    check: bool = True,
+    keep_failed: bool = False,
+    near: Trajectory | None = None,
+    progress: Progress = lambda _: None,
+) -> Design:
+    """Solve, export, replay what was written, co-simulate, and deliver what passes.
+
+    Parameters
+    ----------
+    spec : Spec
+    formats : sequence of str
+        Names known to the exporters' registry.
+    folder : Path
+        Made if needed; files of the same names are replaced, others left alone.
+    check : bool
+        Without it the manifest says ``"unverified"``.
+    keep_failed : bool
+        Deliver even what failed, marked so in the manifest.
+    near : Trajectory, optional
+        Of a similar design's solution, to begin at.
+    progress : callable
+        Told what is being done.
+
+    Raises
+    ------
+    GenProfileError
+        Nothing was written.
+    """
+    exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
+    require_end(exporters, stops=spec.move.stops)
+    progress("solving")
+    spec = timed(spec)
+    planned = plan(spec, near)
+    with staged(folder) as staging:
+        progress("exporting")
+        artefacts, replayed = _export(spec, planned.trial.command, exporters, staging)
+        worst = _check(spec, planned, replayed, progress) if check else None
+        _accompany(spec, staging)
+        manifest = _manifest(spec, planned, artefacts, worst)
+        staging.write(FILENAME, _after_earlier_ones(manifest, folder / FILENAME).to_json())
+        delivered = worst is None or worst.passed or keep_failed
+        if delivered:
+            staging.deliver()
+    kept = artefacts if delivered else ()
+    return Design(spec=spec, plan=planned, check=worst, artefacts=kept, folder=folder)
+
+
+def _accompany(spec: Spec, staging: Staging) -> None:
+    """Put beside the manifest what the spec in it names: an own machine, a foreign judge."""
+    if spec.plant.file is not None:
+        staging.write(spec.plant.file.name, spec.plant.file.content)
+    judge = spec.check.foreign
+    if judge is not None:
+        staging.write(judge.name, judge.path.read_bytes())
+
+
+def _export(
+    spec: Spec, command: Profile, exporters: dict[str, Exporter], staging: Staging
+) -> tuple[tuple[Artefact, ...], list[SampledProfile]]:
+    """Write every format, and replay each one's first file as the disk holds it."""
+    target = target_of(spec)
+    artefacts, replayed = [], []
+    for name, exporter in exporters.items():
+        payload = ""
+        for index, file in enumerate(exporter.encode(command, target)):
+            written = staging.write(file.filename, file.content)
+            if index == 0:
+                replayed.append(exporter.replay(written, target))
+                payload = replayed[-1].payload_hash()
+            artefacts.append(
+                Artefact(
+                    format=name,
+                    path=file.filename,
+                    sha256=sha256(written),
+                    bytes=len(written),
+                    payload_sha256=payload,
+                )
+            )
+    return tuple(artefacts), replayed
+
+
+def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progress: Progress) -> Check:
+    """Judge all artefacts against the continuous motion, and keep the verdict on the worst."""
+    progress("checking by co-simulation")
+    machines = planned.trial.machines
+    further = further_scenarios(spec, machines)
+    checks = []
+    for setpoints in replayed:
+        if spec.check.foreign is not None:
+            checks.append(judge_foreign(spec, spec.check.foreign, setpoints, [*machines, *further]))
+            continue
+        found = cosimulate(
+            spec,
+            setpoints,
+            machines,
+            output_step=sample_spacing(spec, setpoints, machines),
+            on_build=lambda: progress("compiling the plant's FMU, once"),
+        )
+        expected = planned.trial.swing.at(found[0].times)
+        check = judge(spec, setpoints, machines, found, expected)
+        checks.append(
+            with_further(
+                spec,
+                setpoints,
+                check,
+                further,
+                lambda done, total: progress(f"checking by co-simulation, {done} of {total} scenarios"),
+            )
+        )
+    return max(checks, key=lambda check: check.demand)
+
+
+def _manifest(spec: Spec, planned: Plan, artefacts: tuple[Artefact, ...], check: Check | None) -> Manifest:
+    return Manifest(
+        name=spec.name,
+        spec=spec.to_dict(),
+        spec_sha256=spec.sha256(),
+        profile_sha256=planned.trial.command.payload_hash(),
+        versions={library: version(library) for library in LIBRARIES},
+        artefacts=artefacts,
+        check=None if check is None else check.to_dict(),
+    )
+
+
+def _after_earlier_ones(manifest: Manifest, path: Path) -> Manifest:
+    """Keep what the manifest in the output folder says of files that stay; replace a damaged one."""
+    if not path.is_file():
+        return manifest
+    with suppress(OutputError):
+        return manifest.after(parse_manifest(path.read_bytes(), str(path)))
+    return manifest

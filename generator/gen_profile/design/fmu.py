@@ -1,0 +1,171 @@
+"""From a spec to an FMU of its plant, of its motion, or of both, joined in one FMU or as a system of two."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.artefacts.writing import deliver
+from gen_profile.design.plan import plan, timed
+from gen_profile.errors import CosimulationError, InfeasibleProblem
+from gen_profile.motion.profile import Profile
+from gen_profile.problem.linearization import linearize
+from gen_profile.spec.model import Spec
+from gen_profile_fmu.building import build_fmu
+from gen_profile_fmu.fmu_files import Version
+from gen_profile_fmu.model import AUTHOR, Model, identifier_of, plant_model, profile_model, system_model
+from gen_profile_fmu.nominals import smooth_move, state_nominals
+from gen_profile_fmu.plant_variables import InputKind, Machine
+from gen_profile_fmu.platforms import PLATFORMS, host_platform
+from gen_profile_fmu.system_structure import ssp
+
+PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
+KINDS = ("plant", "profile", "system", "ssp")
+
+
+@attrs.frozen(kw_only=True)
+class Export:
+    """An FMU, or a system of FMUs, that was written.
+
+    Attributes
+    ----------
+    path : Path
+    content : bytes
+    identifier : str
+        The FMU's model identifier, or the system's name.
+    version : Version
+    platforms : tuple of str
+        That it has binaries for.
+    """
+
+    path: Path
+    content: bytes
+    identifier: str
+    version: Version
+    platforms: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        host = host_platform()
+        return {
+            "path": str(self.path),
+            "sha256": hashlib.sha256(self.content).hexdigest(),
+            "bytes": len(self.content),
+            "fmi": self.version.value,
+            "model_identifier": self.identifier,
+            "platforms": [{"name": name, "runs_here": name == host} for name in self.platforms],
+        }
+
+
+def export_fmu(
+    spec: Spec,
+    kind: str,
+    *,
+    version: Version,
+    input_kind: InputKind,
+    platforms: tuple[str, ...],
+    path: Path | None,
+    author: str = AUTHOR,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Export:
+    """Write an FMU, or a system of two.
+
+    Parameters
+    ----------
+    spec : Spec
+    kind : str
+        One of `KINDS`.
+    version : Version
+    input_kind : InputKind
+        What a plant's drives are asked for; nothing else has inputs.
+    platforms : tuple of str
+        Names of `PLATFORMS`; none for sources only.
+    path : Path or None
+        Named after the spec in the working folder if not given.
+    author : str
+        Who made the model.
+    progress : callable
+        Told what is being done.
+
+    Raises
+    ------
+    GenProfileError
+        Nothing was written.
+    """
+    is_system = kind == "ssp"
+    identifier = identifier_of(spec.name if is_system else f"{spec.name} {kind}")
+    path = path or Path(f"{identifier}.{'ssp' if is_system else 'fmu'}")
+
+    def built(model: Model) -> bytes:
+        return build_fmu(attrs.evolve(model, author=author), version, platforms, progress)
+
+    if is_system:
+        profile = _model(spec, "profile", input_kind, progress)
+        plant = _model(spec, "plant", input_kind, progress)
+        content = ssp(identifier, profile, plant, spec.export.cycle_time, built)
+    else:
+        content = built(_model(spec, kind, input_kind, progress))
+    deliver(path, content)
+    return Export(path=path, content=content, identifier=identifier, version=version, platforms=platforms)
+
+
+def platform_names(choice: str) -> tuple[str, ...]:
+    """Turn ``"host"``, ``"all"`` or a platform's name into names of `PLATFORMS`."""
+    match choice:
+        case "host":
+            return (host_platform(),)
+        case "all":
+            return tuple(PLATFORMS)
+    return (choice,)
+
+
+def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Callable[[str], None]) -> Model:
+    name = identifier_of(f"{spec.name} {kind}")
+    if kind == "plant":
+        return plant_model(_machine(spec, _rough_nominals(spec)), input_kind, name)
+    progress("solving")
+    trial = plan(timed(spec)).trial
+    if kind == "profile":
+        return profile_model(name, spec.machine().actuated, trial.command)
+    return system_model(name, _machine(spec, _nominals(spec, trial.motion)), trial.command)
+
+
+def _machine(spec: Spec, nominal: Mapping[str, float]) -> Machine:
+    move = spec.move
+    return Machine(
+        plant=spec.machine(),
+        parameters=spec.plant.parameters,
+        tau=spec.actuator.tau or 0.0,
+        period=spec.export.cycle_time,
+        position=move.start,
+        initial=move.initial,
+        nominal=nominal,
+    )
+
+
+def _nominals(spec: Spec, motion: Profile) -> dict[str, float]:
+    return state_nominals(spec.machine(), spec.plant.parameters, motion, spec.move.initial)
+
+
+def _rough_nominals(spec: Spec) -> dict[str, float]:
+    """Find how large the states become in a move as the spec's, without solving.
+
+    None are found where that would throw a load over: a plant is good for other moves, too.
+    """
+    try:
+        return _nominals(spec, _rough_motion(spec))
+    except (CosimulationError, InfeasibleProblem):
+        return {}
+
+
+def _rough_motion(spec: Spec) -> Profile:
+    move, duration = spec.move, spec.move.duration
+    if move.shortest:
+        slowest = linearize(spec.machine(), spec.plant.parameters, move.target).frequencies[0]
+        duration = PERIODS * 2.0 * np.pi / slowest
+    return smooth_move(move.start, move.target, duration)

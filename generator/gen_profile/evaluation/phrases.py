@@ -1,0 +1,75 @@
+"""How figures, moves and machines read, in a terminal and in a report."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from gen_profile.spec.model import Spec
+from gen_profile.units import UNITS
+
+SMALLEST, LARGEST = 1e-4, 1e4  # beyond, four digits would need a power of ten
+
+
+def number(value: float) -> str:
+    """Write four digits, and none below a hundred-thousandth: of a millimetre, that is numerical error."""
+    kept = round(value, 5) + 0.0
+    if abs(kept) >= LARGEST:
+        text = f"{kept:.0f}"
+    elif 0.0 < abs(kept) < SMALLEST:
+        text = f"{kept:.5f}"
+    else:
+        text = f"{kept:.4g}"
+    return text.replace("-", "−")
+
+
+def mm(metres: float) -> str:
+    """Write a length in mm."""
+    return f"{number(1e3 * metres)} mm"
+
+
+def named(values: Mapping[str, object]) -> list[str]:
+    """Write each value behind its name."""
+    return [
+        f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in values.items()
+    ]
+
+
+def bound(metres: float) -> str:
+    """Write a numerical error in µm, two digits."""
+    return f"{1e6 * metres:.2g} µm"
+
+
+def machine(name: str) -> str:
+    """Write a scenario's name with signs and units that stay together."""
+    return re.sub(r"-(?=[0-9.])", "−", name).replace(" %", "\N{NO-BREAK SPACE}%")
+
+
+def place_unit(spec: Spec, column: int) -> tuple[str, float]:
+    """Say in which unit an axis's places are told, its controller's, and how many of it make one SI unit.
+
+    Counts of an encoder tell nobody anything; they are told in SI units.
+    """
+    scale, axis = spec.axis_scales()[column], spec.machine().actuated[column]
+    if scale.unit not in UNITS:
+        return axis.unit, 1.0
+    return scale.unit, UNITS[scale.unit][1]
+
+
+def move(spec: Spec) -> str:
+    """Say what moves, how far, and in what time."""
+    axes = spec.machine().actuated
+    distances = " and ".join(
+        f"{axis.name} {number(factor * distance)} {unit}"
+        for axis, distance, (unit, factor) in zip(
+            axes, spec.move.distance, (place_unit(spec, column) for column in range(len(axes))), strict=True
+        )
+    )
+    return f"{distances} in {number(spec.move.duration)} s"
+
+
+def uncertain(spec: Spec) -> str:
+    """Say which parameters may be off, and by how much."""
+    ranges = spec.robustness.uncertain
+    return ", ".join(f"{name} ±{number(100.0 * share)} %" for name, share in ranges.items()) or "none stated"

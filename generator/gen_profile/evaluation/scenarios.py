@@ -1,0 +1,121 @@
+"""What a motion is tried on: machines at the ends and corners of their ranges, drives, random draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+
+import attrs
+import numpy as np
+from scipy.stats import qmc
+
+from gen_profile.motion.profile import Array
+from gen_profile.spec.model import Spec
+from gen_profile.verification.verdict import TIMING, Scenario
+
+NOMINAL = "nominal"
+LAG = "lag"
+MOST_TRACED = 3  # ranges whose machines are all followed in full, which takes much longer than peaks alone
+FEWEST_TIMINGS = 20  # draws of uneven times
+
+
+def scenarios(spec: Spec) -> tuple[Scenario, ...]:
+    """List the nominal machine, then that with all uncertain parameters at their upper ends, and the rest.
+
+    Corners of many ranges are left to `further_scenarios`, but for the two extreme ones.
+    """
+    ranges = spec.checked_ranges()
+    ends = _corners(ranges)
+    if len(ranges) > MOST_TRACED:
+        ends = [ends[0], ends[-1]]
+    if len(ranges) > 1:
+        ends += [{name: end} for name in ranges for end in (1, 0)]
+    nominal = Scenario(name=NOMINAL, parameters=spec.plant.parameters)
+    return _numbered([nominal, *_off_nominal(spec, ends)])
+
+
+def extremes(spec: Spec) -> tuple[int, ...]:
+    """Tell which of `scenarios` are nominal, all parameters at upper ends, and all at lower ends."""
+    ranges = len(spec.checked_ranges())
+    return (0, 1, 2**ranges if ranges <= MOST_TRACED else 2) if ranges else (0,)
+
+
+def further_scenarios(spec: Spec, machines: Sequence[Scenario]) -> tuple[Scenario, ...]:
+    """List what else `[check]` asks for: more corners, other drives, random draws, faults of timing.
+
+    Parameters
+    ----------
+    spec : Spec
+    machines : sequence of Scenario
+        Of `scenarios`.
+    """
+    path = spec.check.path
+    others: list[Scenario] = []
+    ranges = spec.checked_ranges()
+    if len(ranges) > MOST_TRACED:
+        others += [
+            attrs.evolve(corner, group="corners") for corner in _off_nominal(spec, _corners(ranges)[1:-1])
+        ]
+    if path.bends:
+        for lag in dict.fromkeys(path.lag or (None,)):
+            words = "" if lag is None else f", lag {lag:.6g} s"
+            others += [
+                attrs.evolve(machine, name=f"{machine.name}{words}", group="drives", lag=lag)
+                for machine in machines
+            ]
+    others += _draws(spec)
+    if path.faulty:
+        for draw in range(max(FEWEST_TIMINGS, len(machines))):
+            machine = machines[draw % len(machines)]
+            name = f"{machine.name}, timing {draw}"
+            others.append(attrs.evolve(machine, name=name, group=TIMING, lag=path.lag and path.lag[1]))
+    return _numbered(others, len(machines))
+
+
+def _numbered(rows: Sequence[Scenario], first: int = 0) -> tuple[Scenario, ...]:
+    return tuple(attrs.evolve(row, row=first + index) for index, row in enumerate(rows))
+
+
+def _corners(ranges: Mapping[str, object]) -> list[dict[str, int]]:
+    """List the corners of some ranges by the ends (1 upper, 0 lower) that meet there; none of no ranges."""
+    corners = (dict(zip(ranges, ends, strict=True)) for ends in product((1, 0), repeat=len(ranges)))
+    return [corner for corner in corners if corner]
+
+
+def _off_nominal(spec: Spec, corners: Sequence[Mapping[str, int]]) -> Iterator[Scenario]:
+    """Put parameters to the lower (0) or upper (1) ends of their ranges."""
+    ranges, nominal = spec.checked_ranges(), spec.plant.parameters
+    for corner in corners:
+        shifted = {name: ranges[name][end] for name, end in corner.items()}
+        words = [_offset(spec, name, value) for name, value in shifted.items()]
+        yield Scenario(name=", ".join(words), parameters={**nominal, **shifted})
+
+
+def _offset(spec: Spec, name: str, value: float) -> str:
+    """Name a parameter's value relative to the nominal one, but where it is stated as it is."""
+    if name in spec.check.spans:
+        return f"{name} {value:.6g}"
+    return f"{name} {100.0 * (value / spec.plant.parameters[name] - 1.0):+.6g} %"
+
+
+def _draws(spec: Spec) -> list[Scenario]:
+    """Draw machines, and the drives' lag where it has a range, as a Latin hypercube."""
+    lag = spec.check.path.lag
+    ranges = spec.checked_ranges() | ({LAG: lag} if lag is not None else {})
+    if not (ranges and spec.check.samples):
+        return []
+    ends = np.array(list(ranges.values()))
+    values = ends[:, 0] + _latin_hypercube(spec, len(ranges)) * (ends[:, 1] - ends[:, 0])
+    rows = []
+    for draw, drawn in enumerate(values.tolist()):
+        named = dict(zip(ranges, drawn, strict=True))
+        lag_drawn = named.pop(LAG, None) if lag is not None else None
+        parameters = {**spec.plant.parameters, **named}
+        rows.append(Scenario(name=f"sample {draw}", parameters=parameters, group="samples", lag=lag_drawn))
+    return rows
+
+
+def _latin_hypercube(spec: Spec, dimensions: int) -> Array:
+    generator = np.random.default_rng(spec.check.seed)
+    drawn: Array = qmc.LatinHypercube(dimensions, seed=generator).random(spec.check.samples)
+    return drawn

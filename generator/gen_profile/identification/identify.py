@@ -1,0 +1,322 @@
+"""From measurements on site to a spec whose machine they determine, and whose uncertainty they state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+import tomli_w
+
+from gen_profile.artefacts.writing import staged
+from gen_profile.errors import InfeasibleProblem, SpecError
+from gen_profile.identification.estimation import CONFIDENCE, Estimate, estimate
+from gen_profile.identification.fit import Machine
+from gen_profile.identification.log_table import read_text
+from gen_profile.identification.measurements import (
+    GREATEST,
+    DirectReading,
+    Measurement,
+    Period,
+    SwingLog,
+    parse_swing,
+)
+from gen_profile.identification.uncertainty import WIDEST
+from gen_profile.plants.plant import Plant
+from gen_profile.spec.model import Spec
+from gen_profile.suggestion import suggestion
+from gen_profile.units import UNITS
+
+TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}  # how many of them make a second
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Identification:
+    """Outcome of an identification.
+
+    Attributes
+    ----------
+    given, spec : Spec
+        What the search began with, and what it ended in.
+    readings : tuple of DirectReading or Period
+    logs : tuple of SwingLog
+    estimate : Estimate
+    q_a : tuple of float
+        Where the axes stood, in m or rad.
+    """
+
+    given: Spec
+    spec: Spec
+    readings: tuple[DirectReading | Period, ...]
+    logs: tuple[SwingLog, ...]
+    estimate: Estimate
+    q_a: tuple[float, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        found, units = self.estimate, {q.name: q.unit for q in self.spec.machine().parameters}
+        return {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "confidence": CONFIDENCE,
+            "contradiction": found.contradiction,
+            "parameters": {
+                name: {
+                    "unit": units[name],
+                    "given": self.given.plant.parameters[name],
+                    "value": value,
+                    "standard_uncertainty": found.standard_uncertainty[name],
+                    "half_range": found.half_range[name],
+                    "stated": self.given.robustness.uncertain.get(name),
+                    "uncertain": self.spec.robustness.uncertain.get(name),
+                    "rests_on": found.rests_on[name],
+                }
+                for name, value in found.values.items()
+            },
+            "readings": [
+                {
+                    **attrs.asdict(reading),
+                    "model": model,
+                    "unit": units[reading.parameter] if isinstance(reading, DirectReading) else "s",
+                }
+                for reading, model in zip(self.readings, found.model, strict=True)
+            ],
+            "logs": [
+                {
+                    "load": log.load,
+                    "quantity": log.quantity,
+                    "samples": len(log.times),
+                    "unit": log.unit,
+                    "swing": float(np.ptp(log.values)) / 2.0,
+                    "noise": noise,
+                    "unrest": unrest,
+                    "misfit": None
+                    if left is None
+                    else {"rms": left.rms, "frequency_rad_per_s": left.frequency, "widened": widened},
+                }
+                for log, noise, unrest, left, widened in zip(
+                    self.logs, found.noise, found.unrest, found.misfits, found.widened, strict=True
+                )
+            ],
+        }
+
+
+def read_swing(
+    path: Path,
+    spec: Spec,
+    *,
+    columns: tuple[str, str],
+    signal: str,
+    unit: str | None,
+    time_unit: str,
+    after: float,
+) -> SwingLog:
+    """Read a logged swing of a spec's machine.
+
+    Parameters
+    ----------
+    path : Path
+        Table with a column of times and one of values.
+    columns : (str, str)
+        Their names, or their numbers from 1.
+    signal : str
+        What the values are: ``angle`` or ``sway`` of the first load, or of a named one, ``angle:hook``.
+    unit : str or None
+        Of the values; rad or m by default. A number before it is the size of one count, ``0.09 deg``.
+    time_unit : str
+        One of `TIME_UNITS`.
+    after : float
+        Time in s from which on the axes stood still.
+
+    Raises
+    ------
+    SpecError
+        The machine has no such signal.
+    OutputError
+        The file cannot be read.
+    """
+    loads = spec.machine().loads
+    quantity, _, named = signal.partition(":")
+    load = named or loads[0]
+    si_units = {"angle": "rad", "sway": "m"}
+    if quantity not in si_units:
+        raise SpecError(f"--signal: unknown signal {quantity!r}{suggestion(quantity, si_units)}")
+    if load not in loads:
+        raise SpecError(f"--signal: unknown load {load!r}{suggestion(load, loads)}")
+    per_unit = _per_unit(unit or si_units[quantity], quantity, si_units[quantity])
+    log = parse_swing(
+        read_text(path, "--swing"),
+        str(path),
+        columns=columns,
+        per_second=TIME_UNITS[time_unit],
+        per_unit=per_unit,
+        after=after,
+        quantity=quantity,
+        load=load,
+    )
+    if quantity == "angle" and (span := float(np.ptp(log.values))) > math.pi:
+        raise SpecError(
+            f"--unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?"
+        )
+    return log
+
+
+def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
+    """Say how many of a log's steps make a radian or metre."""
+    name = unit.lstrip("0123456789. ").rstrip()
+    size = unit.rstrip().removesuffix(name).strip()
+    fitting = [known for known, (si, _) in UNITS.items() if si == si_unit]
+    if name not in fitting:
+        raise SpecError(f"--unit: {unit!r} does not measure {quantity}{suggestion(name, fitting)}")
+    try:
+        step = float(size or 1.0)
+    except ValueError:
+        step = 0.0
+    if step <= 0.0:
+        raise SpecError(f"--unit: {unit!r} shall begin with the size of a count, as in 0.0879 {name}.")
+    return UNITS[name][1] / step
+
+
+def identify(
+    spec: Spec,
+    measurements: Sequence[Measurement],
+    free: Sequence[str] = (),
+    q_a: Sequence[float] | None = None,
+) -> Identification:
+    """Identify parameters of a spec's machine, and put them and their ranges into the spec.
+
+    Parameters
+    ----------
+    spec : Spec
+        Its parameters are where the search starts; those that are not identified are taken as exact.
+    measurements : sequence of Measurement
+    free : sequence of str
+        Parameters to identify, beside those that were read directly.
+    q_a : (m,) sequence of float, optional
+        Where the axes stood while periods and swings were measured; the target of the move by default.
+
+    Raises
+    ------
+    SpecError
+        A measurement or parameter does not belong to the machine.
+    InfeasibleProblem
+        The measurements do not determine the parameters, or not well enough to be of use.
+    """
+    plant = spec.machine()
+    logs = tuple(m for m in measurements if isinstance(m, SwingLog))
+    readings = tuple(m for m in measurements if not isinstance(m, SwingLog))
+    read = [reading.parameter for reading in readings if isinstance(reading, DirectReading)]
+    asked = {*free, *read}
+    _require_known(plant, readings, asked)
+    stood = tuple(spec.move.target if q_a is None else q_a)
+    if len(stood) != len(plant.actuated):
+        raise SpecError(f"--at: must hold one position per axis ({len(plant.actuated)}), found {len(stood)}.")
+    if not all(abs(place) <= GREATEST for place in stood):
+        raise SpecError(f"--at: must be places in m or rad, found {', '.join(f'{x:g}' for x in stood)}.")
+    found = estimate(
+        Machine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
+        [q.name for q in plant.parameters if q.name in asked],
+        readings,
+        logs,
+    )
+    return Identification(
+        given=spec,
+        spec=_identified(spec, found),
+        readings=readings,
+        logs=logs,
+        estimate=found,
+        q_a=stood,
+    )
+
+
+def write_spec(spec: Spec, path: Path, text: str | None = None) -> None:
+    """Write a spec as TOML, and the machine's file beside it where the user wrote one.
+
+    Parameters
+    ----------
+    spec : Spec
+    path : Path
+    text : str, optional
+        That states it; by default it is written out in full.
+
+    Raises
+    ------
+    OutputError
+    """
+    with staged(path.parent) as staging:
+        if spec.plant.file is not None:
+            staging.write(spec.plant.file.name, spec.plant.file.content)
+        staging.write(path.name, (text or tomli_w.dumps(spec.to_dict())).encode("utf-8"))
+        staging.deliver()
+
+
+def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], asked: set[str]) -> None:
+    known = {q.name: q for q in plant.parameters}
+    faults = [f"{name}: unknown parameter{suggestion(name, known)}" for name in sorted(asked - known.keys())]
+    for reading in (reading for reading in readings if isinstance(reading, DirectReading)):
+        parameter = known.get(reading.parameter)
+        if parameter and not parameter.lower <= reading.value <= parameter.upper:
+            faults.append(
+                f"--measured {parameter.name}: must be from {parameter.lower:g} to {parameter.upper:g} "
+                f"{parameter.unit}, found {reading.value:g}."
+            )
+    modes = len(plant.unactuated)
+    faults += [
+        f"--period: the machine has {modes} modes, found mode {reading.mode}."
+        for reading in readings
+        if isinstance(reading, Period) and reading.mode > modes
+    ]
+    if not asked:
+        faults.append(
+            "Name what to identify: --free NAME, or read it directly, --measured NAME=VALUE±UNCERTAINTY."
+        )
+    if faults:
+        raise SpecError(*faults)
+
+
+def _identified(spec: Spec, found: Estimate) -> Spec:
+    """Put the parameters and their ranges into a spec."""
+    shares = {
+        name: found.half_range[name] / abs(value) for name, value in found.values.items() if value != 0.0
+    }
+    wide = {name: share for name, share in shares.items() if share > WIDEST}
+    if wide:
+        words = " and ".join(f"{name} to ±{100.0 * share:.0f} % only" for name, share in wide.items())
+        if found.contradiction > 1.0:
+            raise InfeasibleProblem(
+                f"The measurements contradict one another by {found.contradiction:.2g} times their "
+                f"uncertainties, so they determine {words}; look for the wrong one."
+            )
+        raise InfeasibleProblem(f"The measurements determine {words}; measure better, or take it as known.")
+    values = {name: _rounded(value, found.standard_uncertainty[name]) for name, value in found.values.items()}
+    robustness = spec.robustness
+    robust = robustness.method if robustness.uncertain else "sensitivity"
+    stated = robustness.uncertain  # what a rope does in service: that it was measured once narrows nothing
+    found_shares = {name: max(_rounded_up(share), stated.get(name, 0.0)) for name, share in shares.items()}
+    uncertain = {**stated, **found_shares}
+    order = [name for name in spec.plant.parameters if name in uncertain]
+    return attrs.evolve(
+        spec,
+        plant=attrs.evolve(
+            spec.plant,
+            parameters={**spec.plant.parameters, **values},
+            defaults=tuple(name for name in spec.plant.defaults if name not in found.values),
+        ),
+        robustness=attrs.evolve(
+            robustness, method=robust, uncertain={name: uncertain[name] for name in order}
+        ),
+    )
+
+
+def _rounded(value: float, uncertainty: float) -> float:
+    """Leave out the digits that are worth less than a hundredth of the uncertainty."""
+    return round(value, 2 - math.floor(math.log10(uncertainty)))
+
+
+def _rounded_up(share: float) -> float:
+    """Keep two digits of a share, rounded up."""
+    digits = 1 - math.floor(math.log10(share))
+    return math.ceil(share * 10.0**digits) / 10.0**digits

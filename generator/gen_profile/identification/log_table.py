@@ -1,0 +1,178 @@
+"""Tables that loggers write: columns between semicolons, tabs or commas, decimals with points or commas."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import OutputError
+from gen_profile.motion.profile import Array
+from gen_profile.suggestion import suggestion
+
+SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
+MOST_BYTES = 200_000_000
+GREATEST = 1e12  # ms since 1970, or counts: beyond it a logger wrote rubbish
+# what a file begins with that is no text, and what to do about it
+OTHERS = {
+    b"PK\x03\x04": "a workbook (xlsx, ods) or another archive: open it and save the sheet as CSV",
+    b"\xd0\xcf\x11\xe0": "an old workbook (xls): open it and save the sheet as CSV",
+    b"PAR1": "a Parquet table: convert it to CSV",
+    b"\x1f\x8b": "compressed (gzip): unpack it",
+    b"MDF ": "an MDF measurement: export its signals as CSV",
+}
+
+
+@attrs.frozen(kw_only=True)
+class LogTable:
+    """A table's cells, without blanks around them; rows may differ in length.
+
+    Attributes
+    ----------
+    rows : sequence of sequence of str
+        Of what is no blank line; at least one.
+    decimal_comma : bool
+        Whether a comma may stand for a decimal point.
+    """
+
+    rows: Sequence[Sequence[str]]
+    decimal_comma: bool
+
+    def cell(self, row: int, place: int) -> str:
+        """Text of a cell; empty where the row ends before."""
+        cells = self.rows[row]
+        return cells[place] if place < len(cells) else ""
+
+    def number(self, row: int, place: int) -> float:
+        """Value of a cell; NaN where it holds no finite number."""
+        text = self.cell(row, place)
+        try:
+            value = float(text.replace(",", ".") if self.decimal_comma else text)
+        except ValueError:
+            return math.nan
+        return value if math.isfinite(value) else math.nan
+
+    def seconds(self, row: int, place: int) -> float:
+        """Time of a cell: a number, or a date and time as of ISO 8601, which is told in s; else NaN."""
+        value = self.number(row, place)
+        if not math.isnan(value):
+            return value
+        try:
+            moment = datetime.fromisoformat(self.cell(row, place).replace(",", "."))
+        except ValueError:
+            return math.nan
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+    def place(self, head: int, column: str, source: str) -> int:
+        """Find a column by its name in a row of names, or by its number from 1.
+
+        Raises
+        ------
+        OutputError
+            There is none.
+        """
+        names = self.rows[head] if self.is_head(head) else []
+        if column in names:
+            return names.index(column)
+        if column.isdecimal() and 1 <= int(column) <= len(self.rows[head]):
+            return int(column) - 1
+        known = suggestion(column, names) if names else f"; there are {len(self.rows[head])}, without names."
+        raise OutputError(f"{source}: there is no column {column!r}{known}")
+
+    def is_head(self, row: int) -> bool:
+        """Tell whether a row holds more than numbers."""
+        return any(math.isnan(self.number(row, place)) for place in range(len(self.rows[row])))
+
+    def numbers(self, head: int, places: Sequence[int], source: str) -> Array:
+        """Read columns of numbers, the first of which are times, below a row; shape (rows, columns).
+
+        What stands above the first time is passed over, and rows in which a logger left a cell empty. Dates
+        count from the first, in s.
+
+        Raises
+        ------
+        OutputError
+            A cell holds no number.
+        """
+        time, rows = places[0], []
+        below = range(head + self.is_head(head), len(self.rows))
+        first = next((row for row in below if not math.isnan(self.seconds(row, time))), below.start)
+        for row in range(first, len(self.rows)):
+            held = [self.cell(row, place) for place in places]
+            if not all(held):
+                continue
+            values = [self.seconds(row, time), *(self.number(row, place) for place in places[1:])]
+            for place, text, value in zip(places, held, values, strict=True):
+                if not abs(value) <= GREATEST:
+                    name = self.cell(head, place) if self.is_head(head) else f"column {place + 1}"
+                    raise OutputError(
+                        f"{source}, row {row + 1}: {name} holds {text[:40]!r}, which is no number of a log."
+                    )
+            rows.append(values)
+        table = np.array(rows).reshape(-1, len(places))
+        if rows and math.isnan(self.number(first, time)):  # a date
+            table[:, 0] -= table[0, 0]
+        return table
+
+
+def read_text(path: Path, option: str) -> str:
+    """Read what a logger wrote.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read, or is no text.
+    """
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise OutputError(f"{option} {path}: more than {MOST_BYTES // 10**6} MB; cut the move out of it.")
+        content = path.read_bytes()
+    except OSError as error:
+        raise OutputError(f"{option}: cannot read the log {path}: {error.strerror}.") from error
+    for mark, words in OTHERS.items():
+        if content.startswith(mark):
+            raise OutputError(f"{option} {path}: this is {words}.")
+    return decoded(content)
+
+
+def decoded(content: bytes) -> str:
+    """Decode what a logger wrote: UTF-16 or UTF-8 if it is, else Windows' Western European."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16", errors="replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
+
+
+def read_table(text: str, source: str) -> LogTable:
+    """Split a text into cells.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        Where it comes from, for errors.
+
+    Raises
+    ------
+    OutputError
+        It is empty, or no table.
+    """
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise OutputError(f"{source}: the log is empty.")
+    separator = next(
+        (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines)), ","
+    )
+    try:
+        rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)]
+    except csv.Error as error:
+        raise OutputError(f"{source}: it is no table ({error}).") from error
+    return LogTable(rows=rows, decimal_comma=separator != ",")

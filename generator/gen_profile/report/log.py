@@ -1,0 +1,278 @@
+"""A log of what the machine really did: a table with named columns.
+
+::
+
+    time_s;cart_position_mm;payload_sway_mm;hook_angle_deg
+    0,000;0,0;0,2;0,01
+
+Columns are called as those of the exported CSV or of a stream's log, in one of some languages: a position
+may leave its axis out where there is one only, a sway or an angle its load where the end load is meant. Units
+stand behind the quantity, with an underscore, a space, in brackets, or in the row below; without one an axis
+counts in its own unit, and everything else in SI units. Columns are separated by semicolons, tabs or commas;
+where not by commas, a decimal comma is understood, too. Columns of other names are left alone.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import OutputError
+from gen_profile.identification.log_table import LogTable, read_table, read_text
+from gen_profile.motion.profile import Array, read_only
+from gen_profile.spec.model import Spec
+from gen_profile.units import COUNTS, UNITS
+
+LEAST_SAMPLES = 16
+# what loggers in some countries write, `gen-profile stream --log` among them: in English, German, French,
+# Italian and Spanish; the longest first, lest a part of one be taken for another
+WORDS = {
+    **dict.fromkeys(
+        ("position_actual", "actual_position", "istposition", "position", "posizione"), "position"
+    ),
+    **dict.fromkeys(("posición", "actual", "weg"), "position"),
+    **dict.fromkeys(("time", "zeit", "temps", "tempo", "tiempo"), "time"),
+    **dict.fromkeys(("sway", "auslenkung", "oscillation", "oscillazione", "oscilación"), "sway"),
+    **dict.fromkeys(("angle", "winkel", "angolo", "ángulo"), "angle"),
+}
+_COLUMN = re.compile(
+    r"(?:(?P<owner>\S.*?)[ _.])?(?P<quantity>" + "|".join(WORDS) + r")"
+    r"(?:[ _]?[\[(]?(?P<unit>s|ms|m|mm|um|rad|deg|counts)[\])]?)?",
+    re.IGNORECASE,
+)
+_SI = {"sway": "m", "angle": "rad"}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class MeasuredLog:
+    """Signals of a machine, sampled at the same times.
+
+    Attributes
+    ----------
+    source : str
+        Name of the file.
+    times : (samples,) array
+        s, rising.
+    positions, sways, angles : mapping of str to (samples,) array
+        By axis or load, in m (or rad).
+    ignored : tuple of str
+        Columns of other names.
+    """
+
+    source: str
+    times: Array = attrs.field(converter=read_only)
+    positions: Mapping[str, Array]
+    sways: Mapping[str, Array]
+    angles: Mapping[str, Array]
+    ignored: tuple[str, ...] = ()
+
+
+@attrs.frozen(kw_only=True)
+class _Column:
+    """What a column holds, and what its numbers are divided by."""
+
+    quantity: str
+    owner: str
+    divisor: float
+
+
+def read_log(path: Path, spec: Spec, columns: str | None = None) -> MeasuredLog:
+    """Read a log of a spec's machine.
+
+    Parameters
+    ----------
+    path : Path
+    spec : Spec
+    columns : str, optional
+        Which column holds what, as in ``time_ms=Zeit,payload_sway_mm=4``; told by their names by default.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read, or is no such table.
+    """
+    return parse_log(read_text(path, "--measured"), path.name, spec, columns)
+
+
+def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) -> MeasuredLog:
+    """Read a table's text.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        Name of the file, for errors.
+    spec : Spec
+    columns : str, optional
+        See `read_log`.
+
+    Raises
+    ------
+    OutputError
+        It is no such table.
+    """
+    table = read_table(text, f"--measured {source}")
+    head = _head(table, spec, source, {} if columns is None else _chosen(columns))
+    names = list(table.rows[head])
+    if columns is None:
+        units = table.rows[head + 1] if head + 1 < len(table.rows) else []
+        told = {name: _column(_with_unit(name, unit), spec, source) for name, unit in _pairs(names, units)}
+        known = {name: column for name, column in told.items() if column is not None}
+        _require(known, names, spec, source)
+        places = [names.index(name) for name in known]
+    else:
+        chosen = _chosen(columns)
+        known = {meaning: _required(meaning, spec, source) for meaning in chosen}
+        _require(known, list(chosen), spec, source)
+        places = [table.place(head, column, f"--measured {source}") for column in chosen.values()]
+    order = sorted(range(len(places)), key=lambda place: list(known.values())[place].quantity != "time")
+    numbers = table.numbers(head, [places[place] for place in order], f"--measured {source}")
+    signals = {
+        (column.quantity, column.owner): numbers[:, order.index(place)] / column.divisor
+        for place, column in enumerate(known.values())
+    }
+    times = signals.pop(("time", ""))
+    if len(times) < LEAST_SAMPLES:
+        raise OutputError(f"--measured {source}: needs at least {LEAST_SAMPLES} samples, found {len(times)}.")
+    back = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(back):
+        raise OutputError(
+            f"--measured {source}: the times must rise from row to row, and do not after "
+            f"{times[back[0]]:.6g} s."
+        )
+    by_quantity: dict[str, dict[str, Array]] = {"position": {}, "sway": {}, "angle": {}}
+    for (quantity, owner), values in signals.items():
+        by_quantity[quantity][owner] = read_only(values)
+    return MeasuredLog(
+        source=source,
+        times=times,
+        positions=by_quantity["position"],
+        sways=by_quantity["sway"],
+        angles=by_quantity["angle"],
+        ignored=tuple(name for place, name in enumerate(names) if place not in places),
+    )
+
+
+def _chosen(columns: str) -> dict[str, str]:
+    """Read ``time_ms=Zeit,payload_sway_mm=4``: what is meant, and the column that holds it."""
+    pairs = [part.partition("=") for part in columns.split(",")]
+    if not all(meaning.strip() and column.strip() for meaning, _, column in pairs):
+        raise OutputError(
+            f"--columns {columns!r}: write MEANING=COLUMN for each, such as time_ms=Zeit,payload_sway_mm=4."
+        )
+    return {meaning.strip(): column.strip() for meaning, _, column in pairs}
+
+
+def _required(meaning: str, spec: Spec, source: str) -> _Column:
+    found = _column(meaning, spec, source)
+    if found is None:
+        plant = spec.machine()
+        raise OutputError(
+            f"--columns: {meaning!r} is nothing of this machine; write time_s, "
+            f"{plant.actuated[0].name}_position, "
+            f"{plant.loads[-1]}_sway or {plant.loads[-1]}_angle, with a unit behind such as _mm or _deg."
+        )
+    return found
+
+
+def _head(table: LogTable, spec: Spec, source: str, chosen: Mapping[str, str]) -> int:
+    """Find the row of names, below whatever a logger wrote above it."""
+    for row, cells in enumerate(table.rows):
+        if chosen:
+            found = len(set(cells) & set(chosen.values()))
+        else:
+            found = sum(_COLUMN.fullmatch(cell) is not None for cell in cells) - 1
+        if found > 0:
+            return row
+        if row > 0 and table.is_head(row - 1) and not table.is_head(row):
+            break
+    return 0
+
+
+def _pairs(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, str]]:
+    return [(name, units[place] if place < len(units) else "") for place, name in enumerate(names)]
+
+
+def _with_unit(name: str, below: str) -> str:
+    """Put the unit that stands in the row below a name behind it, where the name has none."""
+    found, unit = _COLUMN.fullmatch(name), below.strip("[]() ")
+    if found is None or found["unit"] or not _COLUMN.fullmatch(f"time_{unit}"):
+        return name
+    return f"{name}_{unit}"
+
+
+def _column(name: str, spec: Spec, source: str) -> _Column | None:
+    """Tell what a column holds from its name; None where it is somebody else's."""
+    found = _COLUMN.fullmatch(name)
+    if found is None:
+        return None
+    owner, unit = found["owner"] or "", (found["unit"] or "").lower()
+    quantity = WORDS[found["quantity"].lower()]
+    if quantity == "time":
+        seconds = {"": 1.0, "s": 1.0, "ms": 1e3}
+        return (
+            _Column(quantity="time", owner="", divisor=seconds[unit])
+            if unit in seconds and not owner
+            else None
+        )
+    plant = spec.machine()
+    if quantity == "position":
+        owners = [axis.name for axis in plant.actuated]
+        owner = owner or (owners[0] if len(owners) == 1 else "")
+    else:
+        owners = list(plant.loads)
+        owner = owner or (owners[-1] if plant.directions == 1 else "")
+    if owner not in owners:
+        return None
+    si = plant.actuated[owners.index(owner)].unit if quantity == "position" else _SI[quantity]
+    divisor = _divisor(spec, owner if quantity == "position" else "", unit or "", si)
+    if divisor is None:
+        raise OutputError(f"--measured {source}: column {name!r} is in {unit}, which does not measure it.")
+    return _Column(quantity=quantity, owner=owner, divisor=divisor)
+
+
+def _divisor(spec: Spec, axis: str, unit: str, si: str) -> float | None:
+    """Find how many of a column's unit make one SI unit; negative where the axis counts the other way."""
+    sign = 1.0
+    if axis:
+        scale = next(scale for scale in spec.axis_scales() if scale.name == axis)
+        if unit in ("", scale.unit):
+            return scale.factor
+        if unit == COUNTS:
+            return scale.counts_per_si
+        sign = math.copysign(1.0, scale.factor)
+    if not unit:
+        return 1.0
+    if unit not in UNITS or UNITS[unit][0] != si:
+        return None
+    return sign * UNITS[unit][1]
+
+
+def _require(known: Mapping[str, _Column], names: Sequence[str], spec: Spec, source: str) -> None:
+    """Hold the columns to what a comparison needs: a time, and something that was measured, each once."""
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise OutputError(f"--measured {source}: two columns are called {twice!r}; rename one.")
+    held = [(column.quantity, column.owner) for column in known.values()]
+    for name, column in known.items():
+        if held.count((column.quantity, column.owner)) > 1:
+            raise OutputError(
+                f"--measured {source}: column {name!r} is there twice, in two units; remove one."
+            )
+    plant = spec.machine()
+    examples = f"{plant.actuated[0].name}_position, {plant.loads[-1]}_sway, {plant.loads[-1]}_angle"
+    if ("time", "") not in held:
+        raise OutputError(
+            f"--measured {source}: there is no column time_s (or time_ms); found {', '.join(names)[:200]}; "
+            "name the column of times, as --columns time_s=1 does."
+        )
+    if len(held) < 2:
+        raise OutputError(
+            f"--measured {source}: there is no column of this machine ({examples}, with units behind "
+            f"such as _mm or _deg); found {', '.join(names)[:200]}."
+        )

@@ -1,0 +1,339 @@
+"""What the machine really did, beside what was planned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import attrs
+import numpy as np
+from scipy.integrate import trapezoid
+from scipy.linalg import null_space
+from scipy.optimize import minimize_scalar
+
+from gen_profile.design.plan import Trial
+from gen_profile.errors import OutputError
+from gen_profile.evaluation.simulation import Response
+from gen_profile.motion.profile import Array
+from gen_profile.problem.linearization import linearize
+from gen_profile.report.log import MeasuredLog
+from gen_profile.spec.model import Spec
+
+STARTS = 400  # starts of the move that are tried before the best is refined
+MOST_FITTED = 4000  # samples
+ANYTHING = 0.1  # rad, of what no angle tells
+PERIODS = 1.0  # of the slowest mode that a log must hold after the arrival for a residual to be judged
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Signal:
+    """One measured quantity and the planned one at the same times.
+
+    Attributes
+    ----------
+    times : (samples,) array
+        s since the start of the move.
+    measured, planned : (samples,) arrays
+    unit : str
+        Theirs: ``"m"`` or ``"rad"``.
+    """
+
+    times: Array
+    measured: Array
+    planned: Array
+    unit: str
+
+    @property
+    def deviation(self) -> Array:
+        """How far the machine is from the plan, shape (samples,)."""
+        return np.asarray(self.measured - self.planned)
+
+    @property
+    def peak(self) -> float:
+        """Greatest deviation."""
+        return float(np.abs(self.deviation).max())
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the deviation over time."""
+        spans = self.times[-1] - self.times[0]
+        return float(np.sqrt(trapezoid(self.deviation**2, self.times) / spans))
+
+    def to_dict(self) -> dict[str, float]:
+        """Nest plain values for JSON."""
+        return {f"deviation_rms_{self.unit}": self.rms, f"deviation_peak_{self.unit}": self.peak}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class MeasuredSway:
+    """A load's sway, and what is left of it after the arrival.
+
+    Attributes
+    ----------
+    signal : Signal
+        Planned for the nominal machine.
+    residual : float or None
+        Greatest distance from its place at rest after the arrival, in m: a sensor's zero does not sway. None
+        where the log ends too soon.
+    limit : float
+        m.
+    from_angles : bool
+        Whether it was computed from the ropes' angles.
+    """
+
+    signal: Signal
+    residual: float | None
+    limit: float
+    from_angles: bool
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the load keeps its limit; None where that cannot be said."""
+        return None if self.residual is None else self.residual <= self.limit
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Measured:
+    """A log held against a trial.
+
+    Attributes
+    ----------
+    log : MeasuredLog
+        What it holds of the move.
+    start : float
+        When the move begins in the whole log, in s.
+    arrival : float
+        When the axes shall stand still, in s since the start.
+    positions : mapping of str to Signal
+        By axis.
+    sways : mapping of str to MeasuredSway
+        By load.
+    angles : mapping of str to Signal
+        By load, of the nominal machine.
+    nearest : int or None
+        Which of the trial's machines swings most like it; None where no swing was logged.
+    loads : tuple of str
+        Of the machine, whether they were logged or not.
+    """
+
+    log: MeasuredLog
+    start: float
+    arrival: float
+    positions: Mapping[str, Signal]
+    sways: Mapping[str, MeasuredSway]
+    angles: Mapping[str, Signal]
+    nearest: int | None
+    loads: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether all loads that were measured keep their limits; None where none could be judged."""
+        verdicts = [sway.passed for sway in self.sways.values() if sway.passed is not None]
+        return all(verdicts) if verdicts else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "passed": self.passed,
+            "start_s": self.start,
+            "nearest": self.nearest,
+            "positions": {name: signal.to_dict() for name, signal in self.positions.items()},
+            "sways": {
+                name: {
+                    **sway.signal.to_dict(),
+                    "residual_m": sway.residual,
+                    "limit_m": sway.limit,
+                    "passed": sway.passed,
+                }
+                for name, sway in self.sways.items()
+            },
+            "angles": {name: signal.to_dict() for name, signal in self.angles.items()},
+        }
+
+
+def compare_measured(
+    spec: Spec, trial: Trial, log: MeasuredLog, arrival: float, start: float | None = None
+) -> Measured:
+    """Hold a log against the plan.
+
+    Parameters
+    ----------
+    spec : Spec
+    trial : Trial
+    log : MeasuredLog
+    arrival : float
+        When the axes stand still, in s since the start of the move.
+    start : float, optional
+        When the move begins in the log, in s; where not given, the start that fits best is taken.
+
+    Raises
+    ------
+    OutputError
+        The log does not hold the move.
+    """
+    start = _best_start(trial, log) if start is None else start
+    move = _the_move(trial, log, start)
+    q_a, responses = trial.motion(move.times).position, trial.swing.at(move.times)
+    plant, loads = spec.machine(), spec.machine().loads
+    sways = {**_sways_of_angles(spec, move, q_a), **move.sways}
+
+    swung = _signals(move.times, sways, responses[0].sway, dict.fromkeys(loads, "m"))
+    units = {axis.name: axis.unit for axis in plant.actuated}
+    return Measured(
+        log=move,
+        start=start,
+        arrival=arrival,
+        positions=_signals(move.times, move.positions, q_a, units),
+        sways={
+            load: _sway(spec, load, signal, arrival=arrival, from_angles=load not in move.sways)
+            for load, signal in swung.items()
+        },
+        angles=_signals(move.times, move.angles, responses[0].angle, dict.fromkeys(loads, "rad")),
+        nearest=_nearest(move, responses, loads),
+        loads=tuple(loads),
+    )
+
+
+def _signals(
+    times: Array, measured: Mapping[str, Array], planned: Array, units: Mapping[str, str]
+) -> dict[str, Signal]:
+    """Pair what was measured with its planned column, which has a name and a unit; leave out what was not."""
+    return {
+        name: Signal(times=times, measured=measured[name], planned=planned[:, column], unit=unit)
+        for column, (name, unit) in enumerate(units.items())
+        if name in measured
+    }
+
+
+def _the_move(trial: Trial, log: MeasuredLog, start: float) -> MeasuredLog:
+    """Cut out of a log what was planned, the swing afterwards included; its times begin with the move."""
+    until = trial.motion.duration + trial.watch
+    kept = (log.times >= start) & (log.times <= start + until)
+    if kept.sum() < 2 or log.times[kept][-1] < start + trial.motion.duration:
+        raise OutputError(
+            f"--measured {log.source}: the log ends before the move that begins at {start:.4g} s in it does; "
+            "log on until the load is at rest, or state the start with --measured-start."
+        )
+
+    def cut(signals: Mapping[str, Array]) -> dict[str, Array]:
+        return {name: values[kept] for name, values in signals.items()}
+
+    return attrs.evolve(
+        log,
+        times=log.times[kept] - start,
+        positions=cut(log.positions),
+        sways=cut(log.sways),
+        angles=cut(log.angles),
+    )
+
+
+def _nearest(move: MeasuredLog, responses: Sequence[Response], loads: Sequence[str]) -> int | None:
+    """Find the machine whose swing is nearest to all that was logged, sensors' zeros aside."""
+    apart = np.zeros(len(responses))
+    for logged, kind in ((move.sways, "sway"), (move.angles, "angle")):
+        for name, values in logged.items():
+            planned = [getattr(response, kind)[:, loads.index(name)] for response in responses]
+            size = float(np.var(planned[0])) or 1.0
+            apart += [float(np.var(values - one)) / size for one in planned]
+    return int(np.argmin(apart)) if move.sways or move.angles else None
+
+
+def _sway(spec: Spec, load: str, signal: Signal, *, arrival: float, from_angles: bool) -> MeasuredSway:
+    frequencies = linearize(spec.machine(), spec.plant.parameters, spec.move.target).distinct_frequencies
+    after = signal.times >= arrival
+    residual = None
+    if after.any() and signal.times[-1] - arrival >= PERIODS * 2.0 * np.pi / frequencies[0]:
+        left = signal.measured[after]
+        residual = float(np.abs(left - _zero(signal.times[after], left, frequencies)).max())
+    return MeasuredSway(
+        signal=signal,
+        residual=residual,
+        limit=spec.check.residual_sway[load],
+        from_angles=from_angles,
+    )
+
+
+def _zero(times: Array, values: Array, frequencies: Array) -> float:
+    """Find what a sensor shows at rest from a swing: the constant beside the machine's modes.
+
+    A mean is off by up to a fifth of the swing unless swings are whole. Least squares are exact for the
+    nominal modes, and Hann's window, which fades out swings cut short, makes up for modes a little off.
+    """
+    stride = -(-len(times) // MOST_FITTED)
+    t, y = times[::stride] - times[0], values[::stride]
+    seen = frequencies[frequencies * np.diff(t).max() < np.pi]
+    waves = (wave(frequency * t) for frequency in seen for wave in (np.cos, np.sin))
+    weights = np.sin(np.pi * (t + t[1]) / (t[-1] + 2.0 * t[1]))  # root of the window; no sample has none
+    basis = np.column_stack([np.ones_like(t), *waves])
+    return float(np.linalg.lstsq(basis * weights[:, None], y * weights)[0][0])
+
+
+def _best_start(trial: Trial, log: MeasuredLog) -> float:
+    """Find when the move begins in a log: where a measured signal is nearest to the planned one.
+
+    An axis' position tells it best; the sway of a load where no axis that moves was logged.
+    """
+    plant, duration = trial.swing.plant, trial.motion.duration
+    ways = np.abs(trial.motion.target - trial.motion.start)
+    axes = [axis.name for axis in plant.actuated]
+    moving = [name for name in log.positions if ways[axes.index(name)] > 0.0]
+    grid = np.linspace(0.0, duration, 2001)
+    if moving:
+        signal = log.positions[moving[0]]
+        planned = trial.motion(grid).position[:, axes.index(moving[0])]
+    else:
+        name, signal = next(iter({**log.sways, **log.angles}.items()))
+        (nominal, *_) = trial.swing.at(grid)
+        seen = nominal.sway if name in log.sways else nominal.angle
+        planned = seen[:, plant.loads.index(name)]
+    times = log.times
+
+    def apart(start: float) -> float:
+        return float(np.mean((signal - np.interp(times - start, grid, planned)) ** 2))
+
+    first, last = float(times[0]) - 0.1 * duration, float(times[-1]) - 0.5 * duration
+    starts = np.linspace(first, max(last, first + duration), STARTS)
+    best = int(np.argmin([apart(start) for start in starts]))
+    step = starts[1] - starts[0]
+    return float(
+        minimize_scalar(
+            apart,
+            bounds=(starts[best] - step, starts[best] + step),
+            method="bounded",
+            options={"xatol": 1e-6},
+        ).x
+    )
+
+
+def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Array]:
+    """Compute the sway of the loads that the ropes' angles tell of.
+
+    The angles are taken to be linear in the coordinates, as ropes' are. What no angle tells of may be
+    anything: a load whose sway depends on that has none.
+    """
+    plant = spec.machine()
+    p, n_u = SimpleNamespace(**spec.plant.parameters), len(plant.unactuated)
+    still = list(map(float, q_a[-1]))
+    rows = [plant.loads.index(name) for name in move.angles]
+    if not rows:
+        return {}
+    columns = [plant.outputs(list(unit), still, p).angle for unit in np.eye(n_u)]
+    gain = np.array(columns, dtype=np.float64).T[rows].reshape(-1, n_u)
+    if not gain.any():
+        return {}
+    measured = np.stack(list(move.angles.values()))
+    q_u = np.linalg.lstsq(gain, measured, rcond=None)[0]
+    unknown = null_space(gain).sum(axis=1)[:, None]
+    told, other = (
+        [
+            np.broadcast_to(np.asarray(sway, dtype=np.float64), len(q_a)).copy()
+            for sway in plant.outputs(list(q), list(q_a.T), p).sway
+        ]
+        for q in (q_u, q_u + ANYTHING * unknown)
+    )
+    return {
+        name: sway
+        for name, sway, same in zip(plant.loads, told, other, strict=True)
+        if np.allclose(sway, same, rtol=1e-9, atol=1e-12)
+    }

@@ -1,0 +1,147 @@
+"""A measured move, told and drawn beside the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gen_profile.charts.curves import TIME, sway_levels
+from gen_profile.charts.figure import PALETTE, Band, Figure, Level, Line, Panel, Style
+from gen_profile.design.plan import Trial
+from gen_profile.evaluation.phrases import machine, mm, number, place_unit
+from gen_profile.motion.profile import Array
+from gen_profile.report.content import Row, Section, Share, Table, Verdict
+from gen_profile.report.measured import Measured, MeasuredSway, Signal
+from gen_profile.spec.model import Spec
+
+DRAWN = 1500  # samples of a log that are drawn; all of them are judged
+PLANNED = Style(colour=PALETTE[0], width=2.0)
+MEASURED = Style(colour=PALETTE[1], width=1.4)
+NEAREST = Style(colour=PALETTE[2], dash="dash", width=1.3)
+
+
+def measured_verdict(measured: Measured) -> Verdict:
+    """Say whether the machine did as it should."""
+    judged = {load: sway for load, sway in measured.sways.items() if sway.residual is not None}
+    if not judged:
+        alone = measured.angles and not measured.sways
+        return Verdict(
+            word="Measured, not judged.",
+            passed=None,
+            sentences=(
+                f"{measured.log.source} tells no sway for as long as one slow swing after the arrival"
+                + (", nor do the angles in it alone: log those of all ropes." if alone else "."),
+            ),
+        )
+    load, worst = max(judged.items(), key=lambda pair: _share(pair[1]))
+    passed = bool(measured.passed)
+    others = [name for name in measured.loads if name not in judged]
+    return Verdict(
+        word="Measured: kept." if passed else "Measured: exceeded.",
+        passed=passed,
+        sentences=(
+            f"On the machine the {load} swings by {mm(worst.residual or 0.0)} after the arrival, "
+            f"and {mm(worst.limit)} are allowed ({measured.log.source}).",
+            *([f"Not measured: the sway of the {' and the '.join(others)}."] if others else []),
+        ),
+    )
+
+
+def measured_section(spec: Spec, trial: Trial, measured: Measured) -> Section:
+    """Draw what was measured over what was planned, with the deviations."""
+    words = [
+        f"The move begins at {number(measured.start)} s in {measured.log.source}.",
+        *_likeness(trial, measured),
+    ]
+    if measured.log.ignored:
+        words.append(f"Columns that were left alone: {', '.join(measured.log.ignored)}.")
+    figure = Figure(
+        caption="Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on.",
+        panels=[*_panels(spec, trial, measured)],
+    )
+    return Section(title="What the machine did", words=[" ".join(words)], blocks=[_table(measured), figure])
+
+
+def _likeness(trial: Trial, measured: Measured) -> Iterator[str]:
+    """Say which of the machines that were tried the real one is most like."""
+    if measured.nearest is not None and len(trial.machines) > 1:
+        yield f"Of the machines tried, {machine(trial.machines[measured.nearest].name)} swings most like it."
+    computed = [load for load, sway in measured.sways.items() if sway.from_angles]
+    if computed:
+        yield f"Sway computed from the ropes' angles and nominal lengths: {', '.join(computed)}."
+
+
+def _table(measured: Measured) -> Table:
+    rows = [
+        *(_row(f"position of {axis}", signal) for axis, signal in measured.positions.items()),
+        *(_row(f"sway of the {load}", sway.signal, sway) for load, sway in measured.sways.items()),
+        *(_row(f"angle of the {load}", signal) for load, signal in measured.angles.items()),
+    ]
+    return Table(head=("", "off the plan, RMS", "at most", "residual", "allowed", "share"), rows=rows)
+
+
+def _row(name: str, signal: Signal, sway: MeasuredSway | None = None) -> Row:
+    cells = [name, *(f"{number(1e3 * value)} m{signal.unit}" for value in (signal.rms, signal.peak))]
+    if sway is None or sway.residual is None:
+        return Row(cells=[*cells, "", "", ""])
+    share = Share(_share(sway))
+    return Row(cells=[*cells, mm(sway.residual), mm(sway.limit), share], mark="" if sway.passed else "failed")
+
+
+def _share(sway: MeasuredSway) -> float:
+    return (sway.residual or 0.0) / sway.limit
+
+
+def _panels(spec: Spec, trial: Trial, measured: Measured) -> Iterator[Panel]:
+    arrival = Band(low=measured.arrival, high=measured.arrival)
+    names = [axis.name for axis in spec.machine().actuated]
+    for axis, signal in measured.positions.items():
+        times, position, planned, deviation = _thinned(signal)
+        unit, factor = place_unit(spec, names.index(axis))
+        yield Panel(
+            title=f"Position of {axis}",
+            x_label=TIME,
+            y_label=f"position ({unit})",
+            lines=[_planned(times, factor * planned), _measured(times, factor * position)],
+            bands=[arrival],
+        )
+        yield Panel(
+            title=f"Deviation of {axis}",
+            x_label=TIME,
+            y_label=f"deviation (m{signal.unit})",
+            lines=[_measured(times, 1e3 * deviation)],
+            bands=[arrival],
+        )
+    loads = list(spec.machine().loads)
+    for load, sway in measured.sways.items():
+        times, found, planned, _ = _thinned(sway.signal)
+        lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * found)]
+        if measured.nearest:
+            like = trial.swing.at(times)[measured.nearest].sway[:, loads.index(load)]
+            name = machine(trial.machines[measured.nearest].name)
+            lines.append(Line(name=f"planned, {name}", x=times, y=1e3 * like, style=NEAREST))
+        levels = sway_levels(spec, load, measured.arrival, float(times[-1]))
+        yield _swinging(f"Sway of the {load}", "sway (mm)", lines, levels, arrival)
+    for load, signal in measured.angles.items():
+        times, found, planned, _ = _thinned(signal)
+        lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * found)]
+        yield _swinging(f"Angle of the {load}", "angle (mrad)", lines, [], arrival)
+
+
+def _swinging(title: str, label: str, lines: list[Line], levels: list[Level], arrival: Band) -> Panel:
+    return Panel(title=title, x_label=TIME, y_label=label, lines=lines, levels=levels, bands=[arrival])
+
+
+def _planned(times: Array, values: Array) -> Line:
+    return Line(name="planned", x=times, y=values, style=PLANNED)
+
+
+def _measured(times: Array, values: Array) -> Line:
+    return Line(name="measured", x=times, y=values, style=MEASURED)
+
+
+def _thinned(signal: Signal) -> tuple[Array, Array, Array, Array]:
+    """Leave out samples that no screen would show: times, measured, planned and deviation."""
+    kept = np.unique(np.linspace(0, len(signal.times) - 1, DRAWN).round().astype(int))
+    return signal.times[kept], signal.measured[kept], signal.planned[kept], signal.deviation[kept]

@@ -1,0 +1,323 @@
+"""The sections of a report, from the values that the workflows found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import tomli_w
+
+from gen_profile.charts.curves import (
+    cast,
+    compared_styles,
+    hamiltonian_figure,
+    motion_figure,
+    other_methods,
+    spectrum_figure,
+    sway_figure,
+)
+from gen_profile.charts.figure import PLAIN
+from gen_profile.comparison.candidates import own_method
+from gen_profile.comparison.compare import Comparison
+from gen_profile.design.design import Design
+from gen_profile.design.plan import Trial
+from gen_profile.evaluation.phrases import bound, machine, mm, number, place_unit
+from gen_profile.motion.metrics import extremes, greatest
+from gen_profile.report.actors import animation
+from gen_profile.report.content import Block, Listing, Row, Section, Share, Table, Terms, Verdict
+from gen_profile.report.measured import Measured
+from gen_profile.report.measured_section import measured_section
+from gen_profile.report.robustness import robustness_section
+from gen_profile.solvers.solution import Solution
+from gen_profile.spec.model import Spec
+from gen_profile.verification.verdict import Check
+
+UNITS_OF_TIME = ("s", "s²", "s³")
+QUANTITIES = ("velocity", "acceleration", "jerk")
+JERK = 3
+MOST_LISTED = 40  # scenarios; the worst of them say enough
+GROUPED = ("how many", "median (mm)", "99 % (mm)", "worst (mm)", "verdict")
+# head → figure, and how many of the head's unit make one of the figure's
+COMPARED = {
+    "time (s)": ("duration_s", 1.0),
+    "a max ({}/s²)": ("acceleration_max_m_per_s2", 1.0),
+    "a RMS ({}/s²)": ("acceleration_rms_m_per_s2", 1.0),
+    "jerk max ({}/s³)": ("jerk_max_m_per_s3", 1.0),
+    "sway on the way (mm)": ("sway_transient_peak_m", 1e3),
+    "residual, nominal (mm)": ("sway_residual_peak_m", 1e3),
+    "residual, worst (mm)": ("sway_residual_worst_m", 1e3),
+}
+
+
+def verdict(check: Check) -> Verdict:
+    """Say first what a reader wants to know: may this be deployed."""
+    if not check.passed:
+        return Verdict(word="Failed.", passed=False, sentences=check.reasons())
+    load, finding = check.worst
+    tried = len(check.judged)
+    return Verdict(
+        word="Passed.",
+        passed=True,
+        sentences=(
+            f"After the move the {load} sways by {mm(finding.residual[load])} at most "
+            f"({machine(finding.scenario.name)}), and {mm(check.limit[load])} are allowed.",
+            f"Co-simulated from the written file in {tried} scenario{'s' if tried > 1 else ''}; "
+            f"numerical error below {bound(check.error_bound)}, counted against the margin.",
+            *(f"Beware: {sentence}" for sentence in check.warnings()),
+        ),
+    )
+
+
+def facts(spec: Spec, trial: Trial, figures: Mapping[str, float], check: Check) -> list[tuple[str, str]]:
+    """Name the few numbers that say what the motion is."""
+    load, finding = check.worst
+    margin = check.limit[load] - finding.residual[load] - check.error_bound
+    return [
+        ("Duration", f"{number(trial.motion.duration)} s"),
+        *(
+            (
+                f"Peak {quantity}{_of(spec, axis.name)}",
+                f"{number(greatest(trial.command, order, column))} {axis.unit}/{per}",
+            )
+            for column, axis in enumerate(spec.machine().actuated)
+            for order, (quantity, per) in enumerate(zip(QUANTITIES, UNITS_OF_TIME, strict=True), start=1)
+            if order < JERK or len(spec.axis) == 1
+        ),
+        ("Sway on the way, nominal", mm(figures["sway_transient_peak_m"])),
+        (f"Residual sway of the {load}, worst", mm(finding.residual[load])),
+        ("Margin left", mm(margin)),
+    ]
+
+
+def sections(
+    outcome: Design, check: Check, comparison: Comparison | None, measured: Measured | None
+) -> Iterator[Section]:
+    """Put the report in the order in which an engineer asks."""
+    spec, trial, shown = outcome.spec, outcome.plan.trial, cast(outcome.plan.trial)
+    if measured is not None:
+        yield measured_section(spec, trial, measured)
+    yield Section(
+        title="The machine plays the move",
+        words=("All machines follow the same setpoints. Dashed: where the loads would be if nothing swung.",),
+        blocks=[animation(spec, trial, shown, check.arrival)],
+    )
+    yield Section(
+        title="Limits and margins",
+        blocks=[_limits(spec, trial, outcome.plan.figures, check)],
+    )
+    yield Section(title="The motion", blocks=[motion_figure(spec, trial), spectrum_figure(spec, trial)])
+    yield Section(
+        title="The loads",
+        blocks=[sway_figure(spec, trial, shown, check.arrival), *_scenarios(check)],
+    )
+    robust = _robustness(spec, trial, comparison)
+    if robust is not None:
+        yield robust
+    if comparison is not None:
+        yield _methods(comparison)
+    yield _evidence(outcome)
+    yield _files(outcome)
+
+
+def _of(spec: Spec, axis: str) -> str:
+    return f", {axis}" if len(spec.axis) > 1 else ""
+
+
+def _limits(spec: Spec, trial: Trial, figures: Mapping[str, float], check: Check) -> Table:
+    """Hold every limit of the spec against what the motion takes of it."""
+    rows = [*_axis_limits(spec, trial)]
+    if spec.limits.sway is not None:
+        rows.append(_limit("sway on the way", figures["sway_transient_peak_m"], spec.limits.sway, "mm", 1e3))
+    for load, limit in check.limit.items():
+        worst = max(finding.residual[load] for finding in check.judged) + check.error_bound
+        rows.append(_limit(f"residual sway of the {load}, error included", worst, limit, "mm", 1e3))
+    return Table(head=("", "takes", "allowed", "margin", "share"), rows=rows)
+
+
+def _axis_limits(spec: Spec, trial: Trial) -> Iterator[Row]:
+    for column, axis in enumerate(spec.machine().actuated):
+        limits = spec.limits.of(column)
+        for order, (quantity, per) in enumerate(zip(QUANTITIES, UNITS_OF_TIME, strict=True), start=1):
+            allowed = getattr(limits, quantity)
+            taken = greatest(trial.command, order, column)
+            name, unit = f"{quantity} of {axis.name}", f"{axis.unit}/{per}"
+            if allowed is None:
+                yield Row(cells=(name, f"{number(taken)} {unit}", "no limit stated", "", ""))
+            else:
+                yield _limit(name, taken, allowed, unit)
+        if limits.travel is not None:
+            unit, factor = place_unit(spec, column)
+            low, high = (factor * end for end in limits.travel)
+            least, most = (factor * end for end in extremes(trial.command, 0, column))
+            margin = min(least - low, high - most)
+            yield Row(
+                cells=(
+                    f"travel of {axis.name}",
+                    f"{number(least)} to {number(most)} {unit}",
+                    f"{number(low)} to {number(high)} {unit}",
+                    f"{number(margin)} {unit}",
+                    "",
+                ),
+            )
+
+
+def _limit(name: str, taken: float, allowed: float, unit: str, factor: float = 1.0) -> Row:
+    texts = (f"{number(factor * value)} {unit}" for value in (taken, allowed, allowed - taken))
+    return Row(cells=(name, *texts, Share(taken / allowed)), mark="failed" if taken > allowed else "")
+
+
+def _scenarios(check: Check) -> Iterator[Table]:
+    """Sum up the groups of scenarios, where there are several, and list the worst scenarios."""
+    groups = check.to_dict()["groups"]
+    if len(groups) > 1:
+        yield Table(head=("scenarios", "", *GROUPED), rows=[_group(group) for group in groups], words=2)
+    loads = list(check.limit)
+    worst_first = sorted(check.findings, key=lambda finding: -_demand(check, finding.residual))
+    listed = worst_first[:MOST_LISTED]
+    what = "scenario" if len(listed) == len(worst_first) else f"the worst of {len(worst_first)} scenarios"
+    yield Table(
+        head=(what, *(f"{load} (mm)" for load in loads), "share of the limit", "verdict"),
+        rows=[
+            Row(
+                cells=(
+                    machine(finding.scenario.name),
+                    *(number(1e3 * finding.residual[load]) for load in loads),
+                    Share(_demand(check, finding.residual)),
+                    "passed" if check.keeps_limit(finding) else "failed",
+                ),
+                mark="" if check.keeps_limit(finding) else "failed",
+            )
+            for finding in listed
+        ],
+    )
+
+
+def _group(group: Mapping[str, Any]) -> Row:
+    sways = (group["quantiles_m"]["0.5"], group["quantiles_m"]["0.99"], group["worst"]["residual_peak_m"])
+    verdict = "passed" if group["passed"] else "failed"
+    return Row(
+        cells=(
+            group["group"],
+            group["what"],
+            str(group["rows"]),
+            *(number(1e3 * sway) for sway in sways),
+            verdict if group["counts"] else f"{verdict}, not counted",
+        ),
+        mark="" if group["passed"] else "failed",
+    )
+
+
+def _demand(check: Check, residual: Mapping[str, float]) -> float:
+    return max((residual[load] + check.error_bound) / limit for load, limit in check.limit.items())
+
+
+def _robustness(spec: Spec, trial: Trial, comparison: Comparison | None) -> Section | None:
+    own = own_method(spec)
+    if comparison is None:
+        return robustness_section(spec, own, {own: trial.motion}, {own: PLAIN})
+    motions = {row.method: row.trial.motion for row in comparison.rows}
+    return robustness_section(
+        spec, own, {**motions, own: trial.motion}, {own: PLAIN, **compared_styles(comparison)}
+    )
+
+
+def _methods(comparison: Comparison) -> Section:
+    spec = comparison.spec
+    unit = spec.machine().actuated[0].unit
+    own = own_method(spec)
+    table = Table(
+        head=("method", *(head.format(unit) for head in COMPARED), "keeps the limit", "Pareto front"),
+        rows=[
+            Row(
+                cells=(
+                    row.method,
+                    *(number(factor * row.figures[key]) for key, factor in COMPARED.values()),
+                    "yes" if row.safe else "no",
+                    "yes" if row.method in comparison.efficient else "",
+                ),
+                mark="own" if row.method == own else "",
+            )
+            for row in comparison.rows
+        ],
+    )
+    left_out = Terms(rows=list(comparison.left_out.items()))
+    advice = [
+        f"{kind.capitalize()}: {advised.method or 'none'}. {advised.reason}"
+        for kind, advised in comparison.recommended.items()
+    ]
+    blocks: list[Block] = [table]
+    if comparison.rows:
+        blocks.append(other_methods(comparison))
+    if comparison.left_out:
+        blocks.append(left_out)
+    return Section(
+        title="Beside other methods",
+        words=(
+            "The same move by optimal motions and input shapers on the same machines; this design's is bold.",
+            *advice,
+        ),
+        blocks=blocks,
+    )
+
+
+def _evidence(outcome: Design) -> Section:
+    solution = outcome.plan.solution
+    if solution is None:
+        shaper = outcome.spec.solver
+        words = (
+            f"The motion is a {shaper.base} move through the shaper {shaper.method}; nothing was optimised."
+        )
+        return Section(title="Solver evidence", words=(words,), blocks=[])
+    optimum = solution.raise_for_status()
+    blocks: list[Block] = [Terms(rows=[*_solver(solution)])]
+    if optimum.hamiltonian is not None:
+        blocks.append(hamiltonian_figure(optimum.knots, optimum.hamiltonian))
+    return Section(title="Solver evidence", blocks=blocks)
+
+
+def _solver(solution: Solution) -> Iterator[tuple[str, str]]:
+    optimum = solution.raise_for_status()
+    yield "Method", f"{solution.method}: {solution.status.value[0].lower()}{solution.status.value[1:]}"
+    yield "Iterations", f"{solution.iterations} on {len(optimum.knots) - 1} intervals"
+    yield "Last step", f"{solution.residual:.1e}, relative"
+    yield "Cost", f"{optimum.cost:.6g} with β = {optimum.sway_weight:.4g} and γ = {optimum.sway_scale:.4g}/m"
+    if optimum.defect is not None:
+        yield "Defect", f"{optimum.defect:.1e}: what the canonical equations miss between nodes, relative"
+    if optimum.hamiltonian_variation is not None:
+        yield "Hamiltonian", f"constant to {optimum.hamiltonian_variation:.1e} of its size"
+    if solution.redundant:
+        names = ", ".join(solution.redundant)
+        yield "Left out", f"sensitivities to {names}: {solution.redundancy}"
+    if solution.worst_case_bound is not None:
+        least = mm(solution.worst_case_bound)
+        yield "Lower bound", f"no motion brings the worst machine below {least}, for small angles"
+
+
+def _files(outcome: Design) -> Section:
+    spec = outcome.spec
+    table = Table(
+        head=("format", "file", "bytes", "SHA-256"),
+        rows=[
+            Row(cells=(artefact.format, artefact.path, str(artefact.bytes), artefact.sha256))
+            for artefact in outcome.artefacts
+        ],
+        words=2,
+        code=True,
+    )
+    hashes = {"Spec": spec.sha256(), "Motion": outcome.plan.trial.command.payload_hash()}
+    if spec.plant.file is not None:
+        hashes[f"Machine {spec.plant.file.name}"] = spec.plant.file.sha256
+    if spec.check.foreign is not None:
+        hashes[f"Judge {spec.check.foreign.name}"] = spec.check.foreign.sha256
+    return Section(
+        title="Files",
+        words=(
+            "gen-profile writes these very bytes for this spec in these formats"
+            + ("." if outcome.passed else ", with --keep-failed only: the check failed."),
+        ),
+        blocks=[
+            table,
+            Terms(rows=[(f"{name}, SHA-256", digest) for name, digest in hashes.items()]),
+            Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict())),
+        ],
+    )

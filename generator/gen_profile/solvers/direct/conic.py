@@ -1,0 +1,150 @@
+"""Conic quadratic programs: a thin typed layer over the solver Clarabel."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Any
+
+import attrs
+import clarabel
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gen_profile.motion.profile import Array
+
+Matrix = Any  # scipy.sparse matrix or array
+TOLERANCE = 1e-10
+MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
+
+
+class Verdict(Enum):
+    """How a program ended."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    FAILED = "failed"
+
+
+_VERDICTS = {
+    "Solved": Verdict.SOLVED,
+    "AlmostSolved": Verdict.SOLVED,  # to about 1e-5 of the tolerance asked for, which is far beyond need
+    "PrimalInfeasible": Verdict.INFEASIBLE,
+    "AlmostPrimalInfeasible": Verdict.INFEASIBLE,
+}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class ConicSolution:
+    """Outcome of a program.
+
+    Attributes
+    ----------
+    verdict : Verdict
+    exact : bool
+        Whether it was solved as exactly as asked for.
+    x : (variables,) array
+    multipliers : list of (rows,) arrays
+        One per constraint, in the order in which they were added.
+    """
+
+    verdict: Verdict
+    exact: bool
+    x: Array
+    multipliers: list[Array]
+
+
+class ConicProgram:
+    """Minimise ``½ xᵀ P x + qᵀ x`` under constraints that are added one by one.
+
+    Parameters
+    ----------
+    units : (variables,) array
+        About how large each variable is; the solver works with their quotients.
+    """
+
+    def __init__(self, units: Array) -> None:
+        self.variables = len(units)
+        self._units = units
+        self._rows: list[Matrix] = []
+        self._sides: list[Array] = []
+        self._cones: list[Any] = []
+
+    def equal(self, matrix: Matrix, side: Array) -> None:
+        """Require ``matrix x = side``."""
+        self._add(matrix, side, clarabel.ZeroConeT(len(side)))
+
+    def at_most(self, matrix: Matrix, side: Array, give: float = 0.0) -> None:
+        """Require ``matrix x ≤ side``, or ``side + give (s − 1)`` with the last variable s."""
+        self._add(*self._giving(matrix, side, np.full(len(side), give)), clarabel.NonnegativeConeT(len(side)))
+
+    def within_cone(self, matrix: Matrix, side: Array, give: float = 0.0) -> None:
+        """Require that ``side − matrix x`` has a first entry no smaller than the length of the rest.
+
+        The first entry is greater by ``give (s − 1)`` with the last variable s.
+        """
+        gives = np.pad([give], (0, len(side) - 1))
+        self._add(*self._giving(matrix, side, gives), clarabel.SecondOrderConeT(len(side)))
+
+    def solve(self, quadratic: Matrix, linear: Array) -> ConicSolution:
+        """Solve for a cost, P given whole and symmetric."""
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.max_iter = MAX_ITERATIONS
+        settings.max_threads = 1  # the same bits whatever the machine
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+        units = sparse.diags(self._units)
+        scaled, slope = sparse.triu(units @ quadratic @ units, format="csc"), self._units * linear
+        size = max(float(np.abs(scaled.data).max(initial=0.0)), float(np.abs(slope).max()))
+        solver = clarabel.DefaultSolver(
+            scaled / size,
+            slope / size,
+            (sparse.vstack(self._rows) @ units).tocsc(),
+            np.concatenate(self._sides),
+            self._cones,
+            settings,
+        )
+        solution = solver.solve()
+        ends = np.cumsum([len(side) for side in self._sides])[:-1]
+        return ConicSolution(
+            verdict=_VERDICTS.get(str(solution.status), Verdict.FAILED),
+            exact=str(solution.status) == "Solved",
+            x=self._units * np.array(solution.x),
+            multipliers=np.split(size * np.array(solution.z), ends),
+        )
+
+    def _giving(self, matrix: Matrix, side: Array, gives: Array) -> tuple[Matrix, Array]:
+        """Let the last variable widen rows."""
+        if not gives.any():
+            return matrix, side
+        column = sparse.csc_matrix(
+            (gives, (np.arange(len(gives)), np.full(len(gives), self.variables - 1))),
+            shape=(len(gives), self.variables),
+        )
+        return matrix - column, side - gives
+
+    def _add(self, matrix: Matrix, side: Array, cone: Any) -> None:
+        self._rows.append(sparse.csc_matrix(matrix, shape=(len(side), self.variables)))
+        self._sides.append(np.asarray(side, dtype=np.float64))
+        self._cones.append(cone)
+
+
+def place(blocks: Array, columns: NDArray[Any], width: int) -> Matrix:
+    """Stack blocks below one another, each with its own first column.
+
+    Parameters
+    ----------
+    blocks : (count, rows, columns) array
+    columns : (count,) array of int
+        Where each block begins.
+    width : int
+        Columns of the result.
+
+    Returns
+    -------
+    (count * rows, width) sparse matrix
+    """
+    count, height, breadth = blocks.shape
+    rows = np.arange(count * height).repeat(breadth)
+    across = (np.asarray(columns)[:, None, None] + np.arange(breadth)).repeat(height, axis=1).ravel()
+    return sparse.csc_matrix((blocks.ravel(), (rows, across)), shape=(count * height, width))

@@ -1,0 +1,200 @@
+"""What the conic programs of the direct method minimise, and keep within bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+
+import attrs
+import numpy as np
+from scipy import sparse
+
+from gen_profile.motion.profile import Array
+from gen_profile.problem.axis_reach import axis_reach
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.pontryagin import SNAP_TIME
+from gen_profile.problem.problem import Problem
+from gen_profile.problem.sway_cost import SwayCost
+from gen_profile.solvers.direct.bezier import Piece, elevation, gram
+from gen_profile.solvers.direct.condensing import IntervalMaps
+from gen_profile.solvers.direct.conic import ConicProgram, Matrix, place
+from gen_profile.solvers.direct.transcription import Iterate, Transcription
+
+WITHIN = 1.0 - 1e-6  # share of a limit that a program may use: its own tolerance must not break the limit
+
+DERIVATIVES = {1: "velocity", 2: "acceleration", 3: "jerk", 0: "travel"}  # of the position, that have limits
+
+
+def effort_form(problem: Problem, piece: Piece) -> Array:
+    """Write twice the effort of an axis as a quadratic form, for an axis measured by its own reach.
+
+    In units of reach² / duration⁶.
+    """
+
+    def square(rows: Array) -> Array:
+        return np.asarray(rows.T @ gram(len(rows) - 1) @ rows * piece.length)
+
+    if problem.effort == "snap":
+        return square(piece.derivative(3)) + (SNAP_TIME / problem.duration) ** 2 * square(piece.derivative(4))
+    if problem.effort == "reference":
+        # ÿ_ref = ÿ + τ y⃛, and ÿ counts as jerk times duration
+        jerk = piece.derivative(3)
+        rows = piece.derivative(2) + (problem.tau or 0.0) / problem.duration * elevation(len(jerk) - 1) @ jerk
+        return square(rows) * problem.duration**2
+    return square(piece.derivative(3))
+
+
+def cost(
+    transcription: Transcription,
+    forms: Sequence[Array],
+    sway_cost: SwayCost,
+    iterate: Iterate,
+    maps: IntervalMaps,
+) -> tuple[Matrix, Array]:
+    """Expand eq. (26) about an iterate to second order: P and q of ``½ xᵀ P x + qᵀ x``.
+
+    Parameters
+    ----------
+    forms : sequence of (size, size) arrays
+        Twice the effort of every axis, dimensionless.
+    sway_cost : SwayCost
+        Divided by the cost's scale.
+    """
+    width = transcription.variables
+    quadratic, linear = transcription.effort(forms, width), np.zeros(width)
+    if sway_cost.beta > 0.0:
+        sway, matrix, offset = transcription.end_sway(iterate, maps, width)
+        points, directions = sway.shape
+        shares = transcription.quadrature()
+        slope, curvature = sway_cost.derivatives(sway)
+        slope, curvature = shares[:, None] * slope, shares[:, None, None] * curvature
+        hessian = place(curvature, np.arange(points) * directions, points * directions)
+        quadratic = quadratic + matrix.T @ hessian @ matrix
+        linear = matrix.T @ (slope.ravel() + hessian @ (offset - sway.ravel()))
+    return quadratic, linear
+
+
+def keep_limits(
+    program: ConicProgram, problem: Problem, transcription: Transcription, loosened: Container[str] = ()
+) -> None:
+    """Bound the command of every axis, and its travel, at every instant.
+
+    Parameters
+    ----------
+    loosened : container of str
+        Places of limits that the program's last variable widens so many times, such as ``limits.jerk``;
+        travel at either end by so many times its width, less one.
+    """
+    duration = problem.duration
+    lag = (problem.tau or 0.0) / duration
+    for axis, reach in enumerate(axis_reach(problem)):
+        limits = problem.limits.of(axis)
+        for order, name in DERIVATIVES.items():
+            limit = getattr(limits, name)
+            if limit is None:
+                continue
+            if order == 0:
+                low, high = ((edge - problem.start[axis]) / reach for edge in limit)
+                give = high - low
+            else:
+                give = high = WITHIN * limit * duration**order / reach
+                low = -high
+            loose = problem.limits.place(axis, name) in loosened
+            rows = transcription.piece.leading(order, lag)
+            transcription.bound(program, rows, (low, high), axis, give if loose else 0.0)
+
+
+def keep_sway(
+    program: ConicProgram,
+    transcription: Transcription,
+    limit: float,
+    iterate: Iterate,
+    maps: IntervalMaps,
+    *,
+    loosened: bool = False,
+) -> None:
+    """Bound the end load's sway of the nominal machine at the collocation points.
+
+    Parameters
+    ----------
+    limit : float
+        m.
+    loosened : bool
+        Let the program's last variable widen it so many times.
+    """
+    sway, matrix, offset = transcription.end_sway(iterate, maps, program.variables)
+    points, directions = sway.shape
+    give = float(loosened)
+    if directions == 1:
+        program.at_most(matrix / limit, 1.0 - offset / limit, give)
+        program.at_most(-matrix / limit, 1.0 + offset / limit, give)
+        return
+    rows = matrix.tocsr()
+    for point in range(points):
+        here = slice(point * directions, (point + 1) * directions)
+        program.within_cone(
+            sparse.vstack([sparse.csr_matrix((1, program.variables)), -rows[here] / limit]),
+            np.concatenate([[1.0], offset[here] / limit]),
+            give,
+        )
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Amplitudes:
+    """How the modes of a machine show in its loads, in shares of the loads' limits.
+
+    Attributes
+    ----------
+    rows : (modes, 2, n) array
+        From the dimensionless state at the end to the two quadratures of every mode.
+    shares : (loads, modes) array
+        What the unit amplitude of a mode takes of the limit of a load.
+    """
+
+    rows: Array
+    shares: Array
+
+
+def amplitudes(
+    problem: Problem, parameters: Mapping[str, float], load_limits: Sequence[float], scale: Array
+) -> Amplitudes:
+    """Linearise a machine about its rest at the target."""
+    linear = linearize(problem.plant, parameters, problem.target)
+    n_u = len(linear.frequencies)
+    inverse = np.linalg.inv(linear.modes)
+    gains = np.abs(linear.sway_gain @ linear.modes) / np.asarray(load_limits)[:, None]
+    greatest = gains.max(axis=0)
+    rows = np.zeros((n_u, 2, 2 * n_u))
+    rows[:, 0, :n_u] = greatest[:, None] * inverse
+    rows[:, 1, n_u:] = (greatest / linear.frequencies)[:, None] * inverse
+    return Amplitudes(rows=rows * scale[: 2 * n_u], shares=gains / greatest)
+
+
+def bound_worst(program: ConicProgram, transcription: Transcription, tried: Sequence[Amplitudes]) -> int:
+    """Bound what every load of every machine can swing to by one variable, the program's last.
+
+    The program must have been posed with `worst_case_variables` extra ones.
+
+    Returns
+    -------
+    int
+        Column of that variable: the worst share of a limit.
+    """
+    worst = program.variables - 1
+    column = transcription.variables
+    for index, machine in enumerate(tried):
+        end = transcription.node_columns(index)[-1:]
+        modes = np.arange(column, column + len(machine.rows))
+        for mode, rows in zip(modes, machine.rows, strict=True):
+            quadratures = place(-rows[None], end, program.variables)
+            radius = place(-np.ones((1, 1, 1)), np.array([mode]), program.variables)
+            program.within_cone(sparse.vstack([radius, quadratures]), np.zeros(3))
+        sums = place(machine.shares[None], modes[:1], program.variables)
+        most = place(np.ones((1, len(machine.shares), 1)), np.array([worst]), program.variables)
+        program.at_most(sums - most, np.zeros(len(machine.shares)))
+        column += len(modes)
+    return worst
+
+
+def worst_case_variables(tried: Sequence[Amplitudes]) -> int:
+    """Count the extra variables that `bound_worst` needs."""
+    return sum(len(machine.rows) for machine in tried) + 1

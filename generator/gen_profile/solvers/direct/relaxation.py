@@ -1,0 +1,175 @@
+"""By how much a problem's limits would have to be wider, or its move longer, for a motion to keep them.
+
+One variable more, the share, widens some of the limits; the least one is the optimum of convex programs like
+those that find motions (see `solvers.direct`). There is one whether or not the problem can be solved, and it
+falls smoothly with the duration: where it is 1, the limits can just be kept.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cache
+
+import attrs
+import numpy as np
+from scipy.optimize import brentq
+
+from gen_profile.motion.profile import Array
+from gen_profile.problem.problem import Problem
+from gen_profile.problem.sway_cost import SwayCost
+from gen_profile.solvers.direct import goals
+from gen_profile.solvers.direct.condensing import IntervalMaps
+from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, Matrix, Verdict
+from gen_profile.solvers.direct.solver import (
+    MAX_ITERATIONS,
+    STEP_TOLERANCE,
+    LeastCost,
+    Setup,
+    sequence,
+    set_up,
+)
+from gen_profile.solvers.direct.transcription import Iterate
+from gen_profile.spec.model import LimitsSpec
+
+PRICES = (1e-5, 1e-3, 1e-1)  # of the effort without limits: ever less sway would take ever more of it
+CHANGE = 1e-4  # of the share, relative, that is worth another program
+DURATION_PRECISION = 5e-3  # relative
+POWER = 1.8  # with which shares fall over the duration, more or less
+STEPS = (math.log(1.1), math.log(2.0))  # of the duration's logarithm
+LITTLE = 0.01  # by which the share's logarithm must fall within the longer of them
+ROUNDS = 12
+UNSETTLED = math.log(1e6)  # in place of the logarithm of a share that was not found
+TINY = 1e-6  # share below which how small it is does not matter
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class LeastShare:
+    """Minimise how many times as wide some limits must be.
+
+    Attributes
+    ----------
+    setup : Setup
+    loosened : tuple of str
+        Places of the limits that are widened; travel by so many times its width, less one, at either end.
+    price : float
+        Of a unit of effort.
+    """
+
+    setup: Setup
+    loosened: tuple[str, ...]
+    price: float
+
+    @property
+    def extra(self) -> int:
+        """Number of variables of its own: the share."""
+        return 1
+
+    def pose(
+        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
+    ) -> tuple[Matrix, Array]:
+        """Add the limits to a program: P and q."""
+        problem, transcription = self.setup.problem, self.setup.transcription
+        goals.keep_limits(program, problem, transcription, self.loosened)
+        if problem.limits.sway is not None:
+            loose = "limits.sway" in self.loosened
+            goals.keep_sway(program, transcription, problem.limits.sway, iterate, maps[0], loosened=loose)
+        linear = np.zeros(program.variables)
+        linear[-1] = 1.0
+        program.at_most(-linear[None], np.zeros(1))
+        return self.price * transcription.effort(self.setup.forms, program.variables), linear
+
+    def step(self, solutions: Sequence[ConicSolution]) -> float:
+        """Measure by how much the share changed last, in units of what would be noticed."""
+        share, before = float(solutions[-1].x[-1]), float("inf")
+        if len(solutions) > 1:
+            before = float(solutions[-2].x[-1])
+        return STEP_TOLERANCE * abs(share - before) / (CHANGE * max(abs(share), TINY))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Relaxed:
+    """The motion for which some limits must be widened least.
+
+    Attributes
+    ----------
+    share : float
+        How many times as wide they must be.
+    iterate : Iterate
+        The motion.
+    """
+
+    share: float
+    iterate: Iterate
+
+
+def relaxed(problem: Problem, loosened: Sequence[str]) -> Relaxed | None:
+    """Find how many times as wide limits must be, where those not loosened stay as they are.
+
+    Parameters
+    ----------
+    problem : Problem
+        With limits; where it has a `worst_case`, no residual sway is asked for.
+    loosened : sequence of str
+        Places of limits, such as ``limits.sway``.
+
+    Returns
+    -------
+    Relaxed or None
+        None where the other limits cannot be kept, or the programs do not settle.
+    """
+    setup, redundant = set_up(problem)
+    if redundant:
+        kept = tuple(name for name in problem.desensitized if name not in redundant)
+        return relaxed(attrs.evolve(problem, desensitized=kept), loosened)
+    setup = attrs.evolve(setup, tried=())
+    free = LeastCost(
+        setup=attrs.evolve(setup, problem=attrs.evolve(problem, limits=LimitsSpec())),
+        sway_cost=SwayCost(beta=0.0, gamma=1.0),
+        sway_limit=None,
+    )
+    unlimited = sequence(setup, setup.transcription.rest(), free)
+    if unlimited.verdict is not Verdict.SOLVED:
+        return None
+    x = unlimited.solutions[-1].x
+    effort = 0.5 * float(x @ (setup.transcription.effort(setup.forms, len(x)) @ x))
+    for price in PRICES:
+        goal = LeastShare(setup=setup, loosened=tuple(loosened), price=price / effort)
+        found = sequence(setup, unlimited.iterate, goal)
+        if found.verdict is Verdict.SOLVED:
+            return Relaxed(share=float(found.solutions[-1].x[-1]), iterate=found.iterate)
+        if found.verdict is Verdict.INFEASIBLE or found.iterations == MAX_ITERATIONS:
+            break
+    return None
+
+
+def least_duration(problem: Problem) -> float | None:
+    """Find the duration in s, no shorter than the problem's, in which all limits can just be kept.
+
+    Returns
+    -------
+    float or None
+        None where the limits cannot be kept however long the move is. The problem's own where the programs do
+        not settle, so that nothing is known.
+    """
+    places = tuple(problem.limits.stated())
+
+    @cache
+    def excess(log_duration: float) -> float:
+        found = relaxed(attrs.evolve(problem, duration=math.exp(log_duration)), places)
+        return UNSETTLED if found is None else math.log(max(found.share, TINY)) - DURATION_PRECISION
+
+    short = math.log(problem.duration)
+    if not places or excess(short) <= 0.0:
+        return problem.duration
+    lowest = short
+    for _ in range(ROUNDS):
+        enough = short + float(np.clip(excess(short) / POWER, *STEPS))
+        if excess(enough) <= 0.0:
+            return math.exp(brentq(excess, short, enough, xtol=DURATION_PRECISION))
+        if excess(enough) < excess(lowest) - LITTLE:
+            lowest = enough
+        elif excess(enough) < UNSETTLED and enough - lowest > STEPS[1]:
+            return None
+        short = enough
+    return problem.duration

@@ -1,0 +1,473 @@
+"""Direct method: the motion's polynomials themselves as variables, found by a few conic programs.
+
+A machine's equations are nearly linear in the motion, and everything else is convex: effort, sway, limits on
+Bézier coefficients, and the amplitudes of the modes after the move. So the equations are linearised about the
+last motion, and the convex program that results is solved to the end, until the motion stays (sequential
+convex programming; Malyuta et al., 2022); where motions overshoot one another, the last few predict the next
+(see `solvers.acceleration`). The first of these programs, linearised at rest, bounds from below what any
+motion can do where angles are small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gen_profile.motion.profile import Array
+from gen_profile.problem.axis_reach import axis_reach
+from gen_profile.problem.dynamics import parameter_column
+from gen_profile.problem.initial_state import initial_state
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.motion_equations import motion_equations
+from gen_profile.problem.pontryagin import SNAP_TIME, optimality_system
+from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
+from gen_profile.problem.sway_cost import SwayCost
+from gen_profile.solvers.direct import goals
+from gen_profile.solvers.direct.bezier import Piece, power_basis
+from gen_profile.solvers.direct.condensing import IntervalMaps, axes_map
+from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, Matrix, Verdict
+from gen_profile.solvers.direct.transcription import Iterate, Machine, Transcription
+from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
+from gen_profile.solvers.indirect.acceleration import accelerate
+from gen_profile.solvers.indirect.boundary_value_problem import Canonical, canonical_problem, independence
+from gen_profile.solvers.solution import Optimum, Solution, Status
+from gen_profile.spec.model import LimitsSpec
+
+METHOD = "direct"
+INTERVALS = 40
+MAX_INTERVALS = 480
+RADIANS_PER_INTERVAL = 1.5  # of the fastest mode, which Gauss collocation then follows to 1e-7 of the cost
+STEP_TOLERANCE = 1e-8  # of the motion's coordinates, relative
+STALLED = 1e-5  # step that is still taken for the programs' own tolerance when it ceases to shrink
+ROUGH = 2e-4  # step that is taken for it where a program was solved less exactly than asked for
+SLOW = 0.3  # share of the step before from which on steps are combined
+MAX_ITERATIONS = 50
+WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
+LEAST_SHARE = 0.01  # of a load's limit, of which a change is still measured
+HORIZONTAL = np.pi / 2.0
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Setup:
+    """A problem, transcribed.
+
+    Attributes
+    ----------
+    problem : Problem
+    transcription : Transcription
+    forms : tuple of (size, size) arrays
+        Twice the effort of every axis, in units of `cost_scale`.
+    cost_scale : float
+        Of the running cost.
+    tried : tuple of Amplitudes
+        Of every machine whose residual sway is to be bounded; empty where end states are zero instead.
+    """
+
+    problem: Problem
+    transcription: Transcription
+    forms: tuple[Array, ...]
+    cost_scale: float
+    tried: tuple[goals.Amplitudes, ...] = ()
+
+    @property
+    def extra(self) -> int:
+        """Number of variables that bounding the worst machine takes."""
+        return goals.worst_case_variables(self.tried) if self.tried else 0
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Found:
+    """Where a sequence of programs ended."""
+
+    verdict: Verdict
+    iterate: Iterate
+    solutions: tuple[ConicSolution, ...]
+    step: float
+
+    @property
+    def iterations(self) -> int:
+        """Number of programs."""
+        return len(self.solutions)
+
+
+class Goal(Protocol):
+    """What programs shall achieve."""
+
+    @property
+    def extra(self) -> int:
+        """Number of variables of its own, the program's last."""
+        ...
+
+    def pose(
+        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
+    ) -> tuple[Matrix, Array]:
+        """Add limits and constraints of its own to a program, and give its cost: P and q."""
+        ...
+
+    def step(self, solutions: Sequence[ConicSolution]) -> float:
+        """Measure by how much what counts changed from one program to the next."""
+        ...
+
+
+def solve(problem: Problem, near: Iterate | None = None) -> Solution:
+    """Find the motion that minimises eq. (26) within the limits and leaves neither sway nor sensitivity.
+
+    Parameters
+    ----------
+    problem : Problem
+    near : Iterate, optional
+        A motion to begin at, in place of standing still.
+
+    Returns
+    -------
+    Solution
+        Never raises for a problem that has none: the status says why.
+    """
+    setup, redundant = set_up(problem)
+    if redundant:
+        kept = tuple(name for name in problem.desensitized if name not in redundant)
+        solution = solve(attrs.evolve(problem, desensitized=kept), near)
+        return attrs.evolve(solution, problem=problem, redundant=redundant)
+    sway_cost, iterations = resolve_sway_cost(problem)
+    start = near or setup.transcription.rest()
+
+    def attempt(sway_limit: float | None) -> Solution:
+        nonlocal iterations, start
+        goal = LeastCost(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
+        found = sequence(setup, start, goal)
+        iterations, start = iterations + found.iterations, found.iterate
+        return conclude(setup, found, sway_cost, iterations)
+
+    return within_sway(problem.limits.sway, attempt)
+
+
+def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
+    """Give β and γ their values, and count the iterations that it took."""
+    if problem.sway_weight == 0.0 or problem.sway_scale is not None:
+        return SwayCost(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
+    quiet = attrs.evolve(problem, sway_weight=0.0, sway_scale=1.0, limits=LimitsSpec(), worst_case=None)
+    solution = solve(quiet)
+    if solution.optimum is None:
+        return SwayCost(beta=0.0, gamma=1.0), solution.iterations
+    effort, sway = solution.optimum.cost / problem.duration, sway_on_the_way(solution)
+    if sway == 0.0:  # a hoist alone swings nothing
+        return SwayCost(beta=0.0, gamma=1.0), solution.iterations
+    return SwayCost(
+        beta=problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2, gamma=AUTO_SWAY / sway
+    ), solution.iterations
+
+
+def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tuple[Setup, tuple[str, ...]]:
+    """Transcribe a problem; also name the parameters whose sensitivities need not be asked for.
+
+    Parameters
+    ----------
+    problem : Problem
+    others : sequence of mapping of str to float
+        Parameters of further machines whose residual sway shall be bounded, with the nominal one's.
+    """
+    system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
+    canonical = canonical_problem(problem, system)
+    asked, redundant = independence(canonical)
+    machines = (
+        _nominal(problem, canonical, asked),
+        *(_other(problem, canonical, parameters) for parameters in others),
+    )
+    jerks = [problem.limits.of(axis).jerk for axis in range(system.layout.m)]
+    commands_jerk = problem.tau is not None and any(jerk is not None for jerk in jerks)
+    intervals = _intervals(problem)
+    piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=1.0 / intervals)
+    reach = axis_reach(problem)
+    transcription = Transcription(
+        intervals=intervals,
+        piece=piece,
+        axes=axes_map(piece, np.array(problem.start), reach, problem.duration),
+        duration=problem.duration,
+        target=np.array(problem.distance) / reach,
+        final_velocity=np.array(problem.final_velocity) * problem.duration / reach,
+        machines=machines,
+    )
+    form, cost_scale = goals.effort_form(problem, piece), canonical.data.cost_scale
+    unit = canonical.data.effort_weights * reach**2 / problem.duration**6 / cost_scale
+    setup = Setup(
+        problem=problem,
+        transcription=transcription,
+        forms=tuple(share * form for share in unit),
+        cost_scale=cost_scale,
+        tried=_amplitudes(problem, machines, others),
+    )
+    return setup, redundant
+
+
+def _nominal(problem: Problem, canonical: Canonical, asked: NDArray[np.bool_]) -> Machine:
+    """State the machine that is to rest at the end, and what it is to be insensitive to."""
+    layout, scale = canonical.system.layout, canonical.data.scale
+    states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
+    exact = problem.worst_case is None or problem.worst_case.nominal_zero
+    modal = np.asarray(np.linalg.inv(canonical.coordinates.basis), dtype=np.float64)
+    swung = initial_state(problem.plant, problem.initial)
+    return Machine(
+        equations=motion_equations(problem.plant, problem.desensitized, problem.order),
+        parameters=parameter_column(problem.plant, dict(problem.parameters)),
+        scale=scale[states],
+        start=np.pad(swung, (0, len(states) - len(swung))) / scale[states],
+        end=modal[np.ix_(states[asked[states] & exact], states)],
+    )
+
+
+def _other(problem: Problem, canonical: Canonical, parameters: Mapping[str, float]) -> Machine:
+    """State a machine of other parameters that follows the same motion."""
+    scale = canonical.data.scale[: 2 * canonical.system.layout.n_u]
+    return Machine(
+        equations=motion_equations(problem.plant, (), problem.order),
+        parameters=parameter_column(problem.plant, dict(parameters)),
+        scale=scale,
+        start=initial_state(problem.plant, problem.initial) / scale,
+        end=np.zeros((0, len(scale))),
+    )
+
+
+def _amplitudes(
+    problem: Problem, machines: Sequence[Machine], others: Sequence[Mapping[str, float]]
+) -> tuple[goals.Amplitudes, ...]:
+    """Say how what every machine swings with at the end shows, where the worst of them counts."""
+    if problem.worst_case is None:
+        return ()
+    limits = problem.worst_case.load_limits
+    return tuple(
+        goals.amplitudes(problem, values, limits, machine.scale)
+        for values, machine in zip([problem.parameters, *others], machines, strict=True)
+    )
+
+
+def _intervals(problem: Problem) -> int:
+    """Resolve the fastest mode and, for snap, the layers at the ends in which it acts."""
+    fastest = linearize(problem.plant, problem.parameters, problem.target).frequencies[-1]
+    enough = fastest * problem.duration / RADIANS_PER_INTERVAL
+    if problem.effort == "snap":
+        enough = max(enough, problem.duration / SNAP_TIME)
+    return int(np.clip(np.ceil(enough), INTERVALS, MAX_INTERVALS))
+
+
+def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
+    """Solve programs linearised about one another's motion until what counts stays."""
+    transcription, iterate = setup.transcription, start
+    solutions: list[ConicSolution] = []
+    points: list[Array] = []
+    images: list[Array] = []
+    step, verdict = float("inf"), Verdict.FAILED
+    while verdict is Verdict.FAILED and len(solutions) < MAX_ITERATIONS:
+        maps = transcription.maps(iterate)
+        program = transcription.program(maps, goal.extra)
+        solutions.append(program.solve(*goal.pose(program, iterate, maps)))
+        if solutions[-1].verdict is not Verdict.SOLVED:
+            verdict = solutions[-1].verdict
+            break
+        before, step = step, goal.step(solutions)
+        points.append(iterate.flat())
+        iterate = transcription.iterate(solutions[-1].x, maps)
+        images.append(iterate.flat())
+        stalled = step < STALLED and step > 0.5 * before
+        if step < STEP_TOLERANCE or stalled or (step < ROUGH and not solutions[-1].exact):
+            verdict = Verdict.SOLVED
+        elif step > SLOW * before:
+            iterate = iterate.of_flat(accelerate(points, images, transcription.importance))
+    return Found(verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class LeastCost:
+    """Minimise eq. (26), with the end load's sway and the worst case within bounds.
+
+    Attributes
+    ----------
+    setup : Setup
+    sway_cost : SwayCost
+    sway_limit : float or None
+        m, on the way.
+    worst : float or None
+        Share of a load's limit, after the move.
+    """
+
+    setup: Setup
+    sway_cost: SwayCost
+    sway_limit: float | None
+    worst: float | None = None
+
+    @property
+    def extra(self) -> int:
+        """Number of variables of its own."""
+        return self.setup.extra
+
+    def pose(
+        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
+    ) -> tuple[Matrix, Array]:
+        """Add the bounds to a program and expand the cost: P and q."""
+        transcription = self.setup.transcription
+        goals.keep_limits(program, self.setup.problem, transcription)
+        if self.sway_limit is not None:
+            goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0])
+        if self.worst is not None:
+            column = goals.bound_worst(program, transcription, self.setup.tried)
+            row = sparse.csc_matrix(([1.0], ([0], [column])), shape=(1, program.variables))
+            program.at_most(row, np.array([self.worst]))
+        scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / self.setup.cost_scale)
+        quadratic, linear = goals.cost(transcription, self.setup.forms, scaled, iterate, maps[0])
+        return _widen(quadratic, program.variables), np.pad(linear, (0, program.variables - len(linear)))
+
+    def step(self, solutions: Sequence[ConicSolution]) -> float:
+        """Measure by how much the motion changed last."""
+        columns = slice(0, self.setup.transcription.intervals * self.setup.transcription.breadth)
+        after = solutions[-1].x[columns]
+        before = solutions[-2].x[columns] if len(solutions) > 1 else np.zeros_like(after)
+        return float(np.abs(after - before).max() / np.abs(after).max())
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class LeastWorst:
+    """Minimise the worst share of a load's limit; a trace of effort makes the motion unique."""
+
+    setup: Setup
+    trace: float
+
+    @property
+    def extra(self) -> int:
+        """Number of variables of its own."""
+        return self.setup.extra
+
+    def pose(
+        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
+    ) -> tuple[Matrix, Array]:
+        """Add the bounds to a program: P and q."""
+        transcription, sway_limit = self.setup.transcription, self.setup.problem.limits.sway
+        goals.keep_limits(program, self.setup.problem, transcription)
+        if sway_limit is not None:
+            goals.keep_sway(program, transcription, sway_limit, iterate, maps[0])
+        column = goals.bound_worst(program, transcription, self.setup.tried)
+        linear = np.zeros(program.variables)
+        linear[column] = 1.0
+        return self.trace * transcription.effort(self.setup.forms, program.variables), linear
+
+    def step(self, solutions: Sequence[ConicSolution]) -> float:
+        """Measure by how much the worst share changed last, in units of what would be noticed."""
+        before = solutions[-2].x[-1] if len(solutions) > 1 else float("inf")
+        noticed = WORTHWHILE * max(abs(float(solutions[-1].x[-1])), LEAST_SHARE)
+        return STEP_TOLERANCE * abs(float(solutions[-1].x[-1] - before)) / noticed
+
+
+def _widen(matrix: Matrix, width: int) -> Matrix:
+    widened = sparse.csc_matrix(matrix)
+    widened.resize(width, width)
+    return widened
+
+
+def conclude(setup: Setup, found: Found, sway_cost: SwayCost, iterations: int) -> Solution:
+    """Turn the outcome of programs into a solution."""
+    problem = setup.problem
+    status, cure = Status.CONVERGED, ""
+    if found.verdict is Verdict.INFEASIBLE:
+        status, cure = Status.INFEASIBLE, "Allow more time (move.duration), or wider limits."
+    elif found.verdict is not Verdict.SOLVED:
+        status, cure = Status.DIVERGED, "Allow more time (move.duration)."
+    elif greatest_angle(setup, found.iterate) > HORIZONTAL:
+        status, cure = Status.SWINGS_TOO_FAR, "Allow more time (move.duration), or shorten the move."
+    return Solution(
+        status=status,
+        method=METHOD,
+        problem=problem,
+        optimum=_optimum(setup, found, sway_cost) if status is Status.CONVERGED else None,
+        iterations=iterations,
+        residual=found.step,
+        cure=cure,
+    )
+
+
+def _optimum(setup: Setup, found: Found, sway_cost: SwayCost) -> Optimum:
+    """Return to SI units."""
+    problem, transcription = setup.problem, setup.transcription
+    piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
+    intervals, axes = transcription.intervals, len(reach)
+    local = found.iterate.local.reshape(intervals, axes, piece.size)
+    knots = duration * np.arange(intervals + 1) / intervals
+    control = np.einsum("pb,kab->kpa", power_basis(3), local[:, :, piece.order :])
+    stages, machine = found.iterate.stages[0], transcription.machines[0]
+    points = stages.reshape(-1, stages.shape[2])
+    felt = transcription.axes(found.iterate.local).reshape(len(points), -1)
+    states, costates = _nodes(setup, found)
+    return Optimum(
+        knots=knots,
+        states=states,
+        costates=costates,
+        hamiltonian=None,
+        top_derivative=control
+        * (reach / duration**piece.order)
+        / (duration / intervals) ** np.arange(control.shape[1])[:, None],
+        top_order=piece.order,
+        sway=machine.equations.sway(points, felt, machine.parameters)[:, :, 0],
+        angle=greatest_angle(setup, found.iterate),
+        cost=_cost(setup, found.iterate, sway_cost),
+        sway_weight=sway_cost.beta,
+        sway_scale=sway_cost.gamma,
+        defect=None,
+        hamiltonian_variation=None,
+    )
+
+
+def _nodes(setup: Setup, found: Found) -> tuple[Array, Array]:
+    """Read the nominal machine's states and costates at the nodes off a program, in SI units.
+
+    A costate is what the cost would lose if its state were displaced there, which is the multiplier of the
+    constraint that carries the state to the node.
+    """
+    problem, transcription = setup.problem, setup.transcription
+    piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
+    axes, orders, intervals = len(reach), piece.order, transcription.intervals
+    x, multipliers, scale = (
+        found.solutions[-1].x,
+        found.solutions[-1].multipliers,
+        transcription.machines[0].scale,
+    )
+    local = x[: intervals * transcription.breadth].reshape(intervals, axes, piece.size)
+    last = np.stack([piece.derivative(order)[-1] for order in range(orders)])
+    moved = np.concatenate([local[:, :, :orders], (local[-1:] @ last.T)])
+    moved_costates = np.concatenate([-multipliers[0], multipliers[1]]).reshape(intervals + 1, axes, orders)
+    units = reach[:, None] / duration ** np.arange(orders)
+    swung, swung_costates = transcription.nodes(x, 0), -multipliers[2].reshape(intervals + 1, -1)
+    half = 2 * len(problem.plant.unactuated)
+
+    def in_order(pendulum: Array, chain: Array) -> Array:
+        by_order = chain.transpose(0, 2, 1).reshape(intervals + 1, -1)
+        return np.concatenate([pendulum[:, :half], by_order, pendulum[:, half:]], axis=1)
+
+    start = np.zeros((axes, orders))
+    start[:, 0] = problem.start
+    return (
+        in_order(swung * scale, moved * units + start),
+        setup.cost_scale * duration * in_order(swung_costates / scale, moved_costates / units),
+    )
+
+
+def greatest_angle(setup: Setup, iterate: Iterate) -> float:
+    """Greatest rope angle of the nominal machine at the collocation points, in rad."""
+    machine, stages = setup.transcription.machines[0], iterate.stages[0]
+    points = stages.reshape(-1, stages.shape[2])
+    felt = setup.transcription.axes(iterate.local).reshape(len(points), -1)
+    return float(np.abs(machine.equations.angle(points, felt, machine.parameters)).max())
+
+
+def _cost(setup: Setup, iterate: Iterate, sway_cost: SwayCost) -> float:
+    """Evaluate eq. (26) in SI units."""
+    transcription, duration = setup.transcription, setup.problem.duration
+    local = iterate.local.reshape(transcription.intervals, len(setup.forms), -1)
+    effort = sum(
+        0.5 * float(np.einsum("ka,ab,kb->", local[:, axis], form, local[:, axis]))
+        for axis, form in enumerate(setup.forms)
+    )
+    sway = transcription.end_sway_found(iterate)
+    swayed = float(transcription.quadrature() @ sway_cost.values(sway))
+    return duration * (setup.cost_scale * effort + swayed)

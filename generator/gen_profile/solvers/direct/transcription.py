@@ -1,0 +1,296 @@
+"""A problem as conic programs over piecewise polynomial motions and the machines' states at the nodes.
+
+Variables, all dimensionless: for every interval the local coordinates of every axis (see
+`solvers.bezier.Piece`), then for every machine its state y at every node, then what a goal adds. Whatever
+couples, couples neighbours only, so the work grows with the number of intervals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gen_profile.motion.profile import Array
+from gen_profile.problem.motion_equations import MotionEquations
+from gen_profile.solvers.collocation import GAUSS, STAGES
+from gen_profile.solvers.direct.bezier import Piece
+from gen_profile.solvers.direct.condensing import AxesMap, IntervalMaps, interval_maps
+from gen_profile.solvers.direct.conic import ConicProgram, Matrix, place
+
+IntArray = NDArray[np.intp]
+INTERVALS_PER_CHANGE = 4.0
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Machine:
+    """A machine that follows the motion.
+
+    Attributes
+    ----------
+    equations : MotionEquations
+    parameters : (1, parameters) array
+    scale : (n,) array
+        Size of its states y, to measure them by.
+    start : (n,) array
+        Its dimensionless states at the start.
+    end : (conditions, n) array
+        What of its dimensionless states must be zero at the end.
+    """
+
+    equations: MotionEquations
+    parameters: Array
+    scale: Array
+    start: Array
+    end: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Iterate:
+    """A motion, and every machine's states at the collocation points under it.
+
+    Attributes
+    ----------
+    local : (intervals, m · size) array
+        Dimensionless coordinates of the axes.
+    stages : tuple of (intervals, STAGES, n) arrays
+        In SI units.
+    """
+
+    local: Array
+    stages: tuple[Array, ...]
+
+    def flat(self) -> Array:
+        """Put everything into one row."""
+        return np.concatenate([self.local.ravel(), *(stages.ravel() for stages in self.stages)])
+
+    def of_flat(self, values: Array) -> Iterate:
+        """Give such a row the shapes of this iterate."""
+        blocks = (self.local, *self.stages)
+        parts = np.split(values, np.cumsum([block.size for block in blocks])[:-1])
+        local, *stages = (part.reshape(block.shape) for part, block in zip(parts, blocks, strict=True))
+        return Iterate(local=local, stages=tuple(stages))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Transcription:
+    """The parts of a problem that do not change from one linearisation to the next.
+
+    Attributes
+    ----------
+    intervals : int
+    piece : Piece
+        Of every axis on every interval, in time from 0 to 1.
+    axes : AxesMap
+    duration : float
+        s.
+    target, final_velocity : (m,) arrays
+        Dimensionless positions and velocities at the end.
+    machines : tuple of Machine
+        The nominal one first.
+    """
+
+    intervals: int
+    piece: Piece
+    axes: AxesMap
+    duration: float
+    target: Array
+    final_velocity: Array
+    machines: tuple[Machine, ...]
+
+    @property
+    def breadth(self) -> int:
+        """Local coordinates of all axes on one interval."""
+        return len(self.target) * self.piece.size
+
+    @property
+    def variables(self) -> int:
+        """Number of variables without those of a goal."""
+        return int(self.node_columns(len(self.machines))[0])
+
+    @property
+    def units(self) -> Array:
+        """About how large each variable is: derivatives grow as if the motion changed every few intervals."""
+        growth = self.intervals / INTERVALS_PER_CHANGE
+        orders = np.minimum(np.arange(self.piece.size), self.piece.order)
+        local = np.tile(growth**orders, self.intervals * len(self.target))
+        return np.concatenate([local, np.ones(self.variables - len(local))])
+
+    @property
+    def importance(self) -> Array:
+        """How much every number of an iterate counts for its size: the axes' motion, which determines all."""
+        axes = self.intervals * self.breadth
+        states = sum(len(machine.scale) for machine in self.machines) * self.intervals * STAGES
+        return np.concatenate([1.0 / self.units[:axes], np.zeros(states)])
+
+    @property
+    def local_columns(self) -> IntArray:
+        """First column of every interval's axis coordinates."""
+        return np.arange(self.intervals) * self.breadth
+
+    def node_columns(self, machine: int) -> IntArray:
+        """First column of a machine's state at every node."""
+        before = sum(len(other.scale) for other in self.machines[:machine]) * (self.intervals + 1)
+        size = len(self.machines[machine].scale) if machine < len(self.machines) else 0
+        return self.intervals * self.breadth + before + np.arange(self.intervals + 1) * size
+
+    def rest(self) -> Iterate:
+        """Stand still at the start."""
+        return Iterate(
+            local=np.zeros((self.intervals, self.breadth)),
+            stages=tuple(np.zeros((self.intervals, STAGES, len(m.scale))) for m in self.machines),
+        )
+
+    def maps(self, iterate: Iterate) -> tuple[IntervalMaps, ...]:
+        """Linearise every machine about a motion; states in units of the machine's scale."""
+        found = []
+        for machine, stages in zip(self.machines, iterate.stages, strict=True):
+            maps = interval_maps(
+                machine.equations,
+                machine.parameters,
+                self.axes,
+                stages=stages,
+                local=iterate.local,
+                length=self.duration / self.intervals,
+            )
+            scale = machine.scale
+            found.append(
+                attrs.evolve(
+                    maps,
+                    transition=maps.transition * scale / scale[:, None],
+                    drive=maps.drive / scale[:, None],
+                    offset=maps.offset / scale,
+                    stage_transition=maps.stage_transition * scale,
+                )
+            )
+        return tuple(found)
+
+    def program(self, maps: Sequence[IntervalMaps], extra: int = 0) -> ConicProgram:
+        """Pose the motion: continuous, from rest to its target, and every machine moved by it.
+
+        The constraints, in the order of their multipliers: continuity of the axes, their end, then for every
+        machine its states (the costates at the nodes, negative) and its end.
+        """
+        width = self.variables + extra
+        program = ConicProgram(np.concatenate([self.units, np.ones(extra)]))
+        orders = self.piece.order
+        first = self._per_axis(np.eye(self.piece.size)[:orders])
+        last = self._per_axis(np.stack([self.piece.derivative(order)[-1] for order in range(orders)]))
+        columns = self.local_columns
+        program.equal(
+            self._repeat(first, columns, width) - _after(self._repeat(last, columns[:-1], width), len(first)),
+            np.zeros(len(first) * self.intervals),
+        )
+        end = np.zeros((len(self.target), orders))
+        end[:, 0], end[:, 1] = self.target, self.final_velocity
+        program.equal(place(last[None], columns[-1:], width), end.ravel())
+        for index, (machine, linear) in enumerate(zip(self.machines, maps, strict=True)):
+            n = len(machine.scale)
+            nodes = self.node_columns(index)
+            moved = place(linear.transition, nodes[:-1], width) + place(linear.drive, columns, width)
+            program.equal(
+                self._repeat(np.eye(n), nodes, width) - _after(moved, n),
+                np.concatenate([machine.start, linear.offset.ravel()]),
+            )
+            program.equal(place(machine.end[None], nodes[-1:], width), np.zeros(len(machine.end)))
+        return program
+
+    def bound(
+        self, program: ConicProgram, rows: Array, bounds: tuple[float, float], axis: int, give: float = 0.0
+    ) -> None:
+        """Keep Bézier coefficients of one axis between bounds, on every interval.
+
+        Parameters
+        ----------
+        rows : (coefficients, size) array
+        bounds : (float, float)
+            Lower and upper one.
+        give : float
+            By how much either bound is wider for every 1 by which the program's last variable exceeds 1.
+        """
+        wide = np.zeros((len(rows), len(self.target), self.piece.size))
+        wide[:, axis] = rows
+        matrix = self._repeat(wide.reshape(len(rows), -1), self.local_columns, program.variables)
+        lower, upper = (np.full(matrix.shape[0], bound) for bound in bounds)
+        program.at_most(matrix, upper, give)
+        program.at_most(-matrix, -lower, give)
+
+    def effort(self, blocks: Sequence[Array], width: int) -> Matrix:
+        """Join one quadratic form per axis, each of the local coordinates, into one of all variables."""
+        whole = np.zeros((len(self.target), self.piece.size) * 2)
+        for axis, block in enumerate(blocks):
+            whole[axis, :, axis] = block
+        square = self._repeat(whole.reshape(self.breadth, -1), self.local_columns, width)
+        return sparse.vstack([square, sparse.csc_matrix((width - square.shape[0], width))], format="csc")
+
+    def end_sway(self, iterate: Iterate, maps: IntervalMaps, width: int) -> tuple[Array, Matrix, Array]:
+        """Linearise the end load's sway of the nominal machine at the collocation points.
+
+        Returns
+        -------
+        found : (points, directions) array
+            At the iterate, in m.
+        matrix : (points * directions, width) sparse matrix
+        offset : (points * directions,) array
+            The sway is ``matrix x + offset``, the directions of a point side by side.
+        """
+        machine, stages = self.machines[0], iterate.stages[0]
+        n, felt = len(machine.scale), self.axes(iterate.local)
+        points = self.intervals * STAGES
+        values = machine.equations.end_sway(
+            stages.reshape(points, n), felt.reshape(points, -1), machine.parameters
+        )
+        values = values.reshape(self.intervals, STAGES, -1, values.shape[2])
+        found, by_state, by_axes = values[..., 0], values[..., 1 : 1 + n], values[..., 1 + n :]
+        by_local = by_axes @ self.axes.matrix + by_state @ maps.stage_drive
+        by_node = by_state @ maps.stage_transition
+        directions = found.shape[2]
+        matrix = place(
+            by_local.reshape(self.intervals, STAGES * directions, -1), self.local_columns, width
+        ) + place(by_node.reshape(self.intervals, STAGES * directions, -1), self.node_columns(0)[:-1], width)
+        offset = (
+            found
+            + np.einsum("ksda,ksa->ksd", by_state, maps.stage_offset - stages)
+            + np.einsum("ksda,ksa->ksd", by_axes, self.axes.offset - felt)
+        )
+        return found.reshape(points, directions), matrix, offset.ravel()
+
+    def end_sway_found(self, iterate: Iterate) -> Array:
+        """Evaluate the end load's sway of the nominal machine in m, shape (points, directions)."""
+        machine, stages = self.machines[0], iterate.stages[0]
+        points = stages.reshape(-1, stages.shape[2])
+        felt = self.axes(iterate.local).reshape(len(points), -1)
+        return machine.equations.end_sway(points, felt, machine.parameters)[:, :, 0]
+
+    def iterate(self, x: Array, maps: Sequence[IntervalMaps]) -> Iterate:
+        """Read a motion and the machines' states off a program's solution."""
+        local = x[: self.intervals * self.breadth].reshape(self.intervals, -1)
+        nodes = [self.nodes(x, index) for index in range(len(self.machines))]
+        return Iterate(
+            local=local,
+            stages=tuple(linear.stages(y[:-1], local) for linear, y in zip(maps, nodes, strict=True)),
+        )
+
+    def nodes(self, x: Array, machine: int) -> Array:
+        """Read a machine's dimensionless states at the nodes off a program's solution."""
+        columns = self.node_columns(machine)
+        n = len(self.machines[machine].scale)
+        return x[columns[0] : columns[-1] + n].reshape(self.intervals + 1, n)
+
+    def quadrature(self) -> Array:
+        """Weights of the collocation points for integrals over dimensionless time, shape (points,)."""
+        return np.asarray(np.tile(GAUSS.b / self.intervals, self.intervals), dtype=np.float64)
+
+    def _per_axis(self, rows: Array) -> Array:
+        return np.asarray(np.kron(np.eye(len(self.target)), rows), dtype=np.float64)
+
+    def _repeat(self, block: Array, columns: IntArray, width: int) -> Matrix:
+        return place(np.broadcast_to(block, (len(columns), *block.shape)), columns, width)
+
+
+def _after(matrix: Matrix, rows: int) -> Matrix:
+    """Move a matrix down by some rows of zeros."""
+    return sparse.vstack([sparse.csc_matrix((rows, matrix.shape[1])), matrix], format="csc")

@@ -1,0 +1,40 @@
+"""Sway on the way: how great it is, and how programs that see it at points keep it between them, too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from gen_profile.evaluation.simulation import greatest_sway
+from gen_profile.solvers.direct.goals import WITHIN
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.solution import Solution
+
+SWAY_ROUNDS = 4  # to account for what the sway does between collocation points
+
+
+def sway_on_the_way(solution: Solution) -> float:
+    """Greatest sway of the nominal machine's end load during the motion of a solution, in m."""
+    problem = solution.problem
+    return greatest_sway(problem.plant, optimal_profile(solution), problem.parameters, problem.initial)
+
+
+def within_sway(limit: float | None, attempt: Callable[[float | None], Solution]) -> Solution:
+    """Ask for less sway at the collocation points until that between them is within the limit, too.
+
+    Parameters
+    ----------
+    limit : float or None
+        m.
+    attempt : float or None → Solution
+        Solves with a limit at the collocation points.
+    """
+    asked = limit
+    for _ in range(SWAY_ROUNDS):
+        solution = attempt(asked)
+        if limit is None or asked is None or solution.optimum is None:
+            break
+        sway = sway_on_the_way(solution)
+        if sway <= limit:
+            break
+        asked *= WITHIN * limit / sway
+    return solution

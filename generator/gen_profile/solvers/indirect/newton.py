@@ -1,0 +1,92 @@
+"""Damped Newton on a collocated boundary value problem, judged by the size of its steps.
+
+The residual of a boundary value problem says little about the distance to its solution; the Newton step is
+that distance, to first order, whatever the units. A damped step is taken if it shortens the next step, or at
+least the simplified one, which the old Jacobian gives (the natural monotonicity test: Deuflhard, Newton
+Methods for Nonlinear Problems, 2004, section 3.3).
+"""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+
+from gen_profile.motion.profile import Array
+from gen_profile.solvers.collocation import Trajectory
+from gen_profile.solvers.indirect.boundary_value_problem import Canonical
+
+TOLERANCE = 1e-7  # step after which the next iterate's error is of the order of its square
+STALLED = 1e-5  # step that is taken for rounding noise when it ceases to shrink
+SLOW = 0.5  # share of the step before that is no longer Newton's convergence
+SMALLEST_DAMPING = 1.0 / 16.0
+MAX_ITERATIONS = 20
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class NewtonOutcome:
+    """Where the iteration ended; `solution` is None when it did not converge."""
+
+    solution: Trajectory | None
+    iterations: int
+    residual: float
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Iterate:
+    """A trajectory, the canonical equations linearised about it, and where a full Newton step leads."""
+
+    trajectory: Trajectory
+    flow: Array
+    following: Trajectory
+    step: float
+
+
+def solve_newton(problem: Canonical, guess: Trajectory) -> NewtonOutcome:
+    """Iterate from a guess until the step is small, as `Canonical.distance` measures it.
+
+    Parameters
+    ----------
+    problem : Canonical
+    guess : Trajectory
+    """
+    current, damping = _iterate(problem, guess), 1.0
+    if current is None:
+        return NewtonOutcome(solution=None, iterations=1, residual=float("inf"))
+    for iteration in range(1, MAX_ITERATIONS + 1):
+        if current.step < TOLERANCE:
+            return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
+        trial = _iterate(problem, current.trajectory.blend(current.following, damping))
+        if trial is not None and _shortens(problem, current, trial, damping):
+            stalled = trial.step < STALLED and trial.step > SLOW * current.step
+            current, damping = trial, min(1.0, 2.0 * damping)
+            if stalled:
+                return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
+        elif current.step < STALLED:
+            return NewtonOutcome(solution=current.following, iterations=iteration, residual=current.step)
+        else:
+            damping /= 2.0
+            if damping < SMALLEST_DAMPING:
+                break
+    return NewtonOutcome(solution=None, iterations=iteration, residual=current.step)
+
+
+def _iterate(problem: Canonical, trajectory: Trajectory) -> _Iterate | None:
+    """Take a full Newton step, if there is one."""
+    try:
+        flow = problem.flow(trajectory.points)
+        following = problem.solve_linear(flow, trajectory)
+    except np.linalg.LinAlgError:
+        return None
+    return _Iterate(
+        trajectory=trajectory, flow=flow, following=following, step=problem.distance(trajectory, following)
+    )
+
+
+def _shortens(problem: Canonical, current: _Iterate, trial: _Iterate, damping: float) -> bool:
+    """Apply the monotonicity tests to the damped step that led to `trial`."""
+    enough = (1.0 - damping / 4.0) * current.step
+    if trial.step <= enough:
+        return True
+    mixed = np.concatenate([trial.flow[..., :1], current.flow[..., 1:]], axis=-1)
+    simplified = problem.solve_linear(mixed, trial.trajectory)
+    return problem.distance(trial.trajectory, simplified) <= enough

@@ -1,0 +1,121 @@
+"""Mesh refinement: split the intervals on which a collocated solution is not accurate enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile.motion.profile import Array
+from gen_profile.solvers.collocation import Trajectory
+from gen_profile.solvers.indirect.boundary_value_problem import Canonical
+from gen_profile.solvers.indirect.newton import NewtonOutcome, solve_newton
+
+MAX_INTERVALS = 480
+MOST_PARTS = (4, 2)  # of an interval at once; the fewer, the nearer to the solution before
+MAX_ROUNDS = 6  # where a fast mode is not resolved, what is split in one place shows in another
+DRIFT_TOLERANCE = 1e-7  # of the Hamiltonian over an interval, relative to its size
+DEFECT_TOLERANCE = 3e-3  # see `defect`; what it costs in sway is of its square
+
+
+def refine(
+    canonical: Canonical,
+    coarse: Trajectory,
+    least: int = 0,
+    solve: Callable[[Canonical, Trajectory], NewtonOutcome] = solve_newton,
+) -> NewtonOutcome:
+    """Split intervals until the equations are met and the Hamiltonian is constant.
+
+    Where the mesh would grow beyond `MAX_INTERVALS`, the intervals that need it least are left alone. No
+    solution comes of it where Newton's method fails on finer meshes.
+
+    Parameters
+    ----------
+    canonical : Canonical
+    coarse : Trajectory
+        Its solution on a mesh that may be too coarse to judge it by.
+    least : int
+        Intervals to begin with.
+    solve : callable
+        From a problem and a start to the solution on the same mesh.
+    """
+    meshes = [np.linspace(0.0, 1.0, least + 1)] if least >= len(coarse.mesh) else []
+    solution, iterations, residual = coarse, 0, 0.0
+    for _ in range(MAX_ROUNDS):
+        if not meshes:
+            parts = _parts(canonical, solution)
+            if parts.max() == 1:
+                break
+            meshes = [_split(solution.mesh, np.minimum(parts, most)) for most in MOST_PARTS]
+        outcome, spent = _first_solved(canonical, solution, meshes, solve)
+        iterations += spent
+        if outcome.solution is None:
+            return attrs.evolve(outcome, iterations=iterations)
+        solution, residual, meshes = outcome.solution, outcome.residual, []
+    return NewtonOutcome(solution=solution, iterations=iterations, residual=residual)
+
+
+def _first_solved(
+    canonical: Canonical,
+    solution: Trajectory,
+    meshes: Sequence[Array],
+    solve: Callable[[Canonical, Trajectory], NewtonOutcome],
+) -> tuple[NewtonOutcome, int]:
+    """Try one mesh after the other; also count the iterations of all."""
+    spent = 0
+    for mesh in meshes:
+        outcome = solve(canonical, solution.on(mesh))
+        spent += outcome.iterations
+        if outcome.solution is not None:
+            break
+    return outcome, spent
+
+
+def _parts(canonical: Canonical, solution: Trajectory) -> NDArray[np.intp]:
+    """Tell into how many parts to divide every interval."""
+    stages = solution.scheme.stages
+    wanted = (defect(canonical, solution) / DEFECT_TOLERANCE) ** (1.0 / stages)
+    if canonical.resolved:
+        drift = _drift(canonical, solution) / DRIFT_TOLERANCE
+        wanted = np.maximum(wanted, drift ** (1.0 / (2 * stages)))
+    most = max(MAX_INTERVALS, len(wanted))
+    while (parts := np.clip(np.ceil(wanted), 1, MOST_PARTS[0]).astype(np.intp)).sum() > most:
+        wanted *= 0.9
+    return parts
+
+
+def _drift(canonical: Canonical, solution: Trajectory) -> Array:
+    """Change of H over each interval, relative to its size; none for the exact solution."""
+    hamiltonian = canonical.quantities(solution.nodes)[:, 0]
+    return np.asarray(np.abs(np.diff(hamiltonian)) / np.abs(hamiltonian).max())
+
+
+def _split(mesh: Array, parts: NDArray[np.intp]) -> Array:
+    """Divide every interval into equal parts."""
+    pieces = [
+        np.linspace(a, b, n, endpoint=False) for a, b, n in zip(mesh[:-1], mesh[1:], parts, strict=True)
+    ]
+    return np.concatenate([*pieces, mesh[-1:]])
+
+
+@lru_cache(maxsize=1)  # who refined is asked again for what was reached
+def defect(canonical: Canonical, solution: Trajectory) -> Array:
+    """Greatest miss of the state equations between collocation points, on each interval.
+
+    Per interval, as a share of each state's size. (What is missed of the costates' shows in the Hamiltonian.)
+    What fast modes make of a small displacement is filtered as stiff solvers do (Hairer and Wanner, Solving
+    Ordinary Differential Equations II, eq. IV.8.20).
+    """
+    scheme, n, lengths = solution.scheme, len(canonical.final), np.diff(solution.mesh)[:, None, None]
+    local = np.convolve(np.concatenate([[0.0], scheme.c, [1.0]]), [0.5, 0.5], "valid")[:, None]
+    powers, coefficients = np.arange(scheme.stages + 1), solution.coefficients()
+    values = local**powers @ coefficients
+    slopes = (powers[1:] * local ** powers[:-1]) @ coefficients[:, 1:, :n]
+    asked = canonical.slopes(values.reshape(-1, solution.size))[0].reshape(values.shape)
+    by_state = canonical.linear(solution.nodes[:-1])[0][:, :, :n]
+    fading = np.eye(n) - lengths / scheme.stages * by_state
+    missed = np.linalg.solve(fading, (slopes - lengths * asked[:, :, :n]).swapaxes(1, 2))
+    return np.asarray((np.abs(missed) * canonical.weights(solution)[:, None]).max(axis=(1, 2)))

@@ -1,0 +1,116 @@
+"""Indirect method: Pontryagin's conditions solved as a two-point boundary value problem.
+
+Most machines swing so little that one linear model leads to the solution, on few long intervals and within
+milliseconds (`solvers.simplified_newton`). Where it does not, the solution is sought by homotopy, on meshes
+as fine as it takes (`solvers.homotopy`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import attrs
+import numpy as np
+
+from gen_profile.one_thread import one_thread
+from gen_profile.problem.pontryagin import optimality_system
+from gen_profile.problem.problem import Problem
+from gen_profile.solvers.collocation import LONG_GAUSS, Trajectory
+from gen_profile.solvers.indirect.boundary_value_problem import (
+    Canonical,
+    canonical_problem,
+    independence,
+    quintic,
+    with_sway_cost,
+)
+from gen_profile.solvers.indirect.extremal import METHOD, judged
+from gen_profile.solvers.indirect.homotopy import MODERATE_ANGLE, solve_by_homotopy
+from gen_profile.solvers.indirect.newton import NewtonOutcome
+from gen_profile.solvers.indirect.refinement import refine
+from gen_profile.solvers.indirect.simplified_newton import solve_simplified
+from gen_profile.solvers.solution import Solution
+
+__all__ = ["METHOD", "solve"]
+
+LONG_INTERVALS = 8  # at least
+RADIANS_PER_LONG_INTERVAL = 6.0  # of the fastest mode that matters
+
+
+def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
+    """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
+
+    Parameters
+    ----------
+    problem : Problem
+    near : Trajectory, optional
+        Of the solution of a similar problem, to begin at where one linear model does not do.
+
+    Returns
+    -------
+    Solution
+        Where there is none, the status says why.
+
+    Raises
+    ------
+    InfeasibleProblem
+        The machine does not hang at rest, so that it has no natural frequencies.
+    """
+    with one_thread():
+        return _solve(problem, near)
+
+
+def _solve(problem: Problem, near: Trajectory | None) -> Solution:
+    system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
+    quiet = canonical_problem(problem, system)
+    asked, redundant = independence(quiet)
+    if redundant:
+        kept = tuple(name for name in problem.desensitized if name not in redundant)
+        solution = _solve(attrs.evolve(problem, desensitized=kept), near)
+        return attrs.evolve(solution, problem=problem, redundant=redundant)
+    quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
+    try:
+        found = _solve_simply(problem, quiet)
+    except np.linalg.LinAlgError:
+        found = None
+    return found or solve_by_homotopy(problem, quiet, near)
+
+
+def _solve_simply(problem: Problem, quiet: Canonical) -> Solution | None:
+    """Solve with few long intervals and one linear model; there is none where the machine swings too far.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When it swings so far that equations overflow.
+    """
+    if not quiet.resolved:
+        return None
+    intervals = max(LONG_INTERVALS, math.ceil(quiet.phase / RADIANS_PER_LONG_INTERVAL))
+    mesh = np.linspace(0.0, 1.0, intervals + 1)
+    start = quintic(quiet, mesh, LONG_GAUSS)
+    weighted, iterations = quiet, 0
+    if problem.sway_weight > 0.0:
+        if problem.sway_scale is None:
+            measured = _refined(quiet, start)
+            if measured.solution is None:
+                return None
+            start, iterations = measured.solution, measured.iterations
+        weighted = with_sway_cost(problem, quiet, start)
+    found = _refined(weighted, start)
+    if found.solution is None:
+        return None
+    solution = judged(problem, weighted, found.solution, iterations + found.iterations, found.residual)
+    return solution if solution.optimum is None or solution.optimum.angle < MODERATE_ANGLE else None
+
+
+def _refined(problem: Canonical, start: Trajectory) -> NewtonOutcome:
+    """Solve on the start's mesh, then on finer ones as needed."""
+    found = solve_simplified(problem, start)
+    if found.solution is None:
+        return found
+    refined = refine(problem, found.solution, solve=solve_simplified)
+    return attrs.evolve(
+        refined,
+        iterations=found.iterations + refined.iterations,
+        residual=refined.residual or found.residual,
+    )

@@ -1,0 +1,153 @@
+"""Which requirement makes a problem infeasible, and the nearest value with which it can be solved.
+
+Values are solved for (see `solvers.relaxation`), rounded to the safe side, and tried: what is named works.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from typing import Any
+
+import attrs
+
+from gen_profile.problem.limits import rounded_up
+from gen_profile.problem.problem import Problem
+from gen_profile.solvers.direct.relaxation import least_duration, relaxed
+from gen_profile.solvers.solution import Solution
+
+FACTORS = (1.01, 1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
+NEAR = 1.05  # how many times a value that will not do the one that is named may be
+FARTHER = 1.7  # times the least value with a solution, up to which one that is welcome is looked for
+
+
+@attrs.frozen(kw_only=True)
+class Trial:
+    """How values are tried.
+
+    Attributes
+    ----------
+    solve : Problem → Solution
+    keeps : Solution → bool
+        Whether it is one that will do.
+    welcome : Solution → bool
+        Whether it is one that is better named than others near by.
+    """
+
+    solve: Callable[[Problem], Solution]
+    keeps: Callable[[Solution], bool]
+    welcome: Callable[[Solution], bool]
+
+    def pleases(self, problem: Problem) -> bool:
+        """Whether a problem has a solution that will do and is welcome."""
+        solution = self.solve(problem)
+        return self.keeps(solution) and self.welcome(solution)
+
+    def least(self, changed: Callable[[float], Problem]) -> float | None:
+        """Find the least factor of a change that will do: the first one nearly always does."""
+
+        @cache
+        def kept(factor: float) -> Solution | None:
+            solution = self.solve(changed(factor))
+            return solution if self.keeps(solution) else None
+
+        def does(factor: float) -> bool:
+            return kept(factor) is not None
+
+        def pleases(factor: float) -> bool:
+            solution = kept(factor)
+            return solution is not None and self.welcome(solution)
+
+        first = next(filter(does, FACTORS), None)
+        if first is None:
+            return None
+        near = [factor for factor in FACTORS if first <= factor <= FARTHER * first]
+        pleasing = next(filter(pleases, near), None)
+        enough, will_do = (first, does) if pleasing is None else (pleasing, pleases)
+        short = max((factor for factor in FACTORS if factor < enough), default=1.0)
+        while enough > NEAR * short:
+            middle = math.sqrt(enough * short)
+            enough, short = (middle, short) if will_do(middle) else (enough, middle)
+        return enough
+
+
+def cures(problem: Problem, trial: Trial, *, in_time: bool = False) -> str:
+    """Name what to change, each thing by itself, in one or two sentences; nothing where nothing was found.
+
+    Parameters
+    ----------
+    problem : Problem
+        Without a solution.
+    trial : Trial
+    in_time : bool
+        Look for what would do in the duration asked for only.
+    """
+    sentences = []
+    longer = None if in_time else _longer(problem, trial)
+    if longer is not None:
+        within = "With these limits it" if problem.limits.stated() else "It"
+        sentences.append(f"{within} takes at least {longer} s (move.duration).")
+    instead = list(_wider(problem, trial)) or list(_less_robust(problem, trial))
+    if instead:
+        sentences.append(f"In {problem.duration:g} s it would do with {', or with '.join(instead)}.")
+    return " ".join(sentences)
+
+
+def _longer(problem: Problem, trial: Trial) -> str | None:
+    """Find the least duration that will do, in s, rounded up to three digits."""
+    enough = least_duration(problem)
+    if enough is None:
+        return None
+
+    def lasting(factor: float) -> Problem:
+        return attrs.evolve(problem, duration=float(rounded_up(factor * enough)))
+
+    factor = trial.least(lasting)
+    return None if factor is None else rounded_up(factor * enough)
+
+
+def _wider(problem: Problem, trial: Trial) -> Iterator[str]:
+    """Widen one limit by itself as little as will do; all of them alike where one is not enough."""
+    stated = problem.limits.stated()
+    alone = [found for place, value in stated.items() if (found := _widened(problem, {place: value}, trial))]
+    if not alone and len(stated) > 1 and (together := _widened(problem, stated, trial)):
+        alone = [together]
+    yield from alone
+
+
+def _widened(problem: Problem, limits: Mapping[str, Any], trial: Trial) -> str:
+    """Write the values of some limits that will do, the others as they are; nothing where there are none."""
+    easiest = relaxed(problem, tuple(limits))
+    if easiest is None:
+        return ""
+    enough = max(easiest.share, 1.0)
+
+    def wider(factor: float) -> dict[str, Any]:
+        return {place: _times(value, factor * enough) for place, value in limits.items()}
+
+    factor = trial.least(lambda factor: attrs.evolve(problem, limits=problem.limits.changed(wider(factor))))
+    if factor is None:
+        return ""
+    return " and ".join(f"{place} = {_written(value)}" for place, value in wider(factor).items())
+
+
+def _less_robust(problem: Problem, trial: Trial) -> Iterator[str]:
+    """Ask for less robustness."""
+    if problem.order > 1 and trial.pleases(attrs.evolve(problem, order=1)):
+        yield "robustness.order = 1"
+    elif problem.desensitized and trial.pleases(attrs.evolve(problem, desensitized=(), order=1)):
+        yield 'robustness.method = "none"'
+
+
+def _times(value: Any, share: float) -> Any:
+    """Widen a limit so many times, travel by as much at either end; rounded outwards."""
+    if not isinstance(value, tuple):
+        return float(rounded_up(share * value))
+    low, high = value
+    more = float(rounded_up((share - 1.0) * (high - low)))
+    return (float(f"{low - more:.9g}"), float(f"{high + more:.9g}"))
+
+
+def _written(value: Any) -> str:
+    return f"[{value[0]:.9g}, {value[1]:.9g}]" if isinstance(value, tuple) else f"{value:g}"

@@ -1,0 +1,115 @@
+"""Which solver for which problem."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import attrs
+
+from gen_profile.problem.actuator import lag_compensated
+from gen_profile.problem.limits import breaches
+from gen_profile.problem.problem import Problem
+from gen_profile.solvers.collocation import Trajectory
+from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.direct import worst_case
+from gen_profile.solvers.direct.relaxation import relaxed
+from gen_profile.solvers.direct.transient_sway import sway_on_the_way
+from gen_profile.solvers.indirect import solver as indirect
+from gen_profile.solvers.infeasibility import Trial, cures
+from gen_profile.solvers.minimum_time import shortest_duration
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.solution import Solution
+from gen_profile.spec.model import LimitsSpec, SolverName
+
+Judge = Callable[[Solution], bool]
+
+
+def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
+    """Solve a problem by the method that suits it; where that fails, find out what would help.
+
+    Parameters
+    ----------
+    problem : Problem
+    method : str
+        ``"indirect"`` knows no limits; ``"auto"`` takes it where none binds, and the direct method elsewhere.
+    near : Trajectory, optional
+        Of the solution of a similar problem: the indirect method begins there.
+    """
+    return explained(attempt(problem, method, near), method)
+
+
+def explained(solution: Solution, method: SolverName = "auto", welcome: Judge = lambda _: True) -> Solution:
+    """Find out what would help where a solve failed.
+
+    Parameters
+    ----------
+    solution : Solution
+    method : str
+        By which it was looked for.
+    welcome : Solution → bool
+        Whether a value is better named than others near by, by its solution.
+    """
+    # the indirect method, which knows the linear angle, tells by itself what helps where there are no limits
+    told = solution.method == indirect.METHOD and (
+        method == "indirect" or not solution.problem.limits.stated()
+    )
+    if solution.optimum is not None or told:
+        return solution
+    # where the direct method finds a motion, so does "auto", and the direct method is the quicker to fail
+    return attrs.evolve(solution, cure=remedy(solution.problem, "direct", welcome) or solution.cure)
+
+
+def remedy(problem: Problem, method: SolverName = "auto", welcome: Judge = lambda _: True) -> str:
+    """Say which other values would let a method find a motion within the limits; nothing where none will."""
+    trial = Trial(solve=lambda other: attempt(other, method), keeps=keeps_limits, welcome=welcome)
+    found = cures(problem, trial)
+    if method == "indirect" and keeps_limits(attempt(problem)):
+        return f'With solver.method = "auto" the limits are kept. {found}'.strip()
+    return found
+
+
+def attempt(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
+    """Solve a problem without finding out what would help where that fails."""
+    if problem.worst_case is not None:
+        return worst_case.solve(problem)
+    if method == "direct":
+        return _direct(problem)
+    solution = indirect.solve(problem, near)
+    if method == "indirect" or keeps_limits(solution):
+        return solution
+    other = _direct(problem)
+    return solution if other.optimum is None and solution.optimum is None else other
+
+
+def _direct(problem: Problem) -> Solution:
+    """Begin at rest, and where that misleads, at the motion that is most easily within the limits."""
+    solution = direct.solve(problem)
+    if keeps_limits(solution) or not problem.limits.stated():
+        return solution
+    easiest = relaxed(problem, tuple(problem.limits.stated()))
+    return solution if easiest is None or easiest.share > 1.0 else direct.solve(problem, easiest.iterate)
+
+
+def requirements(problem: Problem) -> str:
+    """Say which limits would have to be wider for a motion in the duration of a problem that has none."""
+    trial = Trial(solve=lambda other: attempt(other, "direct"), keeps=keeps_limits, welcome=lambda _: True)
+    return cures(problem, trial, in_time=True)
+
+
+def minimum_time(problem: Problem) -> float | None:
+    """Find the shortest duration in s for a problem's limits and robustness; None where none was found."""
+    if problem.worst_case is None:
+        return shortest_duration(problem, direct.solve)
+    return shortest_duration(problem, worst_case.solve_within_limits)
+
+
+def keeps_limits(solution: Solution) -> bool:
+    """Tell whether a solution is one and keeps its problem's limits."""
+    if solution.optimum is None:
+        return False
+    problem = solution.problem
+    if problem.limits == LimitsSpec():
+        return True
+    sway = sway_on_the_way(solution) if problem.limits.sway is not None else 0.0
+    command = lag_compensated(optimal_profile(solution), problem.tau)
+    return not breaches(problem.limits, command, sway)

@@ -1,0 +1,496 @@
+"""A motion task as frozen values: machine, move, robustness, cost, limits, check and target.
+
+Every number is in SI units. What a TOML file may say is exactly the attributes here;
+`gen_profile.spec.reading` turns text into them and gathers its faults.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Literal
+
+import attrs
+
+from gen_profile.plants.machine_file import MachineFile, plant_of_file
+from gen_profile.plants.plant import Plant
+from gen_profile.plants.registry import find_plant
+from gen_profile.units import AxisScale, axis_factor
+
+
+@attrs.frozen
+class Bounds:
+    """Allowed values of a number, `above` itself excluded, and what they are: a unit, or words."""
+
+    above: float = -float("inf")
+    least: float = -float("inf")
+    most: float = float("inf")
+    meaning: str = ""
+
+
+@attrs.frozen
+class Pattern:
+    """Allowed texts: a regular expression and what it means in words."""
+
+    expression: str
+    meaning: str
+
+
+Name = Annotated[
+    str,
+    Pattern(
+        r"(?!(?i:con|prn|aux|nul|com[0-9]|lpt[0-9])(?:\.|$))"
+        r"[A-Za-z0-9](?:[A-Za-z0-9._ -]{0,62}[A-Za-z0-9_-])?",
+        "1 to 64 letters, digits, dots, underscores, hyphens and spaces, beginning with a letter or digit, "
+        "not ending with a dot or space, and no device's name in Windows, as CON",
+    ),
+]
+Positive = Annotated[float, Bounds(above=0.0)]
+NotNegative = Annotated[float, Bounds(least=0.0)]
+RelativeRange = Annotated[float, Bounds(above=0.0, most=0.9, meaning="(0.1 is 10 %)")]
+CycleTime = Annotated[float, Bounds(least=1e-5, most=1.0, meaning="s (4 ms are 0.004)")]
+Duration = Annotated[float, Bounds(least=1e-3, most=1e5, meaning="s")]
+Column = Literal["position", "velocity", "acceleration", "jerk"]
+Distance = Annotated[float, Bounds(least=-1e5, most=1e5, meaning="m (or rad)")]
+SolverName = Literal["auto", "indirect", "direct"]
+ShaperName = Literal["nzv", "zv", "zvd", "zvdd", "umzvd", "ei", "2hump-ei", "3hump-ei", "mzv"]
+Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]
+
+DEFAULT_COUNTS_PER_SI = 1e6
+RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longest axis move
+
+
+def _frozen_mapping(values: Mapping[str, Any]) -> Mapping[str, Any]:
+    return MappingProxyType(dict(values))
+
+
+@attrs.frozen(kw_only=True)
+class PlantSpec:
+    """Which machine, with the value of every parameter, and the file that a user wrote it in."""
+
+    type: str
+    file: MachineFile | None = None
+    parameters: Mapping[str, float] = attrs.field(factory=dict, converter=_frozen_mapping)
+    defaults: tuple[str, ...] = attrs.field(default=(), eq=False)  # parameters the spec left to the type
+
+
+@attrs.frozen(kw_only=True)
+class MoveSpec:
+    """Start and target of every axis in m (or rad), duration in s; from standstill, to standstill or a speed.
+
+    Attributes
+    ----------
+    shortest : bool
+        The duration is to be found, and the one given here means nothing.
+    initial : mapping of str to float
+        What swings at the start: unactuated coordinates by name in m (or rad), their rates as ``NAME.rate``.
+    final_velocity : tuple of float
+        Of every axis at the target, in m/s (or rad/s).
+    """
+
+    start: tuple[Distance, ...]
+    target: tuple[Distance, ...]
+    duration: Duration
+    shortest: bool = False
+    initial: Mapping[str, float] = attrs.field(factory=dict, converter=_frozen_mapping)
+    final_velocity: tuple[Distance, ...] = attrs.field()
+
+    @final_velocity.default
+    def _standstill(self) -> tuple[float, ...]:
+        return (0.0,) * len(self.target)
+
+    @property
+    def distance(self) -> tuple[float, ...]:
+        """Signed distance of every axis."""
+        return tuple(b - a for a, b in zip(self.start, self.target, strict=True))
+
+    @property
+    def stops(self) -> bool:
+        """Whether the axes stand still at the end."""
+        return not any(self.final_velocity)
+
+
+@attrs.frozen(kw_only=True)
+class ActuatorSpec:
+    """How the drive follows: perfectly, or with a first-order lag of time constant tau in s (eq. 6)."""
+
+    type: Literal["ideal", "first-order"] = "ideal"
+    tau: Positive | None = None
+
+
+@attrs.frozen(kw_only=True)
+class RobustnessSpec:
+    """Uncertain parameters with their relative half-ranges, and what the design does about them."""
+
+    method: Literal["none", "sensitivity", "range"] = "none"
+    order: Literal[1, 2] = 1
+    nominal_zero: bool = False  # with method "range": the nominal machine comes to rest exactly all the same
+    uncertain: Mapping[str, RelativeRange] = attrs.field(factory=dict, converter=_frozen_mapping)
+
+
+@attrs.frozen(kw_only=True)
+class CostSpec:
+    """The cost (26): which effort, the sway's weight β and its scale γ in 1/m (None: automatic)."""
+
+    effort: Literal["jerk", "snap", "reference"] = "jerk"
+    sway_weight: NotNegative = 0.0
+    sway_scale: Positive | None = None
+
+
+@attrs.frozen(kw_only=True)
+class SolverSpec:
+    """Which solver, or which shaper and the move that it is fed with.
+
+    "auto" takes the indirect solver where no limit binds.
+    """
+
+    method: Literal[SolverName, ShaperName] = "auto"
+    base: Literal["quintic", "septic", "jerk-limited"] = "quintic"
+
+    @property
+    def solver(self) -> SolverName:
+        """What finds optimal motions, also where a shaper is to make the motion."""
+        return self.method if self.method in ("auto", "indirect", "direct") else "auto"
+
+    @property
+    def shaper(self) -> str | None:
+        """What makes the motion, where it is no optimal one."""
+        return None if self.method in ("auto", "indirect", "direct") else self.method
+
+
+@attrs.frozen(kw_only=True)
+class AxisLimitsSpec:
+    """Greatest magnitudes of one axis' command in SI units, and its travel."""
+
+    velocity: Positive | None = None
+    acceleration: Positive | None = None
+    jerk: Positive | None = None
+    travel: tuple[Distance, Distance] | None = None
+
+
+@attrs.frozen(kw_only=True)
+class LimitsSpec:
+    """Limits of all axes' commands, and the end load's transient sway in m.
+
+    `axis` holds what is different for single axes: all axes by name in the plant's order, or none.
+    """
+
+    velocity: Positive | None = None
+    acceleration: Positive | None = None
+    jerk: Positive | None = None
+    sway: Positive | None = None
+    travel: tuple[Distance, Distance] | None = None
+    axis: Mapping[str, AxisLimitsSpec] = attrs.field(factory=dict, converter=_frozen_mapping)
+
+    def own(self, column: int) -> tuple[str, AxisLimitsSpec]:
+        """Name of an axis that has limits of its own, and those."""
+        return list(self.axis.items())[column] if self.axis else ("", AxisLimitsSpec())
+
+    def of(self, column: int) -> AxisLimitsSpec:
+        """Limits of one axis: its own, and where it has none, those of all."""
+        _, own = self.own(column)
+        names = [field.name for field in attrs.fields(AxisLimitsSpec)]
+        stated = {name: getattr(own, name) for name in names if getattr(own, name) is not None}
+        return AxisLimitsSpec(**{name: getattr(self, name) for name in names} | stated)
+
+    def place(self, column: int, name: str) -> str:
+        """Where one kind of limit of one axis stands in the spec."""
+        axis, own = self.own(column)
+        return f"limits.{name}" if getattr(own, name) is None else f"limits.axis.{axis}.{name}"
+
+    def stated(self) -> dict[str, Any]:
+        """Every limit that is stated, by its place in the spec, such as ``limits.axis.x.jerk``."""
+        tables: dict[str, LimitsSpec | AxisLimitsSpec] = {
+            "limits": self,
+            **{f"limits.axis.{axis}": own for axis, own in self.axis.items()},
+        }
+        values = {
+            f"{table}.{field.name}": getattr(own, field.name)
+            for table, own in tables.items()
+            for field in attrs.fields(type(own))
+        }
+        return {
+            place: value for place, value in values.items() if value is not None and place != "limits.axis"
+        }
+
+    def changed(self, values: Mapping[str, Any]) -> LimitsSpec:
+        """Put other values in their places."""
+        limits = self
+        for place, value in values.items():
+            table, _, name = place.rpartition(".")
+            axis = table.removeprefix("limits").removeprefix(".axis.")
+            own = {axis: attrs.evolve(limits.axis[axis], **{name: value})} if axis else {}
+            limits = attrs.evolve(limits, **({"axis": {**limits.axis, **own}} if own else {name: value}))
+        return limits
+
+
+@attrs.frozen(kw_only=True)
+class ForeignFmu:
+    """Somebody else's FMU that judges in place of ours.
+
+    Attributes
+    ----------
+    name : str
+        File name, without folders: it lies beside whatever it judged.
+    path : Path
+        Where the file lies now.
+    sha256 : str
+    input : str
+        What its inputs are: ``"acceleration"``, ``"velocity"`` or ``"setpoint"`` of the axes.
+    inputs : tuple of str
+        Its variables, one per axis.
+    sway : mapping of str to str
+        Its variables by load, of those loads that it has.
+    parameters : mapping of str to str
+        Its variables by the plant's parameters.
+    time_limit : float
+        s, for all scenarios together.
+    """
+
+    name: str
+    path: Path = attrs.field(eq=False)
+    sha256: str
+    input: str
+    inputs: tuple[str, ...]
+    sway: Mapping[str, str] = attrs.field(converter=_frozen_mapping)
+    parameters: Mapping[str, str] = attrs.field(converter=_frozen_mapping)
+    time_limit: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Write the keys of ``[check]``."""
+        return {
+            "fmu": self.name,
+            "fmu_sha256": self.sha256,
+            "input": {self.input: list(self.inputs)},
+            "output": {"sway": dict(self.sway)},
+            "parameters": dict(self.parameters),
+            "time_limit": self.time_limit,
+        }
+
+
+@attrs.frozen(kw_only=True)
+class PathSpec:
+    """The way of a setpoint from the artefact to the axis.
+
+    Attributes
+    ----------
+    quantum : float
+        Spacing in m (or rad) of the positions that the drive can be asked for; 0 where it takes any.
+    between : str
+        What the drive does until the next setpoint: interpolate linearly (60C2h), or hold the last one.
+    lag : (float, float) or None
+        Range of the drives' time constant in s, which need not be the one that the setpoints lead.
+    latency : float
+        s by which all setpoints come late.
+    jitter : float
+        s by which each of them comes earlier or later at most.
+    lost : float
+        Share of them that never comes; the axis stays where it is until the next one.
+    """
+
+    quantum: NotNegative = 0.0
+    between: Literal["linear", "hold"] = "linear"
+    lag: tuple[NotNegative, NotNegative] | None = None
+    latency: Annotated[float, Bounds(least=0.0, most=10.0)] = 0.0
+    jitter: Annotated[float, Bounds(least=0.0, most=1.0)] = 0.0
+    lost: Annotated[float, Bounds(least=0.0, most=0.5)] = 0.0
+
+    @property
+    def faulty(self) -> bool:
+        """Whether setpoints come at other times than they should, or not at all."""
+        return self.latency > 0.0 or self.jitter > 0.0 or self.lost > 0.0
+
+    @property
+    def bends(self) -> bool:
+        """Whether the drive makes something else of setpoints that come in time than straight lines."""
+        return self.quantum > 0.0 or self.between != "linear" or self.lag is not None
+
+
+@attrs.frozen(kw_only=True)
+class CheckSpec:
+    """What may remain of the sway, on which machines, and who is to judge.
+
+    Attributes
+    ----------
+    residual_sway : mapping of str to float
+        Greatest in m of each load by name, in all scenarios.
+    uncertain : mapping of str to float, or None
+        Relative half-ranges of parameters; those of the design where it is None.
+    spans : mapping of str to (float, float)
+        Least and greatest value of parameters for which a share says nothing, such as a damping of 0.
+    samples : int
+        Machines drawn at random from all ranges, beside the ends and corners.
+    seed : int
+        Of what is random.
+    path : PathSpec
+    foreign : ForeignFmu or None
+        Somebody else's FMU that judges in place of ours.
+    """
+
+    residual_sway: Mapping[str, Positive] = attrs.field(converter=_frozen_mapping)
+    uncertain: Mapping[str, RelativeRange] | None = attrs.field(
+        default=None, converter=attrs.converters.optional(_frozen_mapping)
+    )
+    spans: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=_frozen_mapping)
+    samples: Annotated[int, Bounds(least=0, most=1_000_000)] = 0
+    seed: Annotated[int, Bounds(least=0, most=0xFFFF_FFFF)] = 0
+    path: PathSpec = attrs.field(factory=PathSpec)
+    foreign: ForeignFmu | None = None
+    default: bool = attrs.field(default=False, eq=False)  # the limit was not stated
+
+
+@attrs.frozen(kw_only=True)
+class AxisSpec:
+    """What the target's axis counts in."""
+
+    unit: Literal["m", "mm", "um", "deg", "rad", "counts"]
+    sign: Literal[1, -1] = 1
+    counts_per_metre: Positive = DEFAULT_COUNTS_PER_SI
+
+
+@attrs.frozen(kw_only=True)
+class ExportSpec:
+    """The controller's cycle in s, and what the formats leave to choose."""
+
+    cycle_time: CycleTime = 0.001
+    plc_layout: Literal["segments", "samples", "counts"] = "segments"
+    csv_dialect: Literal["rfc4180", "excel-de", "sew", "kollmorgen", "lenze"] = "rfc4180"
+    csv_columns: tuple[Column, ...] = ("position", "velocity", "acceleration", "jerk")
+
+
+@attrs.frozen(kw_only=True)
+class CanSpec:
+    """The drives on the CAN bus, and how they are to be fed, watched and stopped.
+
+    Attributes
+    ----------
+    node : int
+        CANopen node of the first axis; the second axis takes the next one, and so on.
+    bitrate : int
+        bit/s.
+    mode : str
+        ``"csp"`` (cyclic synchronous position, 607Ah), ``"ip"`` (interpolated position, 60C1h) or ``"csv"``
+        (cyclic synchronous velocity, 60FFh).
+    sync_period : float
+        s; also the drives' interpolation period 60C2h.
+    feed_forward : str
+        What goes along with each position in csp: nothing, the velocity 60B1h, the torque 60B2h, or both.
+    torque_per_acceleration : float or None
+        For the torque: ‰ of the rated torque per m/s² (or rad/s²) of the axis.
+    timeout : float or None
+        How long a drive waits for the next setpoint before it stops by itself, and the streamer for an
+        answer, in s; None takes 20 ms or three cycles, whichever is longer.
+    start_tolerance : float
+        How far the axis may stand from the first setpoint, in m (or rad).
+    following_error : float or None
+        Window 6065h in m (or rad); None leaves the drive's own. In csv, where no drive watches it, the
+        streamer does, and it must be stated.
+    quick_stop : float or None
+        Deceleration 6085h in m/s² (or rad/s²); None takes twice the motion's greatest acceleration.
+    travel : mapping of str to (float, float)
+        Software position limits 607Dh by axis, in m (or rad).
+    encoder, gear, feed : (int, int) or None
+        Numerator and denominator of 608Fh (increments per motor revolutions), 6091h (motor per shaft
+        revolutions) and 6092h (counts per shaft revolutions), for drives that scale positions themselves.
+    vendor, product : int or None
+        Identity 1018h:01 and :02 that a drive must have.
+    homed : (int, int, int) or None
+        Index, subindex and bits of the drive's object that are set once it knows where its axis is.
+    """
+
+    node: Annotated[int, Bounds(least=1, most=127)] = 1
+    bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
+    mode: Literal["csp", "ip", "csv"] = "csp"
+    sync_period: CycleTime = 0.004
+    feed_forward: Literal["none", "velocity", "torque", "both"] = "none"
+    torque_per_acceleration: Positive | None = None
+    timeout: Annotated[float, Bounds(least=0.001, most=30.0)] | None = None
+    start_tolerance: Positive = 0.001
+    following_error: Positive | None = None
+    quick_stop: Positive | None = None
+    travel: Mapping[str, tuple[Distance, Distance]] = attrs.field(factory=dict, converter=_frozen_mapping)
+    encoder: tuple[Unsigned32, Unsigned32] | None = None
+    gear: tuple[Unsigned32, Unsigned32] | None = None
+    feed: tuple[Unsigned32, Unsigned32] | None = None
+    vendor: Unsigned32 | None = None
+    product: Unsigned32 | None = None
+    homed: tuple[Unsigned32, Annotated[int, Bounds(least=0, most=255)], Unsigned32] | None = None
+
+
+@attrs.frozen(kw_only=True)
+class Spec:
+    """One motion task, complete: nothing downstream looks anything else up."""
+
+    name: Name
+    plant: PlantSpec
+    move: MoveSpec
+    actuator: ActuatorSpec
+    robustness: RobustnessSpec
+    cost: CostSpec
+    solver: SolverSpec
+    limits: LimitsSpec
+    check: CheckSpec
+    axis: Mapping[str, AxisSpec] = attrs.field(converter=_frozen_mapping)
+    export: ExportSpec
+    can: CanSpec
+
+    def machine(self) -> Plant:
+        """Load the plant."""
+        return find_plant(self.plant.type) if self.plant.file is None else plant_of_file(self.plant.file)
+
+    def checked_ranges(self) -> dict[str, tuple[float, float]]:
+        """Least and greatest value of every parameter that the check changes, in the machine's order."""
+        shares = self.robustness.uncertain if self.check.uncertain is None else self.check.uncertain
+        ranges = dict(self.check.spans)
+        for name, share in shares.items():
+            low, high = (self.plant.parameters[name] * (1.0 + sign * share) for sign in (-1, +1))
+            ranges.setdefault(name, (low, high))
+        return {name: ranges[name] for name in self.plant.parameters if name in ranges}
+
+    def axis_scales(self) -> tuple[AxisScale, ...]:
+        """How the target counts each axis, in the plant's order."""
+        return tuple(
+            AxisScale(
+                name=name,
+                unit=axis.unit,
+                factor=axis.sign * axis_factor(axis.unit, axis.counts_per_metre),
+                counts_per_si=axis.sign * axis.counts_per_metre,
+            )
+            for name, axis in self.axis.items()
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values that `gen_profile.spec.reading.spec_from_dict` reads back to an equal spec."""
+        document: dict[str, Any] = _plain(self)
+        own = self.plant.file
+        written = {} if own is None else {"file": own.name, "file_sha256": own.sha256}
+        document["plant"] = {"type": self.plant.type, **written, **self.plant.parameters}
+        if self.cost.sway_scale is None:
+            document["cost"]["sway_scale"] = "auto"
+        del document["check"]["default"]
+        if self.check.foreign is not None:
+            del document["check"]["foreign"]
+            document["check"] |= self.check.foreign.to_dict()
+        if document["move"].pop("shortest"):
+            document["move"]["duration"] = "minimum"
+        return document
+
+    def sha256(self) -> str:
+        """Hash of the whole spec, defaults included, in hexadecimal."""
+        text = json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+        return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """Plain dicts, lists and scalars; None left out."""
+    if attrs.has(type(value)):
+        pairs = {field.name: getattr(value, field.name) for field in attrs.fields(type(value))}
+        return {key: _plain(item) for key, item in pairs.items() if item is not None}
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return value

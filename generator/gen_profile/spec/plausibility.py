@@ -1,0 +1,266 @@
+"""Values that are well formed and cannot be meant, or hardly, such as millimetres typed for metres.
+
+What is judged here takes no solution of the move: its mean speed, the quasi-static sway under the least
+acceleration that makes it, the ropes' lengths.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile.errors import SpecError
+from gen_profile.spec.model import CanSpec, Spec
+
+Array = NDArray[np.float64]
+
+STEP = 1e-6  # m (or rad), for differences of forces and outputs about rest
+# (unit of the axis, what) → beyond which it is hardly meant, and cannot be
+FAST = {
+    ("m", "velocity"): (15.0, 100.0),
+    ("m", "acceleration"): (200.0, 1e4),
+    ("rad", "velocity"): (100.0, 1e4),
+    ("rad", "acceleration"): (1e4, 1e6),
+}
+LONG_WAY = 1000.0  # m, longer than the runways of cranes
+MANY_TURNS = 4.0 * math.pi  # rad
+LONG_TIME, SLOW = 1000.0, 5e-3  # s, and m/s (or rad/s): a duration in ms rather than so slow a move
+LARGE_SWING = 0.8  # rad: sin and tan are 10 % and 29 % off the angle
+RESIDUAL_OF_ROPE = 0.5  # a load that hangs by 30° after the move
+RESIDUAL_OF_MOVE = 0.05
+WORST_TIMING = 4.0  # times its quasi-static sway, a mode sways after steps of acceleration to +a, -a and 0
+FAR = 10.0  # times the load's whole way
+LOOSE = 0.5  # of the longest move, that an axis may be away from its setpoint
+
+
+@attrs.frozen(kw_only=True)
+class Doubt:
+    """A value that is hardly meant, or cannot be; a sentence with its place and the cure."""
+
+    sentence: str
+    refused: bool = False
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Scale:
+    """What a machine's loads can do in a move, by load in the plant's order.
+
+    Attributes
+    ----------
+    depth : (loads,) array
+        How far they hang below the suspension, in m; 0 where nothing hangs.
+    way : (loads,) array
+        How far the axes' move takes them, in m.
+    sway : (loads,) array
+        Greatest sway in m that is to be expected of any motion of this length and duration.
+    angle : (loads,) array
+        Of the ropes in rad, under the least acceleration that makes the move.
+    """
+
+    depth: Array
+    way: Array
+    sway: Array
+    angle: Array
+
+
+def refuse_implausible(spec: Spec) -> None:
+    """Refuse values that cannot be meant.
+
+    Raises
+    ------
+    SpecError
+        With a sentence for each.
+    """
+    if refused := [doubt.sentence for doubt in _doubts(spec) if doubt.refused]:
+        raise SpecError(*refused)
+
+
+def doubts(spec: Spec) -> tuple[str, ...]:
+    """Say which values are hardly meant, a sentence each."""
+    return tuple(doubt.sentence for doubt in _doubts(spec) if not doubt.refused)
+
+
+def _doubts(spec: Spec) -> Iterator[Doubt]:
+    scale = _scale(spec)
+    yield from _move(spec)
+    yield from _limits(spec, scale)
+    yield from _residual(spec, scale)
+    yield from _swing(spec, scale)
+    yield from _drive(spec)
+
+
+def _thousandth(value: float, what: str) -> str:
+    """End a sentence by what a value means if it is in thousandths, as one below 1 hardly is."""
+    return f"{what}; did you mean {value / 1e3:.4g}?" if value >= 1.0 else f"{what}; state less."
+
+
+def _fast(place: str, found: str, *, value: float, unit: str, kind: str, cure: str) -> Iterator[Doubt]:
+    """Doubt a speed or acceleration."""
+    hardly, never = FAST[unit, kind]
+    if value > hardly:
+        verdict = "which no such machine reaches" if value > never else "which few machines reach"
+        yield Doubt(sentence=f"{place}: {found}, {verdict}; {cure}", refused=value > never)
+
+
+def _move(spec: Spec) -> Iterator[Doubt]:
+    """Doubt distances, the duration, and speeds that follow from them."""
+    move, axes = spec.move, spec.machine().actuated
+    for axis, distance, speed in zip(
+        axes, map(abs, move.distance), map(abs, move.final_velocity), strict=True
+    ):
+        metres = axis.unit == "m"
+        meant = distance / 1e3 if metres else math.radians(distance)
+        units = f"distances are in {axis.unit} and durations in s"
+        cure = f"{units}; did you mean {meant:.4g} {axis.unit}?"
+        mean = distance / move.duration
+        said = f"{axis.name} moves {distance:g} {axis.unit}"
+        if not move.shortest:
+            found = f"{said} in {move.duration:g} s, at {mean:.3g} {axis.unit}/s on average"
+            hurried = list(
+                _fast("move.duration", found, value=mean, unit=axis.unit, kind="velocity", cure=cure)
+            )
+            yield from hurried
+            if hurried:
+                continue
+        if metres and distance > LONG_WAY:
+            yield Doubt(sentence=f"move.distance: {said}, farther than any crane's runway; {cure}")
+        elif not metres and distance > MANY_TURNS:
+            turns = distance / (2.0 * math.pi)
+            yield Doubt(sentence=f"move.distance: {said}, which are {turns:.3g} turns; {cure}")
+        yield from _fast(
+            "move.final_velocity",
+            f"{axis.name} ends at {speed:g} {axis.unit}/s",
+            value=speed,
+            unit=axis.unit,
+            kind="velocity",
+            cure=_thousandth(speed, f"speeds are in {axis.unit}/s"),
+        )
+    longest = max(map(abs, move.distance))
+    if not move.shortest and move.duration >= LONG_TIME and 0.0 < longest < SLOW * move.duration:
+        cure = _thousandth(move.duration, "durations are in s")
+        yield Doubt(sentence=f"move.duration: {move.duration:g} s for {longest:g} m (or rad) is slow; {cure}")
+
+
+def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
+    """Doubt limits that hold nothing back."""
+    units = {axis.name: axis.unit for axis in spec.machine().actuated}
+    for place, value in spec.limits.stated().items():
+        *table, kind = place.split(".")
+        unit = units[table[-1]] if len(table) > 1 else max(units.values(), key="m".__eq__)
+        if (unit, kind) in FAST:
+            per = "s" if kind == "velocity" else "s²"
+            cure = _thousandth(value, f"limits are in {unit}/{per}")
+            yield from _fast(
+                place, f"allows {value:g} {unit}/{per}", value=value, unit=unit, kind=kind, cure=cure
+            )
+    sway, depth = spec.limits.sway, scale.depth[-1]
+    if sway is not None and sway > (depth or FAR * max(scale.way[-1], *scale.depth)) > 0.0:
+        what = f"the ropes' {depth:.4g} m" if depth else f"{FAR:g} times the move"
+        cure = _thousandth(sway, "lengths are in m")
+        yield Doubt(sentence=f"limits.sway: {sway:g} m are more than {what}; {cure}", refused=True)
+
+
+def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
+    """Doubt limits of the residual sway that every motion keeps."""
+    if spec.check.default:
+        return
+    limits = spec.check.residual_sway
+    alike = len(set(limits.values())) == 1
+    from_rest = not spec.move.initial and spec.move.stops
+    end_load = spec.machine().end_load
+    ends = spec.machine().loads[end_load]  # others, such as a hook, may be left to swing
+    for load, limit in reversed(list(limits.items())):  # the end load, which hangs lowest, speaks for all
+        column = list(limits).index(load)
+        place = "check.residual_sway" if alike else f"check.residual_sway.{load}"
+        directions = end_load if load in ends else slice(column, column + 1)
+        depth, way, sway = (float(of[directions].max()) for of in (scale.depth, scale.way, scale.sway))
+        cure = _thousandth(limit, "lengths are in m")
+        if depth and limit > RESIDUAL_OF_ROPE * depth:
+            found = f"{limit:g} m are more than half of the {depth:.4g} m by which the {load} hangs"
+            yield Doubt(sentence=f"{place}: {found}; {cure}", refused=True)
+        elif from_rest and not depth and limit > FAR * way > 0.0:
+            found = f"{limit:g} m are more than {FAR:g} times the {way:.4g} m that the move takes the {load}"
+            yield Doubt(sentence=f"{place}: {found}; {cure}", refused=True)
+        elif load in ends and from_rest and limit > max(sway, RESIDUAL_OF_MOVE * way) > 0.0:
+            found = (
+                f"{limit:g} m are more than the {sway:.2g} m that almost any motion of this length and time"
+            )
+            yield Doubt(sentence=f"{place}: {found} leaves, so the check tells nothing; state less.")
+        else:
+            continue
+        if alike:
+            return
+
+
+def _swing(spec: Spec, scale: Scale) -> Iterator[Doubt]:
+    """Doubt moves that swing a load out of the range in which it behaves like a spring."""
+    angle = float(np.max(scale.angle, initial=0.0))
+    if not spec.move.shortest and angle > LARGE_SWING:
+        found = f"the move swings the load by some {math.degrees(angle):.0f}°, far beyond small angles"
+        units = "distances are in m and durations in s"
+        yield Doubt(sentence=f"move.duration: {found}; {units}, so allow more than {spec.move.duration:g} s.")
+
+
+def _drive(spec: Spec) -> Iterator[Doubt]:
+    """Doubt what is stated of the drives."""
+    tau = spec.actuator.tau
+    if tau is not None and not spec.move.shortest and tau > spec.move.duration:
+        cure = _thousandth(tau, "time constants are in s")
+        yield Doubt(sentence=f"actuator.tau: {tau:g} s are longer than the whole move; {cure}")
+    ways = [
+        abs(way)
+        for axis, way in zip(spec.machine().actuated, spec.move.distance, strict=True)
+        if axis.unit == "m"
+    ]
+    for name in ("start_tolerance", "following_error"):
+        value, usual = getattr(spec.can, name), getattr(CanSpec(), name)
+        if value is not None and value != usual and value > LOOSE * max(ways, default=math.inf) > 0.0:
+            cure = _thousandth(value, "tolerances are in m")
+            yield Doubt(sentence=f"can.{name}: {value:g} m are more than half of the move; {cure}")
+
+
+def _scale(spec: Spec) -> Scale:
+    """Estimate what the loads can do; nothing is told of a machine whose equations fail at the target."""
+    try:
+        with np.errstate(divide="raise", over="raise", invalid="raise"):
+            return _scale_at_target(spec)
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return Scale(**dict.fromkeys(("depth", "way", "sway", "angle"), np.zeros(len(spec.machine().loads))))
+
+
+def _scale_at_target(spec: Spec) -> Scale:
+    """Take the machine's equations about rest at the target.
+
+    Of M_uu q̈_u = K_u − M_auᵀ q̈_a, q̈_u = 0 gives the quasi-static swing, and without K_u, when the axes jump
+    faster than anything swings, q_u = −M_uu⁻¹ M_auᵀ Δq_a. A move of d in T takes 4 d/T² at least.
+    """
+    plant, target = spec.machine(), list(spec.move.target)
+    named = SimpleNamespace(**spec.plant.parameters)
+    still = [0.0] * len(plant.unactuated)
+    standing = [0.0] * len(target)
+    swung: list[list[float]] = (STEP * np.eye(len(still))).tolist()
+    rest, *near = (plant.equations(q_u, still, target, standing, named) for q_u in (still, *swung))
+    level, *views = (plant.outputs(q_u, target, named) for q_u in (still, *swung))
+    stiffness = -np.array([one.K_u for one in near], dtype=float).T / STEP
+    inputs = np.array(rest.M_au, dtype=float).T
+    held = np.linalg.lstsq(stiffness, inputs, rcond=None)[0]
+    free = np.linalg.lstsq(np.array(rest.M_uu, dtype=float), inputs, rcond=None)[0]
+    sway = np.array([view.sway for view in views], dtype=float).T / STEP
+    angle = np.array([view.angle for view in views], dtype=float).T / STEP
+    distance = np.array(spec.move.distance)
+    least = 4.0 * distance / spec.move.duration**2
+    depth = np.maximum(0.0, -np.array(level.height, dtype=float))
+    way = np.abs(sway @ free) @ np.abs(distance)
+    worst = WORST_TIMING * np.abs(sway @ held) @ np.abs(least)
+    angles = np.minimum(np.abs(angle @ held @ least), np.abs(angle @ free @ distance))
+    return Scale(
+        depth=depth,
+        way=way,
+        sway=way if spec.move.shortest else np.minimum(worst, way),
+        angle=np.where(depth > 0.0, angles, 0.0),
+    )

@@ -1,0 +1,211 @@
+"""From TOML files, presets and ``KEY=VALUE`` overrides to a `Spec`, with every fault in one error."""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from gen_profile.errors import OutputError, SpecError
+from gen_profile.spec.model import Spec
+from gen_profile.spec.plausibility import refuse_implausible
+from gen_profile.spec.structure import Faults, Table, structure
+from gen_profile.spec.tables import complete
+from gen_profile.suggestion import listed, meant, number_meant, suggestion
+
+HERE = Path()
+SLIPS = {
+    r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
+    r"^\s*[\w.-]+\s*:": "; write = between a key and its value",
+    r"=\s*[A-Za-z_]": "; a text stands in quotes",
+}
+
+
+def read_spec(path: Path, overrides: Sequence[str] = ()) -> Spec:
+    """Read a TOML file.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read.
+    SpecError
+        The text is no TOML, or its content has faults: all of them are listed.
+    """
+    return parse_spec(read_text(path), overrides, str(path), path.parent)
+
+
+def read_text(path: Path) -> str:
+    """Read a TOML file's text, unparsed.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read.
+    SpecError
+        It is no UTF-8 text.
+    """
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        near = meant(path.name, [other.name for other in path.parent.glob("*.toml")])
+        cure = f"; did you mean {listed(near)}?" if near and isinstance(error, FileNotFoundError) else "."
+        raise OutputError(f"Cannot read the spec {path}: {error.strerror}{cure}") from error
+    except UnicodeDecodeError as error:
+        raise SpecError(f"{path}: not UTF-8 text (byte {error.start}); save the spec as UTF-8.") from error
+
+
+def parse_spec(text: str, overrides: Sequence[str] = (), source: str = "spec", folder: Path = HERE) -> Spec:
+    """Read TOML text, apply overrides such as ``plant.L1=0.5`` and validate the whole.
+
+    Parameters
+    ----------
+    text : str
+    overrides : sequence of str
+    source : str
+        Where the text comes from, for errors.
+    folder : Path
+        What files that the spec names are relative to.
+
+    Raises
+    ------
+    SpecError
+        The text is no TOML (with line and column), or its content has faults: all of them are listed.
+    """
+    document = _document(text, source)
+    if not document and not overrides:
+        raise SpecError(f"{source}: the spec is empty; it must state at least [plant] type and [move].")
+    return spec_from_dict(overridden(document, overrides), folder)
+
+
+def overridden(document: Mapping[str, Any], overrides: Sequence[str]) -> Table:
+    """Copy nested plain values and set keys such as ``plant.L1=0.5`` in them.
+
+    Raises
+    ------
+    SpecError
+        An override makes no sense.
+    """
+    changed = copy.deepcopy(dict(document))
+    overridden_in(changed, overrides)
+    return changed
+
+
+def overridden_in(document: Table, overrides: Sequence[str]) -> None:
+    """Set keys such as ``plant.L1=0.5`` in nested plain values.
+
+    Raises
+    ------
+    SpecError
+        An override makes no sense.
+    """
+    for override in overrides:
+        _override(document, override)
+
+
+def presets() -> dict[str, str]:
+    """List every preset's name with its summary (the first comment line of its TOML file), sorted."""
+    folder = files("gen_profile") / "presets"
+    texts = {item.name.removesuffix(".toml"): item.read_text("utf-8") for item in folder.iterdir()}
+    return {name: text.partition("\n")[0].lstrip("# ") for name, text in sorted(texts.items())}
+
+
+def preset_spec(name: str, overrides: Sequence[str] = ()) -> Spec:
+    """Read a preset by name.
+
+    Raises
+    ------
+    SpecError
+        There is no such preset, or the overrides have faults.
+    """
+    return parse_spec(preset_text(name), overrides, name)
+
+
+def preset_text(name: str) -> str:
+    """Read a preset's TOML text.
+
+    Raises
+    ------
+    SpecError
+        There is no such preset.
+    """
+    if name not in presets():
+        raise SpecError(f"--preset: unknown preset {name!r}{suggestion(name, presets())}")
+    return (files("gen_profile") / "presets" / f"{name}.toml").read_text("utf-8")
+
+
+def spec_from_dict(document: Mapping[str, Any], folder: Path = HERE) -> Spec:
+    """Validate nested plain values, as TOML or a manifest holds them.
+
+    Parameters
+    ----------
+    document : mapping
+    folder : Path
+        What files that the spec names are relative to.
+
+    Raises
+    ------
+    SpecError
+        With one sentence for every fault found.
+    """
+    faults = Faults()
+    spec = structure(complete(document, folder, faults), faults)
+    refuse_implausible(spec)
+    return spec
+
+
+def _document(text: str, source: str) -> Table:
+    """Parse TOML; its parser tells where it stumbled, except at the end of the text."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        last = text.split("\n")
+        end = f"(at the end: line {len(last)}, column {len(last[-1]) + 1})"
+        problem = re.sub(r"[(]at end of document[)]", end, str(error))
+        raise SpecError(f"{source}: not valid TOML: {problem}{_slip(text, problem)}.") from error
+    except RecursionError as error:
+        raise SpecError(f"{source}: not valid TOML: arrays or tables nested too deeply.") from error
+    except ValueError as error:
+        raise SpecError(f"{source}: not valid TOML: a whole number of thousands of digits.") from error
+
+
+def _slip(text: str, problem: str) -> str:
+    """Continue a sentence about text that is no TOML by what its writer took for TOML, if that shows."""
+    line = text.split("\n")[int(found[1]) - 1] if (found := re.search(r"line (\d+)", problem)) else ""
+    values = re.findall(r"=\s*([^\s#,}\]=]+(?:,[0-9]+)?(?:\s*[A-Za-zµ°%][^\s#}]*)?)", line.partition("#")[0])
+    hints = filter(None, (number_meant(value) for value in values if not value[0].isalpha()))
+    if hint := next((hint for hint in hints if "quotes" not in hint), ""):
+        return hint
+    return next((hint for pattern, hint in SLIPS.items() if re.search(pattern, line)), "")
+
+
+def _override(document: Table, override: str) -> None:
+    """Set a dotted key; the value is TOML where it parses as TOML, else text."""
+    key, equals, text = override.partition("=")
+    path = [part.strip() for part in key.split(".")]
+    if not equals or not all(path):
+        raise SpecError(f"--set {override!r}: write KEY=VALUE, such as --set plant.L1=0.5.")
+    table = document
+    for depth, part in enumerate(path[:-1]):
+        inner = table.setdefault(part, {})
+        if not isinstance(inner, dict):
+            taken = ".".join(path[: depth + 1])
+            raise SpecError(f"--set {override!r}: {taken!r} is a value, not a table.")
+        table = inner
+    # a move is stated one way: the override's way replaces the file's
+    replaced = {"distance": ("start", "target"), "start": ("distance",), "target": ("distance",)}
+    if path[0] == "move":
+        for other in replaced.get(path[-1], ()):
+            table.pop(other, None)
+    table[path[-1]] = _override_value(text)
+
+
+def _override_value(text: str) -> Any:
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text.strip()
+    return parsed["value"] if parsed.keys() == {"value"} else text.strip()

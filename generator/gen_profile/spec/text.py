@@ -1,0 +1,63 @@
+"""A spec's text with some values changed, and all that its author wrote beside them kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import tomli_w
+import tomlkit
+from tomlkit.items import Table
+
+from gen_profile.errors import GenProfileError
+from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import overridden_in, parse_spec
+
+CHANGED = ("plant", "robustness")
+
+
+def changed_text(text: str, overrides: tuple[str, ...], given: Spec, spec: Spec, folder: Path) -> str:
+    """Write a spec that differs from the one a text states, in parameters and robustness.
+
+    Parameters
+    ----------
+    text : str
+        TOML.
+    overrides : tuple of str
+        That were applied to it; they are written, too.
+    given : Spec
+        What both state.
+    spec : Spec
+        What the new text shall state.
+    folder : Path
+        What files that the text names are relative to.
+
+    Returns
+    -------
+    str
+        With every comment of the old text; the complete spec where that text cannot be changed so.
+    """
+    document = tomlkit.parse(text)
+    overridden_in(document, overrides)
+    before, after = given.to_dict(), spec.to_dict()
+    for name in CHANGED:
+        _change(document, name, before[name], after[name])
+    try:
+        if parse_spec(document.as_string(), source="spec", folder=folder) != spec:
+            return tomli_w.dumps(after)
+    except GenProfileError:
+        return tomli_w.dumps(after)
+    if spec.plant.file is not None:
+        document["plant"]["file"] = spec.plant.file.name  # lies beside the new spec
+    return document.as_string()
+
+
+def _change(table: tomlkit.TOMLDocument | Table, key: str, before: object, after: object) -> None:
+    if before == after:
+        return
+    if isinstance(after, dict) and isinstance(before, dict):
+        if key not in table:
+            table[key] = tomlkit.table()
+        for name, value in after.items():
+            _change(table[key], name, before.get(name), value)
+    else:
+        table[key] = after

@@ -1,0 +1,73 @@
+"""The machine that simulated drives move: its FMU, behind the drives' port `Load`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from gen_profile.design.plan import RESIDUAL_SAMPLES, STANDSTILL, watch_time
+from gen_profile.errors import CosimulationError
+from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.motion.metrics import length, peak
+from gen_profile.spec.model import Spec
+from gen_profile.verification.cosimulation import max_step
+from gen_profile_fmu.stepping import SteppedPlant
+
+
+class CraneLoad:
+    """The nominal machine of a spec, at rest at the start of its move; a context manager.
+
+    Parameters
+    ----------
+    spec : Spec
+    on_build : callable, optional
+        Called before the FMU is compiled.
+
+    Raises
+    ------
+    CosimulationError
+    """
+
+    def __init__(self, spec: Spec, on_build: Callable[[], None] | None = None) -> None:
+        if spec.move.initial:
+            raise CosimulationError(
+                "move.initial: the simulated crane would swing on while its drives start up, and nobody "
+                "knows how it swings when the motion begins; leave move.initial out."
+            )
+        machines = scenarios(spec)
+        tau = spec.actuator.tau or 0.0
+        self._settle, self._watch = STANDSTILL * tau, watch_time(spec, machines)
+        self._end_load = spec.machine().end_load
+        self._position: Sequence[float] = spec.move.start
+        self._fmu = SteppedPlant(
+            spec.machine(),
+            spec.move.start,
+            machines[0].parameters,
+            tau=tau,
+            max_step=max_step(spec, machines[0]),
+            on_build=on_build,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._fmu.close()
+
+    def advance(self, position: Sequence[float], duration: float) -> Sequence[float]:
+        """Lead every axis evenly to a position in m (or rad), and return where the axes then are."""
+        self._position = position
+        return [float(at) for at in self._fmu.advance(position, duration).position]
+
+    def residual_sway(self) -> float:
+        """Hold the axes, and return the greatest sway of the end load in m from their standstill on."""
+        if self._settle:
+            self._fmu.advance(self._position, self._settle)
+        step = self._watch / (RESIDUAL_SAMPLES - 1)
+        sway = [self._fmu.advance(self._position, step).sway[self._end_load] for _ in range(RESIDUAL_SAMPLES)]
+        return float(peak(length(np.array(sway)))[0])

@@ -1,0 +1,111 @@
+"""What became of a stream, in SI units: for people, for programs, and as a table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.motion.profile import Array, grid_times
+from gen_profile.spec.model import Spec
+from gen_profile_exporters.can.following import Standstill, standstills
+from gen_profile_exporters.can.plan import StreamPlan
+from gen_profile_exporters.can.record import Record
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Source:
+    """A verified motion and the spec that it was designed for."""
+
+    spec: Spec
+    plan: StreamPlan
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Outcome:
+    """What became of a stream; see the command-line contract.
+
+    Attributes
+    ----------
+    source : Source
+    record : Record
+    notes : tuple of str
+        What limited this machine's punctuality or made up for it, and what else there is to say.
+    sway : float or None
+        Of the simulated machine after the move, in m.
+    """
+
+    source: Source
+    record: Record
+    notes: tuple[str, ...]
+    sway: float | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether the motion was carried out to its end."""
+        return not self.record.reason
+
+    @property
+    def planned(self) -> Array:
+        """Position that each axis is led to by the instant of each SYNC, in m, shape (cycles, axes)."""
+        return self._si(self.source.plan.motion.at_sync)
+
+    @property
+    def actual(self) -> Array:
+        """Position that each drive told at each SYNC, in m; not a number where none was told."""
+        return np.where(self.record.told[:, None], self._si(self.record.actual), np.nan)
+
+    @property
+    def standstills(self) -> tuple[Standstill, ...]:
+        """Axes that stood still while their setpoints went on."""
+        motion = self.source.plan.motion
+        return standstills(motion.at_sync, self.record.actual, self.record.told, motion.period)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        told = self.record.told
+        apart = np.abs(self.actual - self.planned)[told]
+        target = self._si(self.source.plan.motion.position[-1])
+        drive = {
+            "position_error_m": float(np.abs(self._si(np.array(self.record.final)) - target).max()),
+            "following_error_max_m": float(apart.max()) if told.any() else None,
+            "sway_residual_peak_m": self.sway,
+            "cycles_unanswered": self.record.sent - int(told.sum()),
+            "cycles_standing": sum(len(found.cycles) for found in self.standstills),
+        }
+        return {
+            "state": self.record.phase.value,
+            "cycles_sent": self.record.sent,
+            "cycles_planned": len(self.source.plan.cycles),
+            "lateness_us": self.record.lateness.to_dict(),
+            "drift_s": self.record.lateness.drift,
+            "drive": drive if told.any() else None,
+            "reason": self.record.reason,
+            "notes": [*self.notes, *map(self._standstill_words, self.standstills)],
+        }
+
+    def table(self) -> bytes:
+        """Render plan and reality side by side (RFC 4180)."""
+        axes = self.source.spec.machine().actuated
+        heads = [f"{axis.name}_{what}_{axis.unit}" for axis in axes for what in ("planned", "actual")]
+        times = grid_times(len(self.planned) - 1, self.source.plan.motion.period)
+        columns = np.stack([self.planned, self.actual], axis=2).reshape(len(times), -1)
+        rows = [
+            ",".join([f"{time:.9g}", *("" if np.isnan(cell) else f"{cell:.9g}" for cell in row)])
+            for time, row in zip(times, columns, strict=True)
+        ]
+        return ("\n".join([",".join(["time_s", *heads]), *rows]) + "\n").encode("ascii")
+
+    def _standstill_words(self, found: Standstill) -> str:
+        axis, many = self.source.plan.target.axes[found.column], len(found.cycles)
+        unit = self.source.spec.machine().actuated[found.column].unit
+        return (
+            f"axis {axis.name}: it stood still in {many} {'cycles' if many > 1 else 'cycle'} of the motion, "
+            f"from cycle {found.cycles[0]} on, and came {1e3 * found.apart / abs(axis.counts_per_si):.3g} "
+            f"m{unit} off it: its drive left setpoints out."
+        )
+
+    def _si(self, counts: Any) -> Array:
+        scale = np.array([axis.counts_per_si for axis in self.source.plan.target.axes])
+        return np.asarray(counts / scale)

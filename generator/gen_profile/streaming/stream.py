@@ -1,0 +1,263 @@
+"""Streaming an artefact to the drives on a CAN bus, or to simulated ones, and telling what became of it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+from gen_profile.artefacts.manifest import FILENAME, sha256
+from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.errors import OutputError, SpecError, StreamAborted
+from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import spec_from_dict
+from gen_profile.streaming.outcome import Outcome, Source
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.clock import NANOSECONDS, Clock, SharedClock, SystemClock
+from gen_profile_exporters.can.console import stopped_by_signals, told_aside
+from gen_profile_exporters.can.lateness import Lateness, rehearse
+from gen_profile_exporters.can.plan import plan_of
+from gen_profile_exporters.can.port import Port
+from gen_profile_exporters.can.realtime import PEER_PRIORITY, priority, real_time
+from gen_profile_exporters.can.startup import startup_lists
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.registry import format_of
+
+if TYPE_CHECKING:
+    import can
+
+    from gen_profile.streaming.load import CraneLoad
+    from gen_profile_exporters.can.drive_bank import DriveBank
+    from gen_profile_exporters.can.drive_dictionary import Make
+    from gen_profile_exporters.can.record import Record
+
+Tell = Callable[[str], None]
+SPIN = 200_000  # ns before each cycle, where a processor can be spared for it
+
+
+def require_extra() -> None:
+    """Refuse to go on without what only streaming needs.
+
+    Raises
+    ------
+    OutputError
+    """
+    if find_spec("canopen") is None:
+        raise OutputError("Streaming needs canopen: pip install 'gen-profile[can]'.")
+
+
+def require_rest(spec: Spec) -> None:
+    """Refuse a motion that begins with a swing: it would meet the load in another phase of it.
+
+    Raises
+    ------
+    SpecError
+    """
+    if spec.move.initial:
+        raise SpecError(
+            "move.initial: drives need a while to start up, and nobody knows how the load swings by then; "
+            "let it come to rest, leave move.initial out, and export again."
+        )
+
+
+def verified(path: Path, *, accept_unverified: bool = False) -> Source:
+    """Read an artefact, and require that its manifest vouches for it.
+
+    Raises
+    ------
+    OutputError
+        It or its manifest cannot be read.
+    SpecError
+        It is no CAN log, was altered, failed its check or never had one, or begins with a swing.
+    ExportError
+        It is damaged.
+    """
+    if format_of(path) != "can":
+        raise SpecError(f"{path}: only the log of the format can is streamed; export with --export can.")
+    content, beside = read_artefact(path), path.parent / FILENAME
+    manifest = manifest_beside(path, content)
+    if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == "can"}:
+        raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
+    if manifest.check is None and not accept_unverified:
+        raise SpecError(f"{path} is unverified: export it with its check, or say --accept-unverified.")
+    if manifest.check is not None and not manifest.check.get("passed"):
+        raise SpecError(f"{path} failed its check, as {beside} tells; it is not streamed.")
+    spec = spec_from_dict(manifest.spec, path.parent)
+    require_rest(spec)
+    return Source(spec=spec, plan=plan_of(content, target_of(spec)))
+
+
+def summary(source: Source) -> dict[str, Any]:
+    """List what a stream will do, without doing it."""
+    target, motion = source.plan.target, source.plan.motion
+    return {
+        "state": "planned",
+        "cycles_sent": 0,
+        "cycles_planned": len(source.plan.cycles),
+        "period_s": motion.period,
+        "bus_load": frames.cycle_bits(target) / target.can.bitrate / motion.period,
+        "axes": [
+            {
+                "name": axis.name,
+                "node": node,
+                "start_m": float(motion.position[0, column] / axis.counts_per_si),
+                "target_m": float(motion.position[-1, column] / axis.counts_per_si),
+            }
+            for column, (axis, node) in enumerate(zip(target.axes, frames.nodes(target), strict=True))
+        ],
+        "startup": [
+            {"node": node, "object": f"{e.index:04X}h:{e.sub:02X}", "value": e.value, "meaning": e.meaning}
+            for node, entries in startup_lists(motion, target).items()
+            for e in entries
+        ],
+    }
+
+
+def self_test(source: Source) -> Lateness:
+    """Keep the cycle without a bus, and refuse one that this machine cannot hold.
+
+    Raises
+    ------
+    StreamAborted
+    """
+    period = frames.period_microseconds(source.spec.can) * 1000
+    with real_time() as refused:
+        found = rehearse(_clock(refused), period)
+    if found.percentile(100) * 1e3 >= period / 2:
+        raise StreamAborted(
+            f"This machine cannot hold a cycle of {period / 1e6:g} ms: it was late by up to "
+            f"{found.percentile(100) / 1e3:.3g} ms (half a cycle is allowed). {' '.join(refused)} "
+            "Choose a longer can.sync_period, or relieve the machine."
+        )
+    return found
+
+
+def stream(
+    source: Source,
+    port: Port,
+    *,
+    simulate_drive: bool = False,
+    reset_fault: bool = False,
+    notes: tuple[str, ...] = (),
+    tell: Tell = lambda _: None,
+) -> Outcome:
+    """Stream a motion, and stop the axes whatever happens.
+
+    Parameters
+    ----------
+    source : Source
+    port : Port
+    simulate_drive : bool
+        Put simulated drives on the bus, which move the spec's nominal machine.
+    reset_fault : bool
+        Whether drives that are in fault are reset first.
+    notes : tuple of str
+        What there is to say beforehand.
+    tell : callable
+        Told each phase.
+
+    Raises
+    ------
+    SpecError
+        The interface cannot be opened.
+    CosimulationError
+        The simulated machine cannot be built.
+    """
+    from gen_profile_exporters.can.streamer import Streamer  # noqa: PLC0415  # canopen is an extra
+
+    with ExitStack() as stack:
+        simulation = stack.enter_context(_simulated(source, port, tell)) if simulate_drive else None
+        bus = port.open(source.spec.can.bitrate)
+        stack.callback(_shut_down, bus)
+        aside = stack.enter_context(told_aside(tell))
+        refused = stack.enter_context(real_time())
+        clock = _clock(refused) if simulation is None else simulation.clock
+        streamer = Streamer(bus, clock, source.plan, aside, reset_fault=reset_fault)
+        stack.enter_context(stopped_by_signals(streamer.ask_to_stop))
+        before = 0 if simulation is None else simulation.clock.catch_up()
+        record = streamer.run()
+    if simulation is None:
+        sway, remarks = None, port.remarks(record.launched)
+    else:
+        sway, remarks = simulation.sway, _stalls(simulation.clock.stalled - before)
+    said = (*notes, *refused, *remarks, *_afterwards(record))
+    return Outcome(source=source, record=record, notes=said, sway=sway)
+
+
+def _shut_down(bus: can.BusABC) -> None:
+    """Close a bus that may have failed, which must not hide what became of the stream."""
+    with suppress(Exception):
+        bus.shutdown()
+
+
+def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
+    """Have simulated drives answer until told to stop, as promptly as the machine permits."""
+    with priority(PEER_PRIORITY):
+        bank.run(stop)
+
+
+def drive_bank(
+    source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make, clock: Clock | None = None
+) -> DriveBank:
+    """Put a simulated drive on the bus for every axis, at rest at the start of the move."""
+    from gen_profile_exporters.can.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
+    from gen_profile_exporters.can.simulated_drive import SimulatedDrive  # noqa: PLC0415
+
+    target = target_of(source_spec)
+    scales = [axis.counts_per_si for axis in target.axes]
+    drives = [
+        SimulatedDrive(node, make, round(at * scale))
+        for node, at, scale in zip(frames.nodes(target), source_spec.move.start, scales, strict=True)
+    ]
+    return DriveBank(bus, clock or SystemClock(), drives, scales, load)
+
+
+@attrs.define
+class _Simulation:
+    """Simulated drives: the clock that they share with the streamer, and what they leave behind."""
+
+    clock: SharedClock
+    sway: float | None = None
+
+
+def _afterwards(record: Record) -> tuple[str, ...]:
+    """Say what went wrong when the motion was done, which the next stream may meet."""
+    return (f"When the drives were switched off: {record.aftermath}",) if record.aftermath else ()
+
+
+def _stalls(stalled: int) -> tuple[str, ...]:
+    """Say how long a simulation stood still, in ns, if it did."""
+    milliseconds = round(1e3 * stalled / NANOSECONDS)
+    if milliseconds == 0:
+        return ()
+    return (f"This machine stalled for {milliseconds} ms in all, and the simulation with it.",)
+
+
+@contextmanager
+def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
+    """Have simulated drives work on the bus whenever the streamer sleeps."""
+    from gen_profile.streaming.load import CraneLoad  # noqa: PLC0415  # FMPy and CasADi, 0.5 s
+    from gen_profile_exporters.can.drive_dictionary import Make  # noqa: PLC0415  # canopen is an extra
+
+    period = frames.period_microseconds(source.spec.can) * 1000
+    with (
+        CraneLoad(source.spec, lambda: tell("compiling the plant's FMU, once")) as load,
+        port.open(source.spec.can.bitrate) as bus,
+    ):
+        clock = SharedClock(longest=period // 4)
+        clock.work = drive_bank(source.spec, bus, load, Make(), clock).poll
+        found = _Simulation(clock)
+        yield found
+        found.sway = load.residual_sway()
+
+
+def _clock(refused: tuple[str, ...]) -> SystemClock:
+    """Spin before each cycle where that takes the processor from nobody."""
+    spare = not refused and sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
+    return SystemClock(SPIN if spare else 0)

@@ -1,0 +1,216 @@
+"""One case of a sweep, from its values to a record and files, on whatever computer a worker runs.
+
+Nothing is shared with the workers but the program: what a case needs comes with it, and what comes of it goes
+back as bytes.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import version
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, cast
+
+import attrs
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from gen_profile.design.design import LIBRARIES, Design, design
+from gen_profile.errors import (
+    CosimulationError,
+    ExportError,
+    GenProfileError,
+    InfeasibleProblem,
+    LimitViolation,
+    OutputError,
+    SolverDiverged,
+    SpecError,
+)
+from gen_profile.solvers.collocation import SCHEMES, Trajectory
+from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import parse_spec
+from gen_profile.sweep.grid import overrides
+from gen_profile.verification.batch import on_processors
+from gen_profile.verification.verdict import Check
+
+_ALONE = threading.Lock()  # FMUs are no guests for threads, and a Dask worker may have several
+TRAJECTORY = ("mesh", "nodes", "stages")
+PASSED, CHECK_FAILED, CRASHED = "passed", "check failed", "crashed"
+STATUSES: dict[type[GenProfileError], str] = {
+    SpecError: "faulty spec",
+    InfeasibleProblem: "infeasible",
+    SolverDiverged: "diverged",
+    LimitViolation: "limit broken",
+    ExportError: "not exportable",
+    CosimulationError: "not simulated",
+}
+
+
+@attrs.frozen(kw_only=True)
+class Recipe:
+    """What all cases of a sweep have in common.
+
+    Attributes
+    ----------
+    text : str
+        TOML of the spec.
+    overrides : tuple of str
+        Of the spec, the same for every case.
+    source : str
+        Where the text comes from, for errors.
+    folder : str
+        What files that the spec names are relative to; workers must find them there, too.
+    formats : tuple of str
+        To export.
+    versions : tuple of (str, str)
+        Of the libraries that shape the numbers.
+    """
+
+    text: str
+    overrides: tuple[str, ...]
+    source: str
+    folder: str
+    formats: tuple[str, ...]
+    versions: tuple[tuple[str, str], ...]
+
+    def spec(self, values: Mapping[str, Any]) -> Spec:
+        """Read the spec of a case.
+
+        Raises
+        ------
+        SpecError
+        """
+        return parse_spec(self.text, (*self.overrides, *overrides(values)), self.source, Path(self.folder))
+
+
+@attrs.frozen(kw_only=True)
+class Outcome:
+    """What came of a case.
+
+    Attributes
+    ----------
+    record : dict
+        Plain values: the case's row of the table. It tells of no clock and no computer.
+    files : dict of str to bytes
+        Artefacts with their manifest; none where the case failed.
+    start : bytes or None
+        Where the search for the next case's solution may begin, if there is such a place.
+    """
+
+    record: dict[str, Any]
+    files: dict[str, bytes]
+    start: bytes | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether the case may be used."""
+        return bool(self.record["status"] == PASSED)
+
+
+@cache
+def versions() -> tuple[tuple[str, str], ...]:
+    """List the libraries that shape the numbers, as installed here."""
+    return tuple((library, version(library)) for library in LIBRARIES)
+
+
+def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes | None = None) -> Outcome:
+    """Design, export and check one case; whatever is wrong with it becomes its record.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    case : int
+    values : mapping
+        Of the keys varied.
+    start : bytes, optional
+        Of the outcome of a neighbour.
+
+    Raises
+    ------
+    SpecError
+        This computer has other versions than the recipe asks for.
+    OutputError
+        This computer has no room for the files.
+    """
+    if versions() != recipe.versions:
+        raise SpecError(
+            f"--scheduler: a worker has {_listed(versions())}, and this sweep needs "
+            f"{_listed(recipe.versions)}; install the same there."
+        )
+    try:
+        with (
+            _ALONE,
+            TemporaryDirectory(prefix="gen-profile-") as folder,
+            threadpool_limits(1),
+            on_processors(1),
+        ):
+            near = None if start is None else _unpacked(start)
+            outcome = design(recipe.spec(values), recipe.formats, Path(folder), near=near)
+            files = {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
+        return Outcome(record=_record(case, values, outcome), files=files, start=_packed(outcome))
+    except OutputError:
+        raise
+    except GenProfileError as error:
+        return failed(case, values, STATUSES.get(type(error), CRASHED), str(error))
+    except Exception as error:
+        return failed(case, values, CRASHED, f"Internal error ({type(error).__name__}: {error}).")
+
+
+def failed(case: int, values: Mapping[str, Any], status: str, reason: str) -> Outcome:
+    """Record a case of which nothing came."""
+    return Outcome(
+        record={"case": case, "values": dict(values), "status": status, "reason": reason}, files={}
+    )
+
+
+def _record(case: int, values: Mapping[str, Any], outcome: Design) -> dict[str, Any]:
+    document, check = outcome.to_dict(), cast("Check", outcome.check)  # nobody asked for none
+    load, finding = check.worst
+    solver = {
+        key: ", ".join(value) if isinstance(value, list) else value
+        for key, value in document["solver"].items()
+        if key not in {"status", "time_s"}  # of which one is told before, and the other differs every time
+    }
+    return {
+        "case": case,
+        "values": dict(values),
+        "status": PASSED if check.passed else CHECK_FAILED,
+        "reason": " ".join(check.reasons()),
+        "spec_sha256": document["spec_sha256"],
+        "profile_sha256": outcome.plan.trial.command.payload_hash(),
+        "solver": solver,
+        "figures": document["figures"],
+        "check": {
+            "worst_load": load,
+            "worst_scenario": finding.scenario.name,
+            "worst_sway_m": finding.residual[load],
+            "limit_m": check.limit[load],
+            "error_bound_m": check.error_bound,
+            "arrival_s": check.arrival,
+        },
+        "artefacts": [attrs.asdict(artefact) for artefact in outcome.artefacts],
+    }
+
+
+def _packed(outcome: Design) -> bytes | None:
+    """Write down where the search for a neighbour's solution may begin."""
+    solution = outcome.plan.solution
+    if solution is None or solution.trajectory is None:
+        return None
+    buffer, start = BytesIO(), solution.trajectory
+    np.savez(buffer, scheme=start.scheme.name, **{name: getattr(start, name) for name in TRAJECTORY})
+    return buffer.getvalue()
+
+
+def _unpacked(start: bytes) -> Trajectory:
+    with np.load(BytesIO(start)) as arrays:
+        scheme = SCHEMES[str(arrays["scheme"])]
+        return Trajectory(scheme=scheme, **{name: arrays[name] for name in TRAJECTORY})
+
+
+def _listed(installed: tuple[tuple[str, str], ...]) -> str:
+    return ", ".join(f"{library} {number}" for library, number in installed)

@@ -1,0 +1,165 @@
+"""From a sweep to one PLC block that plays any of its profiles, made of the very files that passed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from gen_profile.artefacts.manifest import FILENAME, parse_manifest, sha256
+from gen_profile.artefacts.writing import staged
+from gen_profile.errors import ExportError, SpecError
+from gen_profile.evaluation.phrases import named
+from gen_profile.spec.reading import spec_from_dict
+from gen_profile.sweep.case import PASSED
+from gen_profile.sweep.store import grid_of, read_swept
+from gen_profile.sweep.table import Table, read_table
+from gen_profile_exporters.block_source import BlockSource
+from gen_profile_exporters.exporter import Target, target_of
+from gen_profile_exporters.profile_library import LibraryEntry, library_source, read_library
+from gen_profile_exporters.registry import container_of, find_container, formats
+
+
+@attrs.frozen(kw_only=True)
+class Library:
+    """What was written.
+
+    Attributes
+    ----------
+    path, index : Path
+        Of the block, and of a JSON file that tells which profile is which.
+    format : str
+        Of the block's file.
+    files : tuple of Path
+        What was written of that format: the block's file, and what else the format needs.
+    block : str
+        Name of the function block.
+    bytes : int
+        Of the block's file.
+    profiles : tuple of dict
+        By number: case, values, hash, duration and worst sway.
+    """
+
+    path: Path
+    index: Path
+    format: str
+    files: tuple[Path, ...]
+    block: str
+    bytes: int
+    profiles: tuple[dict[str, Any], ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "path": str(self.path),
+            "index": str(self.index),
+            "format": self.format,
+            "files": [str(path) for path in self.files],
+            "block": self.block,
+            "bytes": self.bytes,
+            "profiles": list(self.profiles),
+        }
+
+
+def write_library(folder: Path, path: Path) -> Library:
+    """Put the PLC blocks of all cases that passed into one, and make sure that it issues the same.
+
+    Parameters
+    ----------
+    folder : Path
+        Of a finished sweep that exported a format with the playback block.
+    path : Path
+        File to write, such as ``crane.st``; the function block is named after it, and its suffix tells the
+        format, which need not be the sweep's.
+
+    Raises
+    ------
+    SpecError
+        The sweep exported no playback blocks, no case passed, or no format with the block has that suffix.
+    OutputError
+        The sweep's files were altered, or the library cannot be written.
+    ExportError
+        The profiles do not fit into one block.
+    """
+    format_ = container_of(path)
+    container, stem = find_container(format_), path.name[: -len(formats()[format_].suffix)]
+    grid = grid_of(folder)
+    keys = [axis.key for axis in grid.axes]
+    profiles: list[dict[str, Any]] = []
+    entries, target = [], None
+    for row in _passed(read_table(folder, grid)):
+        artefact = _block_of(row)
+        content = read_swept(folder / row["folder"] / artefact["path"], artefact["sha256"])
+        target = target or _target(folder / row["folder"], stem.removeprefix("FB_"))
+        values = {key: row[key] for key in keys}
+        source = find_container(artefact["format"]).unwrap(content, target)
+        entries.append(LibraryEntry(source=source, label="  ".join(named(values))))
+        profiles.append(
+            {
+                "number": len(profiles),
+                "case": row["case"],
+                "values": values,
+                "payload_sha256": artefact["payload_sha256"],
+                "duration_s": row["duration_s"],
+                "sway_residual_worst_m": row["check_worst_sway_m"],
+            }
+        )
+    if target is None:
+        raise SpecError(
+            f"No case of the sweep in {folder} passed, so there is nothing to put into a library."
+        )
+    library = library_source(entries, target)
+    first, *others = container.wrap(library, target)
+    index = path.with_name(f"{stem}.json")
+    with staged(path.parent) as staging:
+        written = staging.write(path.name, first.content)
+        _require_same(container.unwrap(written, target), target, profiles)
+        for file in others:
+            staging.write(file.filename, file.content)
+        staging.write(index.name, _index(library.name, written, profiles))
+        staging.deliver()
+    return Library(
+        path=path,
+        index=index,
+        format=format_,
+        files=(path, *(path.with_name(file.filename) for file in others)),
+        block=library.name,
+        bytes=len(written),
+        profiles=tuple(profiles),
+    )
+
+
+def _passed(table: Table) -> list[dict[str, Any]]:
+    return [row for row in table.to_pylist() if row["status"] == PASSED]
+
+
+def _target(case: Path, name: str) -> Target:
+    """Give what the profiles were made for, and the library's own name."""
+    path = case / FILENAME
+    spec = spec_from_dict(parse_manifest(read_swept(path), str(path)).spec, case)
+    return attrs.evolve(target_of(spec), name=name)
+
+
+def _block_of(row: dict[str, Any]) -> dict[str, Any]:
+    """Find the first file that holds a playback block; what else belongs to it follows it."""
+    known, artefacts = formats(), row["artefacts"]
+    found: list[dict[str, Any]] = [item for item in artefacts if known[item["format"]].holds_block]
+    if not found:
+        raise SpecError("A library needs the cases' PLC blocks: sweep again with --export plc.")
+    return found[0]
+
+
+def _require_same(library: BlockSource, target: Target, profiles: list[dict[str, Any]]) -> None:
+    """Hold what the library's file issues to what was checked."""
+    for profile, motion in zip(profiles, read_library(library, target), strict=True):
+        if motion.payload_hash() != profile["payload_sha256"]:
+            raise ExportError(
+                f"Profile {profile['number']} would not issue what case {profile['case']} does."
+            )
+
+
+def _index(block: str, written: bytes, profiles: list[dict[str, Any]]) -> bytes:
+    document = {"block": block, "sha256": sha256(written), "profiles": profiles}
+    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8")

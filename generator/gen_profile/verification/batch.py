@@ -1,0 +1,119 @@
+"""Residual sway of many machines at once, by the compiled loop over the plant's FMU."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+import attrs
+import numpy as np
+
+from gen_profile.motion.profile import Array
+from gen_profile.plants.plant import Plant
+from gen_profile.spec.model import Spec
+from gen_profile_fmu.fmu_files import Version
+from gen_profile_fmu.many_runs import ManyRuns
+from gen_profile_fmu.plant_fmu import plant_fmu
+from gen_profile_fmu.plant_variables import MAX_STEP, TAU
+
+_most: ContextVar[int] = ContextVar("_most", default=sys.maxsize)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Feed:
+    """What the drives do, for all machines or for each: between the points they interpolate linearly.
+
+    Attributes
+    ----------
+    times : (points,) or (runs, points) array
+        s, rising.
+    position : (points, axes) or (runs, points, axes) array
+        Where the axes are asked to be at these times, in m (or rad).
+    """
+
+    times: Array
+    position: Array
+
+
+@contextmanager
+def on_processors(count: int) -> Iterator[None]:
+    """Take no more processors than this, such as one beside other processes of the same sweep."""
+    earlier = _most.set(count)
+    try:
+        yield
+    finally:
+        _most.reset(earlier)
+
+
+@contextmanager
+def many_machines(plant: Plant, on_build: Callable[[], None] | None = None) -> Iterator[ManyRuns]:
+    """Load the plant's FMU once for every processor that this process may use."""
+    with ManyRuns(plant_fmu(plant, on_build), Version.FMI2, workers=min(_present(), _most.get())) as runs:
+        yield runs
+
+
+def residual_peaks(
+    runs: ManyRuns,
+    spec: Spec,
+    feed: Feed,
+    machines: Array,
+    *,
+    tau: Array,
+    max_step: Array,
+    since: float,
+) -> Array:
+    """Feed every machine, and find the greatest sway of every load once the axes stand.
+
+    Parameters
+    ----------
+    runs : ManyRuns
+        Of the spec's plant.
+    spec : Spec
+        Of which the plant and what swings at the start are taken.
+    feed : Feed
+    machines : (runs, parameters) array
+        In the order of `Plant.parameters`.
+    tau : (runs,) array
+        Lag of the drives in s.
+    max_step : (runs,) array
+        Longest integration step in s.
+    since : float
+        When the axes stand, in s.
+
+    Returns
+    -------
+    (runs, loads) array
+        m.
+
+    Raises
+    ------
+    CosimulationError
+    """
+    plant = spec.machine()
+    names = [parameter.name for parameter in plant.parameters]
+    values = dict(zip(names, machines.T, strict=True)) | {TAU: tau, MAX_STEP: max_step}
+    values |= {name: np.full(len(machines), value) for name, value in spec.move.initial.items()}
+    first = feed.position[..., 0, :]
+    for axis, start in zip(plant.actuated, np.moveaxis(first, -1, 0), strict=True):
+        values |= {
+            f"{axis.name}.{suffix}": np.broadcast_to(start, len(machines)) for suffix in ("start", "setpoint")
+        }
+    inputs = {
+        f"{axis.name}.setpoint": feed.position[..., 1:, column] for column, axis in enumerate(plant.actuated)
+    }
+    return runs.peaks(feed.times, inputs, values, [f"sway.{load}" for load in plant.loads], since=since)
+
+
+def _present() -> int:
+    """Count the processors that this process is let onto, where the system tells."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def parameter_rows(plant: Plant, machines: Sequence[Mapping[str, float]]) -> Array:
+    """Order the parameters of machines as `Plant.parameters`, shape (machines, parameters)."""
+    return np.array([[values[parameter.name] for parameter in plant.parameters] for values in machines])

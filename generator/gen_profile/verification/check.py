@@ -1,0 +1,210 @@
+"""Judging an artefact that lies on disk, whoever wrote or altered it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
+from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.errors import OutputError, SpecError
+from gen_profile.evaluation.scenarios import further_scenarios, scenarios
+from gen_profile.motion.profile import SampledProfile
+from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import spec_from_dict
+from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
+from gen_profile.verification.external_fmu import judge_foreign
+from gen_profile.verification.monte_carlo import Progress, with_further
+from gen_profile.verification.motion_variant import parse_variant, varied
+from gen_profile.verification.verdict import Check, Scenario
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.registry import find_exporter, format_of
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Judgement:
+    """A check of one file, and what its manifest says about it.
+
+    Attributes
+    ----------
+    path : Path
+    format : str
+    spec : Spec
+    check : Check
+    manifest : str
+        ``"matches"``, ``"differs"`` (the file is not the one that was exported), or ``"none"`` for this spec.
+    variant : str or None
+        What was changed of the motion, in words.
+    """
+
+    path: Path
+    format: str
+    spec: Spec
+    check: Check
+    manifest: str
+    variant: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "artefact": {"format": self.format, "path": str(self.path), "manifest": self.manifest},
+            "variant": self.variant,
+            "check": self.check.to_dict(),
+        }
+
+
+def check_artefact(
+    path: Path,
+    spec: Spec | None = None,
+    on_build: Callable[[], None] | None = None,
+    *,
+    samples: int | None = None,
+    row: int | None = None,
+    strict: bool = False,
+    scale: Sequence[str] = (),
+    mirror: Sequence[str] = (),
+    offset: Sequence[str] = (),
+    progress: Progress = lambda _, __: None,
+) -> Judgement:
+    """Replay a file, co-simulate it, and compare it with its manifest.
+
+    Parameters
+    ----------
+    path : Path
+        Any artefact that the exporters write; its format is told by its suffix.
+    spec : Spec, optional
+        Taken from ``manifest.json`` beside the file when not given.
+    on_build : callable, optional
+        Called before the plant's FMU is compiled.
+    samples : int, optional
+        Draws in place of those that the spec asks for.
+    row : int, optional
+        Number of the only scenario to try.
+    strict : bool
+        Whether faults in the timing of setpoints count as well.
+    scale, mirror, offset : sequences of str
+        A variant to judge, see `gen_profile.verification.motion_variant.parse_variant`.
+    progress : callable
+        Told how many scenarios beyond the machines are done, and of how many.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read, or there is no spec.
+    SpecError
+        There is no such scenario or axis.
+    ExportError
+        The file is damaged.
+    CosimulationError
+    """
+    content, format_ = read_artefact(path), format_of(path)
+    manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
+    spec = spec or _spec_of(manifest, path)
+    setpoints = find_exporter(format_).replay(content, target_of(spec))
+    variant = parse_variant(spec, scale, mirror, offset)
+    standing = _provenance(manifest, content, spec)
+    if samples is not None:
+        spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
+    judged = varied(spec, setpoints, variant) if variant.told() else (spec, setpoints)
+    check = _verdict(*judged, _rows(judged[0], row), on_build, progress)
+    faults = (*check.faults, *_alterations(path, standing))
+    check = attrs.evolve(check, strict=strict, faults=faults)
+    return Judgement(
+        path=path, format=format_, spec=spec, check=check, manifest=standing, variant=variant.told()
+    )
+
+
+def _rows(spec: Spec, row: int | None) -> tuple[Scenario, ...]:
+    """List all scenarios, or the one of a number."""
+    machines = scenarios(spec)
+    rows = (*machines, *further_scenarios(spec, machines))
+    if row is None:
+        return rows
+    if not 0 <= row < len(rows):
+        raise SpecError(
+            f"--scenario {row}: the scenarios of this spec are numbered from 0 to {len(rows) - 1}."
+        )
+    return (rows[row],)
+
+
+def _verdict(
+    spec: Spec,
+    setpoints: SampledProfile,
+    rows: Sequence[Scenario],
+    on_build: Callable[[], None] | None,
+    progress: Progress,
+) -> Check:
+    """Judge setpoints by themselves.
+
+    Holding velocity over a cycle errs with the cycle's square, so setpoints of twice the cycle tell how much.
+    """
+    resolution = float(setpoints.resolution.max())
+    if spec.check.foreign is not None:
+        check = judge_foreign(spec, spec.check.foreign, setpoints, rows)
+        return attrs.evolve(check, error_bound=check.error_bound + resolution)
+    further = [row for row in rows if row.group != "machines"]
+    # where a single scenario is asked for, the nominal machine tells what cycles err by
+    machines = [row for row in rows if row.group == "machines"] or scenarios(spec)[:1]
+    spacing = sample_spacing(spec, setpoints, machines)
+    followed = _of_even_cycles(setpoints, spec)
+    found = cosimulate(spec, followed, machines, output_step=spacing, on_build=on_build)
+    expected = cosimulate(spec, _every_other(followed), machines, output_step=spacing)
+    check = judge(spec, setpoints, machines, found, expected)
+    check = attrs.evolve(check, error_bound=check.error_bound + resolution)
+    if len(rows) == len(further):
+        check = attrs.evolve(check, findings=())
+    return with_further(spec, setpoints, check, further, progress)
+
+
+def _of_even_cycles(setpoints: SampledProfile, spec: Spec) -> SampledProfile:
+    """Go on for one more cycle where their number is odd, as the axes do anyway after the last setpoint."""
+    position = setpoints.position
+    if len(position) % 2 == 0:
+        onward = position[-1:] + setpoints.cycle_time * np.array(spec.move.final_velocity)
+        position = np.concatenate([position, onward])
+    return SampledProfile(cycle_time=setpoints.cycle_time, position=position, resolution=setpoints.resolution)
+
+
+def _every_other(setpoints: SampledProfile) -> SampledProfile:
+    """Leave out every second setpoint, but neither the first nor the last."""
+    return SampledProfile(
+        cycle_time=2.0 * setpoints.cycle_time,
+        position=setpoints.position[::2],
+        resolution=setpoints.resolution,
+    )
+
+
+def _spec_of(manifest: Manifest | None, path: Path) -> Spec:
+    if manifest is None:
+        raise OutputError(
+            f"There is no {FILENAME} beside {path}, so its spec is unknown; name the spec: "
+            f"gen-profile check {path} SPEC.toml"
+        )
+    try:
+        return spec_from_dict(manifest.spec, path.parent)
+    except SpecError as error:
+        raise OutputError(f"The spec in {path.parent / FILENAME} is faulty: {error}") from error
+
+
+def _provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
+    if manifest is None or manifest.spec_sha256 != spec.sha256():
+        return "none"
+    if sha256(content) in {artefact.sha256 for artefact in manifest.artefacts}:
+        return "matches"
+    return "differs"
+
+
+def _alterations(path: Path, standing: str) -> tuple[str, ...]:
+    """Say that a file is none of those that were exported."""
+    if standing != "differs":
+        return ()
+    return (
+        f"{path.name} is none of the files that {FILENAME} beside it lists: it was altered after its export; "
+        "export it again.",
+    )

@@ -1,0 +1,158 @@
+"""Co-simulation of replayed setpoints on the plant FMU, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from gen_profile.design.plan import RESIDUAL_SAMPLES, STANDSTILL, modal_amplitudes, watch_time
+from gen_profile.evaluation.simulation import Response
+from gen_profile.motion.metrics import peak
+from gen_profile.motion.profile import Array, SampledProfile
+from gen_profile.problem.linearization import linearize
+from gen_profile.spec.model import Spec
+from gen_profile.spec.plausibility import doubts
+from gen_profile.verification.plausibility import implausibilities
+from gen_profile.verification.verdict import Check, Finding, Scenario
+from gen_profile_fmu.cosimulation import PlantCosimulation
+
+LONGEST_STEP = 1e-3  # s, of the FMU's integrator
+STEP_PHASE = 0.05  # rad of the fastest mode that one step may cover
+ERROR_FLOOR = 1e-8  # m; covers what both integrations leave
+
+
+def cosimulate(
+    spec: Spec,
+    setpoints: SampledProfile,
+    machines: Sequence[Scenario],
+    *,
+    output_step: float,
+    on_build: Callable[[], None] | None = None,
+) -> tuple[Response, ...]:
+    """Let the plant's FMU follow setpoints, once with every machine.
+
+    Parameters
+    ----------
+    spec : Spec
+    setpoints : SampledProfile
+        Replayed from an artefact.
+    machines : sequence of Scenario
+    output_step : float
+        Spacing of samples in s, at most the cycle.
+    on_build : callable, optional
+        Called before the FMU is compiled.
+
+    Returns
+    -------
+    tuple of Response
+        One per machine, from the standstill of the axes on.
+
+    Raises
+    ------
+    CosimulationError
+        The FMU cannot be built or run.
+    """
+    tau = spec.actuator.tau or 0.0
+    with PlantCosimulation(spec.machine(), on_build) as fmu:
+        return tuple(
+            _from(
+                fmu.run(
+                    setpoints,
+                    machine.parameters,
+                    tau=tau,
+                    max_step=max_step(spec, machine),
+                    settle=STANDSTILL * tau + watch_time(spec, machines),
+                    output_step=output_step,
+                    initial=spec.move.initial,
+                    final_velocity=spec.move.final_velocity,
+                ),
+                arrival(spec, setpoints),
+            )
+            for machine in machines
+        )
+
+
+def judge(
+    spec: Spec,
+    setpoints: SampledProfile,
+    machines: Sequence[Scenario],
+    found: Sequence[Response],
+    expected: Sequence[Response],
+) -> Check:
+    """Compare what swings on with what is allowed.
+
+    Parameters
+    ----------
+    found : sequence of Response
+        Of `cosimulate`, one per machine.
+    expected : sequence of Response
+        Of another simulation at the same times, such that how far the two are apart bounds the error of
+        `found`.
+    """
+    error = max(
+        float(np.abs(one.sway - other.sway).max()) for one, other in zip(found, expected, strict=True)
+    )
+    between = max(above_samples(one.sway) for one in found)
+    return Check(
+        limit=dict(spec.check.residual_sway),
+        error_bound=error + between + ERROR_FLOOR,
+        arrival=arrival(spec, setpoints),
+        findings=tuple(
+            _finding(spec, machine, response) for machine, response in zip(machines, found, strict=True)
+        ),
+        directions=spec.machine().directions,
+        faults=implausibilities(spec, setpoints),
+        doubts=doubts(spec),
+    )
+
+
+def sample_spacing(spec: Spec, setpoints: SampledProfile, machines: Sequence[Scenario]) -> float:
+    """Choose the spacing in s at which residuals are sampled."""
+    return min(setpoints.cycle_time, watch_time(spec, machines) / (RESIDUAL_SAMPLES - 1))
+
+
+def above_samples(values: Array) -> float:
+    """Bound how far a peak between two samples rises above them: h²/8 of the curvature."""
+    return float(np.abs(np.diff(values, n=2, axis=0)).max()) / 8.0
+
+
+def arrival(spec: Spec, setpoints: SampledProfile) -> float:
+    """Time in s from which the axes stand still, the drives' lag included."""
+    return float(setpoints.times[-1]) + STANDSTILL * (spec.actuator.tau or 0.0)
+
+
+def max_step(spec: Spec, machine: Scenario) -> float:
+    """Choose the longest integration step in s, where trajectories are to be had."""
+    return min(LONGEST_STEP, longest_step(spec, machine))
+
+
+def longest_step(spec: Spec, machine: Scenario) -> float:
+    """Find the longest integration step in s that a machine's fastest mode permits."""
+    ends = (spec.move.start, spec.move.target)
+    fastest = max(linearize(spec.machine(), machine.parameters, q_a).frequencies[-1] for q_a in ends)
+    return STEP_PHASE / float(fastest)
+
+
+def _from(response: Response, arrival: float) -> Response:
+    """Cut what comes before."""
+    kept = response.times >= arrival * (1.0 - 1e-12)
+    return Response(
+        times=response.times[kept],
+        position=response.position[kept],
+        velocity=response.velocity[kept],
+        q_u=response.q_u[kept],
+        dq_u=response.dq_u[kept],
+        sway=response.sway[kept],
+        angle=response.angle[kept],
+    )
+
+
+def _finding(spec: Spec, machine: Scenario, response: Response) -> Finding:
+    plant = spec.machine()
+    modal = modal_amplitudes(plant, machine, response)
+    return Finding(
+        scenario=machine,
+        residual=dict(zip(plant.loads, map(float, peak(response.sway)), strict=True)),
+        modal=dict(zip(plant.loads, map(float, modal), strict=True)),
+    )
