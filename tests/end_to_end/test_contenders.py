@@ -8,8 +8,8 @@ import pytest
 
 from gen_profile.comparison.candidates import contenders
 from gen_profile.comparison.compare import compare
-from gen_profile.design.plan import figures, try_motion
 from gen_profile.errors import InfeasibleProblem
+from gen_profile.evaluation.motion_evaluation import figures, try_motion
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.shapers.base_moves import BASES

@@ -3,7 +3,8 @@
 import attrs
 import pytest
 
-from gen_profile.verification.verdict import Check, Finding, Scenario
+from gen_profile.evaluation.scenarios import Scenario
+from gen_profile.verification.verdict import Check, Finding
 
 LIMIT = {"hook": 0.004, "payload": 0.002}
 

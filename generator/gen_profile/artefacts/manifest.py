@@ -58,7 +58,8 @@ class Manifest:
         Of this program and the libraries that shape the numbers.
     artefacts : tuple of Artefact
     check : mapping or None
-        `gen_profile.verification.verdict.Check.to_dict` of the artefact that came off worst; None when none was checked.
+        `gen_profile.verification.verdict.Check.to_dict` of the artefact that came off worst; None when none
+        was checked.
     earlier : tuple of Manifest
         Of exports into the same folder before, with those of their artefacts that were not replaced since.
     """

@@ -11,8 +11,9 @@ from gen_profile.charts.figure import PALETTE, PLAIN, Band, Figure, Level, Line,
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.comparison.candidates import own_method
 from gen_profile.comparison.compare import Comparison, Row
-from gen_profile.design.plan import RESIDUAL_SAMPLES, Trial
+from gen_profile.evaluation.motion_evaluation import Trial
 from gen_profile.evaluation.phrases import machine, place_unit
+from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES
 from gen_profile.evaluation.scenarios import extremes
 from gen_profile.evaluation.simulation import Response
 from gen_profile.evaluation.spectrum import DECADES, natural_frequencies, spectrum

@@ -9,8 +9,8 @@ import attrs
 
 from gen_profile.comparison.candidates import Contender, contenders
 from gen_profile.comparison.recommendation import Recommendation, efficient, recommend
-from gen_profile.design.plan import Trial, figures, keeps_residual_sway, try_motion
 from gen_profile.errors import GenProfileError, InfeasibleProblem
+from gen_profile.evaluation.motion_evaluation import Trial, figures, keeps_residual_sway, try_motion
 from gen_profile.evaluation.phrases import mm
 from gen_profile.spec.model import Spec
 

@@ -10,8 +10,8 @@ import attrs
 import numpy as np
 
 from gen_profile.comparison.candidates import contenders
-from gen_profile.design.plan import SHORTEST_WATCH, STANDSTILL
 from gen_profile.errors import GenProfileError, SpecError
+from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.motion.profile import Array, Profile, grid_length, grid_times, read_only
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.linearization import linearize

@@ -11,12 +11,44 @@ from scipy.stats import qmc
 
 from gen_profile.motion.profile import Array
 from gen_profile.spec.model import Spec
-from gen_profile.verification.verdict import TIMING, Scenario
 
+TIMING = "timing"
+GROUPS = {
+    "machines": "nominal, ends and corners of the ranges",
+    "corners": "all other corners of more than three ranges",
+    "drives": "the same with drives that follow otherwise",
+    "samples": "drawn from all ranges",
+    TIMING: "setpoints late, at uneven times, or lost",
+}
 NOMINAL = "nominal"
 LAG = "lag"
 MOST_TRACED = 3  # ranges whose machines are all followed in full, which takes much longer than peaks alone
 FEWEST_TIMINGS = 20  # draws of uneven times
+
+
+@attrs.frozen(kw_only=True)
+class Scenario:
+    """A machine that the check moves.
+
+    Attributes
+    ----------
+    name : str
+        Such as ``"nominal"`` or ``"L1 +20 %"``.
+    parameters : mapping of str to float
+        Value of every plant parameter.
+    group : str
+        Which scenarios it is judged with: ``"machines"``, or another of `GROUPS`.
+    row : int
+        Its number among all scenarios, from 0.
+    lag : float or None
+        Time constant of the drives in s where it is not the one that the spec states.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    group: str = "machines"
+    row: int = 0
+    lag: float | None = None
 
 
 def scenarios(spec: Spec) -> tuple[Scenario, ...]:

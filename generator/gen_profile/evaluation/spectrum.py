@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
+from gen_profile.evaluation.scenarios import Scenario
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.problem.linearization import linearize
 from gen_profile.spec.model import Spec
-from gen_profile.verification.verdict import Scenario
 
 BEYOND = 1.6  # of the fastest mode's frequency, where a picture of a spectrum ends
 DECADES = 4.0  # of a spectrum that are shown

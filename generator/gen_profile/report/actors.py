@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gen_profile.charts.curves import Shown, end_load_sway
-from gen_profile.design.plan import Trial
+from gen_profile.evaluation.motion_evaluation import Trial
 from gen_profile.report.animation import Actor, Animation
 from gen_profile.report.machines import body_size, drawings, pose_of
 from gen_profile.spec.model import Spec

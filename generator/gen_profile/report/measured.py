@@ -12,8 +12,8 @@ from scipy.integrate import trapezoid
 from scipy.linalg import null_space
 from scipy.optimize import minimize_scalar
 
-from gen_profile.design.plan import Trial
 from gen_profile.errors import OutputError
+from gen_profile.evaluation.motion_evaluation import Trial
 from gen_profile.evaluation.simulation import Response
 from gen_profile.motion.profile import Array
 from gen_profile.problem.linearization import linearize

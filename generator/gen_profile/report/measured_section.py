@@ -8,7 +8,7 @@ import numpy as np
 
 from gen_profile.charts.curves import TIME, sway_levels
 from gen_profile.charts.figure import PALETTE, Band, Figure, Level, Line, Panel, Style
-from gen_profile.design.plan import Trial
+from gen_profile.evaluation.motion_evaluation import Trial
 from gen_profile.evaluation.phrases import machine, mm, number, place_unit
 from gen_profile.motion.profile import Array
 from gen_profile.report.content import Row, Section, Share, Table, Verdict

@@ -1,4 +1,4 @@
-"""From plain values to the typed ones of `gen_profile.spec.model`; a misfit becomes a sentence with its place."""
+"""From plain values to the typed ones of the spec's model; a misfit becomes a sentence with its place."""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ from typing import Self
 
 import numpy as np
 
-from gen_profile.design.plan import RESIDUAL_SAMPLES, STANDSTILL, watch_time
 from gen_profile.errors import CosimulationError
+from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, watch_time
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.motion.metrics import length, peak
 from gen_profile.spec.model import Spec

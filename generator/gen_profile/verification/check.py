@@ -12,7 +12,7 @@ import numpy as np
 from gen_profile.artefacts.manifest import FILENAME, Manifest, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.evaluation.scenarios import further_scenarios, scenarios
+from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
@@ -20,7 +20,7 @@ from gen_profile.verification.cosimulation import cosimulate, judge, sample_spac
 from gen_profile.verification.external_fmu import judge_foreign
 from gen_profile.verification.monte_carlo import Progress, with_further
 from gen_profile.verification.motion_variant import parse_variant, varied
-from gen_profile.verification.verdict import Check, Scenario
+from gen_profile.verification.verdict import Check
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from gen_profile.design.plan import RESIDUAL_SAMPLES, STANDSTILL, modal_amplitudes, watch_time
+from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, modal_amplitudes, watch_time
+from gen_profile.evaluation.scenarios import Scenario
 from gen_profile.evaluation.simulation import Response
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array, SampledProfile
@@ -14,7 +15,7 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import doubts
 from gen_profile.verification.plausibility import implausibilities
-from gen_profile.verification.verdict import Check, Finding, Scenario
+from gen_profile.verification.verdict import Check, Finding
 from gen_profile_fmu.cosimulation import PlantCosimulation
 
 LONGEST_STEP = 1e-3  # s, of the FMU's integrator

@@ -7,8 +7,8 @@ from itertools import groupby
 
 import numpy as np
 
-from gen_profile.design.plan import STANDSTILL, watch_time
-from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.evaluation.residual_sway import STANDSTILL, watch_time
+from gen_profile.evaluation.scenarios import TIMING, Scenario, scenarios
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.spec.model import ForeignFmu, Spec
@@ -18,7 +18,7 @@ from gen_profile.verification.cosimulation import ERROR_FLOOR, above_samples, ar
 from gen_profile.verification.monte_carlo import standstill
 from gen_profile.verification.plausibility import implausibilities
 from gen_profile.verification.setpoint_path import follows_exactly, lag_of, transmitted
-from gen_profile.verification.verdict import TIMING, Check, Finding, Scenario
+from gen_profile.verification.verdict import Check, Finding
 from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
 
 STEPS_PER_LAG = 4  # at least, of drives that lag

@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 import attrs
 import numpy as np
 
-from gen_profile.design.plan import STANDSTILL, watch_time
-from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.evaluation.residual_sway import STANDSTILL, watch_time
+from gen_profile.evaluation.scenarios import Scenario, scenarios
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.spec.model import Spec
 from gen_profile.verification.batch import Feed, many_machines, parameter_rows, residual_peaks
 from gen_profile.verification.cosimulation import STEP_PHASE, longest_step
 from gen_profile.verification.setpoint_path import delay, followed_up, lag_of, transmitted
-from gen_profile.verification.verdict import Check, Finding, Scenario
+from gen_profile.verification.verdict import Check, Finding
 from gen_profile_fmu.many_runs import ManyRuns
 
 BATCH = 50  # rows between two signs of life

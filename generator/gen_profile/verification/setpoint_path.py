@@ -8,10 +8,10 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
+from gen_profile.evaluation.scenarios import TIMING, Scenario
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.spec.model import PathSpec, Spec
 from gen_profile.verification.batch import Feed
-from gen_profile.verification.verdict import TIMING, Scenario
 
 LEAP = 1e-3  # of a cycle, in which a drive that holds setpoints is given the next one
 MOST_JITTER = 0.45  # of a cycle, lest setpoints overtake one another

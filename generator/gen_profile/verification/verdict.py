@@ -8,42 +8,11 @@ from typing import Any
 import attrs
 import numpy as np
 
-TIMING = "timing"
-GROUPS = {
-    "machines": "nominal, ends and corners of the ranges",
-    "corners": "all other corners of more than three ranges",
-    "drives": "the same with drives that follow otherwise",
-    "samples": "drawn from all ranges",
-    TIMING: "setpoints late, at uneven times, or lost",
-}
+from gen_profile.evaluation.scenarios import GROUPS, TIMING, Scenario
+
 QUANTILES = (0.5, 0.9, 0.99)
 FINE = 1e3  # µm, up to which an error is told in these
 MOST_LISTED = 50  # rows of a group; of a larger one the worst are listed, lest a manifest hold thousands
-
-
-@attrs.frozen(kw_only=True)
-class Scenario:
-    """A machine that the check moves.
-
-    Attributes
-    ----------
-    name : str
-        Such as ``"nominal"`` or ``"L1 +20 %"``.
-    parameters : mapping of str to float
-        Value of every plant parameter.
-    group : str
-        Which scenarios it is judged with: ``"machines"``, or another of `GROUPS`.
-    row : int
-        Its number among all scenarios, from 0.
-    lag : float or None
-        Time constant of the drives in s where it is not the one that the spec states.
-    """
-
-    name: str
-    parameters: Mapping[str, float]
-    group: str = "machines"
-    row: int = 0
-    lag: float | None = None
 
 
 @attrs.frozen(kw_only=True)

@@ -1,0 +1,113 @@
+"""A motion on the machines of a spec: what it does to them, and its figures."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import InfeasibleProblem
+from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, watch_time
+from gen_profile.evaluation.scenarios import Scenario, scenarios
+from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, Swing
+from gen_profile.motion.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
+from gen_profile.motion.profile import Profile
+from gen_profile.problem.actuator import lag_compensated
+from gen_profile.problem.limits import rounded_down
+from gen_profile.spec.model import Spec
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Trial:
+    """A motion and what it does to the machines of its spec.
+
+    Attributes
+    ----------
+    motion : Profile
+        Of the axes.
+    command : Profile
+        Setpoints of the drives, which is the motion itself where they are ideal.
+    machines : tuple of Scenario
+        Nominal first.
+    swing : Swing
+        Of these machines.
+    watch : float
+        How long a residual is watched, in s.
+    """
+
+    motion: Profile
+    command: Profile
+    machines: tuple[Scenario, ...]
+    swing: Swing
+    watch: float
+
+
+def try_motion(spec: Spec, motion: Profile) -> Trial:
+    """Integrate every machine of a spec under a motion of its axes.
+
+    Parameters
+    ----------
+    spec : Spec
+    motion : Profile
+    """
+    plant, machines = spec.machine(), scenarios(spec)
+    tau = spec.actuator.tau
+    watch = watch_time(spec, machines)
+    settle = 2.0 * max(spec.export.cycle_time, spec.can.sync_period) + STANDSTILL * (tau or 0.0)
+    until = motion.duration + settle + watch
+    _require_room(spec, until)
+    swing = Swing(plant, motion, [m.parameters for m in machines], until, spec.move.initial)
+    return Trial(
+        motion=motion, command=lag_compensated(motion, tau), machines=machines, swing=swing, watch=watch
+    )
+
+
+def _require_room(spec: Spec, until: float) -> None:
+    """Refuse to judge a motion that goes on, while it is watched, to where the machine cannot be."""
+    move = spec.move
+    beyond = np.array(move.target) + (until - move.duration) * np.array(move.final_velocity)
+    for axis, target, at in zip(spec.machine().actuated, move.target, beyond, strict=True):
+        if not axis.lower <= at <= axis.upper:
+            room = (axis.upper if at > target else axis.lower) - target
+            fast = rounded_down(abs(room) / (until - move.duration)) if room else "0"
+            raise InfeasibleProblem(
+                f"move.final_velocity: {axis.name} would be at {at:.3g} {axis.unit} while the sway is "
+                f"watched, and its range is {axis.lower:g} to {axis.upper:g} {axis.unit}; "
+                f"end at {'-' if at < target else ''}{fast} {axis.unit}/s or slower."
+            )
+
+
+def keeps_residual_sway(spec: Spec, trial: Trial, share: float = 1.0) -> bool:
+    """Whether every load keeps a share of its limit of residual sway on all machines."""
+    limits = share * np.array(list(spec.check.residual_sway.values()))
+    after = trial.swing.at(trial.motion.duration + np.linspace(0.0, trial.watch, RESIDUAL_SAMPLES))
+    return all(bool((peak(response.sway) <= limits).all()) for response in after)
+
+
+def figures(trial: Trial) -> dict[str, float]:
+    """Measure a trial: first axis, end load; sway during the move of the nominal machine, after it of all."""
+    motion, command, duration = trial.motion, trial.command, trial.motion.duration
+    end_load = trial.swing.plant.end_load
+    during = length(trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES))[0].sway[:, end_load])
+    after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
+    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in after]
+    names = ("velocity", "acceleration", "jerk")
+    units = ("m_per_s", "m_per_s2", "m_per_s3")
+    table = {"duration_s": duration}
+    for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1):
+        table[f"{name}_max_{unit}"] = greatest(motion, order)
+        if order > 1:
+            table[f"{name}_rms_{unit}"] = root_mean_square(motion, order)
+    table |= {
+        "sway_transient_peak_m": float(peak(during)[0]),
+        "sway_transient_rms_m": float(mean_square_root(during)[0]),
+        "sway_residual_peak_m": residuals[0],
+        "sway_residual_peak_perturbed_m": residuals[min(1, len(residuals) - 1)],
+        "sway_residual_worst_m": max(residuals),
+    }
+    if command is not motion:
+        table |= {
+            f"command_{name}_max_{unit}": greatest(command, order)
+            for order, (name, unit) in enumerate(zip(names, units, strict=True), start=1)
+        }
+        table["command_overshoot_m"] = overshoot(command)
+    return table

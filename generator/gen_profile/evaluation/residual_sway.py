@@ -1,0 +1,42 @@
+"""How long, and how finely, the sway after a move is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gen_profile.evaluation.scenarios import Scenario
+from gen_profile.evaluation.simulation import Response
+from gen_profile.motion.profile import Array
+from gen_profile.plants.plant import Plant
+from gen_profile.problem.linearization import linearize
+from gen_profile.spec.model import Spec
+
+SHORTEST_WATCH = 4.0  # s; a residual is watched for this long, or for two of the slowest periods
+STANDSTILL = 10.0  # time constants after which a lagging drive counts as standing: its speed is down to e⁻¹⁰
+RESIDUAL_SAMPLES = 4001
+
+
+def watch_time(spec: Spec, machines: Sequence[Scenario]) -> float:
+    """Time in s in which every mode of every machine shows its greatest sway at the target."""
+    plant, target = spec.machine(), spec.move.target
+    slowest = min(linearize(plant, machine.parameters, target).frequencies[0] for machine in machines)
+    return max(SHORTEST_WATCH, 2.0 * 2.0 * np.pi / float(slowest))
+
+
+def modal_amplitudes(plant: Plant, machine: Scenario, standing: Response) -> Array:
+    """Sum over the modes of what each adds to the sway of every load, in m, shape (loads,).
+
+    Parameters
+    ----------
+    plant : Plant
+    machine : Scenario
+    standing : Response
+        Of the machine from the standstill of its axes on.
+    """
+    linear = linearize(plant, machine.parameters, standing.position[0])
+    q_u, dq_u = standing.q_u[0], standing.dq_u[0]
+    z, dz = np.linalg.solve(linear.modes, np.stack([q_u, dq_u], axis=1)).T
+    amplitudes = np.hypot(z, dz / linear.frequencies)
+    return np.asarray(np.abs(linear.sway_gain @ linear.modes) @ amplitudes)
