@@ -6,7 +6,7 @@ python examples/01_design_and_check.py [FOLDER]
 import sys
 from pathlib import Path
 
-from gen_profile.design.design import design
+from gen_profile.designs.design import design
 from gen_profile.spec.reading import preset_spec
 from gen_profile.verification.check import check_artefact
 

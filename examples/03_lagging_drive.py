@@ -8,7 +8,7 @@ time, and asks the drive for much more acceleration.
 
 import numpy as np
 
-from gen_profile.design.plan import plan
+from gen_profile.designs.plan import plan
 from gen_profile.motion.metrics import greatest, peak
 from gen_profile.motion.profile import sample
 from gen_profile.spec.reading import preset_spec

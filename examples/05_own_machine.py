@@ -8,7 +8,7 @@ On the command line: gen-profile inclined.toml, with ``file = "inclined_crane.py
 import sys
 from pathlib import Path
 
-from gen_profile.design.design import design
+from gen_profile.designs.design import design
 from gen_profile.spec.reading import parse_spec
 from gen_profile.verification.check import check_artefact
 

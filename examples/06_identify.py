@@ -7,7 +7,7 @@ Here the measurements come from a simulated crane with noise; on site they come 
 
 import numpy as np
 
-from gen_profile.design.plan import plan
+from gen_profile.designs.plan import plan
 from gen_profile.evaluation.simulation import free_swing
 from gen_profile.identification.identify import identify
 from gen_profile.identification.measurements import SwingLog, parse_period, parse_reading

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from gen_profile.design.design import Design, design
+from gen_profile.designs.design import Design, design
 from gen_profile.spec.reading import preset_spec, presets
 
 AGREEMENT = 2e-6  # relative, of the costs

@@ -5,7 +5,7 @@ python examples/10_many_cranes.py
 
 import numpy as np
 
-from gen_profile.design.plan import plan
+from gen_profile.designs.plan import plan
 from gen_profile.motion.profile import sample
 from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.fmu_files import Version

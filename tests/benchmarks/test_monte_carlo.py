@@ -5,7 +5,7 @@ from time import perf_counter
 import numpy as np
 from fmpy import simulate_fmu
 
-from gen_profile.design.design import design
+from gen_profile.designs.design import design
 from gen_profile.spec.reading import preset_spec
 from gen_profile.verification.check import check_artefact
 from gen_profile_exporters.exporter import target_of

@@ -9,7 +9,7 @@ from generator.lagrangian_machines import Lagrange
 from scipy.integrate import solve_ivp
 
 from gen_profile.comparison.candidates import contenders
-from gen_profile.design.plan import plan
+from gen_profile.designs.plan import plan
 from gen_profile.evaluation.motion_evaluation import figures
 from gen_profile.evaluation.residual_sway import watch_time
 from gen_profile.evaluation.scenarios import scenarios

@@ -14,7 +14,7 @@ from command_line import run_here
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from gen_profile.design.plan import plan
+from gen_profile.designs.plan import plan
 from gen_profile.evaluation.residual_sway import watch_time
 from gen_profile.evaluation.scenarios import further_scenarios, scenarios
 from gen_profile.evaluation.simulation import Swing

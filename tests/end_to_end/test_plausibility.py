@@ -10,7 +10,7 @@ from command_line import run_here
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from gen_profile.design.plan import plan
+from gen_profile.designs.plan import plan
 from gen_profile.errors import ExportError
 from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Profile, SampledProfile, sample

@@ -13,7 +13,7 @@ from command_line import run_here, run_process
 
 from gen_profile.charts.curves import other_methods
 from gen_profile.comparison.compare import compare
-from gen_profile.design.design import design
+from gen_profile.designs.design import design
 from gen_profile.errors import OutputError
 from gen_profile.report.page import NEEDED, require_pages
 from gen_profile.report.print import printed

@@ -7,7 +7,7 @@ import pytest
 from command_line import run_here
 from scipy.integrate import solve_ivp
 
-from gen_profile.design.plan import plan
+from gen_profile.designs.plan import plan
 from gen_profile.spec.reading import preset_spec
 
 STEP = 0.01

@@ -9,7 +9,7 @@ from command_line import run_here
 from matplotlib import image
 
 from gen_profile.comparison.robustness import Robustness, error_grid, robustness
-from gen_profile.design.shape import shaped_motion
+from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import SpecError
 from gen_profile.evaluation.simulation import Swing
 from gen_profile.motion.metrics import peak

@@ -14,7 +14,7 @@ import pytest
 from command_line import PROGRAM, run_here, run_process
 from distributed import Client
 
-from gen_profile.design.design import design
+from gen_profile.designs.design import design
 from gen_profile.spec.reading import preset_spec, preset_text
 from gen_profile.sweep import run as workflow
 from gen_profile.sweep.grid import parse_grid

@@ -9,7 +9,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from gen_profile.cli import fmu as command
-from gen_profile.design.fmu import KINDS
+from gen_profile.designs.fmu import KINDS
 from gen_profile_fmu.plant_variables import InputKind
 from gen_profile_fmu.platforms import PLATFORMS, host_platform
 

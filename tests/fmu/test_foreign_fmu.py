@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gen_profile.artefacts.manifest import FILENAME
-from gen_profile.design.design import design
+from gen_profile.designs.design import design
 from gen_profile.errors import CosimulationError, SpecError
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.reading import preset_spec, spec_from_dict

@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 import pytest
 
-from gen_profile.design.plan import plan, timed
+from gen_profile.designs.plan import plan, timed
 from gen_profile.errors import InfeasibleProblem, LimitViolation
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice

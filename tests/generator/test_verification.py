@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gen_profile.design.plan import plan
+from gen_profile.designs.plan import plan
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.evaluation.simulation import Response
 from gen_profile.motion.profile import sample

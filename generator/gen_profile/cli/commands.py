@@ -86,7 +86,7 @@ def design(
     from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.design.design import design as run
+    from gen_profile.designs.design import design as run
 
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)

@@ -65,7 +65,7 @@ def fmu(
         raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
     spec = chosen_spec(spec_path, preset, overrides)
     from gen_profile.cli.progress import progress
-    from gen_profile.design.fmu import export_fmu, platform_names
+    from gen_profile.designs.fmu import export_fmu, platform_names
     from gen_profile_fmu.fmu_files import Version
     from gen_profile_fmu.model import AUTHOR
     from gen_profile_fmu.plant_variables import InputKind

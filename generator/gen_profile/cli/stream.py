@@ -253,7 +253,7 @@ def _source(
                 f"{path}: an artefact is streamed as it is; --preset, --set, --mode and --node are for specs."
             )
         return verified(path, accept_unverified=accept_unverified)
-    from gen_profile.design.design import design
+    from gen_profile.designs.design import design
     from gen_profile.errors import CheckFailed
 
     spec = chosen_spec(path, preset, overrides)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from gen_profile.comparison.compare import Comparison
     from gen_profile.comparison.robustness import Robustness
-    from gen_profile.design.design import Design
+    from gen_profile.designs.design import Design
     from gen_profile.identification.identify import Identification
     from gen_profile.report.build import Report
     from gen_profile.spec.model import Spec

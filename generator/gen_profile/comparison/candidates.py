@@ -8,8 +8,8 @@ from typing import Any
 
 import attrs
 
-from gen_profile.design.plan import timed
-from gen_profile.design.shape import shaped_motion
+from gen_profile.designs.plan import timed
+from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import GenProfileError, InfeasibleProblem
 from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Profile

@@ -12,7 +12,7 @@ import attrs
 
 from gen_profile.artefacts.manifest import sha256
 from gen_profile.comparison.compare import Comparison, compare
-from gen_profile.design.design import LIBRARIES, Design, design
+from gen_profile.designs.design import LIBRARIES, Design, design
 from gen_profile.evaluation.phrases import move, uncertain
 from gen_profile.report.content import Page
 from gen_profile.report.log import read_log

@@ -19,7 +19,7 @@ from gen_profile.charts.curves import (
 from gen_profile.charts.figure import PLAIN
 from gen_profile.comparison.candidates import own_method
 from gen_profile.comparison.compare import Comparison
-from gen_profile.design.design import Design
+from gen_profile.designs.design import Design
 from gen_profile.evaluation.motion_evaluation import Trial
 from gen_profile.evaluation.phrases import bound, machine, mm, number, place_unit
 from gen_profile.motion.metrics import extremes, greatest

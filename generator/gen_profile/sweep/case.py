@@ -19,7 +19,7 @@ import attrs
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from gen_profile.design.design import LIBRARIES, Design, design
+from gen_profile.designs.design import LIBRARIES, Design, design
 from gen_profile.errors import (
     CosimulationError,
     ExportError,

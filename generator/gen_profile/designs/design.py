@@ -13,7 +13,7 @@ import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256
 from gen_profile.artefacts.writing import Staging, staged
-from gen_profile.design.plan import Plan, plan, timed
+from gen_profile.designs.plan import Plan, plan, timed
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.scenarios import further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile

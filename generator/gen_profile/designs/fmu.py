@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.writing import deliver
-from gen_profile.design.plan import plan, timed
+from gen_profile.designs.plan import plan, timed
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.motion.profile import Profile
 from gen_profile.problem.linearization import linearize

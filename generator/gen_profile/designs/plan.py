@@ -8,7 +8,7 @@ from functools import partial
 import attrs
 import numpy as np
 
-from gen_profile.design.shape import shaped_motion
+from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import InfeasibleProblem, LimitViolation
 from gen_profile.evaluation.motion_evaluation import Trial, figures, keeps_residual_sway, try_motion
 from gen_profile.motion.profile import grid_length, grid_times
