@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         structured_text,
         twincat,
     )
-    from gen_profile_exporters.can import exporter as can
+    from gen_profile_exporters.can.export import exporter as can
     from gen_profile_exporters.exporter import BlockContainer, Exporter
 
     # Holds the project's own formats to the protocol wherever types are checked.
@@ -76,7 +76,7 @@ class Format(NamedTuple):
 
 BUILT_IN: dict[str, Format] = {
     "can": Format(
-        module="gen_profile_exporters.can.exporter",
+        module="gen_profile_exporters.can.export.exporter",
         summary="CiA 402 setpoints and SYNCs as candump log, ASC and BLF, with DBC and start-up list",
         proof="read back",
         suffix=".log",

@@ -7,9 +7,9 @@ import numpy as np
 from exporters.can.bench import MS, Bench
 from exporters.motions import quintic
 
-from gen_profile_exporters.can.plan import message
 from gen_profile_exporters.can.scaling import Setpoints
-from gen_profile_exporters.can.streamer import Phase, Streamer
+from gen_profile_exporters.can.streaming.plan import message
+from gen_profile_exporters.can.streaming.streamer import Phase, Streamer
 
 CYCLES = 900_000
 PERIOD = 0.004

@@ -21,9 +21,9 @@ from command_line import PROGRAM, run_here, run_process
 from gen_profile.artefacts import writing as delivery
 from gen_profile.artefacts.manifest import parse_manifest
 from gen_profile.streaming import stream as workflow
-from gen_profile_exporters.can.clock import SystemClock
-from gen_profile_exporters.can.pacer import Pacer
-from gen_profile_exporters.can.streamer import Streamer
+from gen_profile_exporters.can.host.clock import SystemClock
+from gen_profile_exporters.can.streaming.pacer import Pacer
+from gen_profile_exporters.can.streaming.streamer import Streamer
 
 BUSY = ("late at cycle", "cannot hold a cycle")  # a busy machine says so, and is no fault of the program
 

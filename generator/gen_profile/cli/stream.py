@@ -25,7 +25,7 @@ from gen_profile.errors import OutputError, SpecError, StreamAborted
 
 if TYPE_CHECKING:
     from gen_profile.streaming.outcome import Outcome, Source
-    from gen_profile_exporters.can.lateness import Lateness
+    from gen_profile_exporters.can.host.lateness import Lateness
 
 VIRTUAL = ("virtual", "gen-profile")
 _MISSES = ("extrapolate", "hold", "stop")
@@ -87,7 +87,7 @@ def stream(
     from gen_profile.artefacts.writing import require_place
     from gen_profile.cli.progress import progress
     from gen_profile.streaming import stream as run
-    from gen_profile_exporters.can.port import Port
+    from gen_profile_exporters.can.host.port import Port
 
     run.require_extra()
     overrides += as_overrides({"can.mode": mode, "can.node": node})
@@ -156,8 +156,8 @@ def drive_sim(
     from gen_profile.artefacts.writing import deliver
     from gen_profile.evaluation.phrases import mm, number
     from gen_profile.streaming.load import CraneLoad
-    from gen_profile_exporters.can import drive_dictionary
-    from gen_profile_exporters.can.port import Port
+    from gen_profile_exporters.can.host.port import Port
+    from gen_profile_exporters.can.simulation import drive_dictionary
 
     spec = chosen_spec(spec_path, preset, overrides)
     make = drive_dictionary.Make(miss=miss, own_mapping=own_mapping)

@@ -9,9 +9,9 @@ import numpy as np
 
 from gen_profile.motion.profile import Array, grid_times
 from gen_profile.spec.model import Spec
-from gen_profile_exporters.can.following import Standstill, standstills
-from gen_profile_exporters.can.plan import StreamPlan
-from gen_profile_exporters.can.record import Record
+from gen_profile_exporters.can.streaming.following import Standstill, standstills
+from gen_profile_exporters.can.streaming.plan import StreamPlan
+from gen_profile_exporters.can.streaming.record import Record
 
 
 @attrs.frozen(kw_only=True, eq=False)

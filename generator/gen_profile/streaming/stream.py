@@ -19,13 +19,13 @@ from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.streaming.outcome import Outcome, Source
 from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.clock import NANOSECONDS, Clock, SharedClock, SystemClock
-from gen_profile_exporters.can.console import stopped_by_signals, told_aside
-from gen_profile_exporters.can.lateness import Lateness, rehearse
-from gen_profile_exporters.can.plan import plan_of
-from gen_profile_exporters.can.port import Port
-from gen_profile_exporters.can.realtime import PEER_PRIORITY, priority, real_time
+from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock, SharedClock, SystemClock
+from gen_profile_exporters.can.host.console import stopped_by_signals, told_aside
+from gen_profile_exporters.can.host.lateness import Lateness, rehearse
+from gen_profile_exporters.can.host.port import Port
+from gen_profile_exporters.can.host.realtime import PEER_PRIORITY, priority, real_time
 from gen_profile_exporters.can.startup import startup_lists
+from gen_profile_exporters.can.streaming.plan import plan_of
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import format_of
 
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     import can
 
     from gen_profile.streaming.load import CraneLoad
-    from gen_profile_exporters.can.drive_bank import DriveBank
-    from gen_profile_exporters.can.drive_dictionary import Make
-    from gen_profile_exporters.can.record import Record
+    from gen_profile_exporters.can.simulation.drive_bank import DriveBank
+    from gen_profile_exporters.can.simulation.drive_dictionary import Make
+    from gen_profile_exporters.can.streaming.record import Record
 
 Tell = Callable[[str], None]
 SPIN = 200_000  # ns before each cycle, where a processor can be spared for it
@@ -169,7 +169,7 @@ def stream(
     CosimulationError
         The simulated machine cannot be built.
     """
-    from gen_profile_exporters.can.streamer import Streamer  # noqa: PLC0415  # canopen is an extra
+    from gen_profile_exporters.can.streaming.streamer import Streamer  # noqa: PLC0415  # canopen is an extra
 
     with ExitStack() as stack:
         simulation = stack.enter_context(_simulated(source, port, tell)) if simulate_drive else None
@@ -206,8 +206,8 @@ def drive_bank(
     source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make, clock: Clock | None = None
 ) -> DriveBank:
     """Put a simulated drive on the bus for every axis, at rest at the start of the move."""
-    from gen_profile_exporters.can.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
-    from gen_profile_exporters.can.simulated_drive import SimulatedDrive  # noqa: PLC0415
+    from gen_profile_exporters.can.simulation.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
+    from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive  # noqa: PLC0415
 
     target = target_of(source_spec)
     scales = [axis.counts_per_si for axis in target.axes]
@@ -243,7 +243,7 @@ def _stalls(stalled: int) -> tuple[str, ...]:
 def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
     """Have simulated drives work on the bus whenever the streamer sleeps."""
     from gen_profile.streaming.load import CraneLoad  # noqa: PLC0415  # FMPy and CasADi, 0.5 s
-    from gen_profile_exporters.can.drive_dictionary import Make  # noqa: PLC0415  # canopen is an extra
+    from gen_profile_exporters.can.simulation.drive_dictionary import Make  # noqa: PLC0415  # canopen is an extra
 
     period = frames.period_microseconds(source.spec.can) * 1000
     with (

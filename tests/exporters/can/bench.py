@@ -11,12 +11,12 @@ import attrs
 import can
 from exporters.motions import quintic, target
 
-from gen_profile_exporters.can import exporter
-from gen_profile_exporters.can.drive_bank import DriveBank
-from gen_profile_exporters.can.drive_dictionary import Make
-from gen_profile_exporters.can.plan import plan_of
-from gen_profile_exporters.can.simulated_drive import SimulatedDrive
-from gen_profile_exporters.can.streamer import Streamer
+from gen_profile_exporters.can.export import exporter
+from gen_profile_exporters.can.simulation.drive_bank import DriveBank
+from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
+from gen_profile_exporters.can.streaming.plan import plan_of
+from gen_profile_exporters.can.streaming.streamer import Streamer
 
 MS = 1_000_000
 BEGINNING = 1_000 * MS

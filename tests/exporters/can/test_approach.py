@@ -7,7 +7,7 @@ import pytest
 from exporters.can.bench import Bench
 from motions import quintic
 
-from gen_profile_exporters.can.record import Phase
+from gen_profile_exporters.can.streaming.record import Phase
 
 PERIOD = 0.004
 

@@ -2,7 +2,7 @@
 
 import time
 
-from gen_profile_exporters.can.clock import SharedClock
+from gen_profile_exporters.can.host.clock import SharedClock
 
 MS = 1_000_000
 

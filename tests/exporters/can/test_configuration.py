@@ -10,10 +10,10 @@ from motions import quintic, target
 
 from gen_profile.errors import ExportError
 from gen_profile_exporters.can.cia402 import State
-from gen_profile_exporters.can.drive_dictionary import Make
-from gen_profile_exporters.can.exporter import encode
-from gen_profile_exporters.can.plan import plan_of
-from gen_profile_exporters.can.record import Phase
+from gen_profile_exporters.can.export.exporter import encode
+from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.streaming.plan import plan_of
+from gen_profile_exporters.can.streaming.record import Phase
 
 
 def refused(bench, reason):

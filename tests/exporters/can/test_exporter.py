@@ -8,7 +8,8 @@ from system_parts import program
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
-from gen_profile_exporters.can import exporter, frames
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.export import exporter
 
 MOVE = quintic((0.1, 0.4))
 TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))

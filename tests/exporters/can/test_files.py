@@ -19,9 +19,9 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
 from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.can import frames, scaling, startup
-from gen_profile_exporters.can.candump import read
-from gen_profile_exporters.can.drive_dictionary import Make, dictionary, eds
-from gen_profile_exporters.can.exporter import encode, replay
+from gen_profile_exporters.can.export.candump import read
+from gen_profile_exporters.can.export.exporter import encode, replay
+from gen_profile_exporters.can.simulation.drive_dictionary import Make, dictionary, eds
 from gen_profile_exporters.exporter import target_of
 
 MOVE = quintic((0.1, 0.4))

@@ -9,8 +9,8 @@ from exporters.can.bench import Bench, RigidLoad
 from motions import quintic
 
 from gen_profile.streaming.outcome import Outcome
-from gen_profile_exporters.can.drive_dictionary import Make
-from gen_profile_exporters.can.following import standstills
+from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.streaming.following import standstills
 
 PERIOD = 0.004
 

@@ -4,8 +4,8 @@ import pytest
 from exporters.can.bench import MS, Bench
 
 from gen_profile_exporters.can.cia402 import State
-from gen_profile_exporters.can.record import Phase
-from gen_profile_exporters.can.simulated_drive import HEARTBEAT_LOST, SETPOINT_LOST, SimulatedDrive
+from gen_profile_exporters.can.simulation.simulated_drive import HEARTBEAT_LOST, SETPOINT_LOST, SimulatedDrive
+from gen_profile_exporters.can.streaming.record import Phase
 
 ANSWER = 20  # ms that a slow drive takes for an SDO
 

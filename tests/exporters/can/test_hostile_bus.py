@@ -8,7 +8,7 @@ from exporters.can.bench import QUICK_STOP, Bench
 from motions import quintic
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can.record import Phase
+from gen_profile_exporters.can.streaming.record import Phase
 
 FRAMES = 100_000
 ROUNDS = 20

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import can
 import pytest
 
-from gen_profile_exporters.can import launch
-from gen_profile_exporters.can.port import Port
+from gen_profile_exporters.can.host import launch
+from gen_profile_exporters.can.host.port import Port
 
 
 class Interface:

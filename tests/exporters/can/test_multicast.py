@@ -4,7 +4,7 @@ import can
 import pytest
 from can.interfaces.udp_multicast import UdpMulticastBus
 
-from gen_profile_exporters.can.multicast import MulticastBus
+from gen_profile_exporters.can.host.multicast import MulticastBus
 
 
 @pytest.fixture

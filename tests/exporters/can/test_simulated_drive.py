@@ -12,9 +12,9 @@ from exporters.can.bench import Bench
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can.cia402 import Controlword, State, state_of
-from gen_profile_exporters.can.drive_dictionary import Make, dictionary
-from gen_profile_exporters.can.realtime import real_time
-from gen_profile_exporters.can.simulated_drive import SimulatedDrive
+from gen_profile_exporters.can.host.realtime import real_time
+from gen_profile_exporters.can.simulation.drive_dictionary import Make, dictionary
+from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ import pytest
 from exporters.can.bench import QUICK_STOP, Bench
 from motions import quintic
 
-from gen_profile_exporters.can import console
 from gen_profile_exporters.can.cia402 import State
-from gen_profile_exporters.can.drive_dictionary import Make
-from gen_profile_exporters.can.record import Phase
+from gen_profile_exporters.can.host import console
+from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.streaming.record import Phase
 
 PERIOD = 4  # ms
 STOP_BY_SDO = bytes.fromhex("2b40600002000000")

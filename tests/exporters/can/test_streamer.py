@@ -10,11 +10,11 @@ import pytest
 from exporters.can.bench import OTHER_MAKE, QUICK_STOP, Bench, RigidLoad
 from motions import quintic
 
-from gen_profile_exporters.can.candump import read
 from gen_profile_exporters.can.cia402 import State
-from gen_profile_exporters.can.drive_dictionary import Make
-from gen_profile_exporters.can.exporter import encode
-from gen_profile_exporters.can.record import Phase
+from gen_profile_exporters.can.export.candump import read
+from gen_profile_exporters.can.export.exporter import encode
+from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.streaming.record import Phase
 
 PHASES = ["configure", "align", "enable", "stream", "hold", "disable"]
 PERIOD = 4  # ms

@@ -16,10 +16,10 @@ from pathlib import Path
 import can
 import numpy as np
 
-from gen_profile_exporters.can.candump import Frame, write
-from gen_profile_exporters.can.clock import SystemClock
-from gen_profile_exporters.can.launch import launching_bus
-from gen_profile_exporters.can.realtime import real_time
+from gen_profile_exporters.can.export.candump import Frame, write
+from gen_profile_exporters.can.host.clock import SystemClock
+from gen_profile_exporters.can.host.launch import launching_bus
+from gen_profile_exporters.can.host.realtime import real_time
 
 PERIOD = 0.004
 SYNC = can.Message(arbitration_id=0x080, is_extended_id=False)

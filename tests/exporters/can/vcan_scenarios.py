@@ -24,10 +24,10 @@ import can
 from can.interfaces.socketcan import SocketcanBus
 
 import gen_profile.streaming.load
-import gen_profile_exporters.can.streamer
+import gen_profile_exporters.can.streaming.streamer
 from gen_profile.cli import main as gen_profile_command
 
-LOADED = (gen_profile.streaming.load, gen_profile_exporters.can.streamer)
+LOADED = (gen_profile.streaming.load, gen_profile_exporters.can.streaming.streamer)
 BUS = ("--interface", "socketcan", "--channel", "vcan0")
 PATIENCE = 60.0  # s, for what takes a second or two; a machine may be busy
 SIOCSIFFLAGS = 0x8914  # linux/sockios.h

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile_exporters.can.clock import NANOSECONDS, Clock
+from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 
 BINS_US = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000)
 REHEARSAL = 2.0  # s

@@ -15,8 +15,8 @@ from contextlib import suppress
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from gen_profile_exporters.can.clock import NANOSECONDS
 from gen_profile_exporters.can.frames import message
+from gen_profile_exporters.can.host.clock import NANOSECONDS
 
 assert sys.platform == "linux"  # for the type checker, too
 SO_TXTIME = SCM_TXTIME = 61  # asm-generic/socket.h

@@ -1,7 +1,7 @@
 """The streamer: listen → configure → align → enable → approach → stream → hold → disable; or stop.
 
 Before each cycle the drives' answers to the one before are judged. Whatever is wrong ends in a quick stop
-(`gen_profile_exporters.can.stopping`), before anything is said about it, and no setpoint follows it.
+(`gen_profile_exporters.can.streaming.stopping`) before anything is said about it, and no setpoint follows.
 """
 
 from __future__ import annotations
@@ -13,22 +13,23 @@ import can
 import numpy as np
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can import configuration, frames, startup
-from gen_profile_exporters.can.approach import approach
+from gen_profile_exporters.can import frames, startup
 from gen_profile_exporters.can.cia402 import FOLLOWS, IP_ENABLE, Controlword, State
-from gen_profile_exporters.can.clock import NANOSECONDS, Clock
 from gen_profile_exporters.can.frames import Integers
-from gen_profile_exporters.can.link import Link
-from gen_profile_exporters.can.pacer import Pacer
-from gen_profile_exporters.can.plan import StreamPlan, cycles_of
-from gen_profile_exporters.can.record import Phase, Record, Recorder
+from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 from gen_profile_exporters.can.scaling import (
     greatest_velocity,
     magnitude_counts,
     quick_stop_deceleration,
 )
-from gen_profile_exporters.can.stopping import quick_stop
-from gen_profile_exporters.can.watch import Alert, Axis, Watch
+from gen_profile_exporters.can.streaming import configuration
+from gen_profile_exporters.can.streaming.approach import approach
+from gen_profile_exporters.can.streaming.link import Link
+from gen_profile_exporters.can.streaming.pacer import Pacer
+from gen_profile_exporters.can.streaming.plan import StreamPlan, cycles_of
+from gen_profile_exporters.can.streaming.record import Phase, Record, Recorder
+from gen_profile_exporters.can.streaming.stopping import quick_stop
+from gen_profile_exporters.can.streaming.watch import Alert, Axis, Watch
 
 ALIGN_CYCLES = 10  # of preloads before power goes on
 SETTLED_CYCLES = 10  # within the tolerance, before power goes off

@@ -44,11 +44,11 @@ class Port:
         """
         try:
             if self.interface == "udp_multicast":
-                from gen_profile_exporters.can.multicast import MulticastBus  # noqa: PLC0415
+                from gen_profile_exporters.can.host.multicast import MulticastBus  # noqa: PLC0415
 
                 return MulticastBus(self.channel)
             if sys.platform == "linux" and self.interface == "socketcan":
-                from gen_profile_exporters.can.launch import LaunchingBus  # noqa: PLC0415
+                from gen_profile_exporters.can.host.launch import LaunchingBus  # noqa: PLC0415
 
                 return LaunchingBus(self.channel)
             return can.Bus(channel=self.channel, interface=self.interface, bitrate=bitrate)

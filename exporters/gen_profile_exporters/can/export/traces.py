@@ -8,7 +8,7 @@ from io import BytesIO
 import can
 from can.io.blf import BLFWriter
 
-from gen_profile_exporters.can.candump import Frame
+from gen_profile_exporters.can.export.candump import Frame
 from gen_profile_exporters.can.frames import MICROSECONDS
 
 # A fixed date: the same motion makes the same file. (python-can's writer takes the clock's and the locale's.)

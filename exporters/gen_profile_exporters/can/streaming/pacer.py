@@ -12,8 +12,8 @@ from collections.abc import Iterable, Sequence
 import can
 
 from gen_profile_exporters.can import frames, startup
-from gen_profile_exporters.can.clock import NANOSECONDS
-from gen_profile_exporters.can.link import Link
+from gen_profile_exporters.can.host.clock import NANOSECONDS
+from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.exporter import Target
 
 HEARTBEATS_PER_TIMEOUT = 3

@@ -16,7 +16,7 @@ from canopen.sdo.client import SdoClient
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.clock import NANOSECONDS, Clock
+from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 
 # what it has to say of a missing answer reaches people as a sentence
 logging.getLogger("canopen").addHandler(logging.NullHandler())

@@ -23,8 +23,15 @@ from gen_profile_exporters.can.cia402 import (
     Controlword,
     State,
 )
-from gen_profile_exporters.can.clock import NANOSECONDS
-from gen_profile_exporters.can.drive_dictionary import MAPPED, PDOS, Make, dictionary, refusal, supports
+from gen_profile_exporters.can.host.clock import NANOSECONDS
+from gen_profile_exporters.can.simulation.drive_dictionary import (
+    MAPPED,
+    PDOS,
+    Make,
+    dictionary,
+    refusal,
+    supports,
+)
 from gen_profile_exporters.can.startup import AT_ONCE, MODES, OFF
 
 HEARTBEAT_LOST, SETPOINT_LOST = 0x8130, 0x8250  # EMCY codes of CiA 301

@@ -11,7 +11,7 @@ import can
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, MOVING, State, state_of
-from gen_profile_exporters.can.clock import NANOSECONDS, Clock
+from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 
 OPERATIONAL = 5
 HEARTBEATS_MISSED = 3

@@ -16,8 +16,9 @@ import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile
-from gen_profile_exporters.can import candump, database, frames, startup, traces
-from gen_profile_exporters.can.candump import Frame
+from gen_profile_exporters.can import frames, startup
+from gen_profile_exporters.can.export import candump, database, traces
+from gen_profile_exporters.can.export.candump import Frame
 from gen_profile_exporters.can.frames import MICROSECONDS, SYNC
 from gen_profile_exporters.can.scaling import Setpoints, setpoints, travelled
 from gen_profile_exporters.exporter import File, Target

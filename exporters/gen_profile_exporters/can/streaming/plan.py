@@ -11,7 +11,7 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.exporter import read_setpoints, replay
+from gen_profile_exporters.can.export.exporter import read_setpoints, replay
 from gen_profile_exporters.can.frames import Integers, SetpointFrame, message
 from gen_profile_exporters.can.scaling import Setpoints
 from gen_profile_exporters.exporter import Target
@@ -43,7 +43,7 @@ class StreamPlan:
 
 
 def plan_of(content: bytes, target: Target) -> StreamPlan:
-    """Read a log that `gen_profile_exporters.can.exporter.encode` wrote.
+    """Read a log that `gen_profile_exporters.can.export.exporter.encode` wrote.
 
     Raises
     ------

@@ -20,9 +20,9 @@ import can
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import Controlword
-from gen_profile_exporters.can.clock import NANOSECONDS
-from gen_profile_exporters.can.pacer import Pacer
-from gen_profile_exporters.can.watch import Axis, Watch
+from gen_profile_exporters.can.host.clock import NANOSECONDS
+from gen_profile_exporters.can.streaming.pacer import Pacer
+from gen_profile_exporters.can.streaming.watch import Axis, Watch
 
 AGAIN = NANOSECONDS // 20  # after which an SDO counts as lost
 _SDO = struct.Struct("<BHBHxx")  # an expedited transfer of 16 bits: command, index, subindex, data (CiA 301)

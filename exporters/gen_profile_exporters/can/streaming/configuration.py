@@ -20,10 +20,10 @@ from canopen.sdo.exceptions import SdoError
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import FAULTS, MOVING, Controlword, State, state_of
-from gen_profile_exporters.can.clock import NANOSECONDS
-from gen_profile_exporters.can.link import Link
+from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.scaling import Setpoints, magnitude_counts
 from gen_profile_exporters.can.startup import AT_ONCE, MODES, PDO_PARAMETERS, Entry, startup_lists
+from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.exporter import Target
 
 CIA_402 = 402  # low word of 1000h

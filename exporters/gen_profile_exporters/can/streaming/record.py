@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile_exporters.can.lateness import Lateness
+from gen_profile_exporters.can.host.lateness import Lateness
 
 
 class Phase(Enum):

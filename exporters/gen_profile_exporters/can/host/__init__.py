@@ -1,0 +1,1 @@
+"""The computer: its CAN interfaces, clock, priorities, and terminal."""

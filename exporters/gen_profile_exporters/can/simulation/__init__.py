@@ -1,0 +1,1 @@
+"""CiA 402 drives, simulated, and what they move."""

@@ -1,0 +1,1 @@
+"""The streamer: setpoints in time, drives watched, and axes stopped."""
