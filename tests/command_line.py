@@ -15,12 +15,26 @@ from typing import Any
 from unittest.mock import patch
 
 import attrs
+import click
 from json_page import require_documented
 
 from gen_profile.cli import main
 from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DEFAULT
 
+
+def commands_of(group: click.Group, before: str = "") -> dict[str, click.Command]:
+    """List the commands of a group by their words, those of groups within it among them."""
+    found = {}
+    for name, command in group.commands.items():
+        if isinstance(command, click.Group):
+            found |= commands_of(command, f"{before}{name} ")
+        else:
+            found[before + name] = command
+    return found
+
+
+COMMANDS = commands_of(cli)
 PROGRAM = Path(sysconfig.get_path("scripts")) / "gen-profile"
 
 
@@ -60,8 +74,8 @@ def run_here(*arguments: str | Path) -> Outcome:
                 signal.signal(number, handler)
     outcome = Outcome(code or 0, _text(out), _text(err))
     if "--json" in arguments and outcome.out:
-        command = str(arguments[0])
-        require_documented(command if command in cli.commands else DEFAULT, outcome.document)
+        words = [" ".join(map(str, arguments[:count])) for count in (1, 2)]
+        require_documented(next((name for name in words if name in COMMANDS), DEFAULT), outcome.document)
     return outcome
 
 

@@ -27,7 +27,7 @@ def documented() -> dict[str, list[Any]]:
     found: dict[str, list[Any]] = {}
     for section in re.split(r"^##+ ", PAGE.read_text("utf-8"), flags=re.MULTILINE):
         heading = section.partition("\n")[0]
-        command = re.match(r"`gen-profile (\S+) ", heading)
+        command = re.match(r"`gen-profile ([a-z -]+?) (?:\[|[A-Z])", heading)
         blocks = re.findall(r"^```json\n(.*?)^```$", section, flags=re.MULTILINE | re.DOTALL)
         found[command[1] if command else heading] = [json.loads(block) for block in blocks]
     return found

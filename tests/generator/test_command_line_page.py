@@ -4,9 +4,10 @@ import re
 
 import click
 import pytest
+from command_line import COMMANDS
 from json_page import PAGE, documented, require_documented
 
-from gen_profile.cli import commands, outcome
+from gen_profile.cli import outcome
 from gen_profile.errors import GenProfileError
 
 TEXT = PAGE.read_text("utf-8")
@@ -35,12 +36,12 @@ def rows(text):
 
 def test_every_command_has_its_section():
     headings = re.findall(r"^## (`gen-profile .*)$", TEXT, flags=re.MULTILINE)
-    assert sorted(headings) == sorted(usage(name, command) for name, command in commands.cli.commands.items())
+    assert sorted(headings) == sorted(usage(name, command) for name, command in COMMANDS.items())
 
 
-@pytest.mark.parametrize("name", sorted(commands.cli.commands))
+@pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_option_is_told_as_help_tells_it(name):
-    command = commands.cli.commands[name]
+    command = COMMANDS[name]
     own = [p for p in command.params if isinstance(p, click.Option) and p.name not in SHARED]
     assert rows(section(usage(name, command))) == [row(option) for option in own]
     assert {"as_json", "debug"} <= {p.name for p in command.params}
@@ -48,7 +49,7 @@ def test_every_option_is_told_as_help_tells_it(name):
 
 def test_shared_options_are_told_once():
     top = rows(section("What many commands take"))
-    taken = {p.name: p for p in commands.cli.commands["design"].params if isinstance(p, click.Option)}
+    taken = {p.name: p for p in COMMANDS["design"].params if isinstance(p, click.Option)}
     for name in SHARED - {"spec_path"}:
         assert row(taken[name]) in top
 
@@ -60,7 +61,7 @@ def test_every_exit_code_is_told():
 
 
 def test_every_command_s_document_is_told():
-    assert all(documented()[name] for name in commands.cli.commands)
+    assert all(documented()[name] for name in COMMANDS)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """The command line: arguments in, a workflow called, words and exit codes out."""
 
-from gen_profile.cli import fmu, identify, report, robustness, stream, sweep
+from gen_profile.cli import can, fmu, identify, report, robustness, stream, sweep
 from gen_profile.cli.entry import main
 
-__all__ = ["fmu", "identify", "main", "report", "robustness", "stream", "sweep"]
+__all__ = ["can", "fmu", "identify", "main", "report", "robustness", "stream", "sweep"]

@@ -3,28 +3,13 @@
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
 
 import attrs
 import can
 
 from gen_profile.errors import SpecError
 from gen_profile.suggestion import suggestion
-
-SERIAL = "install pyserial: pip install 'python-can[serial]'"
-NEEDS = {  # what python-can's interfaces take, beside their hardware
-    "socketcan": "bring it up as Linux knows it: ip link set {channel} up type can bitrate 500000 "
-    "(to try things out: ip link add dev vcan0 type vcan, ip link set vcan0 up)",
-    "pcan": "install PEAK's PCAN-Basic library (channels are called PCAN_USBBUS1, …)",
-    "kvaser": "install Kvaser's CANlib (channels are 0, 1, …)",
-    "vector": "install Vector's XL Driver Library, on Windows (channels are 0, 1, …)",
-    "ixxat": "install HMS Ixxat's VCI driver, on Windows (channels are 0, 1, …)",
-    "slcan": SERIAL,
-    "serial": SERIAL,
-    "seeedstudio": SERIAL,
-    "robotell": SERIAL,
-    "gs_usb": "install its library: pip install 'python-can[gs-usb]'",
-}
+from gen_profile_exporters.can.host import detection
 
 
 @attrs.frozen(kw_only=True)
@@ -65,16 +50,9 @@ class Port:
             return f"unknown to python-can{suggestion(self.interface, sorted(can.VALID_INTERFACES))}".rstrip(
                 "."
             )
-        channels = self._channels()
+        channels = [channel.name for channel in detection.channels(self.interface)]
         there = f"channels found: {', '.join(channels)}" if channels else "no channel was found"
-        needs = NEEDS.get(self.interface, "see python-can's documentation for what it needs")
-        return f"{needs.format(channel=self.channel)}; {there}"
-
-    def _channels(self) -> list[str]:
-        """Ask python-can which channels of the interface there are; its drivers fail in ways of their own."""
-        with suppress(Exception):
-            return [str(found["channel"]) for found in can.detect_available_configs(self.interface)]
-        return []
+        return f"{detection.needs(self.interface, self.channel)}; {there}"
 
     def remarks(self, launched: bool) -> tuple[str, ...]:
         """Say what there is to say about who sends each cycle at its instant."""

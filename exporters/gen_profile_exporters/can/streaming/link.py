@@ -6,7 +6,6 @@ which they came. That also makes it run on a clock that a test holds.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
@@ -17,9 +16,6 @@ from canopen.sdo.client import SdoClient
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
-
-# what it has to say of a missing answer reaches people as a sentence
-logging.getLogger("canopen").addHandler(logging.NullHandler())
 
 POLL = NANOSECONDS // 5000  # between two looks for an awaited answer
 ANSWER_TIMEOUT = NANOSECONDS // 2

@@ -1,0 +1,91 @@
+"""Which CAN channels this computer has, and what each interface needs; no bus is touched for it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from contextlib import suppress
+from typing import Any
+
+import attrs
+import can
+
+# what is no hardware of this computer: who looks for its channels has to ask the network, or finds any number
+NOT_HARDWARE = {"virtual", "udp_multicast", "socketcand"}
+
+SERIAL = "install pyserial: pip install 'python-can[serial]'"
+NEEDS = {  # what python-can's interfaces take, beside their hardware
+    "socketcan": "bring it up as Linux knows it: ip link set {channel} up type can bitrate 500000 "
+    "(to try things out: ip link add dev vcan0 type vcan, ip link set vcan0 up)",
+    "pcan": "install PEAK's PCAN-Basic library (channels are called PCAN_USBBUS1, …)",
+    "kvaser": "install Kvaser's CANlib (channels are 0, 1, …)",
+    "vector": "install Vector's XL Driver Library, on Windows (channels are 0, 1, …)",
+    "ixxat": "install HMS Ixxat's VCI driver, on Windows (channels are 0, 1, …)",
+    "slcan": SERIAL,
+    "serial": SERIAL,
+    "seeedstudio": SERIAL,
+    "robotell": SERIAL,
+    "gs_usb": "install its library: pip install 'python-can[gs-usb]'",
+}
+UNKNOWN_NEEDS = "see python-can's documentation for what it needs"
+
+
+@attrs.frozen(kw_only=True)
+class Channel:
+    """One channel of an interface.
+
+    Attributes
+    ----------
+    name : str
+        As python-can takes it.
+    bitrate : int or None
+        bit/s, where the system knows it.
+    state : str
+        In the system's words, such as ``"DOWN"`` or ``"ERROR-ACTIVE"``; empty where it has none.
+    """
+
+    name: str
+    bitrate: int | None = None
+    state: str = ""
+
+
+def hardware() -> list[str]:
+    """List the interfaces that python-can knows for hardware of this computer."""
+    return sorted(can.VALID_INTERFACES - NOT_HARDWARE)
+
+
+def needs(interface: str, channel: str = "can0") -> str:
+    """Say what to install or set up for an interface."""
+    return NEEDS.get(interface, UNKNOWN_NEEDS).format(channel=channel)
+
+
+def channels(interface: str) -> tuple[Channel, ...]:
+    """List the channels that there are; on Linux also those that are down."""
+    if interface == "socketcan":
+        return _of_linux()
+    with suppress(Exception):  # drivers fail in ways of their own
+        return tuple(Channel(name=str(found["channel"])) for found in can.detect_available_configs(interface))
+    return ()
+
+
+def _of_linux() -> tuple[Channel, ...]:
+    program = shutil.which("ip") or shutil.which("ip", path="/usr/sbin:/sbin")
+    if program is None:
+        return ()
+    told = subprocess.run([program, "-details", "-json", "link", "show"], capture_output=True, check=False)
+    try:
+        links = json.loads(told.stdout)
+    except ValueError:  # an ip that knows no JSON
+        return ()
+    return tuple(_channel(link) for link in links if link.get("link_type") == "can")
+
+
+def _channel(link: dict[str, Any]) -> Channel:
+    about = link.get("linkinfo", {}).get("info_data", {})
+    up = "UP" in link.get("flags", ())
+    return Channel(
+        name=link["ifname"],
+        bitrate=about.get("bittiming", {}).get("bitrate"),
+        state=about.get("state", "UP") if up else "DOWN",
+    )

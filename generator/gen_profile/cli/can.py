@@ -1,0 +1,125 @@
+"""The command that shows what can be reached by CAN."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gen_profile.cli.commands import cli
+from gen_profile.cli.options import debug_option, json_option
+from gen_profile.cli.outcome import print_outcome
+from gen_profile.errors import SpecError
+
+if TYPE_CHECKING:
+    from gen_profile_exporters.can.host.detection import Channel
+    from gen_profile_exporters.can.host.port import Port
+    from gen_profile_exporters.can.streaming.discovery import Node
+
+
+@cli.group(epilog="Example: gen-profile can list")
+def can() -> None:
+    """Look at CAN buses."""
+
+
+@can.command("list", epilog="Example: gen-profile can list --interface socketcan --channel can0")
+@click.option(
+    "--interface", metavar="NAME", help="Only this interface, such as socketcan; all of them by default."
+)
+@click.option("--channel", metavar="NAME", help="Ask on this channel of it which nodes are there.")
+@click.option(
+    "--bitrate",
+    metavar="N",
+    type=click.IntRange(10_000, 1_000_000),
+    default=500_000,
+    help="Of the channel in bit/s, where no system sets it; 500000 by default.",
+)
+@json_option
+@debug_option
+def list_(interface: str | None, channel: str | None, bitrate: int, as_json: bool) -> None:
+    """List CAN interfaces, their channels, and the nodes that answer.
+
+    No bus is touched unless a channel is named. There, every node id is asked what it is, if no controller is
+    heard; nothing is written to anyone.
+    """
+    from gen_profile_exporters.can.host import detection
+    from gen_profile_exporters.can.host.port import Port
+
+    if channel is not None and interface is None:
+        raise SpecError(f"--channel {channel}: name its interface, too, as --interface socketcan.")
+    names = detection.hardware() if interface is None else [interface]
+    nodes = None
+    if interface is not None and channel is not None:
+        nodes = _nodes(Port(interface=interface, channel=channel), bitrate)
+    found = {name: detection.channels(name) for name in names}
+    document = {
+        "interfaces": [
+            {
+                "name": name,
+                "channels": [
+                    {"name": one.name, "bitrate": one.bitrate, "state": one.state} for one in channels
+                ],
+                "needs": detection.needs(name),
+            }
+            for name, channels in found.items()
+        ],
+        "nodes": None if nodes is None else [_told(node) for node in nodes],
+    }
+    lines = list(_interface_words(found))
+    if nodes is not None:
+        lines += _node_words(nodes, f"{interface} {channel}")
+    print_outcome(document, "\n".join(lines), as_json)
+
+
+def _nodes(port: Port, bitrate: int) -> tuple[Node, ...]:
+    from gen_profile.streaming.stream import require_extra
+
+    require_extra()
+    from gen_profile_exporters.can.host.clock import SystemClock
+    from gen_profile_exporters.can.streaming.discovery import discover
+    from gen_profile_exporters.can.streaming.link import Link
+
+    with port.open(bitrate) as bus:
+        return discover(Link(bus, SystemClock()))
+
+
+def _told(node: Node) -> dict[str, Any]:
+    return {
+        "node": node.number,
+        "name": node.name,
+        "drive": node.is_drive,
+        "device_type": node.device,
+        "vendor": node.vendor,
+        "product": node.product,
+        "serial": node.serial,
+        "modes": list(node.mode_names),
+    }
+
+
+def _interface_words(found: dict[str, tuple[Channel, ...]]) -> Iterator[str]:
+    from gen_profile_exporters.can.host import detection
+
+    for name, channels in found.items():
+        for channel in channels:
+            rate = "" if channel.bitrate is None else f"{channel.bitrate / 1000:g} kbit/s"
+            yield ", ".join(filter(None, [f"{name} {channel.name}", rate, channel.state]))
+    without = [name for name, channels in found.items() if not channels]
+    if without:
+        yield "Without a channel:"
+    for name in without:
+        yield f"  {name}: {detection.needs(name)}"
+
+
+def _node_words(nodes: tuple[Node, ...], where: str) -> Iterator[str]:
+    if not nodes:
+        yield f"No node answers on {where}: check power, cabling, termination, bit rate and node ids."
+        return
+    yield f"Nodes on {where}:"
+    for node in nodes:
+        numbers = {"vendor": node.vendor, "product": node.product, "serial": node.serial}
+        stated = [f"{what} 0x{number:08X}" for what, number in numbers.items() if number is not None]
+        kind = (
+            f"drive ({', '.join(node.mode_names) or 'no mode to stream in'})" if node.is_drive else "no drive"
+        )
+        yield f"  {node.number}: " + ", ".join([*filter(None, [node.name]), kind, *stated])
