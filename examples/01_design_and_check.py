@@ -6,19 +6,17 @@ python examples/01_design_and_check.py [FOLDER]
 import sys
 from pathlib import Path
 
-from gen_profile.designs.design import design
-from gen_profile.spec.reading import preset_spec
-from gen_profile.verification.check import check_artefact
+import gen_profile as gp
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "gen-profile-out")
 
-spec = preset_spec("paper", ["move.duration=3.5", 'axis.unit="mm"'])
-outcome = design(spec, ["csv", "plc"], folder)
+spec = gp.preset_spec("paper", move={"duration": 3.5}, axis={"unit": "mm"})
+outcome = gp.design(spec, ["csv", "plc"], folder)
 if not outcome.passed:
     sys.exit("\n".join(outcome.check.reasons()))
 
 for artefact in outcome.artefacts:
-    judgement = check_artefact(folder / artefact.path)
+    judgement = gp.check_artefact(folder / artefact.path)
     load, finding = judgement.check.worst
     print(
         f"{artefact.path}: {load} sways by {1e3 * finding.residual[load]:.3f} mm at worst "

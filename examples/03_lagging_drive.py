@@ -8,21 +8,19 @@ time, and asks the drive for much more acceleration.
 
 import numpy as np
 
-from gen_profile.designs.plan import plan
+import gen_profile as gp
 from gen_profile.motion.metrics import greatest, peak
-from gen_profile.motion.profile import sample
-from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.cosimulation import PlantCosimulation
 
 TAU = 0.1
 
-spec = preset_spec("paper", ['actuator.type="first-order"', f"actuator.tau={TAU}", 'cost.effort="snap"'])
-trial = plan(spec).trial
+spec = gp.preset_spec("paper", actuator={"type": "first-order", "tau": TAU}, cost={"effort": "snap"})
+plan = gp.plan(spec)
 
 with PlantCosimulation(spec.machine()) as crane:
-    for name, setpoints in (("leading", trial.command), ("not leading", trial.motion)):
+    for name, setpoints in (("leading", plan.command), ("not leading", plan.motion)):
         response = crane.run(
-            sample(setpoints, cycle_time=0.004),
+            gp.sample(setpoints, cycle_time=0.004),
             spec.plant.parameters,
             tau=TAU,
             max_step=1e-3,

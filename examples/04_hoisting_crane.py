@@ -8,20 +8,19 @@ swing on. The optimal motion follows the equations, and uses the hoist as a seco
 
 import numpy as np
 
-from gen_profile.comparison.compare import compare
+import gen_profile as gp
 from gen_profile.problem.linearization import linearize
-from gen_profile.spec.reading import preset_spec
 
-spec = preset_spec("single-pendulum-crane")
+spec = gp.preset_spec("single-pendulum-crane")
 for word, q_a in (("start", spec.move.start), ("target", spec.move.target)):
     (frequency,) = linearize(spec.machine(), spec.plant.parameters, q_a).frequencies
     rope = spec.plant.parameters["L0"] + q_a[1]
     print(f"{word:6}  rope {rope:4.1f} m, period {2.0 * np.pi / frequency:.2f} s")
 
 for start in (spec.move.start, (0.0, 1.0)):
-    task = preset_spec("single-pendulum-crane", [f"move.start={list(start)}"])
+    task = gp.preset_spec("single-pendulum-crane", move={"start": start})
     print(f"\n{task.move.distance[0]:g} m in {task.move.duration:g} s, hoist from {start[1]:g} m to 1 m")
-    for row in compare(task).rows:
+    for row in gp.compare(task).rows:
         if row.trial:
             nominal, worst = (
                 1e3 * row.figures[key] for key in ("sway_residual_peak_m", "sway_residual_worst_m")

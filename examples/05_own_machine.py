@@ -8,9 +8,8 @@ On the command line: gen-profile inclined.toml, with ``file = "inclined_crane.py
 import sys
 from pathlib import Path
 
-from gen_profile.designs.design import design
+import gen_profile as gp
 from gen_profile.spec.reading import parse_spec
-from gen_profile.verification.check import check_artefact
 
 SPEC = """
 name = "inclined"
@@ -34,11 +33,11 @@ residual_sway = 0.03
 """
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "gen-profile-out")
-outcome = design(parse_spec(SPEC, folder=Path(__file__).parent), ["csv"], folder)
+outcome = gp.design(parse_spec(SPEC, folder=Path(__file__).parent), ["csv"], folder)
 if not outcome.passed:
     sys.exit("\n".join(outcome.check.reasons()))
 
 # the machine's file lies beside the artefact now: both can go to another computer, and be checked there
 print("\n".join(sorted(path.name for path in folder.iterdir())))
-for finding in check_artefact(folder / "inclined.csv").check.findings:
+for finding in gp.check_artefact(folder / "inclined.csv").check.findings:
     print(f"{finding.scenario.name:8} {1e3 * finding.residual['load']:6.2f} mm")

@@ -7,13 +7,11 @@ Here the measurements come from a simulated crane with noise; on site they come 
 
 import numpy as np
 
-from gen_profile.designs.plan import plan
+import gen_profile as gp
 from gen_profile.evaluation.simulation import free_swing
-from gen_profile.identification.identify import identify
 from gen_profile.identification.measurements import SwingLog, parse_period, parse_reading
-from gen_profile.spec.reading import preset_spec
 
-spec = preset_spec("single-pendulum-crane")  # where the search starts: L0 = 3 m, c = 200 N m s/rad
+spec = gp.preset_spec("single-pendulum-crane")  # where the search starts: L0 = 3 m, c = 200 N m s/rad
 stood = (0.0, 4.0)  # the hoist had paid out 4 m while periods and swings were measured
 true = {**spec.plant.parameters, "L0": 3.25, "c": 350.0}
 
@@ -30,10 +28,10 @@ CAMPAIGNS = {
     "logged swing": ([log], ["L0", "c"]),
 }
 for name, (measurements, free) in CAMPAIGNS.items():
-    found = identify(spec, measurements, free, stood)
+    found = gp.identify(spec, measurements, free, stood)
     print(name)
     for parameter, value in found.estimate.values.items():
         half_range = found.estimate.half_range[parameter]
         print(f"  {parameter:2} = {value:8.4g} ± {half_range:.2g}, in truth {true[parameter]:g}")
-    worst = plan(found.spec).figures["sway_residual_worst_m"]
+    worst = gp.plan(found.spec).figures["sway_residual_worst_m"]
     print(f"  residual sway of a motion that is robust to that: {1e3 * worst:.2f} mm at worst")

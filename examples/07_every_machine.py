@@ -11,17 +11,17 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from gen_profile.designs.design import Design, design
-from gen_profile.spec.reading import preset_spec, presets
+import gen_profile as gp
+from gen_profile.designs.design import Design
 
 AGREEMENT = 2e-6  # relative, of the costs
 
 
 def checked(name: str, robustness: str, method: str) -> Design:
     """Design a motion and have it checked; stop where either fails."""
-    spec = preset_spec(name, [f"robustness.method={robustness}", f"solver.method={method}"])
+    spec = gp.preset_spec(name, robustness={"method": robustness}, solver={"method": method})
     with TemporaryDirectory() as folder:
-        outcome = design(spec, ["csv"], Path(folder))
+        outcome = gp.design(spec, ["csv"], Path(folder))
     if not outcome.passed:
         sys.exit(f"{name}, {robustness}, {method}: " + "\n".join(outcome.check.reasons()))
     return outcome
@@ -62,7 +62,7 @@ HEAD = [
 ]
 print("", *HEAD, "", sep="|")
 print("", *("---" for _ in HEAD), "", sep="|")
-for preset in presets():
+for preset in gp.presets():
     if not preset.startswith("paper"):  # has a page of its own
         for method in ("none", "sensitivity", "range"):
             print("", *row(preset, method), "", sep="|")

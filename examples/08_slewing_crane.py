@@ -9,13 +9,10 @@ rest together.
 
 import numpy as np
 
-from gen_profile.comparison.compare import compare
-from gen_profile.spec.reading import preset_spec
+import gen_profile as gp
 
-spec = preset_spec(
-    "tower-crane", ["move.start=[0.0, 25.0]", "move.target=[1.745, 25.0]", "move.duration=25.0"]
-)
-trials = {row.method: row.trial for row in compare(spec).rows if row.trial}
+spec = gp.preset_spec("tower-crane", move={"start": [0.0, 25.0], "target": [1.745, 25.0], "duration": 25.0})
+trials = {row.method: row.trial for row in gp.compare(spec).rows if row.trial}
 for method in ("zvd", "optimal-beta0"):
     trial = trials[method]
     times = np.linspace(0.0, trial.motion.duration, 501)

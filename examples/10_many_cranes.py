@@ -5,9 +5,7 @@ python examples/10_many_cranes.py
 
 import numpy as np
 
-from gen_profile.designs.plan import plan
-from gen_profile.motion.profile import sample
-from gen_profile.spec.reading import preset_spec
+import gen_profile as gp
 from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.many_runs import ManyRuns
 from gen_profile_fmu.plant_fmu import plant_fmu
@@ -15,8 +13,8 @@ from gen_profile_fmu.plant_fmu import plant_fmu
 RUNS = 10_000
 CYCLE, SETTLE = 0.01, 4.0  # s
 
-spec = preset_spec("paper")
-setpoints = sample(plan(spec).trial.command, cycle_time=CYCLE).position[:, 0]
+spec = gp.preset_spec("paper")
+setpoints = gp.sample(gp.plan(spec).command, cycle_time=CYCLE).position[:, 0]
 held = np.append(setpoints[1:], np.full(round(SETTLE / CYCLE), setpoints[-1]))
 times = CYCLE * np.arange(len(held) + 1)
 

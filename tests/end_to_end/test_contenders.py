@@ -9,7 +9,7 @@ import pytest
 from gen_profile.comparison.candidates import contenders
 from gen_profile.comparison.compare import compare
 from gen_profile.errors import InfeasibleProblem
-from gen_profile.evaluation.motion_evaluation import figures, try_motion
+from gen_profile.evaluation.motion_evaluation import evaluate
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.shapers.base_moves import BASES
@@ -63,7 +63,7 @@ def test_the_sway_on_the_way_is_a_limit_too():
         designs(limited(limits))["zv"]()
     (needed,) = re.findall(r"at least ([\d.]+) s", str(refusal.value))
     spec = limited(limits, duration=float(needed))
-    found = figures(try_motion(spec, designs(spec)["zv"]()))
+    found = evaluate(spec, designs(spec)["zv"]()).figures
     assert 0.0299 < found["sway_transient_peak_m"] <= 0.03
 
 

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 
 from gen_profile.comparison.candidates import contenders
 from gen_profile.designs.plan import plan
-from gen_profile.evaluation.motion_evaluation import figures
 from gen_profile.evaluation.residual_sway import watch_time
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.motion.metrics import greatest, peak
@@ -63,7 +62,7 @@ def test_machines_of_several_axes_sway_as_lagrange_says(preset):
             for x in swing.y.T
         ]
         residuals.append(peak(np.array(sway)[:, None])[0])
-    expected = figures(found.trial)
+    expected = found.trial.figures
     assert residuals[0] < 1e-6
     assert residuals[1] == pytest.approx(expected["sway_residual_peak_perturbed_m"], rel=1e-4)
     assert max(residuals) == pytest.approx(expected["sway_residual_worst_m"], rel=1e-4)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import Any
 
@@ -57,29 +57,41 @@ def own_method(spec: Spec) -> str:
     return "optimal" if spec.cost.sway_scale is None else f"optimal-beta{spec.cost.sway_weight:g}"
 
 
-def contenders(spec: Spec) -> Iterator[Contender]:
-    """List shapers, then optimal motions.
+def contenders(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Contender]:
+    """List shapers, then optimal motions, then motions that were made elsewhere.
 
     Parameters
     ----------
     spec : Spec
         Each method takes the spec's duration, or its own shortest one where the spec asks for that; every
         shaper is fed with the spec's base move.
+    own : sequence of Profile
+        Each of a ``method`` of its own.
     """
     for name in SHAPERS:
         yield Contender(method=name, design=partial(shaped_motion, spec, name))
     if spec.solver.shaper is not None:
         spec = attrs.evolve(spec, solver=attrs.evolve(spec.solver, method="auto"))
+    yield from _optimal_contenders(spec)
+    for motion in own:
+        yield Contender(method=motion.method, design=partial(_given, motion))
+
+
+def _optimal_contenders(spec: Spec) -> Iterator[Contender]:
     once = cache(partial(timed, spec))  # the shortest duration does not depend on β
-    own = cache(partial(_attempt, once))
+    of_spec = cache(partial(_attempt, once))
     weight = spec.cost.sway_weight
     for other in sorted({*SWAY_WEIGHTS, weight}):
         name = own_method(spec) if other == weight else f"optimal-beta{other:g}"
-        design = partial(_result, own) if other == weight else partial(_weighed, once, other)
+        design = partial(_result, of_spec) if other == weight else partial(_weighed, once, other)
         yield Contender(method=name, design=design, requirements="the spec's own")
     for kind, keys in _other_robustness(spec).items():
         robust = attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, **keys))
-        yield Contender(method=f"optimal-{kind}", design=partial(_optimal_within, robust, own))
+        yield Contender(method=f"optimal-{kind}", design=partial(_optimal_within, robust, of_spec))
+
+
+def _given(motion: Profile) -> Profile:
+    return motion
 
 
 def _other_robustness(spec: Spec) -> dict[str, Mapping[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import attrs
@@ -10,8 +10,9 @@ import attrs
 from gen_profile.comparison.candidates import Contender, contenders
 from gen_profile.comparison.recommendation import Recommendation, efficient, recommend
 from gen_profile.errors import GenProfileError, InfeasibleProblem
-from gen_profile.evaluation.motion_evaluation import Trial, figures, keeps_residual_sway, try_motion
+from gen_profile.evaluation.motion_evaluation import Trial, evaluate, keeps_residual_sway
 from gen_profile.evaluation.phrases import mm
+from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import Spec
 
 Progress = Callable[[str], None]
@@ -79,7 +80,7 @@ class Comparison:
         }
 
 
-def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
+def compare(spec: Spec, progress: Progress = lambda _: None, *, own: Sequence[Profile] = ()) -> Comparison:
     """Try every shaper and variants of the optimal motion on the machines of a spec.
 
     Parameters
@@ -87,11 +88,13 @@ def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
     spec : Spec
     progress : callable
         Told what is being done.
+    own : sequence of Profile
+        Further motions of the axes, each of a ``method`` of its own.
     """
     rows: list[Row] = []
     left_out: dict[str, str] = {}
     impossible: dict[str, str] = {}
-    for contender in contenders(spec):
+    for contender in contenders(spec, own):
         progress(contender.method)
         try:
             if contender.requirements in impossible:
@@ -118,11 +121,11 @@ def compare(spec: Spec, progress: Progress = lambda _: None) -> Comparison:
 
 
 def _row(spec: Spec, contender: Contender) -> Row:
-    trial = try_motion(spec, contender.design())
+    trial = evaluate(spec, contender.design())
     return Row(
         method=contender.method,
         trial=trial,
-        figures=figures(trial),
+        figures=trial.figures,
         safe=keeps_residual_sway(spec, trial),
     )
 

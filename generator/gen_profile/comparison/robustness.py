@@ -127,6 +127,7 @@ def robustness(
     parameters: Sequence[str] = (),
     *,
     methods: Sequence[str] = (),
+    own: Sequence[Profile] = (),
     points: int | None = None,
     half_range: float | None = None,
     progress: Progress = lambda _: None,
@@ -140,6 +141,8 @@ def robustness(
         One or two; the first uncertain one by default.
     methods : sequence of str
         As `gen_profile.comparison.candidates` names them; all by default.
+    own : sequence of Profile
+        Further motions of the axes, each of a ``method`` of its own.
     points : int, optional
         Per parameter.
     half_range : float, optional
@@ -155,11 +158,11 @@ def robustness(
     errors = error_grid(spec, parameters, points, half_range)
     motions: dict[str, Profile] = {}
     left_out: dict[str, str] = {}
-    listed = {contender.method: contender for contender in contenders(spec)}
+    listed = {contender.method: contender for contender in contenders(spec, own)}
     for method in methods:
         if method not in listed:
             raise SpecError(f"--method {method[:60]}: unknown method{suggestion(method, list(listed))}")
-    for method in methods or listed:
+    for method in [*methods, *(motion.method for motion in own)] if methods else listed:
         progress(method)
         try:
             motions[method] = listed[method].design()

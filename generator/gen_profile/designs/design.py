@@ -109,7 +109,7 @@ class Design:
 def design(
     spec: Spec,
     formats: Sequence[str],
-    folder: Path,
+    folder: Path | str,
     *,
     check: bool = True,
     keep_failed: bool = False,
@@ -123,7 +123,7 @@ def design(
     spec : Spec
     formats : sequence of str
         Names known to the exporters' registry.
-    folder : Path
+    folder : Path or str
         Made if needed; files of the same names are replaced, others left alone.
     check : bool
         Without it the manifest says ``"unverified"``.
@@ -139,6 +139,7 @@ def design(
     GenProfileError
         Nothing was written.
     """
+    folder = Path(folder)
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
     require_end(exporters, stops=spec.move.stops)
     progress("solving")

@@ -64,12 +64,12 @@ class Export:
 
 def export_fmu(
     spec: Spec,
-    kind: str,
+    kind: str = "plant",
+    path: Path | str | None = None,
     *,
-    version: Version,
-    input_kind: InputKind,
-    platforms: tuple[str, ...],
-    path: Path | None,
+    version: Version = Version.FMI2,
+    input_kind: InputKind = InputKind.SETPOINT,
+    platforms: tuple[str, ...] | None = None,
     author: str = AUTHOR,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Export:
@@ -80,13 +80,13 @@ def export_fmu(
     spec : Spec
     kind : str
         One of `KINDS`.
+    path : Path or str, optional
+        Named after the spec in the working folder if not given.
     version : Version
     input_kind : InputKind
         What a plant's drives are asked for; nothing else has inputs.
-    platforms : tuple of str
-        Names of `PLATFORMS`; none for sources only.
-    path : Path or None
-        Named after the spec in the working folder if not given.
+    platforms : tuple of str, optional
+        Names of `PLATFORMS`, none for sources only; this computer's by default.
     author : str
         Who made the model.
     progress : callable
@@ -99,7 +99,8 @@ def export_fmu(
     """
     is_system = kind == "ssp"
     identifier = identifier_of(spec.name if is_system else f"{spec.name} {kind}")
-    path = path or Path(f"{identifier}.{'ssp' if is_system else 'fmu'}")
+    path = Path(path or f"{identifier}.{'ssp' if is_system else 'fmu'}")
+    platforms = platform_names("host") if platforms is None else platforms
 
     def built(model: Model) -> bytes:
         return build_fmu(attrs.evolve(model, author=author), version, platforms, progress)

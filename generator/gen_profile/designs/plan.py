@@ -10,8 +10,8 @@ import numpy as np
 
 from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import InfeasibleProblem, LimitViolation
-from gen_profile.evaluation.motion_evaluation import Trial, figures, keeps_residual_sway, try_motion
-from gen_profile.motion.profile import grid_length, grid_times
+from gen_profile.evaluation.motion_evaluation import Trial, evaluate, keeps_residual_sway
+from gen_profile.motion.profile import Profile, grid_length, grid_times
 from gen_profile.problem.limits import breaches, rounded_up
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
@@ -46,6 +46,16 @@ class Plan:
     solver_time: float
     trial: Trial
     figures: dict[str, float]
+
+    @property
+    def motion(self) -> Profile:
+        """Of the axes."""
+        return self.trial.motion
+
+    @property
+    def command(self) -> Profile:
+        """Setpoints of the drives, which is the motion itself where they are ideal."""
+        return self.trial.command
 
 
 def timed(spec: Spec) -> Spec:
@@ -99,7 +109,7 @@ def _calms(spec: Spec) -> bool:
 
 def _is_calm(spec: Spec, solution: Solution) -> bool:
     """Whether a solution leaves little enough sway on every machine of a spec."""
-    return keeps_residual_sway(spec, try_motion(spec, optimal_profile(solution)), CALM)
+    return keeps_residual_sway(spec, evaluate(spec, optimal_profile(solution)), CALM)
 
 
 def plan(spec: Spec, near: Trajectory | None = None) -> Plan:
@@ -123,8 +133,8 @@ def plan(spec: Spec, near: Trajectory | None = None) -> Plan:
         solution = choice.explained(attempt, spec.solver.solver, partial(_is_calm, spec))
         motion = optimal_profile(solution)
     solver_time = time.perf_counter() - began
-    trial = try_motion(spec, motion)
-    found = figures(trial)
+    trial = evaluate(spec, motion)
+    found = trial.figures
     broken = breaches(spec.limits, trial.command, found["sway_transient_peak_m"])
     if broken:
         sentences = [breach.sentence() for breach in broken]

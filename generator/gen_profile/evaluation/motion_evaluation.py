@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import attrs
 import numpy as np
 
@@ -40,8 +42,13 @@ class Trial:
     swing: Swing
     watch: float
 
+    @cached_property
+    def figures(self) -> dict[str, float]:
+        """Of the first axis and the end load: sway on the way of the nominal machine, afterwards of all."""
+        return _figures(self)
 
-def try_motion(spec: Spec, motion: Profile) -> Trial:
+
+def evaluate(spec: Spec, motion: Profile) -> Trial:
     """Integrate every machine of a spec under a motion of its axes.
 
     Parameters
@@ -83,8 +90,7 @@ def keeps_residual_sway(spec: Spec, trial: Trial, share: float = 1.0) -> bool:
     return all(bool((peak(response.sway) <= limits).all()) for response in after)
 
 
-def figures(trial: Trial) -> dict[str, float]:
-    """Measure a trial: first axis, end load; sway during the move of the nominal machine, after it of all."""
+def _figures(trial: Trial) -> dict[str, float]:
     motion, command, duration = trial.motion, trial.command, trial.motion.duration
     end_load = trial.swing.plant.end_load
     during = length(trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES))[0].sway[:, end_load])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from decimal import ROUND_CEILING, Decimal
+from typing import Any, Protocol
 
 import attrs
 import numpy as np
@@ -25,6 +26,13 @@ def read_only(values: object) -> Array:
 def _finite(_: object, attribute: attrs.Attribute[Array], value: Array) -> None:
     if not np.isfinite(value).all():
         raise GenProfileError(f"{attribute.name} of a motion must be finite numbers, found NaN or infinity.")
+
+
+class PiecewisePolynomial(Protocol):
+    """What SciPy's PPoly and the splines derived from it have in common."""
+
+    x: Any
+    c: Any
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -82,6 +90,30 @@ class Profile:
             raise GenProfileError("A profile's knots, coefficients and target do not fit together.")
         if self.knots[0] != 0.0 or not (np.diff(self.knots) > 0.0).all():
             raise GenProfileError("A profile's knots must rise from 0.")
+
+    @classmethod
+    def from_ppoly(cls, spline: PiecewisePolynomial, method: str = "own") -> Profile:
+        """Take over a motion of another planner.
+
+        Parameters
+        ----------
+        spline : scipy.interpolate.PPoly, CubicSpline or alike
+            Of position over time, in m (or rad) and s; ``spline.c`` of shape (order, segments) or
+            (order, segments, axes). Its first breakpoint becomes time 0; at its last one the motion rests.
+        method : str
+            What designed it.
+
+        Raises
+        ------
+        GenProfileError
+            Its numbers are not finite, or its breakpoints do not rise.
+        """
+        knots, c = np.asarray(spline.x, dtype=np.float64), np.asarray(spline.c, dtype=np.float64)
+        coefficients = np.moveaxis(c.reshape(*c.shape[:2], -1)[::-1], 0, 1)
+        powers = np.diff(knots[-2:]) ** np.arange(len(c))
+        return cls(
+            knots=knots - knots[0], coefficients=coefficients, target=powers @ coefficients[-1], method=method
+        )
 
     @property
     def duration(self) -> float:

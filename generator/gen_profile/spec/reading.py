@@ -25,8 +25,16 @@ SLIPS = {
 }
 
 
-def read_spec(path: Path, overrides: Sequence[str] = ()) -> Spec:
+def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) -> Spec:
     """Read a TOML file.
+
+    Parameters
+    ----------
+    path : Path or str
+    overrides : sequence of str
+        Such as ``"plant.L1=0.5"``.
+    tables : mappings
+        Further values by table, such as ``move={"duration": 3.2}``; None takes a key away.
 
     Raises
     ------
@@ -35,7 +43,8 @@ def read_spec(path: Path, overrides: Sequence[str] = ()) -> Spec:
     SpecError
         The text is no TOML, or its content has faults: all of them are listed.
     """
-    return parse_spec(read_text(path), overrides, str(path), path.parent)
+    path = Path(path)
+    return parse_spec(read_text(path), overrides, str(path), path.parent, **tables)
 
 
 def read_text(path: Path) -> str:
@@ -58,7 +67,9 @@ def read_text(path: Path) -> str:
         raise SpecError(f"{path}: not UTF-8 text (byte {error.start}); save the spec as UTF-8.") from error
 
 
-def parse_spec(text: str, overrides: Sequence[str] = (), source: str = "spec", folder: Path = HERE) -> Spec:
+def parse_spec(
+    text: str, overrides: Sequence[str] = (), source: str = "spec", folder: Path = HERE, **tables: Any
+) -> Spec:
     """Read TOML text, apply overrides such as ``plant.L1=0.5`` and validate the whole.
 
     Parameters
@@ -69,6 +80,8 @@ def parse_spec(text: str, overrides: Sequence[str] = (), source: str = "spec", f
         Where the text comes from, for errors.
     folder : Path
         What files that the spec names are relative to.
+    tables : mappings
+        Further values by table, as `read_spec` takes them.
 
     Raises
     ------
@@ -76,9 +89,41 @@ def parse_spec(text: str, overrides: Sequence[str] = (), source: str = "spec", f
         The text is no TOML (with line and column), or its content has faults: all of them are listed.
     """
     document = _document(text, source)
-    if not document and not overrides:
+    if not document and not overrides and not tables:
         raise SpecError(f"{source}: the spec is empty; it must state at least [plant] type and [move].")
-    return spec_from_dict(overridden(document, overrides), folder)
+    document = overridden(document, overrides)
+    _fill(document, tables)
+    return spec_from_dict(document, folder)
+
+
+def make_spec(**tables: Any) -> Spec:
+    """Make a spec of its tables, such as ``plant={"type": "flexible-joint"}, move={…}``.
+
+    Raises
+    ------
+    SpecError
+        With one sentence for every fault found.
+    """
+    return evolve_spec({}, **tables)
+
+
+def evolve_spec(spec: Spec | Mapping[str, Any], **tables: Any) -> Spec:
+    """Change values of a spec, which is validated as a whole again.
+
+    Parameters
+    ----------
+    spec : Spec, or nested plain values
+    tables : mappings
+        New values by table, as `read_spec` takes them.
+
+    Raises
+    ------
+    SpecError
+        With one sentence for every fault found.
+    """
+    document = copy.deepcopy(spec.to_dict() if isinstance(spec, Spec) else dict(spec))
+    _fill(document, tables)
+    return spec_from_dict(document)
 
 
 def overridden(document: Mapping[str, Any], overrides: Sequence[str]) -> Table:
@@ -113,15 +158,15 @@ def presets() -> dict[str, str]:
     return {name: text.partition("\n")[0].lstrip("# ") for name, text in sorted(texts.items())}
 
 
-def preset_spec(name: str, overrides: Sequence[str] = ()) -> Spec:
-    """Read a preset by name.
+def preset_spec(name: str, overrides: Sequence[str] = (), **tables: Any) -> Spec:
+    """Read a preset by name, with changes as `read_spec` takes them.
 
     Raises
     ------
     SpecError
         There is no such preset, or the overrides have faults.
     """
-    return parse_spec(preset_text(name), overrides, name)
+    return parse_spec(preset_text(name), overrides, name, **tables)
 
 
 def preset_text(name: str) -> str:
@@ -195,12 +240,40 @@ def _override(document: Table, override: str) -> None:
             taken = ".".join(path[: depth + 1])
             raise SpecError(f"--set {override!r}: {taken!r} is a value, not a table.")
         table = inner
-    # a move is stated one way: the override's way replaces the file's
+    _set(table, path, _override_value(text))
+
+
+def _set(table: Table, path: Sequence[str], value: object) -> None:
+    """Set the value of a key in the table that holds it."""
+    # a move is stated one way: the new way replaces the old one
     replaced = {"distance": ("start", "target"), "start": ("distance",), "target": ("distance",)}
     if path[0] == "move":
         for other in replaced.get(path[-1], ()):
             table.pop(other, None)
-    table[path[-1]] = _override_value(text)
+    table[path[-1]] = value
+
+
+def _plain(value: Any) -> Any:
+    """Make lists and numbers of tuples, NumPy's arrays and NumPy's numbers, at any depth."""
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _fill(document: Table, tables: Mapping[str, Any]) -> None:
+    """Set values by table; None takes a key away."""
+    for name, values in _plain(tables).items():
+        if not isinstance(values, dict):
+            document[name] = values
+            continue
+        table = document.setdefault(name, {})
+        for key, value in values.items():
+            if value is None:
+                table.pop(key, None)
+            else:
+                _set(table, (name, key), value)
 
 
 def _override_value(text: str) -> Any:

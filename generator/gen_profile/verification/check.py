@@ -48,6 +48,11 @@ class Judgement:
     manifest: str
     variant: str | None = None
 
+    @property
+    def passed(self) -> bool:
+        """Whether every load keeps its limit in every scenario, and nothing else is wrong."""
+        return self.check.passed
+
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
         return {
@@ -60,7 +65,7 @@ class Judgement:
 
 
 def check_artefact(
-    path: Path,
+    path: Path | str,
     spec: Spec | None = None,
     on_build: Callable[[], None] | None = None,
     *,
@@ -76,7 +81,7 @@ def check_artefact(
 
     Parameters
     ----------
-    path : Path
+    path : Path or str
         Any artefact that the exporters write; its format is told by its suffix.
     spec : Spec, optional
         Taken from ``manifest.json`` beside the file when not given.
@@ -103,6 +108,7 @@ def check_artefact(
         The file is damaged.
     CosimulationError
     """
+    path = Path(path)
     content, format_ = read_artefact(path), format_of(path)
     manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
     spec = spec or _spec_of(manifest, path)

@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from gen_profile.errors import CheckFailed
 from gen_profile.evaluation.scenarios import GROUPS, TIMING, Scenario
 
 QUANTILES = (0.5, 0.9, 0.99)
@@ -83,6 +84,17 @@ class Check:
     def passed(self) -> bool:
         """Whether every load keeps its limit in every scenario, the error bound included."""
         return not self.reasons()
+
+    def raise_for_failure(self) -> None:
+        """Do nothing where the check passed.
+
+        Raises
+        ------
+        CheckFailed
+            With the reasons.
+        """
+        if not self.passed:
+            raise CheckFailed("\n".join(self.reasons()))
 
     def keeps_limit(self, finding: Finding) -> bool:
         """Whether every load keeps its limit in one scenario, the error bound included."""

@@ -1,0 +1,100 @@
+"""The names of `import gen_profile`: what they lead to, what they load, and what a script does with them."""
+
+import ast
+import inspect
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import BPoly, CubicSpline, PPoly
+
+import gen_profile as gp
+from gen_profile.motion.profile import Profile
+
+
+def typed_names():
+    """What a type checker sees, as (name, module)."""
+    tree = ast.parse(Path(inspect.getsourcefile(gp)).read_text("utf-8"))
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    return {alias.asname: (node.module, alias.name) for node in block.body for alias in node.names}
+
+
+def test_every_name_leads_to_what_a_type_checker_sees():
+    names = typed_names()
+    assert {*names, "__version__"} == set(dir(gp))
+    for name, (module, attribute) in names.items():
+        assert getattr(gp, name) is getattr(import_module(module), attribute)
+
+
+def test_no_name_is_hidden_by_a_module_of_the_package():
+    here = Path(inspect.getsourcefile(gp)).parent
+    files, folders = here.glob("*.py"), here.glob("*/__init__.py")
+    modules = {*(file.stem for file in files), *(file.parent.name for file in folders)}
+    assert not modules & set(dir(gp))
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'desing'"):
+        _ = gp.desing
+
+
+def test_a_spec_from_keyword_values_is_the_one_of_the_file(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        'name = "mine"\n[plant]\ntype = "single-pendulum-crane"\n[move]\ntarget = [2.0, 1.0]\nduration = 9\n'
+    )
+    tables = {"plant": {"type": "single-pendulum-crane"}, "move": {"target": np.array([2, 1]), "duration": 9}}
+    assert gp.make_spec(name="mine", **tables) == gp.read_spec(str(file))
+    longer = gp.read_spec(file, move={"duration": 10.0})
+    assert longer == gp.read_spec(file, ["move.duration=10"]) == gp.evolve_spec(longer)
+    assert longer.move.duration == 10.0
+
+
+def test_evolving_keeps_what_is_not_named_and_takes_away_what_is_none():
+    spec = gp.preset_spec("paper", limits={"velocity": 0.3, "jerk": 20.0})
+    changed = gp.evolve_spec(spec, limits={"jerk": None}, move={"start": (0.1,), "target": (0.4,)})
+    assert (changed.limits.velocity, changed.limits.jerk) == (0.3, None)
+    assert changed.move.distance == pytest.approx((0.3,))
+    assert gp.evolve_spec(changed, move={"distance": 0.2}).move.start == (0.0,)
+    assert spec.limits.jerk == 20.0  # the given one is as it was
+
+
+@pytest.mark.parametrize(
+    ("tables", "sentence"),
+    [
+        ({"move": {"duration": -1}}, r"move\.duration: must be at least 0\.001 .*, found -1"),
+        ({"plant": {"L9": 1.0}}, r"plant\.L9: unknown key"),
+        ({"moves": {"duration": 1}}, r"moves: unknown key; did you mean 'move'"),
+        ({"move": 3}, r"move: must be a table, found 3"),
+        ({"plant": {"L1": np.nan}}, r"plant\.L1: must be a number"),
+    ],
+)
+def test_faulty_values_are_told_with_their_place(tables, sentence):
+    with pytest.raises(gp.SpecError, match=sentence):
+        gp.preset_spec("paper", **tables)
+
+
+@pytest.mark.parametrize(
+    "spline",
+    [
+        CubicSpline([0.0, 0.5, 2.0], [0.0, 0.1, 0.3], bc_type="clamped"),
+        CubicSpline([1.0, 1.5, 3.0], [[0.0, 1.0], [0.1, 0.5], [0.3, 0.2]], bc_type="clamped"),
+        PPoly.from_bernstein_basis(BPoly.from_derivatives([0.0, 2.0], [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])),
+    ],
+)
+def test_a_spline_is_a_motion(spline):
+    motion = Profile.from_ppoly(spline)
+    times = np.linspace(0.0, motion.duration, 101)
+    for order in range(4):
+        theirs = spline(times + spline.x[0], order).reshape(len(times), -1)
+        np.testing.assert_allclose(motion.derivative(times, order)[:-1], theirs[:-1], atol=1e-12)
+    np.testing.assert_allclose(motion.target, np.atleast_1d(spline(spline.x[-1])), atol=1e-12)
+
+
+def test_a_verdict_that_failed_raises():
+    spec = gp.preset_spec("paper", check={"residual_sway": 1e-6}, export={"cycle_time": 0.02})
+    design = gp.design(spec, ["csv"], "unused", keep_failed=False)
+    assert not Path("unused").exists()
+    with pytest.raises(gp.CheckFailed, match="sways by"):
+        design.check.raise_for_failure()
