@@ -4,7 +4,7 @@ The table in docs/machines.md is made by it. Where there are no limits and no ra
 direct method solve the same problem by different means: both motions are checked, and the last column is how
 far apart their costs are.
 
-    python examples/07_every_machine.py
+    python examples/07_every_machine.py [PRESET …]
 """
 
 import sys
@@ -62,7 +62,7 @@ HEAD = [
 ]
 print("", *HEAD, "", sep="|")
 print("", *("---" for _ in HEAD), "", sep="|")
-for preset in gp.presets():
+for preset in sys.argv[1:] or gp.presets():
     if not preset.startswith("paper"):  # has a page of its own
         for method in ("none", "sensitivity", "range"):
             print("", *row(preset, method), "", sep="|")

@@ -149,6 +149,7 @@ def test_misused_arguments(tmp_path, monkeypatch, words, message):
     assert "Traceback" not in outcome.err
 
 
+@pytest.mark.slow
 def test_what_a_target_cannot_take_is_refused_with_the_cure(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     bus = ("--export", "can", "--set", "can.bitrate=10000")

@@ -74,6 +74,7 @@ def test_the_check_of_a_file_sways_as_its_linear_interpolation(folder):
     assert_sways_as(check, column((folder / "paper.csv").read_text("utf-8")))
 
 
+@pytest.mark.slow
 def test_an_altered_renamed_file_gives_its_own_sway_in_a_fresh_process(folder):
     text = (folder / "paper.csv").read_text("utf-8")
     altered = altered_row(text, len(text.splitlines()) // 2, 1.02)

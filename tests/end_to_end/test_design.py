@@ -58,6 +58,7 @@ def test_other_names_of_a_format_are_recorded_as_the_listed_one(tmp_path):
     assert [row["format"] for row in outcome.document["artefacts"]] == ["plc"]
 
 
+@pytest.mark.slow
 def test_the_installed_program_keeps_the_json_contract(tmp_path):
     outcome = run_process("--export", "csv", "--json", cwd=tmp_path)
     assert (outcome.code, outcome.errors) == (0, [])

@@ -7,6 +7,8 @@ import pytest
 from command_line import run_process
 from system_parts import missing
 
+pytestmark = pytest.mark.slow
+
 FORMATS = ("--export", "csv", "--export", "plc", "--export", "can")
 GERMAN = "de_DE.UTF-8"
 

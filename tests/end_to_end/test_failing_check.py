@@ -13,6 +13,8 @@ import pytest
 from command_line import PROGRAM, run_here, run_process
 from fmu.caches import share_zig
 
+pytestmark = pytest.mark.slow
+
 STRICT = ("--set", "check.residual_sway=0.0001")
 
 

@@ -52,6 +52,7 @@ def residuals(command, tau, machine, arrival, watch):
     return np.abs(oracle.sway(free.y[:2].T, machine)).max(axis=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overrides", CASES.values(), ids=CASES.keys())
 def test_every_load_sways_as_separate_equations_say(tmp_path, overrides):
     spec = preset_spec("paper", overrides)

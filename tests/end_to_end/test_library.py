@@ -47,6 +47,7 @@ def library(swept, tmp_path_factory):
     return path, outcome.document
 
 
+@pytest.mark.slow
 def test_holds_the_profiles_that_passed_in_their_order(swept, library):
     path, document = library
     rows = [row for row in read_table(swept, grid_of(swept)).to_pylist() if row["status"] == "passed"]
@@ -150,6 +151,7 @@ def test_a_library_that_would_issue_something_else_is_not_written(swept, tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_sweep_without_plc_blocks_is_refused(tmp_path):
     folder = sweep(tmp_path / "swept", "--vary", "solver.method=zvd")
     outcome = run_here("library", folder, "--out", tmp_path / "library.st")
@@ -159,6 +161,7 @@ def test_a_sweep_without_plc_blocks_is_refused(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_a_sweep_of_which_nothing_passed_is_refused(tmp_path):
     folder = sweep(tmp_path / "swept", "--vary", "check.residual_sway=1e-9", "--set", "solver.method=zvd")
     outcome = run_here("library", folder, "--out", tmp_path / "library.st")

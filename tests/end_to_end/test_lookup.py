@@ -40,6 +40,7 @@ def residual(library, case, asked_for, distance):
     return finding.residual[load], check.passed
 
 
+@pytest.mark.slow
 def test_what_was_swept_is_found_itself(library):
     found = looked_up(library, "--move.distance", "0.3", "--plant.L1", "0.35", "--solver.method", "auto")
     row = read_table(library, grid_of(library)).to_pylist()[found["case"]]

@@ -18,6 +18,7 @@ from gen_profile.spec.reading import preset_spec, presets
 PRESETS = [name for name in presets() if not name.startswith("paper")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_solves_and_passes_its_check(tmp_path, preset):
     designed = run_here("--preset", preset, "--out", tmp_path, "--export", "csv", "--json")
@@ -37,6 +38,7 @@ def test_every_preset_solves_and_passes_its_check(tmp_path, preset):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["single-pendulum-crane", "gantry-crane", "tower-crane"])
 def test_machines_of_several_axes_sway_as_lagrange_says(preset):
     spec = preset_spec(preset)

@@ -25,6 +25,7 @@ from gen_profile.spec.reading import preset_spec
 FEW = ("--set", "cost.sway_weight=0", "--set", "robustness={}")
 
 
+@pytest.mark.slow
 def test_a_bitmap_shows_lines_of_many_colours(tmp_path):
     assert run_here("compare", "--plot", tmp_path / "picture.png").code == 0
     pixels = image.imread(tmp_path / "picture.png")
@@ -38,6 +39,7 @@ def test_a_bitmap_shows_lines_of_many_colours(tmp_path):
     assert rows_with_ink.mean() > 0.8
 
 
+@pytest.mark.slow
 def test_a_vector_picture_is_well_formed_and_names_what_it_shows(tmp_path):
     assert run_here("compare", "--plot", tmp_path / "picture.svg").code == 0
     root = ElementTree.parse(tmp_path / "picture.svg").getroot()
@@ -56,6 +58,7 @@ def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path, preset, load):
     assert "payload-" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_pictures_of_one_comparison_are_alike_to_the_byte(tmp_path, suffix, monkeypatch):
     pictures = []
@@ -129,6 +132,7 @@ def drawn(request):
     pyplot.close(figure)
 
 
+@pytest.mark.slow
 def test_legends_and_panels_do_not_overlap(drawn):
     _, figure = drawn
     boxes = [axis.get_tightbbox() for axis in figure.axes]
@@ -200,6 +204,7 @@ def test_without_matplotlib_the_sentence_tells_what_to_install(tmp_path, monkeyp
     assert (outcome.code, outcome.errors) == (2, [INSTALL])
 
 
+@pytest.mark.slow
 def test_where_matplotlib_is_not_installed_the_program_says_so_too(tmp_path):
     """A start-up file of Python hides it."""
     (tmp_path / "sitecustomize.py").write_text(HIDE, "utf-8")

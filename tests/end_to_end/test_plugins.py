@@ -92,6 +92,7 @@ def test_they_are_listed(installed):
     assert run(installed, "plants", "--json").document["plants"]["pendulum"]["loads"] == ["load"]
 
 
+@pytest.mark.slow
 def test_they_design_export_and_check(installed):
     outcome = run(installed, "plugged.toml", "--export", "text", "--export", "csv", "--json")
     assert outcome.code == 0, outcome.err
@@ -115,6 +116,7 @@ def test_without_them_the_spec_names_what_is_known(installed):
     assert "double-pendulum-crane" in outcome.err
 
 
+@pytest.mark.slow
 def test_a_broken_one_is_a_sentence_and_blocks_only_itself(installed):
     (installed / "site" / "plugin_format.py").write_text("import nonexistent\n")
     outcome = run(installed, "--preset", "paper", "--export", "text")

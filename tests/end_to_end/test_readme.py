@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from command_line import PROGRAM
 
+pytestmark = pytest.mark.slow
+
 README = Path(__file__).parents[2] / "README.md"
 BLOCKS = re.findall(r"^```sh\n(.*?)^```$", README.read_text("utf-8"), re.MULTILINE | re.DOTALL)
 

@@ -59,6 +59,7 @@ def paper(tmp_path_factory):
     return path, json.loads(outcome.out)
 
 
+@pytest.mark.slow
 def test_it_says_what_the_design_found(paper):
     path, document = paper
     text = " ".join(Reader(path.read_text("utf-8")).texts)
@@ -155,6 +156,7 @@ def test_it_needs_nothing_but_itself_and_is_below_six_megabytes(paper):
     assert path.stat().st_size < 6_000_000
 
 
+@pytest.mark.slow
 def test_the_same_spec_gives_the_same_bytes_wherever_and_whenever(tmp_path):
     pages = []
     for folder, environment in (

@@ -14,6 +14,8 @@ from gen_profile.report.content import Listing, Page, Row, Section, Share, Table
 from gen_profile.report.page import render
 from gen_profile.spec.reading import presets
 
+pytestmark = pytest.mark.slow
+
 DRAWN = "path.js-line[d]"
 CURVES = f"""
     return [...document.querySelectorAll('.plot')].map((plot) => plot.querySelectorAll('{DRAWN}').length)"""

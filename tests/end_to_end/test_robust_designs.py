@@ -21,6 +21,7 @@ def test_the_shortest_duration_ends_on_a_cycle_and_stands_in_the_manifest(tmp_pa
     assert run_here("check", tmp_path / "paper.csv").code == 0
 
 
+@pytest.mark.slow
 def test_no_duration_does(tmp_path):
     spec = tmp_path / "spec.toml"
     spec.write_text(
@@ -60,6 +61,7 @@ def test_both_methods_write_nearly_the_same(tmp_path):
     assert documents[0]["solver"]["defect"] is None
 
 
+@pytest.mark.slow
 def test_the_shortest_motion_leaves_no_more_sway_than_the_check_allows(tmp_path):
     """Limits alone would let the paper's crane do it in 2.56 s, and one of a shorter rope sway by 3.4 mm."""
     words = ("--set", "limits.acceleration=0.7", "--json", "--out", tmp_path)

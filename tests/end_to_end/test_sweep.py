@@ -21,6 +21,8 @@ from gen_profile.sweep.grid import parse_grid
 from gen_profile.sweep.plan import prepare
 from gen_profile.verification.check import check_artefact
 
+pytestmark = pytest.mark.slow
+
 AXES = ("--vary", "move.distance=0.1,0.3,1e6", "--vary", "plant.L1=0.4:0.5:4")
 QUICK = ("--preset", "paper", "--set", "export.cycle_time=0.01")
 

@@ -184,6 +184,7 @@ if multiprocessing.parent_process() is not None:
 """
 
 
+@pytest.mark.slow
 def test_a_case_that_kills_its_process_is_a_row(tmp_path):
     (tmp_path / "deadly.py").write_text(DEADLY, "utf-8")
     text = preset_text("paper-beta0").replace('type = "double-pendulum-crane"', 'file = "deadly.py"')

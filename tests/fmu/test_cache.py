@@ -111,6 +111,7 @@ class TestPlantFmu:
         assert archives[0] != archives[1]
         assert archives[0].read_bytes() == archives[1].read_bytes()
 
+    @pytest.mark.slow
     def test_is_built_by_two_processes_at_once(self, new_cache):
         commands = [[sys.executable, "-c", BUILD]] * 2
         processes = [

@@ -90,6 +90,7 @@ def test_a_velocity_of_ideal_drives_has_no_lag(tmp_path):
     assert abs(found["sway.payload"][found["time"] > 3.0]).max() < 3e-5
 
 
+@pytest.mark.slow
 def test_other_platforms_are_labelled(tmp_path):
     done = run_here("fmu", "plant", "--platform", "linux-arm64", "--out", tmp_path / "a.fmu", "--json")
     assert done.document["platforms"] == [{"name": "linux-arm64", "runs_here": False}]

@@ -31,6 +31,8 @@ from gen_profile_fmu.model import plant_model
 from gen_profile_fmu.plant_variables import InputKind
 from gen_profile_fmu.platforms import host_platform
 
+pytestmark = pytest.mark.slow
+
 CRANE = find_plant("double-pendulum-crane")
 NAMES = {
     "acceleration": "cart.setpoint_acceleration",

@@ -25,6 +25,8 @@ from gen_profile_fmu.fmu_files import Version
 from gen_profile_fmu.plant_fmu import cached_fmu
 from gen_profile_fmu.platforms import PLATFORMS, host_platform
 
+pytestmark = pytest.mark.slow
+
 SYSTEM = model_of("system", find_plant("double-pendulum-crane"))
 WINE = "/usr/lib/wine/wine64"
 

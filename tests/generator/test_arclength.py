@@ -36,6 +36,7 @@ def folded():
     )
 
 
+@pytest.mark.slow
 def test_passes_a_fold(folded):
     canonical, guess = folded
     straight = advance(canonical.towards, guess, guess.scaled(0.0))

@@ -41,6 +41,7 @@ def test_a_swinging_load_arrives_at_rest(solver, effort, tau):
     assert np.abs(sways(unaware, problem.parameters, SWUNG)).max() > 0.02
 
 
+@pytest.mark.slow
 @SOLVERS
 def test_what_was_measured_is_the_same_on_all_machines(solver):
     """Zero sensitivity means: the state after the move is that of the nominal crane, to first order."""
@@ -106,6 +107,7 @@ def test_an_axis_moves_for_a_swing_across_the_way(method):
     assert across[-1] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_worst_machine_of_a_range_swings_at_the_start_too():
     box = WorstCase(uncertain={"L1": 0.2}, load_limits=(0.003, 0.003), nominal_zero=False)
     problem = crane_problem(

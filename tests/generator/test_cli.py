@@ -133,6 +133,7 @@ def test_an_interrupt_is_no_bug(monkeypatch):
     assert outcome.errors[-1] == "Error: Interrupted."
 
 
+@pytest.mark.slow
 def test_debugging_logs_what_libraries_tell(tmp_path):
     outcome = run_process("--debug", "--no-check", "--out", tmp_path)
     assert outcome.code == 0
@@ -162,6 +163,7 @@ def test_a_terminal_sees_a_spinner_and_nothing_stays(monkeypatch):
     assert not terminal.getvalue().endswith("…\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_closed_output_does_not_stop_the_work(tmp_path, closed):
     """As in ``gen-profile >&-``."""

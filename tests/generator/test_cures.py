@@ -70,6 +70,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("preset", "overrides", "blamed"), REFUSED.values(), ids=REFUSED)
 def test_every_change_that_is_named_works_and_half_of_it_does_not(preset, overrides, blamed):
     changes = refused(preset, *overrides)
@@ -79,6 +80,7 @@ def test_every_change_that_is_named_works_and_half_of_it_does_not(preset, overri
         assert not works(preset, *overrides, nearer(preset, overrides, change, 0.5))
 
 
+@pytest.mark.slow
 def test_a_hoist_is_no_way_out_where_its_travel_is_limited():
     overrides = ["limits.sway=0.08", HOIST]
     changes = refused("single-pendulum-crane", *overrides)
@@ -105,6 +107,7 @@ def test_robustness_is_to_blame_where_nothing_else_is(order, less):
     assert cures(problem, trial) == f"In 3 s it would do with {less}."
 
 
+@pytest.mark.slow
 def test_too_short_a_move_with_limits_is_told_a_duration_that_keeps_them():
     overrides = ["move.duration=1.0", "limits.acceleration=0.3"]
     changes = refused("paper", *overrides)
@@ -112,6 +115,7 @@ def test_too_short_a_move_with_limits_is_told_a_duration_that_keeps_them():
     assert works("paper", *overrides, *changes[0])
 
 
+@pytest.mark.slow
 def test_the_least_sway_of_a_pendulum_is_what_its_load_needs_to_get_there():
     """A load is accelerated by ω² times its sway: full ahead, then full astern, s = 4 d / (ω T)²."""
     free = ["plant.c=0", 'robustness={method="none", uncertain={}}', "move.duration=10"]
@@ -157,6 +161,7 @@ def test_a_speed_that_leads_out_of_an_axis_range_is_told_one_that_does_not():
         plan(preset_spec("single-pendulum-crane", [f"move.final_velocity=[0.0, {1.02 * float(speed)}]"]))
 
 
+@pytest.mark.slow
 def test_where_no_duration_will_do_the_limit_to_blame_is_named():
     overrides = ["limits.acceleration=1", "limits.sway=0.01", "move.initial={theta1=0.02}"]
     with pytest.raises(InfeasibleProblem, match=r"^move\.duration: no duration keeps the limits") as refusal:
@@ -168,6 +173,7 @@ def test_where_no_duration_will_do_the_limit_to_blame_is_named():
     assert cured.figures["sway_transient_peak_m"] <= float(limit)
 
 
+@pytest.mark.slow
 def test_the_sway_between_collocation_points_is_within_the_limit_over_a_range_too():
     overrides = ["robustness.method=range", "limits.sway=0.016"]
     assert plan(preset_spec("paper", overrides)).figures["sway_transient_peak_m"] <= 0.016

@@ -37,6 +37,7 @@ def test_tape_and_stopwatch_hold_the_machine_in_their_ranges():
     np.testing.assert_allclose(np.mean(errors, axis=0), 0.0, atol=0.2)
 
 
+@pytest.mark.slow
 def test_a_logged_swing_holds_the_machine_in_its_ranges():
     """Rope and damping from 25 noisy logs of a crane that is a fifth off, zero error included."""
     true = HOIST.nominal() | {"L0": 2.3, "c": 300.0}
@@ -101,6 +102,7 @@ def test_every_machine_is_told_by_its_swing(type_):
     assert found.half_range[name] < 0.02 * true[name]
 
 
+@pytest.mark.slow
 def test_steps_of_an_encoder_do_not_average_out():
     """One degree of resolution and 4° of swing: errors repeat with the swing, wherever the zero lies."""
     true = HOIST.nominal() | {"L0": 2.3, "c": 300.0}

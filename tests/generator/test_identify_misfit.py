@@ -24,6 +24,7 @@ def hoist(**changed):
     return Machine(plant=HOIST, parameters=HOIST.nominal() | changed, q_a=(0.0, 4.0))
 
 
+@pytest.mark.slow
 def test_another_rope_that_is_wrong_is_named():
     true = CRANE.nominal() | {"L1": 0.52, "L2": 0.40}
     times = 0.5 * TIMES

@@ -47,6 +47,7 @@ def test_a_scale_that_no_weight_needs_does_no_harm():
     assert with_scale.cost == without.cost
 
 
+@pytest.mark.slow
 def test_an_absurd_sway_scale_diverges_with_a_cure():
     solution = solve(crane_problem(sway_scale=5000.0))
     assert solution.optimum is None
@@ -214,6 +215,7 @@ def test_an_axis_may_stand_still():
     np.testing.assert_allclose(profile(np.linspace(0.0, 4.0, 41)).position[:, 1], 3.0, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_cost_that_is_too_steep_is_blamed():
     """exp((50/m · 0.25 m)²) at the start: what follows is faster than any mesh."""
     problem = crane_problem(initial={"theta1": 0.3}, target=(0.0,), desensitized=())

@@ -108,6 +108,7 @@ def test_that_test_would_see_casadi():
     assert "casadi" in loaded_by("gen_profile.problem.linearization")
 
 
+@pytest.mark.slow
 def test_every_module_loads_where_the_system_lacks_what_only_some_have():
     imports = "\n".join(f"import {name}" for name in modules())
     hidden = str(ROOT / "tests" / "other_systems")

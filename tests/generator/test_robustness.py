@@ -80,7 +80,8 @@ def mode_amplitude(problem, profile, which):
     return np.abs(drive / omega * total) * max(abs(hook), abs(payload))
 
 
-@settings(max_examples=50)
+@pytest.mark.slow
+@settings(max_examples=20)
 @given(problems())
 def test_every_crane_comes_to_rest(drawn):
     problem, phase = drawn
@@ -116,6 +117,7 @@ def test_the_two_oracles_agree():
     assert 0.99 * max(slow, fast) < residual(other, profile) < 1.01 * (slow + fast)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("machine", "periods", "distance", "beta"),
     [

@@ -30,6 +30,7 @@ def payload_sway_after(motion, p):
     return np.abs(sway[times >= motion.duration]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nominal_zero", "most"), [(False, 0.75e-3), (True, 1.45e-3)])
 def test_the_worst_crane_of_the_paper(nominal_zero, most):
     solution = choice.solve(ranged(nominal_zero))
@@ -61,6 +62,7 @@ def test_what_lies_between_the_ends_counts():
     assert shares.max() <= 1.05 * max(shares[0], shares[-1], shares[20], np.sort(shares)[-5])
 
 
+@pytest.mark.slow
 def test_two_parameters():
     problem = ranged(uncertain={"L1": 0.1, "m2": 0.2})
     solution = choice.solve(problem)
@@ -74,6 +76,7 @@ def test_two_parameters():
     assert worst.max() * 0.003 <= 1.05 * solution.worst_case_bound
 
 
+@pytest.mark.slow
 def test_minimum_time_keeps_the_loads_limits():
     problem = ranged(limits=LimitsSpec(acceleration=0.4))
     shortest = choice.minimum_time(problem)

@@ -18,6 +18,8 @@ from command_line import PROGRAM
 from exporters.can import vcan_kernel
 from system_parts import missing
 
+pytestmark = pytest.mark.slow
+
 HERE = Path(__file__).parent
 TIMEOUT = 0.1  # s
 PERIOD = 0.004  # s
