@@ -1,6 +1,7 @@
 """Which frames carry what: COB-IDs, the content of each PDO, and how much of the bus they take.
 
-Per axis (node ids count up from ``can.node``), after the predefined connection set of CiA 301:
+Per axis (node ids count up from ``can.node``, or stand in ``can.nodes``), after the predefined connection set
+of CiA 301, unless ``can.cob_ids`` states others:
 
 ========== ======================= ================================================ =========================
 COB-ID     PDO                     content                                          sent
@@ -27,7 +28,7 @@ from can import Message
 from numpy.typing import NDArray
 
 from gen_profile.errors import ExportError
-from gen_profile.spec.model import CanSpec
+from gen_profile.spec.model import CanSpec, CobIdsSpec
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.setpoints import two_digits_up
 
@@ -89,6 +90,8 @@ TARGET_VELOCITY = Field(index=0x60FF, sub=0, code="i", name="TargetVelocity")
 VELOCITY_OFFSET = Field(index=0x60B1, sub=0, code="i", name="VelocityOffset")
 TORQUE_OFFSET = Field(index=0x60B2, sub=0, code="h", name="TorqueOffset")
 
+# PDOs by the COB-ID of node 0, as can.cob_ids calls them
+PDO_NAMES = {RPDO1: "command", RPDO2: "setpoint", RPDO3: "feed_forward", TPDO1: "feedback"}
 COMMAND = (CONTROLWORD,)
 FEEDBACK = (STATUSWORD, ACTUAL_POSITION)
 
@@ -155,6 +158,8 @@ def nodes(target: Target) -> tuple[int, ...]:
     ExportError
         There are too few.
     """
+    if target.can.nodes:
+        return _stated_nodes(target)
     first, axes = target.can.node, len(target.axes)
     if first + axes - 1 > LAST_NODE:
         raise ExportError(
@@ -164,24 +169,57 @@ def nodes(target: Target) -> tuple[int, ...]:
     return tuple(range(first, first + axes))
 
 
+def _stated_nodes(target: Target) -> tuple[int, ...]:
+    stated = tuple(target.can.nodes[axis.name] for axis in target.axes)
+    if max(stated) > LAST_NODE:
+        raise ExportError(f"can.nodes: {MASTER} is the master's own; the last node id is {LAST_NODE}.")
+    return stated
+
+
+def cob_ids(target: Target) -> tuple[Mapping[int, int], ...]:
+    """List the COB-IDs of each axis's PDOs, by those of node 0.
+
+    Raises
+    ------
+    ExportError
+        There are too few node ids, or two PDOs have the same COB-ID.
+    """
+    used = {RPDO1, TPDO1, *setpoint_pdos(target.can)}
+    found, taken = [], dict[int, str]()
+    for axis, node in zip(target.axes, nodes(target), strict=True):
+        own = target.can.cob_ids.get(axis.name, CobIdsSpec())
+        found.append({pdo: getattr(own, name) or pdo + node for pdo, name in PDO_NAMES.items()})
+        for pdo in sorted(used):
+            cob_id, place = found[-1][pdo], f"can.cob_ids.{axis.name}.{PDO_NAMES[pdo]}"
+            if taken.setdefault(cob_id, place) != place:
+                raise ExportError(f"{place}: {cob_id:03X}h is {taken[cob_id]} already; choose another one.")
+    return tuple(found)
+
+
 def setpoint_frames(target: Target) -> tuple[SetpointFrame, ...]:
     """List the frames of a cycle in the order in which they are sent, SYNC after them.
 
     Raises
     ------
     ExportError
-        There are too few node ids.
+        There are too few node ids, or two PDOs have the same COB-ID.
     """
     found = []
-    for column, node in enumerate(nodes(target)):
+    for column, own in enumerate(cob_ids(target)):
         first = 0
-        for base, fields in setpoint_pdos(target.can).items():
+        for pdo, fields in setpoint_pdos(target.can).items():
             carried = slice(first, first + len(fields))
             found.append(
-                SetpointFrame(cob_id=base + node, column=column, fields=carried, packing=packing(fields))
+                SetpointFrame(cob_id=own[pdo], column=column, fields=carried, packing=packing(fields))
             )
             first = carried.stop
     return tuple(found)
+
+
+def commanding_cob_ids(target: Target) -> set[int]:
+    """List the COB-IDs that only the controller of these drives may send: commands and setpoints."""
+    sent = (RPDO1, *setpoint_pdos(target.can))
+    return {own[pdo] for own in cob_ids(target) for pdo in sent}
 
 
 def period_digits(can: CanSpec) -> tuple[int, int]:

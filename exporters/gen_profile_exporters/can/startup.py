@@ -100,9 +100,9 @@ def heartbeat_ms(can: CanSpec) -> int:
 
 def startup_lists(motion: Setpoints, target: Target) -> dict[int, tuple[Entry, ...]]:
     """List by node what its drive must be set to, in the order in which it must be set."""
+    drives = zip(frames.nodes(target), frames.cob_ids(target), strict=True)
     return {
-        node: tuple(_entries(node, column, motion, target))
-        for column, node in enumerate(frames.nodes(target))
+        node: tuple(_entries(node, column, own, motion, target)) for column, (node, own) in enumerate(drives)
     }
 
 
@@ -130,10 +130,12 @@ def _number(entry: Entry) -> str:
     return f"0x{entry.value:08X}" if large else str(entry.value)
 
 
-def _entries(node: int, column: int, motion: Setpoints, target: Target) -> Iterator[Entry]:
+def _entries(
+    node: int, column: int, own: Mapping[int, int], motion: Setpoints, target: Target
+) -> Iterator[Entry]:
     can, axis = target.can, target.axes[column]
     yield from _monitoring(can)
-    yield from _mapping(node, can)
+    yield from _mapping(node, own, can)
     digits, exponent = frames.period_digits(can)
     yield Entry(0x60C2, 1, 8, digits, "interpolation period: digits")
     yield Entry(0x60C2, 2, 8, exponent, "interpolation period: power of ten (s)")
@@ -161,14 +163,14 @@ def _monitoring(can: CanSpec) -> Iterator[Entry]:
     yield Entry(0x1006, 0, 32, microseconds, "period of SYNC (µs)", optional=True)
 
 
-def _mapping(node: int, can: CanSpec) -> Iterator[Entry]:
-    yield from _pdo(0x1400, frames.RPDO1 + node, ON_EVENT, frames.COMMAND, "controlword")
+def _mapping(node: int, own: Mapping[int, int], can: CanSpec) -> Iterator[Entry]:
+    yield from _pdo(0x1400, own[frames.RPDO1], ON_EVENT, frames.COMMAND, "controlword")
     used = frames.setpoint_pdos(can)
-    yield from _pdo(0x1401, frames.RPDO2 + node, ON_SYNC, used[frames.RPDO2], "setpoint")
+    yield from _pdo(0x1401, own[frames.RPDO2], ON_SYNC, used[frames.RPDO2], "setpoint")
     yield Entry(0x1401, 5, 16, timeout_ms(can), "longest wait for a setpoint (ms)", optional=True)
     if frames.RPDO3 in used:
-        yield from _pdo(0x1402, frames.RPDO3 + node, ON_SYNC, used[frames.RPDO3], "feed-forward")
-    answer = NO_REMOTE_REQUEST | (frames.TPDO1 + node)
+        yield from _pdo(0x1402, own[frames.RPDO3], ON_SYNC, used[frames.RPDO3], "feed-forward")
+    answer = NO_REMOTE_REQUEST | own[frames.TPDO1]
     yield from _pdo(0x1800, answer, ON_SYNC, frames.FEEDBACK, "feedback")
     for index, cob_id in OTHERS.items():
         if cob_id not in used:

@@ -58,6 +58,9 @@ Distance = Annotated[float, Bounds(least=-1e5, most=1e5, meaning="m (or rad)")]
 SolverName = Literal["auto", "indirect", "direct"]
 ShaperName = Literal["nzv", "zv", "zvd", "zvdd", "umzvd", "ei", "2hump-ei", "3hump-ei", "mzv"]
 Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]
+NodeId = Annotated[int, Bounds(least=1, most=127)]
+# what CiA 301 leaves to PDOs: EMCY lies below, SDOs above
+PdoCobId = Annotated[int, Bounds(least=0x181, most=0x57F, meaning="(181h to 57Fh)")]
 
 DEFAULT_COUNTS_PER_SI = 1e6
 RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longest axis move
@@ -362,6 +365,28 @@ class ExportSpec:
 
 
 @attrs.frozen(kw_only=True)
+class CobIdsSpec:
+    """COB-IDs of one drive's PDOs; None for those of the predefined connection set of CiA 301.
+
+    Attributes
+    ----------
+    command : int or None
+        Controlword, 200h + node id.
+    setpoint : int or None
+        300h + node id.
+    feed_forward : int or None
+        The torque beside a velocity, 400h + node id.
+    feedback : int or None
+        Statusword and actual position, 180h + node id.
+    """
+
+    command: PdoCobId | None = None
+    setpoint: PdoCobId | None = None
+    feed_forward: PdoCobId | None = None
+    feedback: PdoCobId | None = None
+
+
+@attrs.frozen(kw_only=True)
 class CanSpec:
     """The drives on the CAN bus, and how they are to be fed, watched and stopped.
 
@@ -369,6 +394,10 @@ class CanSpec:
     ----------
     node : int
         CANopen node of the first axis; the second axis takes the next one, and so on.
+    nodes : mapping of str to int
+        Nodes of all axes by name, where they do not count up from `node`; empty where they do.
+    cob_ids : mapping of str to CobIdsSpec
+        By axis, where they are not those of the predefined connection set.
     bitrate : int
         bit/s.
     mode : str
@@ -397,11 +426,15 @@ class CanSpec:
         revolutions) and 6092h (counts per shaft revolutions), for drives that scale positions themselves.
     vendor, product : int or None
         Identity 1018h:01 and :02 that a drive must have.
+    serial : mapping of str to int
+        Serial number 1018h:04 that the drive of an axis must have.
     homed : (int, int, int) or None
         Index, subindex and bits of the drive's object that are set once it knows where its axis is.
     """
 
-    node: Annotated[int, Bounds(least=1, most=127)] = 1
+    node: NodeId = 1
+    nodes: Mapping[str, NodeId] = attrs.field(factory=dict, converter=_frozen_mapping)
+    cob_ids: Mapping[str, CobIdsSpec] = attrs.field(factory=dict, converter=_frozen_mapping)
     bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
     mode: Literal["csp", "ip", "csv"] = "csp"
     sync_period: CycleTime = 0.004
@@ -417,6 +450,7 @@ class CanSpec:
     feed: tuple[Unsigned32, Unsigned32] | None = None
     vendor: Unsigned32 | None = None
     product: Unsigned32 | None = None
+    serial: Mapping[str, Unsigned32] = attrs.field(factory=dict, converter=_frozen_mapping)
     homed: tuple[Unsigned32, Annotated[int, Bounds(least=0, most=255)], Unsigned32] | None = None
 
 

@@ -40,6 +40,13 @@ FILE_KEYS = ("file", "file_sha256")
 DEFAULT_NAME = "profile"
 PLACEHOLDER_DURATION = 1.0  # s, until the shortest duration is found
 LARGEST_ANGLE = 1.4  # rad, of a load at the start
+# tables of [can] by axis, with an example of each
+BY_AXIS = {
+    "travel": "cart = [0.0, 0.5]",
+    "nodes": "bridge = 5, trolley = 9",
+    "cob_ids": "cart = { setpoint = 0x321 }",
+    "serial": "cart = 0x12345678",
+}
 SHORTEST_MOVE = 1e-12  # m (or rad); squares of what is smaller come near to what floats can hold
 FLAT = {
     "actuator": ActuatorSpec,
@@ -414,13 +421,12 @@ def _feed_constant(table: Mapping[str, Any], where: str, faults: Faults) -> Tabl
 
 
 def _can(table: Table, plant: Plant | None, faults: Faults) -> Table:
-    travel = table.get("travel", {})
-    if not isinstance(travel, Mapping):
-        faults.add("can.travel", f"must be a table such as {{ cart = [0.0, 0.5] }}, found {found(travel)}")
-        return {**table, "travel": {}}
-    for key in travel:
-        if plant and key not in (names := [axis.name for axis in plant.actuated]):
-            faults.add(place("can.travel", key), f"unknown axis{suggestion(key, names)}")
+    names = [axis.name for axis in plant.actuated] if plant else None
+    if names and len(names) == 1 and isinstance(table.get("serial"), int):
+        table = {**table, "serial": {names[0]: table["serial"]}}
+    for key, example in BY_AXIS.items():
+        table = _by_axis(table, key, example, names, faults)
+    _nodes(table["nodes"], names, faults)
     ahead = table.get("feed_forward", "none")
     if ahead in ("torque", "both") and "torque_per_acceleration" not in table:
         faults.add(
@@ -434,6 +440,30 @@ def _can(table: Table, plant: Plant | None, faults: Faults) -> Table:
             "can.following_error", 'required with mode = "csv": how far the axis may be off the motion, in m'
         )
     return table
+
+
+def _by_axis(table: Table, key: str, example: str, names: Sequence[str] | None, faults: Faults) -> Table:
+    """Hold a table of `[can]` to the machine's axes; without a fault of its own where it is none."""
+    by_axis = table.get(key, {})
+    if not isinstance(by_axis, Mapping):
+        faults.add(f"can.{key}", f"must be a table such as {{ {example} }}, found {found(by_axis)}")
+        by_axis = {}
+    for axis in by_axis:
+        if names and axis not in names:
+            faults.add(place(f"can.{key}", axis), f"unknown axis{suggestion(axis, names)}")
+    return {**table, key: by_axis}
+
+
+def _nodes(nodes: Mapping[str, Any], names: Sequence[str] | None, faults: Faults) -> None:
+    """Have every axis a node of its own, or none of them."""
+    taken: dict[Any, str] = {}
+    for axis, node in nodes.items():
+        if isinstance(node, int) and taken.setdefault(node, axis) != axis:
+            faults.add(place("can.nodes", axis), f"{node} is the node of the axis {taken[node]} already")
+    known = set(names or ()) >= nodes.keys()
+    for axis in names or ():
+        if nodes and known and axis not in nodes:
+            faults.add(place("can.nodes", axis), "required beside the other axes' nodes")
 
 
 def _check_columns(columns: Any, faults: Faults) -> None:

@@ -15,7 +15,7 @@ import attrs
 from gen_profile.artefacts.manifest import FILENAME, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import OutputError, SpecError, StreamAborted
-from gen_profile.spec.model import Spec
+from gen_profile.spec.model import CanSpec, Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.streaming.outcome import Outcome, Source
 from gen_profile_exporters.can import frames
@@ -205,17 +205,31 @@ def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
 def drive_bank(
     source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make, clock: Clock | None = None
 ) -> DriveBank:
-    """Put a simulated drive on the bus for every axis, at rest at the start of the move."""
+    """Put a simulated drive on the bus for every axis, at rest at the start of the move.
+
+    They are those that the spec asks for, by vendor, product and serial number.
+    """
     from gen_profile_exporters.can.simulation.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
     from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive  # noqa: PLC0415
 
     target = target_of(source_spec)
     scales = [axis.counts_per_si for axis in target.axes]
+    axes = zip(target.axes, frames.nodes(target), source_spec.move.start, strict=True)
     drives = [
-        SimulatedDrive(node, make, round(at * scale))
-        for node, at, scale in zip(frames.nodes(target), source_spec.move.start, scales, strict=True)
+        SimulatedDrive(node, _of_identity(make, target.can, axis.name), round(at * axis.counts_per_si))
+        for axis, node, at in axes
     ]
     return DriveBank(bus, clock or SystemClock(), drives, scales, load)
+
+
+def _of_identity(make: Make, can: CanSpec, axis: str) -> Make:
+    """Give a make the identity that a spec asks for."""
+    return attrs.evolve(
+        make,
+        vendor=can.vendor or make.vendor,
+        product=can.product or make.product,
+        serial=can.serial.get(axis, make.serial),
+    )
 
 
 @attrs.define

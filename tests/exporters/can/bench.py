@@ -11,6 +11,7 @@ import attrs
 import can
 from exporters.motions import quintic, target
 
+from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.export import exporter
 from gen_profile_exporters.can.simulation.drive_bank import DriveBank
 from gen_profile_exporters.can.simulation.drive_dictionary import Make
@@ -233,6 +234,7 @@ class Bench:
     def _drives(self, kind, make, load, stand):
         first = [int(at) for at in (self.plan.motion.position[0] if stand is None else stand)]
         counts = [axis.counts_per_si for axis in self.target.axes]
-        drives = [kind(self.target.can.node + n, make, at) for n, at in enumerate(first)]
+        nodes = frames.nodes(self.target)
+        drives = [kind(node, make, at) for node, at in zip(nodes, first, strict=True)]
         rest = [at / count for at, count in zip(first, counts, strict=True)]
         return DriveBank(self.drive_end, self.clock, drives, counts, load or RigidLoad(rest))

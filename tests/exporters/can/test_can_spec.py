@@ -3,6 +3,7 @@
 import pytest
 
 from gen_profile.errors import SpecError
+from gen_profile.spec.model import CobIdsSpec
 from gen_profile.spec.reading import preset_spec, spec_from_dict
 
 TRAVEL = "can.travel={cart=[-0.1, 0.5]}"
@@ -15,13 +16,16 @@ def test_everything_stated_comes_back():
             "can.mode=csp", "can.feed_forward=torque", "can.torque_per_acceleration=40", "can.timeout=0.05",
             "can.start_tolerance=0.002", "can.following_error=0.01", "can.quick_stop=1.5", TRAVEL,
             "can.encoder=[65536, 1]", "can.gear=[3, 1]", "can.feed=[40000, 1]", "can.vendor=0x2E5",
-            "can.product=1", "can.homed=[0x2003, 0, 1]",
+            "can.product=1", "can.homed=[0x2003, 0, 1]", "can.serial=7", "can.nodes={cart=9}",
+            "can.cob_ids={cart={setpoint=0x321, feedback=0x195}}",
         ],
     )  # fmt: skip
     assert spec.can.travel == {"cart": (-0.1, 0.5)}
     assert spec.can.gear == (3, 1)
     assert spec.can.vendor == 0x2E5
     assert spec.can.homed == (0x2003, 0, 1)
+    assert (spec.can.serial, spec.can.nodes) == ({"cart": 7}, {"cart": 9})
+    assert spec.can.cob_ids == {"cart": CobIdsSpec(setpoint=0x321, feedback=0x195)}
     assert spec_from_dict(spec.to_dict()) == spec
 
 
@@ -38,6 +42,15 @@ def test_everything_stated_comes_back():
         ("can.feed_forward=both", 'can.torque_per_acceleration: required with feed_forward = "both"'),
         ("can.timeout=0", "can.timeout: must be at least 0.001"),
         ("can.mode=csv", 'can.following_error: required with mode = "csv"'),
+        ("can.nodes={kart=3}", "can.nodes.kart: unknown axis; did you mean 'cart'?"),
+        ("can.nodes={cart=0}", "can.nodes.cart: must be at least 1 and at most 127, found 0."),
+        ("can.serial={cart=0}", "can.serial.cart: must be at least 1"),
+        (
+            "can.cob_ids={cart={setpoint=0x581}}",
+            "can.cob_ids.cart.setpoint: must be at least 385 and at most 1407",
+        ),
+        ("can.cob_ids={cart={setpoints=0x301}}", "can.cob_ids.cart.setpoints: unknown key"),
+        ("can.cob_ids=3", "can.cob_ids: must be a table such as { cart = { setpoint = 0x321 } }, found 3."),
         ("can.mode=pp", "can.mode: unknown value, found text 'pp'"),
     ],
 )
@@ -51,3 +64,16 @@ def test_faults(override, sentence):
 def test_feed_forward_is_for_csp():
     with pytest.raises(SpecError, match=r'can\.feed_forward: only with mode = "csp"'):
         preset_spec("paper", ["can.mode=ip", "can.feed_forward=velocity"])
+
+
+@pytest.mark.parametrize(
+    ("nodes", "fault"),
+    [
+        ("{x=5, y=5}", "can.nodes.y: 5 is the node of the axis x already"),
+        ("{x=5}", "can.nodes.y: required beside the other axes' nodes"),
+    ],
+)
+def test_every_axis_has_a_node_of_its_own(nodes, fault):
+    with pytest.raises(SpecError) as refusal:
+        preset_spec("gantry-crane", [f"can.nodes={nodes}"])
+    assert [found.rstrip(".") for found in refusal.value.faults] == [fault]

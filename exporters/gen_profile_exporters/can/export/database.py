@@ -23,14 +23,14 @@ def dbc(target: Target) -> bytes:
     names = [identifier(axis.name) for axis in target.axes]
     blocks = ['VERSION ""', "NS_ :", "BS_:", f"BU_: {MASTER_NAME} {' '.join(names)}"]
     blocks.append(f"BO_ {frames.SYNC} Sync: 0 {MASTER_NAME}")
-    for name, axis, node in zip(names, target.axes, frames.nodes(target), strict=True):
+    for name, axis, own in zip(names, target.axes, frames.cob_ids(target), strict=True):
         blocks += [
-            _message(frames.RPDO1 + node, f"{name}_Command", frames.COMMAND, axis, (MASTER_NAME, name)),
+            _message(own[frames.RPDO1], f"{name}_Command", frames.COMMAND, axis, (MASTER_NAME, name)),
             *(
-                _message(base + node, f"{name}_{SETPOINTS[base]}", fields, axis, (MASTER_NAME, name))
-                for base, fields in frames.setpoint_pdos(target.can).items()
+                _message(own[pdo], f"{name}_{SETPOINTS[pdo]}", fields, axis, (MASTER_NAME, name))
+                for pdo, fields in frames.setpoint_pdos(target.can).items()
             ),
-            _message(frames.TPDO1 + node, f"{name}_Feedback", frames.FEEDBACK, axis, (name, MASTER_NAME)),
+            _message(own[frames.TPDO1], f"{name}_Feedback", frames.FEEDBACK, axis, (name, MASTER_NAME)),
         ]
     return ("\n\n".join(blocks) + "\n").encode("ascii")
 

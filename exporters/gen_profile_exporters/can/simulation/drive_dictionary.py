@@ -35,7 +35,7 @@ class Make:
 
     Attributes
     ----------
-    vendor, product : int
+    vendor, product, serial : int
         1018h.
     miss : str
         What it does without a new setpoint: ``"extrapolate"`` (and fault after `misses`), ``"hold"`` the last
@@ -54,6 +54,7 @@ class Make:
 
     vendor: int = VENDOR
     product: int = PRODUCT
+    serial: int = 1
     miss: str = "extrapolate"
     misses: int = 3
     fixed_period: tuple[int, int] | None = None
@@ -197,7 +198,7 @@ def _variables(make: Make) -> Iterator[tuple[int, str, int, str, int]]:
 
 def _records(node: int, make: Make) -> Iterator[tuple[int, str, int | dict[int, int], str, tuple[int, ...]]]:
     yield 0x1016, "Consumer heartbeat time", U32, "rw", (0,)
-    yield 0x1018, "Identity object", U32, "ro", (make.vendor, make.product, REVISION, 1)
+    yield 0x1018, "Identity object", U32, "ro", (make.vendor, make.product, REVISION, make.serial)
     yield 0x607D, "Software position limit", I32, "rw", (0, 0)
     for index, name in (
         (0x608F, "Position encoder resolution"),

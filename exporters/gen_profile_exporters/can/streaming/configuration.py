@@ -24,6 +24,12 @@ from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.scaling import Setpoints, magnitude_counts
 from gen_profile_exporters.can.startup import AT_ONCE, MODES, PDO_PARAMETERS, Entry, startup_lists
 from gen_profile_exporters.can.streaming.link import Link
+from gen_profile_exporters.can.streaming.restoration import (
+    HEARTBEAT_WATCHED,
+    Place,
+    Restoration,
+    settings_of,
+)
 from gen_profile_exporters.exporter import Target
 
 CIA_402 = 402  # low word of 1000h
@@ -34,10 +40,7 @@ COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it 
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
 RESET_PATIENCE = NANOSECONDS  # for a drive to leave its fault
-HEARTBEAT_WATCHED = (0x1016, 1)
 PERIOD_DIGITS, PERIOD_EXPONENT = (0x60C2, 1), (0x60C2, 2)
-
-Place = tuple[int, int]  # index and subindex
 
 
 @attrs.frozen(kw_only=True)
@@ -50,7 +53,13 @@ class Node:
 
 
 def configure(
-    link: Link, target: Target, motion: Setpoints, meanwhile: Callable[[], None], *, reset_fault: bool = False
+    link: Link,
+    target: Target,
+    motion: Setpoints,
+    found: Restoration,
+    meanwhile: Callable[[], None],
+    *,
+    reset_fault: bool = False,
 ) -> tuple[int, ...]:
     """Set up all drives and find each of them fit to follow.
 
@@ -62,6 +71,8 @@ def configure(
     link : Link
     target : Target
     motion : Setpoints
+    found : Restoration
+        Remembers what the drives were set to, as far as that is changed.
     meanwhile : callable
         What must go on while an answer is awaited, once no drive watches our heartbeat any more.
     reset_fault : bool
@@ -88,9 +99,12 @@ def configure(
         if reset_fault:
             _reset_fault(link, node)
         _require_rest(link, node)
+        found.remember_watch(node.number, _upload(link, node, *HEARTBEAT_WATCHED, optional=True))
         _disarm(link, node)
     link.meanwhile = meanwhile
-    return tuple(_configure_one(link, node, target, motion, lists[node.number]) for node in nodes)
+    for node in nodes:
+        _set(link, node, lists[node.number], found)
+    return tuple(_require_fit(link, node, target, motion) for node in nodes)
 
 
 def start(link: Link, target: Target) -> None:
@@ -99,10 +113,15 @@ def start(link: Link, target: Target) -> None:
         link.send(nmt(START, number))
 
 
-def release(link: Link, target: Target) -> None:
-    """Let the drives be alone again: no PDOs taken, no more heartbeats watched.
+def release(link: Link, target: Target, found: Restoration) -> tuple[str, ...]:
+    """Let the drives be alone again: no PDOs taken, no heartbeat of ours watched, set as they were found.
 
     One that does not listen reports a lost heartbeat; the others are none the worse for it.
+
+    Returns
+    -------
+    tuple of str
+        What could not be put back, a sentence each.
     """
     for number in frames.nodes(target):
         with suppress(StreamAborted):
@@ -110,6 +129,7 @@ def release(link: Link, target: Target) -> None:
     for number in frames.nodes(target):
         with suppress(StreamAborted, SdoError, struct.error):
             link.sdo(number).download(*HEARTBEAT_WATCHED, bytes(4))
+    return found.put_back(link)
 
 
 def nmt(command: int, node: int) -> can.Message:
@@ -117,10 +137,8 @@ def nmt(command: int, node: int) -> can.Message:
     return frames.message(frames.NMT, bytes([command, node]))
 
 
-def _configure_one(
-    link: Link, node: Node, target: Target, motion: Setpoints, entries: Sequence[Entry]
-) -> int:
-    _set(link, node, entries)
+def _require_fit(link: Link, node: Node, target: Target, motion: Setpoints) -> int:
+    """Find a drive that was set up fit to follow; return where its axis stands."""
     mode = MODES[target.can.mode]
     if (shown := _read(link, node, 0x6061, bits=8)) != mode:
         raise StreamAborted(f"axis {node.name}: the drive shows mode {shown} (6061h) instead of {mode}.")
@@ -137,7 +155,9 @@ def _require_identity(link: Link, node: Node, target: Target) -> None:
         raise StreamAborted(
             f"axis {node.name}: node {node.number} is no CiA 402 drive (1000h is {device:08X}h)."
         )
-    for sub, wanted, what in ((1, target.can.vendor, "vendor"), (2, target.can.product, "product")):
+    serial = target.can.serial.get(node.name)
+    identity = ((1, target.can.vendor, "vendor"), (2, target.can.product, "product"), (4, serial, "serial"))
+    for sub, wanted, what in identity:
         if wanted is not None and (found := _read(link, node, 0x1018, sub)) != wanted:
             raise StreamAborted(
                 f"axis {node.name}: node {node.number} is another drive: its {what} is {found:08X}h, and "
@@ -189,11 +209,18 @@ def _require_rest(link: Link, node: Node) -> None:
         )
 
 
-def _set(link: Link, node: Node, entries: Sequence[Entry]) -> None:
+def _set(link: Link, node: Node, entries: Sequence[Entry], found: Restoration) -> None:
     """Write the list in its order where something differs, and require what the drive then holds."""
     final = {(entry.index, entry.sub): entry for entry in entries}
-    if not _differing(link, node, final):
+    held = _held(link, node, final)
+    changed = [(entry.index, entry.sub) for entry, _ in _differing(held, final)]
+    if not changed:
         return
+
+    def read(index: int, sub: int) -> bytes | None:
+        return _upload(link, node, index, sub, optional=True)
+
+    found.remember(node.number, settings_of(held, changed, read))
     for entry in entries:
         try:
             link.sdo(node.number).download(entry.index, entry.sub, entry.data)
@@ -201,9 +228,9 @@ def _set(link: Link, node: Node, entries: Sequence[Entry]) -> None:
             continue
         except (SdoError, struct.error) as error:
             raise _silent(node, error) from error
-    if differing := _differing(link, node, final):
-        entry, found = differing[0]
-        holds = "nothing" if found is None else f"{int.from_bytes(found, 'little'):X}h"
+    if differing := _differing(_held(link, node, final), final):
+        entry, kept = differing[0]
+        holds = "nothing" if kept is None else f"{int.from_bytes(kept, 'little'):X}h"
         raise StreamAborted(
             f"axis {node.name}: {entry.index:04X}h:{entry.sub:02X} ({entry.meaning}) must hold "
             f"{int.from_bytes(entry.data, 'little'):X}h, but the drive keeps {holds} there; set the drive, "
@@ -211,12 +238,17 @@ def _set(link: Link, node: Node, entries: Sequence[Entry]) -> None:
         )
 
 
-def _differing(link: Link, node: Node, final: Mapping[Place, Entry]) -> list[tuple[Entry, bytes | None]]:
-    wanted = {place: entry.data for place, entry in final.items()}
-    held = {
+def _held(link: Link, node: Node, final: Mapping[Place, Entry]) -> dict[Place, bytes | None]:
+    return {
         place: _upload(link, node, *place, entry.bits, optional=entry.optional)
         for place, entry in final.items()
     }
+
+
+def _differing(
+    held: Mapping[Place, bytes | None], final: Mapping[Place, Entry]
+) -> list[tuple[Entry, bytes | None]]:
+    wanted = {place: entry.data for place, entry in final.items()}
     same = {place for place, entry in final.items() if _same(entry, held[place])}
     if _interpolation_period(held) == _interpolation_period(wanted):  # 40 × 0.1 ms are 4 × 1 ms, too
         same |= {PERIOD_DIGITS, PERIOD_EXPONENT}

@@ -30,7 +30,6 @@ class Pacer:
     Attributes
     ----------
     link : Link
-    nodes : tuple of int
     period : int
         SYNC period in ns.
     timeout : int
@@ -43,7 +42,7 @@ class Pacer:
 
     def __init__(self, link: Link, target: Target) -> None:
         self.link, self._clock = link, link.clock
-        self.nodes = frames.nodes(target)
+        self._commands = [own[frames.RPDO1] for own in frames.cob_ids(target)]
         self.period = frames.period_microseconds(target.can) * 1000
         self.timeout = startup.timeout_ms(target.can) * NANOSECONDS // 1000
         self.due = self.launch = 0
@@ -107,4 +106,4 @@ class Pacer:
     def commands(self, word: int) -> Sequence[can.Message]:
         """Make controlwords, one for each drive."""
         data = frames.packing(frames.COMMAND).pack(word)
-        return [frames.message(frames.RPDO1 + node, data) for node in self.nodes]
+        return [frames.message(cob_id, data) for cob_id in self._commands]

@@ -28,6 +28,7 @@ from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.pacer import Pacer
 from gen_profile_exporters.can.streaming.plan import StreamPlan, cycles_of
 from gen_profile_exporters.can.streaming.record import Phase, Record, Recorder
+from gen_profile_exporters.can.streaming.restoration import Restoration
 from gen_profile_exporters.can.streaming.stopping import quick_stop
 from gen_profile_exporters.can.streaming.watch import Alert, Axis, Watch
 
@@ -67,15 +68,22 @@ class Streamer:
         self._link = Link(bus, clock)
         self._pacer = Pacer(self._link, plan.target)
         self._watch = Watch(
-            [Axis(axis.name, node) for axis, node in zip(plan.target.axes, self._pacer.nodes, strict=True)],
+            [
+                Axis(axis.name, node, own[frames.TPDO1])
+                for axis, node, own in zip(
+                    plan.target.axes, frames.nodes(plan.target), frames.cob_ids(plan.target), strict=True
+                )
+            ],
             clock,
             period=self._pacer.period,
             heartbeat=startup.heartbeat_ms(plan.target.can) * NANOSECONDS // 1000,
             timeout=self._pacer.timeout,
-            setpoints=[frame.cob_id for frame in frames.setpoint_frames(plan.target)],
+            ours=frames.commanding_cob_ids(plan.target),
         )
         self._link.subscribe(self._watch.take)
-        self._recorder = Recorder(len(plan.cycles), len(self._pacer.nodes))
+        self._recorder = Recorder(len(plan.cycles), len(plan.target.axes))
+        self._found = Restoration()
+        self._left: tuple[str, ...] = ()  # of the settings found, what could not be put back
         self._stop_asked = ""
         self._commanded = False
         self._led: Integers | None = None  # where the axes are to be by the latest SYNC
@@ -107,7 +115,7 @@ class Streamer:
         except BaseException:  # a bug, maybe, but the axes must not run on
             self._stop()
             raise
-        return self._record(Phase.DONE, "", self._watch.fault or "")
+        return self._record(Phase.DONE, "")
 
     def _begin(self, phase: Phase) -> None:
         with suppress(OSError, ValueError):  # whoever is told may be gone
@@ -127,7 +135,7 @@ class Streamer:
         self._watch.raise_alert(Alert.CONFIGURING)
         plan = self._plan
         standing = configuration.configure(
-            self._link, plan.target, plan.motion, self._attend, reset_fault=self._reset_fault
+            self._link, plan.target, plan.motion, self._found, self._attend, reset_fault=self._reset_fault
         )
         self._require_well()
         return standing
@@ -209,9 +217,9 @@ class Streamer:
         self._release()
 
     def _release(self) -> None:
-        """Leave drives alone that are switched off; our heartbeat goes on until they no longer watch it."""
+        """Leave drives alone that are switched off, as they were found, our heartbeat going on meanwhile."""
         self._link.meanwhile = self._pacer.beat
-        configuration.release(self._link, self._plan.target)
+        self._left = configuration.release(self._link, self._plan.target, self._found)
 
     def _stop(self) -> str:
         """Stop what may move, leave the drives alone, and then say what became of it."""
@@ -295,14 +303,15 @@ class Streamer:
                 "it, permit real-time priority, or choose a longer can.sync_period (see --self-test)."
             )
 
-    def _record(self, phase: Phase, reason: str, aftermath: str = "") -> Record:
+    def _record(self, phase: Phase, reason: str) -> Record:
         if phase is Phase.ABORTED:
             self._begin(phase)
+        fault = self._watch.fault if phase is Phase.DONE else None
         return self._recorder.record(
             phase,
             reason,
             tuple(axis.position for axis in self._watch.axes),
-            aftermath=aftermath,
+            aftermath=" ".join(filter(None, [fault, *self._left])),
             launched=self._link.launching is not None,
             period=self._pacer.period,
         )

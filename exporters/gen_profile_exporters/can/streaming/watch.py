@@ -14,6 +14,8 @@ from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, M
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 
 OPERATIONAL = 5
+# command specifiers of SDO requests (CiA 301) that change nothing: upload, its segments, abort, block upload
+READING = {2, 3, 4, 5}
 HEARTBEATS_MISSED = 3
 BUS_OFF, CONTROLLER_STATE, PASSIVE = 0x40, 0x04, 0x30  # of SocketCAN's error frames (linux/can/error.h)
 
@@ -35,6 +37,8 @@ class Axis:
     ----------
     name : str
     node : int
+    feedback : int
+        COB-ID of what the drive tells at each SYNC.
     statusword, position : int
         Of its last feedback; the statusword is 0 before the first one.
     heard, beat : int
@@ -43,6 +47,7 @@ class Axis:
 
     name: str
     node: int
+    feedback: int
     statusword: int = 0
     position: int = 0
     heard: int = 0
@@ -73,8 +78,8 @@ class Watch:
         SYNC period, and period of the drives' heartbeats, in ns.
     timeout : int
         How long a drive may leave SYNC unanswered, in ns.
-    setpoints : iterable of int
-        COB-IDs of the setpoints, which nobody else may send.
+    ours : iterable of int
+        COB-IDs of commands and setpoints, which nobody else may send.
     """
 
     def __init__(
@@ -85,7 +90,7 @@ class Watch:
         period: int,
         heartbeat: int,
         timeout: int,
-        setpoints: Iterable[int],
+        ours: Iterable[int],
     ) -> None:
         self.axes = tuple(axes)
         self.alert = Alert.LISTENING
@@ -93,16 +98,16 @@ class Watch:
         self._clock, self._period, self._heartbeat, self._timeout = clock, period, heartbeat, timeout
         self._feedback = frames.packing(frames.FEEDBACK)
         self._takers = {
-            base + axis.node: (take, axis)
+            cob_id: (take, axis)
             for axis in self.axes
-            for base, take in (
-                (frames.TPDO1, self._take_feedback),
-                (frames.EMCY, self._take_emergency),
-                (frames.HEARTBEAT, self._take_heartbeat),
+            for cob_id, take in (
+                (axis.feedback, self._take_feedback),
+                (frames.EMCY + axis.node, self._take_emergency),
+                (frames.HEARTBEAT + axis.node, self._take_heartbeat),
+                (frames.SDO_REQUEST + axis.node, self._take_request),
             )
         }
-        self._ours = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER, *setpoints}
-        self._ours |= {base + axis.node for base in (frames.RPDO1, frames.SDO_REQUEST) for axis in self.axes}
+        self._ours = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER, *ours}
 
     def take(self, message: can.Message) -> None:
         """Take in one frame, whatever it is."""
@@ -110,10 +115,7 @@ class Watch:
             self._take_error(message)
         elif not (message.is_extended_id or message.is_remote_frame):
             if message.arbitration_id in self._ours:
-                self._find(
-                    f"Frame {message.arbitration_id:03X}h came from somebody else: a second controller is on "
-                    "the bus; disconnect it, or choose other nodes."
-                )
+                self._find_second_controller(message.arbitration_id)
             elif message.arbitration_id in self._takers:
                 take, axis = self._takers[message.arbitration_id]
                 take(axis, bytes(message.data))
@@ -139,6 +141,17 @@ class Watch:
 
     def _find(self, fault: str) -> None:
         self.fault = self.fault or fault
+
+    def _find_second_controller(self, cob_id: int) -> None:
+        self._find(
+            f"Frame {cob_id:03X}h came from somebody else: a second controller is on the bus; disconnect it, "
+            "or choose other nodes."
+        )
+
+    def _take_request(self, axis: Axis, data: bytes) -> None:
+        """Let others read by SDO while we do not; a drive serves one at a time."""
+        if self.alert < Alert.CYCLIC or not data or data[0] >> 5 not in READING:
+            self._find_second_controller(frames.SDO_REQUEST + axis.node)
 
     def _take_feedback(self, axis: Axis, data: bytes) -> None:
         if len(data) == self._feedback.size:

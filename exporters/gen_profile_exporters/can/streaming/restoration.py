@@ -1,0 +1,96 @@
+"""What the drives were set to before they were set up for a motion, kept to be put back afterwards."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+from canopen import SdoAbortedError
+from canopen.sdo.exceptions import SdoError
+
+from gen_profile.errors import StreamAborted
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.startup import OFF, PDO_PARAMETERS
+from gen_profile_exporters.can.streaming.link import Link
+
+MAPPING = 0x200  # from a PDO's parameters to its mapping
+MOST_MAPPED = 64  # entries of a mapping (CiA 301); greater counts are of another kind of PDO
+HEARTBEAT_WATCHED = (0x1016, 1)
+
+Place = tuple[int, int]  # index and subindex
+Setting = tuple[int, int, bytes]
+
+
+class Restoration:
+    """The settings of all drives as they were found, by node."""
+
+    def __init__(self) -> None:
+        self._found: dict[int, list[Setting]] = {}
+
+    def remember(self, node: int, settings: Iterable[Setting]) -> None:
+        """Keep what a drive held, in the order in which it is to be put back."""
+        self._found.setdefault(node, []).extend(settings)
+
+    def remember_watch(self, node: int, watched: bytes | None) -> None:
+        """Keep whose heartbeat a drive watched, unless that was ours, of a stream that was killed."""
+        value = int.from_bytes(watched or b"", "little")
+        if value & 0xFFFF and value >> 16 & 0x7F != frames.MASTER:
+            self.remember(node, [(*HEARTBEAT_WATCHED, value.to_bytes(4, "little"))])
+
+    def put_back(self, link: Link) -> tuple[str, ...]:
+        """Set the drives to what they held; tell what they did not take, a sentence each."""
+        left = []
+        for node, settings in self._found.items():
+            for index, sub, data in settings:
+                try:
+                    link.sdo(node).download(index, sub, data)
+                except SdoAbortedError:
+                    left.append(f"Node {node} does not take back what it held in {index:04X}h:{sub:02X}.")
+                except (StreamAborted, SdoError, struct.error):
+                    left.append(f"Node {node} does not answer; its settings stay those of the motion.")
+                    break
+        return tuple(left)
+
+
+def settings_of(
+    held: Mapping[Place, bytes | None], changed: Iterable[Place], read: Callable[[int, int], bytes | None]
+) -> Iterator[Setting]:
+    """List what puts a drive back: PDOs whole, in the order that CiA 301 asks for, then single objects.
+
+    Parameters
+    ----------
+    held : mapping of (int, int) to bytes or None
+        What the drive holds now; None where it has no such object.
+    changed : iterable of (int, int)
+        What is about to be changed of it.
+    read : callable
+        Reads another object of the drive.
+    """
+    changed = [place for place in changed if place != HEARTBEAT_WATCHED]
+    pdos = {index if index in PDO_PARAMETERS else index - MAPPING for index, _ in changed}
+    pdos = {index for index in pdos & PDO_PARAMETERS if held.get((index + MAPPING, 0)) is not None}
+    for index in sorted(pdos):
+        yield from _pdo(index, held, read)
+    for index, sub in changed:
+        data = held[index, sub]
+        if data is not None and not {index, index - MAPPING} & pdos:
+            yield index, sub, data
+
+
+def _pdo(
+    index: int, held: Mapping[Place, bytes | None], read: Callable[[int, int], bytes | None]
+) -> Iterator[Setting]:
+    cob_id, count = held[index, 1], held[index + MAPPING, 0]
+    assert cob_id is not None and count is not None  # a PDO with a mapping has a COB-ID
+    yield index, 1, (int.from_bytes(cob_id, "little") | OFF).to_bytes(4, "little")
+    yield index + MAPPING, 0, b"\0"
+    if count[0] <= MOST_MAPPED:
+        for sub in range(1, count[0] + 1):
+            entry = read(index + MAPPING, sub)
+            if entry is not None:
+                yield index + MAPPING, sub, entry
+        yield index + MAPPING, 0, count
+    for (of, sub), data in held.items():
+        if of == index and sub != 1 and data is not None:
+            yield index, sub, data
+    yield index, 1, cob_id

@@ -1,0 +1,93 @@
+"""Drives are left as they were found, whatever became of the stream."""
+
+import attrs
+import pytest
+from exporters.can.bench import OTHER_MAKE, Bench
+from exporters.motions import quintic
+
+from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.streaming.record import Phase
+
+OPTIONS = {
+    "following_error": 0.01,
+    "quick_stop": 2.0,
+    "travel": {"cart": (0.0, 0.5)},
+    "encoder": (65536, 1),
+    "gear": (3, 1),
+    "feed": (196608, 1),
+    "feed_forward": "both",
+    "torque_per_acceleration": 50.0,
+}
+OWN = {(0x6085, 0): 77, (0x6007, 0): 2, (0x6060, 0): 9, (0x1017, 0): 250, (0x607D, 1): -5, (0x607D, 2): 10**6}
+OTHER_MASTER, OURS = 5 << 16 | 500, 127 << 16 | 20
+FED = {0x6040, 0x6041, 0x6061, 0x6064, 0x607A, 0x60B1, 0x60B2}  # what is commanded and told, not set
+
+
+def held(drive):
+    """Everything that a drive is set to."""
+    dictionary = drive.local.object_dictionary
+    entries = [entry.values() if hasattr(entry, "values") else [entry] for entry in dictionary.values()]
+    places = [(one.index, one.subindex) for variables in entries for one in variables if one.writable]
+    return {
+        (index, sub): drive.value(index, sub)
+        for index, sub in places
+        if index not in FED and not (index & 0x0200 and index < 0x1C00 and sub > drive.value(index))
+    }
+
+
+def own_settings(bench, watched=OTHER_MASTER):
+    for place, value in {**OWN, (0x1016, 1): watched}.items():
+        bench.drive.store(*place, value)
+        bench.drive._values.pop(place, None)
+    return held(bench.drive)
+
+
+@pytest.mark.parametrize("make", [Make(), OTHER_MAKE, attrs.evolve(Make(), own_mapping=True)])
+@pytest.mark.parametrize("stop", [False, True])
+def test_a_drive_is_left_as_it_was_found(make, stop):
+    with Bench(make=make, profile=quintic((0.1, 0.4)), **OPTIONS) as bench:
+        before, during = own_settings(bench), []
+        if stop:
+            bench.at_cycle(100, lambda: bench.streamer.ask_to_stop("Interrupted."))
+        else:
+            bench.at_cycle(100, lambda: during.append(held(bench.drive)))
+        record = bench.run()
+        after = held(bench.drive)
+    assert record.phase is (Phase.ABORTED if stop else Phase.DONE)
+    assert record.aftermath == ""
+    assert stop or len(during[0].items() - before.items()) > 12
+    assert after == before
+
+
+def test_one_that_was_refused_is_left_so_too():
+    with Bench("bridge", "trolley", profile=quintic((0.1, 0.4), (1.2, -0.7))) as bench:
+        before = [held(drive) for drive in bench.drives.drives]
+        bench.drives.drives[1].store(0x6064, 0, 0)
+        record = bench.run()
+        assert "it stands at 0" in record.reason
+        assert [held(drive) for drive in bench.drives.drives] == before
+
+
+def test_a_heartbeat_that_a_killed_stream_left_watched_is_not():
+    with Bench() as bench:
+        own_settings(bench, watched=OURS)
+        bench.run()
+        assert bench.drive.value(0x1016, 1) == 0
+
+
+def test_a_drive_that_did_not_stop_keeps_its_time_outs():
+    with Bench(timeout=0.02) as bench:
+        bench.at_cycle(100, lambda: setattr(bench.drive_end, "sending", lambda _: False))
+        record = bench.run()
+        assert "Not every drive confirmed" in record.reason
+        assert bench.drive.value(0x1016, 1) == OURS
+        assert bench.drive.value(0x6007) == 3
+
+
+def test_what_is_not_taken_back_is_told():
+    with Bench(quick_stop=2.0) as bench:
+        entry = bench.drive.local.object_dictionary[0x6085]
+        bench.at_cycle(100, lambda: setattr(entry, "access_type", "ro"))
+        record = bench.run()
+    assert record.phase is Phase.DONE
+    assert record.aftermath == "Node 1 does not take back what it held in 6085h:00."
