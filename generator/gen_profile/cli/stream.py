@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -26,6 +25,7 @@ from gen_profile.errors import OutputError, SpecError, StreamAborted
 if TYPE_CHECKING:
     from gen_profile.streaming.outcome import Outcome, Source
     from gen_profile_exporters.can.host.lateness import Lateness
+    from gen_profile_exporters.can.host.port import Port
 
 VIRTUAL = ("virtual", "gen-profile")
 _MISSES = ("extrapolate", "hold", "stop")
@@ -50,6 +50,13 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--mode", type=click.Choice(["csp", "ip", "csv"]), help="Mode of the drives, for a spec.")
 @click.option("--node", metavar="N", type=int, help="CANopen node of the first axis, for a spec.")
 @click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
+@click.option("--to-start", is_flag=True, help="Move slowly to the motion's start from anywhere, and end.")
+@click.option(
+    "--jog",
+    metavar="AXIS=DISTANCE",
+    multiple=True,
+    help="Move slowly by a distance in m (or rad) from anywhere, and end. Repeatable.",
+)
 @click.option("--reset-fault", is_flag=True, help="Reset drives in fault first; know why they were.")
 @click.option("--self-test", is_flag=True, help="First measure whether this machine can hold the cycle.")
 @click.option("--dry-run", is_flag=True, help="Print the plan, and touch no bus.")
@@ -72,6 +79,8 @@ def stream(
     mode: str | None,
     node: int | None,
     simulate_drive: bool,
+    to_start: bool,
+    jog: tuple[str, ...],
     reset_fault: bool,
     self_test: bool,
     dry_run: bool,
@@ -105,6 +114,14 @@ def stream(
             require_bus=require_bus,
             tell=tell,
         )
+        if to_start or jog:
+            _require_moving_alone(to_start, jog, dry_run)
+            port = Port(**_port(interface, channel, simulate_drive))
+            slow = _slow(source, port, jog, simulate_drive, tell)
+            if slow is None:
+                print_outcome(*_at_start(source), as_json)
+                return
+            source = slow
         if dry_run:
             plan = run.summary(source)
             print_outcome(plan, _plan_words(plan, _units(source)), as_json)
@@ -114,8 +131,7 @@ def stream(
             require_place(table)  # the log of a motion that was made must not be lost
         notes: tuple[str, ...] = ()
         if self_test:
-            tell("measuring this machine")
-            notes = (f"Self-test: {_lateness_words(run.self_test(source))}.",)
+            notes = (_self_test(source, tell),)
         outcome = run.stream(
             source, port, simulate_drive=simulate_drive, reset_fault=reset_fault, notes=notes, tell=tell
         )
@@ -245,7 +261,7 @@ def _source(
     tell: Callable[[str], None],
 ) -> Source:
     """Take an artefact, or design one for a spec, once there is a bus for it."""
-    from gen_profile.streaming.stream import require_rest, verified
+    from gen_profile.streaming.stream import designed, require_rest, verified
 
     if path is not None and path.suffix.lower() != ".toml":
         if preset is not None or overrides:
@@ -253,17 +269,50 @@ def _source(
                 f"{path}: an artefact is streamed as it is; --preset, --set, --mode and --node are for specs."
             )
         return verified(path, accept_unverified=accept_unverified)
-    from gen_profile.designs.design import design
-    from gen_profile.errors import CheckFailed
-
     spec = chosen_spec(path, preset, overrides)
+    if spec.can.nodes and any(override.startswith("can.node=") for override in overrides):
+        raise SpecError("--node: the spec states every node in can.nodes; change these.")
     require_rest(spec)
     require_bus(spec.can.bitrate)
-    with TemporaryDirectory(prefix="gen-profile-") as folder:
-        outcome = design(spec, ("can",), Path(folder), progress=tell)
-        if not outcome.artefacts:
-            raise CheckFailed("\n".join(outcome.check.reasons() if outcome.check else ()))
-        return verified(Path(folder) / outcome.artefacts[0].path)
+    return designed(spec, tell)
+
+
+def _require_moving_alone(to_start: bool, jog: tuple[str, ...], dry_run: bool) -> None:
+    if to_start and jog:
+        raise SpecError("--to-start and --jog: choose one of them.")
+    if dry_run:
+        raise SpecError(
+            "--dry-run touches no bus, and so cannot tell where a slow motion begins; leave it out."
+        )
+
+
+def _slow(
+    source: Source, port: Port, jog: tuple[str, ...], simulate_drive: bool, tell: Callable[[str], None]
+) -> Source | None:
+    from gen_profile.streaming import slow_motion
+
+    if jog:
+        return slow_motion.jog(source, port, jog, simulate_drive=simulate_drive, tell=tell)
+    return slow_motion.to_start(source, port, simulate_drive=simulate_drive, tell=tell)
+
+
+def _at_start(source: Source) -> tuple[dict[str, Any], str]:
+    tolerance = source.spec.can.start_tolerance
+    words = (
+        f"The axes stand at the start already, within can.start_tolerance ({tolerance:g}); nothing was moved."
+    )
+    return {"state": "at start", "reason": ""}, words
+
+
+def _self_test(source: Source, tell: Callable[[str], None]) -> str:
+    """Measure this machine, and say before anything moves what came of it."""
+    from gen_profile.streaming.stream import self_test
+
+    motion = source.plan.motion
+    tell(f"measuring this machine for {len(motion.position) * motion.period:.3g} s, as the motion lasts")
+    found = f"Self-test: {_lateness_words(self_test(source))}."
+    tell(found)
+    return found
 
 
 def _port(interface: str | None, channel: str | None, simulated: bool) -> dict[str, str]:

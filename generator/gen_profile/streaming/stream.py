@@ -8,13 +8,14 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
-from gen_profile.errors import OutputError, SpecError, StreamAborted
+from gen_profile.errors import CheckFailed, OutputError, SpecError, StreamAborted
 from gen_profile.spec.model import CanSpec, Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.streaming.outcome import Outcome, Source
@@ -93,6 +94,48 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
     return Source(spec=spec, plan=plan_of(content, target_of(spec)))
 
 
+def designed(spec: Spec, tell: Tell) -> Source:
+    """Design a motion, check it, and take the log that was written of it.
+
+    Raises
+    ------
+    CheckFailed
+        The load sways too much.
+    GenProfileError
+        As `gen_profile.designs.design.design` and `verified`.
+    """
+    from gen_profile.designs.design import design  # noqa: PLC0415  # CasADi, 0.2 s
+
+    with TemporaryDirectory(prefix="gen-profile-") as folder:
+        outcome = design(spec, ("can",), Path(folder), progress=tell)
+        if not outcome.artefacts:
+            raise CheckFailed("\n".join(outcome.check.reasons() if outcome.check else ()))
+        return verified(Path(folder) / outcome.artefacts[0].path)
+
+
+def standing(source: Source, port: Port, tell: Tell) -> tuple[float, ...]:
+    """Ask the drives where their axes stand, in m (or rad); changes nothing.
+
+    Raises
+    ------
+    SpecError
+        The interface cannot be opened.
+    StreamAborted
+        Somebody else is in command, or a drive does not tell.
+    """
+    from gen_profile_exporters.can.streaming.configuration import positions  # noqa: PLC0415  # canopen
+    from gen_profile_exporters.can.streaming.discovery import listen  # noqa: PLC0415  # is an extra
+    from gen_profile_exporters.can.streaming.link import Link  # noqa: PLC0415
+
+    target = source.plan.target
+    tell("asking where the axes stand")
+    with port.open(source.spec.can.bitrate) as bus:
+        link = Link(bus, SystemClock())
+        listen(link)
+        counts = positions(link, target, source.plan.motion)
+    return tuple(at / axis.counts_per_si for at, axis in zip(counts, target.axes, strict=True))
+
+
 def summary(source: Source) -> dict[str, Any]:
     """List what a stream will do, without doing it."""
     target, motion = source.plan.target, source.plan.motion
@@ -120,7 +163,7 @@ def summary(source: Source) -> dict[str, Any]:
 
 
 def self_test(source: Source) -> Lateness:
-    """Keep the cycle without a bus, and refuse one that this machine cannot hold.
+    """Keep the cycle without a bus for as long as the motion lasts, and refuse what this machine cannot hold.
 
     Raises
     ------
@@ -128,7 +171,7 @@ def self_test(source: Source) -> Lateness:
     """
     period = frames.period_microseconds(source.spec.can) * 1000
     with real_time() as refused:
-        found = rehearse(_clock(refused), period)
+        found = rehearse(_clock(refused), period, len(source.plan.cycles))
     if found.percentile(100) * 1e3 >= period / 2:
         raise StreamAborted(
             f"This machine cannot hold a cycle of {period / 1e6:g} ms: it was late by up to "

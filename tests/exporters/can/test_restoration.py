@@ -5,6 +5,7 @@ import pytest
 from exporters.can.bench import OTHER_MAKE, Bench
 from exporters.motions import quintic
 
+from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.simulation.drive_dictionary import Make
 from gen_profile_exporters.can.streaming.record import Phase
 
@@ -91,3 +92,19 @@ def test_what_is_not_taken_back_is_told():
         record = bench.run()
     assert record.phase is Phase.DONE
     assert record.aftermath == "Node 1 does not take back what it held in 6085h:00."
+
+
+def test_a_drive_that_still_brakes_keeps_its_ramp():
+    """It says that it is in fault, and brakes all the same."""
+    with Bench(quick_stop=2.0) as bench:
+        before, told, ramps = held(bench.drive), bench.drive.feedback, []
+        lie = b"\x08\x02"
+        bench.at_cycle(
+            120, lambda: setattr(bench.drive, "feedback", lambda: [(0x181, lie + told()[0][1][2:])])
+        )
+        braking = (State.QUICK_STOP, State.FAULT_REACTION)
+        look = lambda: bench.drive.state in braking and ramps.append(bench.drive.value(0x6085))  # noqa: E731
+        bench.clock.actors.append(look)
+        bench.run()
+        assert held(bench.drive) == before
+    assert set(ramps) == {2_000_000}

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 
 BINS_US = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000)
-REHEARSAL = 2.0  # s
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -61,9 +60,8 @@ class Lateness:
         }
 
 
-def rehearse(clock: Clock, period: int, duration: float = REHEARSAL) -> Lateness:
-    """Keep the cycle without any bus, and say how late it was."""
-    count = max(2, int(duration * NANOSECONDS) // period)
+def rehearse(clock: Clock, period: int, count: int) -> Lateness:
+    """Keep so many cycles without any bus, and say how late they were."""
     late = np.zeros(count, dtype=np.int64)
     start = clock.now() + period
     for cycle in range(count):

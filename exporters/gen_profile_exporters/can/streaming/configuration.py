@@ -40,6 +40,7 @@ COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it 
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
 RESET_PATIENCE = NANOSECONDS  # for a drive to leave its fault
+SCALING = {0x608F, 0x6091, 0x6092}  # of positions, in the drive
 PERIOD_DIGITS, PERIOD_EXPONENT = (0x60C2, 1), (0x60C2, 2)
 
 
@@ -89,11 +90,7 @@ def configure(
         A drive is another one, in fault, cannot be set up, watches nothing, or stands elsewhere.
     """
     lists = startup_lists(motion, target)
-    nodes = [
-        Node(number=number, column=column, name=axis.name)
-        for column, (number, axis) in enumerate(zip(lists, target.axes, strict=True))
-    ]
-    for node in nodes:
+    for node in (nodes := _nodes(target)):
         link.send(nmt(PRE_OPERATIONAL, node.number))
         _require_identity(link, node, target)
         if reset_fault:
@@ -105,6 +102,27 @@ def configure(
     for node in nodes:
         _set(link, node, lists[node.number], found)
     return tuple(_require_fit(link, node, target, motion) for node in nodes)
+
+
+def positions(link: Link, target: Target, motion: Setpoints) -> tuple[int, ...]:
+    """Ask the drives where their axes stand, in counts; changes nothing.
+
+    Raises
+    ------
+    StreamAborted
+        A drive is another one, or counts in other units than the spec says.
+    """
+    lists = startup_lists(motion, target)
+    for node in (nodes := _nodes(target)):
+        _require_identity(link, node, target)
+        for entry in lists[node.number]:
+            held = _upload(link, node, entry.index, entry.sub) if entry.index in SCALING else entry.data
+            if held != entry.data:
+                raise StreamAborted(
+                    f"axis {node.name}: the drive holds another {entry.index:04X}h:{entry.sub:02X} than the "
+                    f"spec ({entry.meaning}), and counts in other units; set that in the drive."
+                )
+    return tuple(_signed(_read(link, node, 0x6064)) for node in nodes)
 
 
 def start(link: Link, target: Target) -> None:
@@ -135,6 +153,13 @@ def release(link: Link, target: Target, found: Restoration) -> tuple[str, ...]:
 def nmt(command: int, node: int) -> can.Message:
     """Make an NMT command."""
     return frames.message(frames.NMT, bytes([command, node]))
+
+
+def _nodes(target: Target) -> list[Node]:
+    return [
+        Node(number=number, column=column, name=axis.name)
+        for column, (number, axis) in enumerate(zip(frames.nodes(target), target.axes, strict=True))
+    ]
 
 
 def _require_fit(link: Link, node: Node, target: Target, motion: Setpoints) -> int:

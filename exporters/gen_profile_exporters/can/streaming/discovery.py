@@ -70,10 +70,7 @@ def discover(link: Link) -> tuple[Node, ...]:
         The bus is in use by a controller, with which questions would interfere; disturbed, so that questions
         would be lost; or it fails.
     """
-    heard, answered = _Ear(), _Answers()
-    link.subscribe(heard.take)
-    _wait(link, LISTEN)
-    heard.require_quiet()
+    heard, answered = listen(link), _Answers()
     link.subscribe(answered.take)
     for number in NODES:
         link.send(frames.message(frames.SDO_REQUEST + number, READ_DEVICE_TYPE))
@@ -82,6 +79,21 @@ def discover(link: Link) -> tuple[Node, ...]:
     _wait(link, PATIENCE)
     heard.require_undisturbed()
     return tuple(_identified(link, number) for number in sorted(answered.nodes))
+
+
+def listen(link: Link) -> _Ear:
+    """Hear for a while that nobody is in command.
+
+    Raises
+    ------
+    StreamAborted
+        Somebody is, or the bus is disturbed.
+    """
+    heard = _Ear()
+    link.subscribe(heard.take)
+    _wait(link, LISTEN)
+    heard.require_quiet()
+    return heard
 
 
 class _Ear:

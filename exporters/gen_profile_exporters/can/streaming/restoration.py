@@ -10,12 +10,16 @@ from canopen.sdo.exceptions import SdoError
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.cia402 import MOVING, state_of
+from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.startup import OFF, PDO_PARAMETERS
 from gen_profile_exporters.can.streaming.link import Link
 
 MAPPING = 0x200  # from a PDO's parameters to its mapping
 MOST_MAPPED = 64  # entries of a mapping (CiA 301); greater counts are of another kind of PDO
 HEARTBEAT_WATCHED = (0x1016, 1)
+PATIENCE = 2 * NANOSECONDS  # for a drive to come to rest
+SILENCE = (StreamAborted, SdoError, struct.error)  # no answer, or none that means anything
 
 Place = tuple[int, int]  # index and subindex
 Setting = tuple[int, int, bytes]
@@ -38,18 +42,38 @@ class Restoration:
             self.remember(node, [(*HEARTBEAT_WATCHED, value.to_bytes(4, "little"))])
 
     def put_back(self, link: Link) -> tuple[str, ...]:
-        """Set the drives to what they held; tell what they did not take, a sentence each."""
-        left = []
-        for node, settings in self._found.items():
-            for index, sub, data in settings:
-                try:
-                    link.sdo(node).download(index, sub, data)
-                except SdoAbortedError:
-                    left.append(f"Node {node} does not take back what it held in {index:04X}h:{sub:02X}.")
-                except (StreamAborted, SdoError, struct.error):
-                    left.append(f"Node {node} does not answer; its settings stay those of the motion.")
-                    break
-        return tuple(left)
+        """Set the drives to what they held; tell what they did not take, a sentence each.
+
+        A drive that is still braking needs the ramp of the motion, and gets its own settings afterwards.
+        """
+        return tuple(words for node in self._found for words in self._put_back_one(link, node))
+
+    def _put_back_one(self, link: Link, node: int) -> Iterator[str]:
+        if not _is_off(link, node):
+            yield f"Node {node} does not say that it is switched off; its settings stay those of the motion."
+            return
+        for index, sub, data in self._found[node]:
+            try:
+                link.sdo(node).download(index, sub, data)
+            except SdoAbortedError:
+                yield f"Node {node} does not take back what it held in {index:04X}h:{sub:02X}."
+            except SILENCE:
+                yield f"Node {node} fell silent; its settings stay those of the motion, in part."
+                return
+
+
+def _is_off(link: Link, node: int) -> bool:
+    """Wait until a drive is not powered to move; asked by SDO, apart from what it told before."""
+    deadline = link.clock.now() + PATIENCE
+    while link.clock.now() < deadline:
+        try:
+            told = link.sdo(node).upload(frames.STATUSWORD.index, frames.STATUSWORD.sub)
+        except SILENCE:
+            return False
+        if state_of(int.from_bytes(told[:2], "little")) not in MOVING:
+            return True
+        link.wait_until(link.clock.now() + PATIENCE // 100)
+    return False
 
 
 def settings_of(

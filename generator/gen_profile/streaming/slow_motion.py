@@ -1,0 +1,127 @@
+"""Slow motions from where the axes stand: to the start of a motion, and jogging.
+
+They are designed and checked as every motion is, so the load hangs still afterwards, and streamed as every
+motion is, with all that stops it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import attrs
+
+from gen_profile.errors import SpecError
+from gen_profile.evaluation.residual_sway import watch_time
+from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.spec.model import Spec
+from gen_profile.streaming.outcome import Source
+from gen_profile.streaming.stream import designed, standing
+from gen_profile.suggestion import suggestion
+from gen_profile_exporters.can.host.port import Port
+from gen_profile_exporters.can.scaling import greatest_acceleration, greatest_velocity
+from gen_profile_exporters.can.streaming.approach import CREEP, SHARE
+
+# room for the shape of a motion: its peaks over those at even speed, or with even acceleration
+PEAK_VELOCITY, PEAK_ACCELERATION = 4.0, 16.0
+SETTLE = 1.5  # of the time in which residual sway is watched; shorter motions ask for greater accelerations
+
+Tell = Callable[[str], None]
+
+
+def to_start(source: Source, port: Port, *, simulate_drive: bool, tell: Tell) -> Source | None:
+    """Design a slow motion from where the axes stand to the first setpoint; None where they stand there.
+
+    Raises
+    ------
+    StreamAborted
+        The drives do not tell where their axes stand, or somebody else is in command.
+    CheckFailed, InfeasibleProblem, SolverDiverged
+        There is no such motion.
+    """
+    spec = source.spec
+    at = spec.move.start if simulate_drive else standing(source, port, tell)
+    apart = [abs(there - here) for here, there in zip(at, spec.move.start, strict=True)]
+    if max(apart) <= spec.can.start_tolerance:
+        return None
+    return designed(slow(source, at, spec.move.start), tell)
+
+
+def jog(source: Source, port: Port, distances: Sequence[str], *, simulate_drive: bool, tell: Tell) -> Source:
+    """Design a slow motion by distances from where the axes stand, each as ``AXIS=DISTANCE`` in m (or rad).
+
+    Raises
+    ------
+    SpecError
+        There is no such axis, or that is no distance.
+    StreamAborted, CheckFailed, InfeasibleProblem, SolverDiverged
+        As `to_start`.
+    """
+    by_axis = _distances(distances, list(source.spec.axis))
+    at = source.spec.move.start if simulate_drive else standing(source, port, tell)
+    target = [here + by_axis.get(name, 0.0) for name, here in zip(source.spec.axis, at, strict=True)]
+    return designed(slow(source, at, target), tell)
+
+
+def slow(source: Source, start: Sequence[float], target: Sequence[float]) -> Spec:
+    """Ask for a motion with a tenth of the source's greatest velocity and acceleration at most.
+
+    Parameters
+    ----------
+    source : Source
+    start, target : sequence of float
+        In m (or rad), one per axis.
+
+    Returns
+    -------
+    Spec
+        With limits on every axis, and a duration that leaves room below them.
+    """
+    spec, motion = source.spec, source.plan.motion
+    durations, limits = [SETTLE * watch_time(spec, scenarios(spec))], {}
+    for column, (name, axis) in enumerate(spec.axis.items()):
+        position, scale = motion.position[:, column], abs(axis.counts_per_metre)
+        velocity = SHARE * greatest_velocity(position, motion.period) / scale or CREEP
+        acceleration = SHARE * greatest_acceleration(position, motion.period) / scale or CREEP
+        distance = abs(target[column] - start[column])
+        durations += [
+            PEAK_VELOCITY * distance / velocity,
+            (PEAK_ACCELERATION * distance / acceleration) ** 0.5,
+        ]
+        own = spec.limits.of(column)
+        limits[name] = attrs.evolve(
+            own, velocity=_lower(own.velocity, velocity), acceleration=_lower(own.acceleration, acceleration)
+        )
+    move = attrs.evolve(
+        spec.move,
+        start=tuple(start),
+        target=tuple(target),
+        duration=float(round(max(durations), 3)),
+        shortest=False,
+        final_velocity=(0.0,) * len(target),
+    )
+    return attrs.evolve(
+        spec,
+        name=f"{spec.name[:59]}-slow",
+        move=move,
+        limits=attrs.evolve(spec.limits, velocity=None, acceleration=None, axis=limits),
+    )
+
+
+def _lower(stated: float | None, peak: float) -> float:
+    """Lower a limit to the peak of a slow motion, unless it is lower already."""
+    return peak if stated is None else min(stated, peak)
+
+
+def _distances(stated: Sequence[str], axes: Sequence[str]) -> Mapping[str, float]:
+    found = {}
+    for text in stated:
+        name, _, number = text.partition("=")
+        if name not in axes:
+            raise SpecError(f"--jog {text}: unknown axis{suggestion(name, axes)}")
+        try:
+            found[name] = float(number)
+        except ValueError:
+            raise SpecError(
+                f"--jog {text}: state the distance as a number of metres (or rad), as --jog {name}=0.05."
+            ) from None
+    return found
