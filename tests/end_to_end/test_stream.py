@@ -10,18 +10,22 @@ import subprocess
 import time
 from importlib import util
 from pathlib import Path
-from threading import Thread
 
 import attrs
 import can
 import canopen
+import numpy as np
 import pytest
 from command_line import PROGRAM, run_here, run_process
+from exporters.can.bench import MS, FakeClock, RigidLoad
 
 from gen_profile.artefacts import writing as delivery
 from gen_profile.artefacts.manifest import parse_manifest
 from gen_profile.streaming import stream as workflow
-from gen_profile_exporters.can.host.clock import SystemClock
+from gen_profile_exporters.can.host.clock import SharedClock, SystemClock
+from gen_profile_exporters.can.simulation.drive_bank import FAREWELL, DriveBank
+from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
 from gen_profile_exporters.can.streaming.pacer import Pacer
 from gen_profile_exporters.can.streaming.streamer import Streamer
 
@@ -43,6 +47,27 @@ def deployed(tmp_path_factory):
     )
     assert run_here("--preset", "paper", *options).code == 0
     return folder
+
+
+class HastyClock(SharedClock):
+    """A shared clock that waits for nobody: each sleep is over as soon as the others have worked."""
+
+    passed = 0
+
+    def now(self):
+        return self.passed
+
+    def sleep_until(self, instant):
+        self.work()
+        while self.passed < instant:
+            self.passed = min(self.passed + MS, instant)
+            self.work()
+
+
+@pytest.fixture
+def hasty(monkeypatch):
+    """Have a simulation take no longer than its computations do."""
+    monkeypatch.setattr(workflow, "SharedClock", HastyClock)
 
 
 def patiently(*arguments):
@@ -75,7 +100,7 @@ def test_simulated_drives_end_without_sway(deployed, tmp_path):
     assert float(rows[-1][1]) == pytest.approx(0.3, abs=1e-4)
 
 
-def test_drives_that_take_only_speed(tmp_path):
+def test_drives_that_take_only_speed(tmp_path, hasty):
     """Velocities (60FFh) from the design over the check to the simulated load."""
     spec = ("can.mode=csv", "can.following_error=0.01", "can.timeout=0.5", "can.sync_period=0.02")
     options = [word for override in spec for word in ("--set", override)]
@@ -99,7 +124,7 @@ def full_disk(monkeypatch):
 FULL = r"Cannot write to the folder .*: No space left on device; choose another one\."
 
 
-def test_in_words_even_where_the_log_cannot_be_written(deployed, tmp_path, full_disk):
+def test_in_words_even_where_the_log_cannot_be_written(deployed, tmp_path, full_disk, hasty):
     table = ("--log", tmp_path / "driven.csv")
     outcome = patiently(deployed / "paper.log", "--simulate-drive", "--self-test", *table)
     assert outcome.code == 2
@@ -128,7 +153,7 @@ def test_a_busy_machine_delays_a_simulation_as_a_whole(deployed, monkeypatch):
     assert int(stall[1]) >= 3 * (100 - 5)
 
 
-def test_turning_axes_are_told_in_radians(tmp_path):
+def test_turning_axes_are_told_in_radians(tmp_path, hasty):
     spec = ("--preset", "flexible-joint", "--set", "can.sync_period=0.02")
     words = run_here("stream", *spec, "--dry-run").out
     assert "hub: node 1, from 0 to 1.5708 rad" in words
@@ -283,7 +308,7 @@ def test_nobody_who_takes_the_outcome(deployed):
     assert done.returncode == 6
 
 
-def test_sigterm_stops_the_axis(deployed, monkeypatch):
+def test_sigterm_stops_the_axis(deployed, monkeypatch, hasty):
     send, sent = Pacer.send, []
 
     def interrupted(self, messages):
@@ -325,25 +350,109 @@ def test_eds_of_the_simulated_drive(tmp_path):
     assert (outcome.code, "Cannot write" in outcome.err) == (2, True)
 
 
-def test_drives_of_their_own(deployed):
-    """drive-sim here, and a streamer in a thread: python-can's virtual bus stays within a process."""
+def test_drives_of_their_own(deployed, monkeypatch):
+    """drive-sim, and a streamer beside it, on a clock that waits for both, however busy this machine is."""
     source, records = workflow.verified(deployed / "paper.log"), []
+    clock = FakeClock(MS)
+    serve = workflow.serve
 
-    def stream():
+    def stream_beside(bank, stop):
+        clock.actors.append(bank.poll)
         with can.Bus(channel="apart", interface="virtual") as bus:
-            while (message := bus.recv(60.0)) is not None and message.arbitration_id != 0x701:
-                pass
-            records.append(Streamer(bus, SystemClock(), source.plan).run())
+            records.append(Streamer(bus, clock, source.plan).run())
+        clock.sleep_until(clock.now() + 2 * FAREWELL)
+        serve(bank, stop)
 
-    thread = Thread(target=stream)
-    thread.start()
+    monkeypatch.setattr(workflow, "serve", stream_beside)
+    monkeypatch.setattr(workflow, "SystemClock", lambda: clock)
     spec = ("--set", "can.timeout=0.5", "--set", "can.sync_period=0.02")
     options = ("--interface", "virtual", "--channel", "apart", "--own-mapping", "--miss", "hold")
     told = run_here("drive-sim", "--preset", "paper", *spec, *options, "--json").document
-    thread.join()
     assert told["states"] == ["switch on disabled"]
-    if not records[0].reason:
-        assert told["position_m"] == pytest.approx([0.3])
-        assert told["sway_residual_peak_m"] < 3e-4
-    else:
-        assert BUSY[0] in records[0].reason
+    assert records[0].reason == ""
+    assert told["position_m"] == pytest.approx([0.3])
+    assert told["sway_residual_peak_m"] < 3e-4
+
+
+@pytest.fixture
+def drive_away(monkeypatch):
+    """A drive whose axis stands away from the start, on a clock of its own."""
+    clock = FakeClock(MS)
+    with can.Bus(channel="away", interface="virtual") as bus:
+        bank = DriveBank(bus, clock, [SimulatedDrive(1, Make(), 70_000)], [1e6], RigidLoad([0.07]))
+        clock.actors.append(bank.poll)
+        monkeypatch.setattr(workflow, "SystemClock", lambda *_: clock)
+        yield bank.drives[0]
+
+
+AWAY = ("--interface", "virtual", "--channel", "away")
+
+
+class TestSlowMotions:
+    def streamed(self, deployed, *options):
+        return run_here("stream", deployed / "paper.log", *AWAY, *options, "--json")
+
+    def test_to_the_start_and_then_the_motion(self, deployed, drive_away):
+        refused = self.streamed(deployed)
+        assert (refused.code, "stands at 0.07" in refused.document["reason"]) == (6, True)
+        ways = []
+        arrive = drive_away.arrive
+        drive_away.arrive = lambda actual: (ways.append(actual), arrive(actual))
+        slow = self.streamed(deployed, "--to-start")
+        assert (slow.code, slow.document["state"], drive_away.actual) == (0, "done", 0.0)
+        steps = np.abs(np.diff(ways)) / 1e6 / 0.02
+        peak = steps.max()
+        ways.clear()
+        again = self.streamed(deployed, "--to-start").document
+        assert (again, ways) == ({"state": "at start", "reason": ""}, [])
+        assert self.streamed(deployed).document["state"] == "done"
+        assert 0.01 < peak / (np.abs(np.diff(ways)).max() / 1e6 / 0.02) <= 0.1 * (1 + 1e-3)
+
+    def test_jogging(self, deployed, drive_away):
+        told = self.streamed(deployed, "--jog", "cart=-0.01").document
+        assert told["state"] == "done"
+        assert drive_away.actual == pytest.approx(60_000)
+
+    def test_they_stop_as_every_stream_does(self, deployed, drive_away, monkeypatch):
+        send, sent = Pacer.send, []
+
+        def interrupted(self, messages):
+            sent.append(messages)
+            if len(sent) == 200:
+                os.kill(os.getpid(), signal.SIGTERM)
+            send(self, messages)
+
+        monkeypatch.setattr(Pacer, "send", interrupted)
+        outcome = self.streamed(deployed, "--to-start")
+        assert outcome.code == 6
+        assert outcome.document["reason"] == "Stopped by SIGTERM. The axes were stopped."
+        assert 0.0 < drive_away.actual < 70_000
+
+    def test_nothing_is_asked_where_somebody_is_in_command(self, deployed, drive_away):
+        with can.Bus(channel="away", interface="virtual") as other:
+            other.send(can.Message(arbitration_id=0x080, is_extended_id=False))
+            clock = workflow.SystemClock()
+            clock.actors.append(lambda: other.send(can.Message(arbitration_id=0x080, is_extended_id=False)))
+            outcome = self.streamed(deployed, "--to-start")
+        assert (outcome.code, "a controller is at work" in outcome.err) == (6, True)
+
+    def test_a_drive_that_counts_in_other_units(self, tmp_path, drive_away):
+        own = ("--set", "can.gear=[3, 1]", "--set", "can.sync_period=0.02")
+        run_here("--preset", "paper", *own, "--export", "can", "--out", tmp_path)
+        outcome = run_here("stream", tmp_path / "paper.log", *AWAY, "--to-start")
+        assert outcome.code == 6
+        assert "the drive holds another 6091h:01 than the spec" in outcome.err
+
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            (("--jog", "kart=0.1"), "--jog kart=0.1: unknown axis; did you mean 'cart'?"),
+            (("--jog", "cart=1e3m"), "state the distance as a number of metres"),
+            (("--jog", "cart=inf"), "state the distance as a number of metres"),
+            (("--jog", "cart=0.1", "--to-start"), "choose one of them"),
+            (("--to-start", "--dry-run"), "--dry-run touches no bus"),
+        ],
+    )
+    def test_what_cannot_be_meant(self, deployed, options, words):
+        outcome = run_here("stream", deployed / "paper.log", *AWAY, *options)
+        assert (outcome.code, words in outcome.err) == (2, True)

@@ -58,7 +58,11 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
     help="Move slowly by a distance in m (or rad) from anywhere, and end. Repeatable.",
 )
 @click.option("--reset-fault", is_flag=True, help="Reset drives in fault first; know why they were.")
-@click.option("--self-test", is_flag=True, help="First measure whether this machine can hold the cycle.")
+@click.option(
+    "--self-test",
+    is_flag=True,
+    help="First measure, for as long as the motion lasts, whether this machine can hold the cycle.",
+)
 @click.option("--dry-run", is_flag=True, help="Print the plan, and touch no bus.")
 @click.option("--accept-unverified", is_flag=True, help="Stream what was exported without its check.")
 @click.option(

@@ -6,6 +6,7 @@ motion is, with all that stops it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 import attrs
@@ -118,10 +119,18 @@ def _distances(stated: Sequence[str], axes: Sequence[str]) -> Mapping[str, float
         name, _, number = text.partition("=")
         if name not in axes:
             raise SpecError(f"--jog {text}: unknown axis{suggestion(name, axes)}")
-        try:
-            found[name] = float(number)
-        except ValueError:
-            raise SpecError(
-                f"--jog {text}: state the distance as a number of metres (or rad), as --jog {name}=0.05."
-            ) from None
+        found[name] = _metres(text, number)
     return found
+
+
+def _metres(text: str, number: str) -> float:
+    try:
+        distance = float(number)
+    except ValueError:
+        distance = math.nan
+    if not math.isfinite(distance):
+        name = text.partition("=")[0]
+        raise SpecError(
+            f"--jog {text}: state the distance as a number of metres (or rad), as --jog {name}=0.05."
+        )
+    return distance

@@ -55,7 +55,8 @@ def run(place, log, queue, disturb):
             time.sleep(UNDER_WAY)
             running = "aborted" not in (place / "stream.err").read_text()
             disturb(streamer, drive)
-        codes = {"stream": _ended(streamer), "drive": _ended(drive, patience=10.0)}
+        code = _ended(streamer)
+        codes = {"stream": code, "drive": _ended(drive, patience=0.0 if disturb is _freeze_drive else 10.0)}
         time.sleep(0.1)
         witness.terminate()
         witness.wait()
@@ -130,7 +131,7 @@ def _freeze(streamer, _):
 
 
 def _freeze_drive(_, drive):
-    os.kill(drive.pid, signal.SIGSTOP)  # and kill it when it does not end
+    os.kill(drive.pid, signal.SIGSTOP)  # for ever; it is killed when the stream has ended
 
 
 def _bus_down(*_):
