@@ -113,3 +113,12 @@ def test_every_module_loads_where_the_system_lacks_what_only_some_have():
     imports = "\n".join(f"import {name}" for name in modules())
     hidden = str(ROOT / "tests" / "other_systems")
     assert printed(f"import os\n{imports}\nprint(hasattr(os, 'fork'))", PYTHONPATH=hidden) == "False\n"
+
+
+def test_the_picture_in_the_documentation_is_drawn_from_the_layers():
+    drawn = printed(
+        f"import runpy; runpy.run_path({str(ROOT / 'docs' / 'draw_layers.py')!r}, run_name='__main__')"
+    )
+    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    assert f"```mermaid\n{drawn}```" in page
+    assert all(f"<b>{layer.removeprefix('gen_profile.')}</b>" in drawn for layer in layers())

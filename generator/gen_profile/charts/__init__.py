@@ -1,0 +1,1 @@
+"""Pictures of results: neutral figures, drawn by Matplotlib or Plotly."""

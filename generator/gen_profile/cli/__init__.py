@@ -1,4 +1,4 @@
-"""The command line: arguments in, a workflow called, words and exit codes out."""
+"""The command line: arguments in, one function called, words and exit codes out."""
 
 from gen_profile.cli import can, fmu, identify, report, robustness, stream, sweep
 from gen_profile.cli.entry import main

@@ -1,4 +1,4 @@
-"""The commands. Each imports its workflow once its spec is read: no fault or ``--help`` waits for CasADi."""
+"""The commands. Each imports what it runs once its spec is read: no fault or ``--help`` waits for CasADi."""
 
 from __future__ import annotations
 

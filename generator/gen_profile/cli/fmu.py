@@ -11,7 +11,7 @@ from gen_profile.cli.options import OutputFile, chosen_spec, debug_option, json_
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
-# spelled out here because --help must not wait for CasADi; a test holds them against the workflow's
+# spelled out here because --help must not wait for CasADi; a test holds them against those of designs/fmu.py
 KINDS = ("plant", "profile", "system", "ssp")
 INPUTS = ("setpoint", "acceleration", "velocity")
 PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86_64", "macos-arm64", "all")

@@ -1,0 +1,1 @@
+"""Methods side by side on the same machines, and over errors of parameters."""

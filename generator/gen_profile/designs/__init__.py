@@ -1,0 +1,1 @@
+"""The main job: a motion planned, exported, checked and delivered; FMUs written."""

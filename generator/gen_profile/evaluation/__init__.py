@@ -1,0 +1,1 @@
+"""A motion on the machines of a spec: simulation, scenarios, figures, spectrum."""

@@ -1,0 +1,1 @@
+"""Motions of the axes, continuous and sampled, and measures of them."""

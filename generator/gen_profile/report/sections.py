@@ -1,4 +1,4 @@
-"""The sections of a report, from the values that the workflows found."""
+"""The sections of a report, from the values that were found."""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""A verified motion streamed to drives, and what became of it."""

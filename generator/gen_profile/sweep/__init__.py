@@ -1,0 +1,1 @@
+"""Designs over a grid of parameters: cases, their store and table, lookup, profile library."""

@@ -1,0 +1,1 @@
+"""The verdict: written files replayed, co-simulated on every machine, and judged."""

@@ -1,0 +1,1 @@
+"""The direct method: the motion as polynomials, found by convex programs."""
