@@ -10,7 +10,7 @@ import numpy as np
 
 import gen_profile as gp
 from gen_profile.motion.metrics import greatest, peak
-from gen_profile_fmu.cosimulation import PlantCosimulation
+from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 TAU = 0.1
 

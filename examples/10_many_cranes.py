@@ -6,9 +6,9 @@ python examples/10_many_cranes.py
 import numpy as np
 
 import gen_profile as gp
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.many_runs import ManyRuns
-from gen_profile_fmu.plant_fmu import plant_fmu
+from gen_profile_fmu.building.plant_fmu import plant_fmu
+from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.running.many_runs import ManyRuns
 
 RUNS = 10_000
 CYCLE, SETTLE = 0.01, 4.0  # s

@@ -17,17 +17,11 @@ from gen_profile.plugins import load_plugin
 from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
-    from gen_profile_exporters import (
-        codesys,
-        csv_table,
-        plcopen_xml,
-        rockwell_l5x,
-        siemens_scl,
-        structured_text,
-        twincat,
-    )
+    from gen_profile_exporters import csv_table
     from gen_profile_exporters.can.export import exporter as can
     from gen_profile_exporters.exporter import BlockContainer, Exporter
+    from gen_profile_exporters.playback import structured_text
+    from gen_profile_exporters.vendors import codesys, plcopen_xml, rockwell_l5x, siemens_scl, twincat
 
     # Holds the project's own formats to the protocol wherever types are checked.
     _CONFORMING: tuple[Exporter, ...] = (
@@ -82,7 +76,7 @@ BUILT_IN: dict[str, Format] = {
         suffix=".log",
     ),
     "codesys": Format(
-        module="gen_profile_exporters.codesys",
+        module="gen_profile_exporters.vendors.codesys",
         summary="playback block, SoftMotion wrapper and XYVA cam in a PLCopen XML project for CODESYS",
         proof="schema-checked",
         suffix=".codesys.xml",
@@ -96,34 +90,34 @@ BUILT_IN: dict[str, Format] = {
         may_end_at_speed=True,
     ),
     "plc": Format(
-        module="gen_profile_exporters.structured_text",
+        module="gen_profile_exporters.playback.structured_text",
         summary="playback function block in portable IEC 61131-3 Structured Text",
         proof="executed",
         suffix=".st",
         holds_block=True,
     ),
     "plcopen-xml": Format(
-        module="gen_profile_exporters.plcopen_xml",
+        module="gen_profile_exporters.vendors.plcopen_xml",
         summary="playback function block as PLCopen XML (TC6 v2.01) for Beremiz and OpenPLC",
         proof="schema-checked",
         suffix=".xml",
         holds_block=True,
     ),
     "rockwell-l5x": Format(
-        module="gen_profile_exporters.rockwell_l5x",
+        module="gen_profile_exporters.vendors.rockwell_l5x",
         summary="CAM arrays for MCCP and MATC in an L5X import for Logix controllers",
         proof="parsed",
         suffix=".L5X",
     ),
     "siemens-scl": Format(
-        module="gen_profile_exporters.siemens_scl",
+        module="gen_profile_exporters.vendors.siemens_scl",
         summary="playback block, wrapper and cam points as SCL sources for TIA Portal",
         proof="untested",
         suffix=".scl",
         holds_block=True,
     ),
     "twincat": Format(
-        module="gen_profile_exporters.twincat",
+        module="gen_profile_exporters.vendors.twincat",
         summary="playback block, NC wrapper and motion function points for TwinCAT 3",
         proof="parsed",
         suffix=".TcPOU",

@@ -12,7 +12,7 @@ import pytest
 from exporters.motions import quintic, target
 
 from gen_profile.motion.profile import sample
-from gen_profile_exporters.quintic_segments import fit
+from gen_profile_exporters.playback.quintic_segments import fit
 from gen_profile_exporters.registry import find_exporter
 
 FORMATS = {

@@ -8,9 +8,9 @@ from fmpy.fmi2 import FMU2Slave
 from fmu.kinds import model_of
 
 from gen_profile.plants.registry import find_plant
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.many_runs import ManyRuns
-from gen_profile_fmu.plant_fmu import cached_fmu
+from gen_profile_fmu.building.plant_fmu import cached_fmu
+from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.running.many_runs import ManyRuns
 
 CRANE = find_plant("double-pendulum-crane")
 TIMES = np.linspace(0.0, 7.0, 701)

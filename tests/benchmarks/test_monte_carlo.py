@@ -10,7 +10,7 @@ from gen_profile.spec.reading import preset_spec
 from gen_profile.verification.check import check_artefact
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter
-from gen_profile_fmu.plant_fmu import plant_fmu
+from gen_profile_fmu.building.plant_fmu import plant_fmu
 
 DRAWS, TRIED = 1000, 8
 STOP = 7.0  # s: the move, and 4 s of watching

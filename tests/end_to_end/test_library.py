@@ -14,7 +14,7 @@ from gen_profile.sweep.store import grid_of
 from gen_profile.sweep.table import read_table
 from gen_profile_exporters.block_source import take_apart
 from gen_profile_exporters.exporter import target_of
-from gen_profile_exporters.profile_library import read_library
+from gen_profile_exporters.playback.library import read_library
 from gen_profile_exporters.registry import container_of, find_container
 
 CYCLE = "export.cycle_time=0.01"

@@ -8,9 +8,9 @@ from motions import quintic, target
 from vendor_axes import VENDORS, Bench
 
 from gen_profile.motion.profile import sample
-from gen_profile_exporters import codesys, siemens_scl, twincat
 from gen_profile_exporters.block_source import take_apart
-from gen_profile_exporters.structured_text import block_text
+from gen_profile_exporters.playback.structured_text import block_text
+from gen_profile_exporters.vendors import codesys, siemens_scl, twincat
 
 CYCLE = 0.02
 ONE, TWO = quintic((0.1, 0.4)), quintic((0.1, 0.4), (1.2, -0.7))

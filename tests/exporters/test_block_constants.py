@@ -9,7 +9,8 @@ from st_interpreter import FunctionBlock, StError
 from test_profile_library import started, together
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters import codesys, plcopen_xml, siemens_scl, structured_text, twincat
+from gen_profile_exporters.playback import structured_text
+from gen_profile_exporters.vendors import codesys, plcopen_xml, siemens_scl, twincat
 
 LAYOUTS = ["segments", "samples", "counts"]
 ONE, TWO = bang_bang(), quintic((0.1, 0.4), (1.2, -0.7), duration=0.4)

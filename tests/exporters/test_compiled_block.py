@@ -16,8 +16,8 @@ from motions import bang_bang, quintic, target
 from playing import QUANTITIES
 from st_interpreter import FunctionBlock
 
-from gen_profile_exporters import structured_text
-from gen_profile_exporters.playback_table import MOST_SAMPLES, tabulate
+from gen_profile_exporters.playback import structured_text
+from gen_profile_exporters.playback.table import MOST_SAMPLES, tabulate
 
 CYCLE = 0.02
 MOVES = {"one": quintic((0.1, 0.4)), "rough": bang_bang(), "two": quintic((0.1, 0.4), (1.2, -0.7))}

@@ -25,8 +25,8 @@ from test_compiled_block import (
 )
 from test_profile_library import DURATIONS, blocks, goal_of, together
 
-from gen_profile_exporters import structured_text
-from gen_profile_exporters.playback_table import MOST_SAMPLES
+from gen_profile_exporters.playback import structured_text
+from gen_profile_exporters.playback.table import MOST_SAMPLES
 
 
 def compiled(text, axes, folder):

@@ -8,9 +8,9 @@ from playing import checked, start
 
 from gen_profile.evaluation.simulation import Swing
 from gen_profile.spec.reading import preset_spec
-from gen_profile_exporters import structured_text
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.machine_variants import AxisVariants, machine_variants
+from gen_profile_exporters.playback import structured_text
 
 ALL = AxisVariants(least_scale=0.0, mirror=True, shift=True)
 TURNED = AxisVariants(mirror=True, shift=True)

@@ -9,8 +9,8 @@ from playing import QUANTITIES, checked, column, play, start
 from st_interpreter import FunctionBlock
 
 from gen_profile.motion.profile import sample
-from gen_profile_exporters import structured_text
-from gen_profile_exporters.playback_table import tabulate
+from gen_profile_exporters.playback import structured_text
+from gen_profile_exporters.playback.table import tabulate
 
 MOVE = quintic((0.1, 0.4))
 TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))

@@ -10,9 +10,9 @@ from playing import IDLE, QUANTITIES, checked, column, play, start
 from st_interpreter import FunctionBlock
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters import structured_text
 from gen_profile_exporters.block_source import take_apart
-from gen_profile_exporters.profile_library import LibraryEntry, library_source, read_library
+from gen_profile_exporters.playback import structured_text
+from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library
 from gen_profile_exporters.registry import BUILT_IN, find_container
 
 LAYOUTS = ["segments", "samples", "counts"]
@@ -287,6 +287,6 @@ def test_motions_for_another_target_are_refused(other):
 
 
 def test_too_many_rows_to_compile_are_refused(monkeypatch):
-    monkeypatch.setattr("gen_profile_exporters.profile_library.MOST_SAMPLES", 3)
+    monkeypatch.setattr("gen_profile_exporters.playback.library.MOST_SAMPLES", 3)
     with pytest.raises(ExportError, match="split them into several libraries"):
         together(blocks(goal_of()), goal_of())

@@ -6,7 +6,7 @@ from motions import bang_bang, quintic, target
 from st_interpreter import FunctionBlock
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters import structured_text
+from gen_profile_exporters.playback import structured_text
 
 MOVE = quintic((0.1, 0.4))
 TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))

@@ -15,11 +15,12 @@ from system_parts import missing
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
-from gen_profile_exporters import codesys, plcopen_xml, rockwell_l5x, siemens_scl, structured_text, twincat
-from gen_profile_exporters.axis_wrapper import CODESYS, SIEMENS, TWINCAT, axis_wrapper
 from gen_profile_exporters.block_source import take_apart
-from gen_profile_exporters.cam_points import quintic_points
-from gen_profile_exporters.structured_text import block_text
+from gen_profile_exporters.playback import structured_text
+from gen_profile_exporters.playback.axis_wrapper import CODESYS, SIEMENS, TWINCAT, axis_wrapper
+from gen_profile_exporters.playback.structured_text import block_text
+from gen_profile_exporters.vendors import codesys, plcopen_xml, rockwell_l5x, siemens_scl, twincat
+from gen_profile_exporters.vendors.cam_points import quintic_points
 
 MOVE = quintic((0.1, 0.4))
 TWO_MOVES = quintic((0.1, 0.4), (1.2, -0.7))

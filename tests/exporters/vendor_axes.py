@@ -8,7 +8,7 @@ drive does at once what its axis is told.
 import attrs
 from st_interpreter import FunctionBlock
 
-from gen_profile_exporters.axis_wrapper import CODESYS, SIEMENS, TWINCAT, axis_wrapper
+from gen_profile_exporters.playback.axis_wrapper import CODESYS, SIEMENS, TWINCAT, axis_wrapper
 
 STRUCTURE = "FUNCTION_BLOCK {}\nVAR_INPUT\n{}\nEND_VAR\nEND_FUNCTION_BLOCK"
 

@@ -10,8 +10,8 @@ from system_parts import missing
 from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
-from gen_profile_fmu.cosimulation import PlantCosimulation
-from gen_profile_fmu.plant_fmu import PlantFmu, plant_fmu
+from gen_profile_fmu.building.plant_fmu import PlantFmu, plant_fmu
+from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 
 @pytest.fixture(scope="session")

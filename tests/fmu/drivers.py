@@ -13,8 +13,8 @@ import numpy as np
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2EventInfo
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.plant_fmu import PlantFmu
+from gen_profile_fmu.building.plant_fmu import PlantFmu
+from gen_profile_fmu.description.fmu_files import Version
 
 Array = np.ndarray
 

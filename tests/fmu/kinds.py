@@ -7,8 +7,8 @@ import numpy as np
 
 from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Plant
-from gen_profile_fmu.model import Model, plant_model, profile_model, system_model
-from gen_profile_fmu.plant_variables import InputKind, Machine
+from gen_profile_fmu.model.contents import Model, plant_model, profile_model, system_model
+from gen_profile_fmu.model.plant_variables import InputKind, Machine
 
 INPUTS = {f"plant-{kind.value}": kind for kind in InputKind}
 KINDS = (*INPUTS, "profile", "system")

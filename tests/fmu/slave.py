@@ -10,7 +10,7 @@ import fmpy
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
-from gen_profile_fmu.plant_fmu import PlantFmu
+from gen_profile_fmu.building.plant_fmu import PlantFmu
 
 # setpoints that most tests follow
 MOVE = [0.001 * k**2 for k in range(1, 30)]

@@ -7,7 +7,7 @@ from fmu.hoisting_pendulum import PLANT as WINCH
 from scipy.integrate import solve_ivp
 
 from gen_profile.motion.profile import Profile, SampledProfile, sample
-from gen_profile_fmu.cosimulation import PlantCosimulation
+from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 OTHER_CRANE = {"m1": 0.5, "m2": 0.1, "L1": 0.6, "L2": 0.25, "g": 9.7, "c1": 0.01, "c2": 0.02}
 

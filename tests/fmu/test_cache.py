@@ -10,13 +10,13 @@ import pytest
 from fmu.caches import share_zig
 
 from gen_profile.errors import CosimulationError
-from gen_profile_fmu.cache import cache_folders, cached, is_intact, write_entry
-from gen_profile_fmu.cosimulation import PlantCosimulation
-from gen_profile_fmu.plant_fmu import plant_fmu
+from gen_profile_fmu.building.cache import cache_folders, cached, is_intact, write_entry
+from gen_profile_fmu.building.plant_fmu import plant_fmu
+from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 BUILD = """
 from gen_profile.plants.registry import find_plant
-from gen_profile_fmu.plant_fmu import plant_fmu
+from gen_profile_fmu.building.plant_fmu import plant_fmu
 print(plant_fmu(find_plant("double-pendulum-crane")).archive)
 """
 
@@ -156,7 +156,7 @@ class TestPlantFmu:
         def refuse(*_):
             raise PermissionError(13, "Permission denied")
 
-        monkeypatch.setattr("gen_profile_fmu.cache.write_entry", refuse)
+        monkeypatch.setattr("gen_profile_fmu.building.cache.write_entry", refuse)
         assert builds.get() == first
 
     def test_says_where_it_could_not_be_written(self, tmp_path, builds, monkeypatch):
@@ -240,7 +240,7 @@ class TestFoldersOfOthers:
                 private.chmod(0o777)
             else:
                 give_away(private, monkeypatch)
-                monkeypatch.setattr("gen_profile_fmu.cache.cache_folders", lambda: [laid, private])
+                monkeypatch.setattr("gen_profile_fmu.building.cache.cache_folders", lambda: [laid, private])
         with pytest.raises(CosimulationError, match=r"no folder to keep .*shared: others may write there"):
             self.found()
 

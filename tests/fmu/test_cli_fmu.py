@@ -10,8 +10,8 @@ from fmpy.validation import validate_fmu
 
 from gen_profile.cli import fmu as command
 from gen_profile.designs.fmu import KINDS
-from gen_profile_fmu.plant_variables import InputKind
-from gen_profile_fmu.platforms import PLATFORMS, host_platform
+from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
+from gen_profile_fmu.model.plant_variables import InputKind
 
 FAST = ("--set", "plant.L1=0.5")
 

@@ -13,12 +13,12 @@ from system_parts import program
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import sample
 from gen_profile.plants.registry import BUILT_IN, find_plant
-from gen_profile_fmu import platforms
-from gen_profile_fmu.c_sources import FOLDER
-from gen_profile_fmu.compiler import compile_library, find_compiler
-from gen_profile_fmu.cosimulation import PlantCosimulation
-from gen_profile_fmu.fmu_files import SOURCE_FILE, Version, sources, standard_headers
-from gen_profile_fmu.plant_fmu import plant_fmu
+from gen_profile_fmu.building import platforms
+from gen_profile_fmu.building.compiler import compile_library, find_compiler
+from gen_profile_fmu.building.plant_fmu import plant_fmu
+from gen_profile_fmu.description.fmu_files import SOURCE_FILE, Version, sources, standard_headers
+from gen_profile_fmu.model.c_sources import FOLDER
+from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 CRANE = find_plant("double-pendulum-crane")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")

@@ -11,8 +11,8 @@ from fmu.hoisting_pendulum import PLANT as WINCH
 
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import SampledProfile, sample
-from gen_profile_fmu.cosimulation import PlantCosimulation
-from gen_profile_fmu.plant_fmu import plant_fmu
+from gen_profile_fmu.building.plant_fmu import plant_fmu
+from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 
 @pytest.fixture
@@ -150,7 +150,7 @@ def test_errors_of_the_fmu_are_logged(cosimulation, crane, setpoints, caplog):
     with pytest.raises(CosimulationError):
         cosimulation.run(setpoints, {**crane.nominal(), "g": 0.0}, max_step=1e-3, settle=0.0)
     (record,) = caplog.records
-    assert (record.name, record.levelno) == ("gen_profile_fmu.instances", logging.WARNING)
+    assert (record.name, record.levelno) == ("gen_profile_fmu.running.instances", logging.WARNING)
     assert record.getMessage() == "logStatusError: g must lie between 0.1 and 30, found 0."
 
 
@@ -177,6 +177,6 @@ def test_a_library_that_does_not_load_is_a_sentence(crane, monkeypatch):
         (attrs.evolve(fmu, folder=fmu.folder / "nowhere"), "Cannot find shared library"),
         (attrs.evolve(fmu, guid="another"), "The identity in the model description is not the binary's"),
     ]:
-        monkeypatch.setattr("gen_profile_fmu.cosimulation.plant_fmu", lambda *_, other=other: other)
+        monkeypatch.setattr("gen_profile_fmu.running.cosimulation.plant_fmu", lambda *_, other=other: other)
         with pytest.raises(CosimulationError, match=reason):
             PlantCosimulation(crane)

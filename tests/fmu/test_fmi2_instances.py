@@ -11,7 +11,7 @@ from fmu.kinds import model_of
 from fmu.slave import MOVE, FMU2LoggedSlave, open_slave, status_of
 from system_parts import program
 
-from gen_profile_fmu.fmu_files import Version, sources
+from gen_profile_fmu.description.fmu_files import Version, sources
 
 DAMAGED = Path(__file__).with_name("damaged_states.c")
 

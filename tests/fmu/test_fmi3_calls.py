@@ -18,8 +18,8 @@ from fmpy.fmi3 import (
 from fmu.kinds import model_of
 
 from gen_profile.plants.registry import find_plant
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.plant_fmu import cached_fmu
+from gen_profile_fmu.building.plant_fmu import cached_fmu
+from gen_profile_fmu.description.fmu_files import Version
 
 CRANE = find_plant("double-pendulum-crane")
 DISCARD, ERROR = 2, 3

@@ -23,13 +23,14 @@ from gen_profile.verification import external_fmu as foreign_check
 from gen_profile.verification.batch import Feed
 from gen_profile.verification.check import check_artefact
 from gen_profile.verification.external_fmu import _axis_inputs
-from gen_profile_fmu import foreign_child, safe_archive
-from gen_profile_fmu.building import build_fmu
-from gen_profile_fmu.fmu_files import Version, sources
-from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign, write_job
-from gen_profile_fmu.model import plant_model
-from gen_profile_fmu.plant_variables import InputKind
-from gen_profile_fmu.platforms import host_platform
+from gen_profile_fmu.building.build import build_fmu
+from gen_profile_fmu.building.platforms import host_platform
+from gen_profile_fmu.description.fmu_files import Version, sources
+from gen_profile_fmu.model.contents import plant_model
+from gen_profile_fmu.model.plant_variables import InputKind
+from gen_profile_fmu.running import external_child as foreign_child
+from gen_profile_fmu.running import safe_archive
+from gen_profile_fmu.running.external_fmu import ForeignRun, run_foreign, write_job
 
 pytestmark = pytest.mark.slow
 

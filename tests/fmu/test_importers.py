@@ -22,12 +22,12 @@ from gen_profile.motion.profile import Profile
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics
-from gen_profile_fmu.building import build_fmu
-from gen_profile_fmu.fmu_files import Version, archive, fmu_files, sources
-from gen_profile_fmu.model import system_model
-from gen_profile_fmu.nominals import smooth_move, state_nominals
-from gen_profile_fmu.plant_fmu import cached_fmu
-from gen_profile_fmu.plant_variables import Machine
+from gen_profile_fmu.building.build import build_fmu
+from gen_profile_fmu.building.plant_fmu import cached_fmu
+from gen_profile_fmu.description.fmu_files import Version, archive, fmu_files, sources
+from gen_profile_fmu.model.contents import system_model
+from gen_profile_fmu.model.nominals import smooth_move, state_nominals
+from gen_profile_fmu.model.plant_variables import Machine
 
 CRANE = find_plant("double-pendulum-crane")
 HEADERS = Path(fmu_manipulation_toolbox.__file__).parent / "resources" / "fmi"  # the standard's, unaltered

@@ -13,10 +13,10 @@ from scipy.integrate import solve_ivp
 
 from gen_profile.motion.profile import Profile
 from gen_profile.plants.registry import find_plant
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.model import profile_model, system_model
-from gen_profile_fmu.plant_fmu import cached_fmu
-from gen_profile_fmu.plant_variables import Machine
+from gen_profile_fmu.building.plant_fmu import cached_fmu
+from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.model.contents import profile_model, system_model
+from gen_profile_fmu.model.plant_variables import Machine
 
 CRANE = find_plant("double-pendulum-crane")
 OTHER = {"m1": 0.5, "m2": 0.1, "L1": 0.6, "L2": 0.25, "g": 9.7, "c1": 0.01, "c2": 0.02}

@@ -11,9 +11,9 @@ from generator.lagrangian_machines import MACHINES, Lagrange
 
 from gen_profile.evaluation.simulation import Swing
 from gen_profile.plants.registry import BUILT_IN, find_plant
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.plant_fmu import cached_fmu
-from gen_profile_fmu.variables import variable_name
+from gen_profile_fmu.building.plant_fmu import cached_fmu
+from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.model.variables import variable_name
 
 PLANTS = [*(find_plant(name) for name in BUILT_IN), WINCH]
 

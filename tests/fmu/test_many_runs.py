@@ -9,9 +9,9 @@ from fmu.kinds import model_of
 
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.registry import find_plant
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.many_runs import ManyRuns
-from gen_profile_fmu.plant_fmu import cached_fmu
+from gen_profile_fmu.building.plant_fmu import cached_fmu
+from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.running.many_runs import ManyRuns
 
 CRANE = find_plant("double-pendulum-crane")
 TIMES = np.arange(0.0, 2.0001, 0.01)

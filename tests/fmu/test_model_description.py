@@ -24,11 +24,11 @@ from fmu.kinds import INPUTS, KINDS, model_of
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Coordinate, Parameter
 from gen_profile.plants.registry import BUILT_IN, find_plant
-from gen_profile_fmu.base_units import BASE_UNITS
-from gen_profile_fmu.fmu_files import Version, archive, fmu_files, sources
-from gen_profile_fmu.model import identifier_of
-from gen_profile_fmu.plant_fmu import cached_fmu, plant_fmu
-from gen_profile_fmu.variables import variable_name
+from gen_profile_fmu.building.plant_fmu import cached_fmu, plant_fmu
+from gen_profile_fmu.description.base_units import BASE_UNITS
+from gen_profile_fmu.description.fmu_files import Version, archive, fmu_files, sources
+from gen_profile_fmu.model.contents import identifier_of
+from gen_profile_fmu.model.variables import variable_name
 
 PLANTS = [*(find_plant(name) for name in BUILT_IN), WINCH]
 CRANE = find_plant("double-pendulum-crane")

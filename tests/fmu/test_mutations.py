@@ -17,8 +17,8 @@ from fmpy.validation import validate_fmu
 from fmu.kinds import model_of
 
 from gen_profile.plants.registry import find_plant
-from gen_profile_fmu.fmu_files import Version, archive
-from gen_profile_fmu.plant_fmu import cached_fmu
+from gen_profile_fmu.building.plant_fmu import cached_fmu
+from gen_profile_fmu.description.fmu_files import Version, archive
 
 CRANE = find_plant("double-pendulum-crane")
 

@@ -18,12 +18,12 @@ from system_parts import program
 
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.registry import find_plant
-from gen_profile_fmu import platforms
-from gen_profile_fmu.building import build_fmu
-from gen_profile_fmu.compiler import compile_library, find_compiler
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.plant_fmu import cached_fmu
-from gen_profile_fmu.platforms import PLATFORMS, host_platform
+from gen_profile_fmu.building import platforms
+from gen_profile_fmu.building.build import build_fmu
+from gen_profile_fmu.building.compiler import compile_library, find_compiler
+from gen_profile_fmu.building.plant_fmu import cached_fmu
+from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
+from gen_profile_fmu.description.fmu_files import Version
 
 pytestmark = pytest.mark.slow
 

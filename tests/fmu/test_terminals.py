@@ -11,9 +11,9 @@ from fmu.kinds import KINDS, model_of
 from lxml import etree
 
 from gen_profile.plants.registry import BUILT_IN, find_plant
-from gen_profile_fmu.fmu_files import Version, archive, fmu_files, sources
-from gen_profile_fmu.model import plant_model
-from gen_profile_fmu.plant_variables import InputKind, Machine
+from gen_profile_fmu.description.fmu_files import Version, archive, fmu_files, sources
+from gen_profile_fmu.model.contents import plant_model
+from gen_profile_fmu.model.plant_variables import InputKind, Machine
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 

@@ -66,9 +66,9 @@ def fmu(
     spec = chosen_spec(spec_path, preset, overrides)
     from gen_profile.cli.progress import progress
     from gen_profile.designs.fmu import export_fmu, platform_names
-    from gen_profile_fmu.fmu_files import Version
-    from gen_profile_fmu.model import AUTHOR
-    from gen_profile_fmu.plant_variables import InputKind
+    from gen_profile_fmu.description.fmu_files import Version
+    from gen_profile_fmu.model.contents import AUTHOR
+    from gen_profile_fmu.model.plant_variables import InputKind
 
     platforms = () if source_only else platform_names(platform or "host")
     with progress() as tell:

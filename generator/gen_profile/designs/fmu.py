@@ -16,13 +16,20 @@ from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.motion.profile import Profile
 from gen_profile.problem.linearization import linearize
 from gen_profile.spec.model import Spec
-from gen_profile_fmu.building import build_fmu
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.model import AUTHOR, Model, identifier_of, plant_model, profile_model, system_model
-from gen_profile_fmu.nominals import smooth_move, state_nominals
-from gen_profile_fmu.plant_variables import InputKind, Machine
-from gen_profile_fmu.platforms import PLATFORMS, host_platform
-from gen_profile_fmu.system_structure import ssp
+from gen_profile_fmu.building.build import build_fmu
+from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
+from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.description.system_structure import ssp
+from gen_profile_fmu.model.contents import (
+    AUTHOR,
+    Model,
+    identifier_of,
+    plant_model,
+    profile_model,
+    system_model,
+)
+from gen_profile_fmu.model.nominals import smooth_move, state_nominals
+from gen_profile_fmu.model.plant_variables import InputKind, Machine
 
 PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
 KINDS = ("plant", "profile", "system", "ssp")

@@ -14,7 +14,7 @@ from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.motion.metrics import length, peak
 from gen_profile.spec.model import Spec
 from gen_profile.verification.cosimulation import max_step
-from gen_profile_fmu.stepping import SteppedPlant
+from gen_profile_fmu.running.stepping import SteppedPlant
 
 
 class CraneLoad:

@@ -18,7 +18,7 @@ from gen_profile.sweep.store import grid_of, read_swept
 from gen_profile.sweep.table import Table, read_table
 from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.exporter import Target, target_of
-from gen_profile_exporters.profile_library import LibraryEntry, library_source, read_library
+from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library
 from gen_profile_exporters.registry import container_of, find_container, formats
 
 

@@ -14,10 +14,10 @@ import numpy as np
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import Spec
-from gen_profile_fmu.fmu_files import Version
-from gen_profile_fmu.many_runs import ManyRuns
-from gen_profile_fmu.plant_fmu import plant_fmu
-from gen_profile_fmu.plant_variables import MAX_STEP, TAU
+from gen_profile_fmu.building.plant_fmu import plant_fmu
+from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
+from gen_profile_fmu.running.many_runs import ManyRuns
 
 _most: ContextVar[int] = ContextVar("_most", default=sys.maxsize)
 

@@ -16,7 +16,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import doubts
 from gen_profile.verification.plausibility import implausibilities
 from gen_profile.verification.verdict import Check, Finding
-from gen_profile_fmu.cosimulation import PlantCosimulation
+from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 LONGEST_STEP = 1e-3  # s, of the FMU's integrator
 STEP_PHASE = 0.05  # rad of the fastest mode that one step may cover

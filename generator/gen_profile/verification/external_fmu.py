@@ -19,7 +19,7 @@ from gen_profile.verification.monte_carlo import standstill
 from gen_profile.verification.plausibility import implausibilities
 from gen_profile.verification.setpoint_path import follows_exactly, lag_of, transmitted
 from gen_profile.verification.verdict import Check, Finding
-from gen_profile_fmu.foreign_fmu import ForeignRun, run_foreign
+from gen_profile_fmu.running.external_fmu import ForeignRun, run_foreign
 
 STEPS_PER_LAG = 4  # at least, of drives that lag
 SPACING = 0.01  # s, at most, of samples while the axes stand

@@ -15,7 +15,7 @@ from gen_profile.verification.batch import Feed, many_machines, parameter_rows, 
 from gen_profile.verification.cosimulation import STEP_PHASE, longest_step
 from gen_profile.verification.setpoint_path import delay, followed_up, lag_of, transmitted
 from gen_profile.verification.verdict import Check, Finding
-from gen_profile_fmu.many_runs import ManyRuns
+from gen_profile_fmu.running.many_runs import ManyRuns
 
 BATCH = 50  # rows between two signs of life
 SAMPLE_PHASE = 0.02  # rad of the fastest mode between two samples of a residual

@@ -1,0 +1,156 @@
+"""The playback block's template, filled in for writing and matched for reading."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import attrs
+
+from gen_profile.errors import ExportError
+from gen_profile_exporters.playback.template import BODY, HEADER, INTERFACE, LAYOUTS
+
+_CHECKED = {  # how the value of a constant enters the checksum
+    "DINT": "fValue := DINT_TO_LREAL({});",
+    "LREAL": "fValue := {};",
+    "BOOL": "IF {} THEN fValue := 1.0; END_IF;",
+}
+_DECLARED = {"LREAL~": "$reals", "BOOL~": "$switches"}
+_COMMENT = re.compile(r"\(\*.*?\*\)", re.DOTALL)
+_HOLE = re.compile(r"@(\w+)")
+_LINES = re.compile(r"^\$(\w+)\n", re.MULTILINE)
+_PART = re.compile(r"\$(\w+)(?:\(([^()]*)\))?")
+# An array's initialiser or an index, a name or hole, a number with its sign, an operator.
+_TOKEN = re.compile(
+    r"\[[^\[\]]*\]|@?[A-Za-z_]\w*|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?|:=|<=|>=|<>|\S",
+    re.ASCII,
+)
+
+
+@attrs.frozen
+class Token:
+    """A piece of program text and the line it begins on."""
+
+    text: str
+    line: int
+
+
+def fill(values: Mapping[str, str], layout: str, axes: int) -> str:
+    """Write a block: a value for every hole, by its name."""
+    return _HOLE.sub(lambda hole: values[hole[1]], HEADER + _program(layout, axes))
+
+
+def match(text: str, layout: str, axes: int) -> dict[str, Token]:
+    """Read a block: what stands in every hole, by its name.
+
+    Raises
+    ------
+    ExportError
+        The text differs from the template elsewhere, or one value from place to place.
+    """
+    found, due = _tokens(text), _due(layout, axes)
+    values: dict[str, Token] = {}
+    for token, expected in zip(found, due, strict=False):
+        hole = _HOLE.fullmatch(expected.text)
+        known = values.setdefault(hole[1], token).text if hole else expected.text
+        if token.text != known and _bare(token.text) != _bare(known):
+            raise ExportError(
+                f"line {token.line}: {token.text[:40]!r} stands where the exported block has {known[:40]!r}; "
+                "only numbers and comments may be edited in it, export it again."
+            )
+    if len(found) != len(due):
+        line = found[len(due)].line if len(found) > len(due) else max(1, len(text.splitlines()))
+        raise ExportError(f"line {line}: the block breaks off or goes on after its end; export it again.")
+    return values
+
+
+def variable_names(layout: str, axes: int) -> list[str]:
+    """List the block's variables in the order of their declaration."""
+    return re.findall(r"^ +(\w+) : ", _program(layout, axes), re.MULTILINE)
+
+
+def constants(values: Mapping[str, str], layout: str, axes: int) -> list[str]:
+    """List the initial values of all constants that enter the checksum, a text for each."""
+    return [
+        _HOLE.sub(lambda hole: values[hole[1]], initial.replace("$axes", str(axes)))
+        for _, _, initial, _ in LAYOUTS[layout]["constants"]
+    ]
+
+
+def constant_count(layout: str, axes: int) -> int:
+    """Count them; each is counted once for every axis."""
+    return len(LAYOUTS[layout]["constants"]) * axes
+
+
+def layout_of(text: str) -> str:
+    """Tell the layout of a block's table by what the table declares."""
+    if re.search(r"\bcPower0\b", text, re.IGNORECASE):
+        return "segments"
+    whole = re.search(r"\bcPosition\s*:\s*ARRAY\s*\[[^\]]*\]\s*OF\s*DINT\b", text, re.IGNORECASE)
+    return "counts" if whole else "samples"
+
+
+@cache
+def _due(layout: str, axes: int) -> list[Token]:
+    return _tokens(_program(layout, axes))
+
+
+def _program(layout: str, axes: int) -> str:
+    """Put the layout's parts in, and settle what the number of axes decides."""
+    array = f"ARRAY [1..{axes}] OF " if axes > 1 else ""
+    constants = LAYOUTS[layout]["constants"]
+    parts = LAYOUTS[layout] | {
+        "constants": "".join(map(_declaration, constants)),
+        "constant_count": str(constant_count(layout, axes)),
+        "checked_constant": _checked(constants, axes),
+        "ones": f"[{', '.join(['1.0'] * axes)}]" if axes > 1 else "1.0",
+        "switches": f"{array}BOOL",
+        "axes": str(axes),
+        "number": "DINT" if layout == "counts" else "LREAL",
+        "reals": f"{array}LREAL",
+        "real": "DINT_TO_LREAL({})" if layout == "counts" else "{}",
+        "row": "{} * cAxes + nAxis - 1" if axes > 1 else "{}",
+        "per_axis": "{} / cAxes" if axes > 1 else "{}",
+        "whole_numbers": f"{array}DINT",
+    }
+    text = _LINES.sub(lambda lines: parts[lines[1]], INTERFACE + BODY)
+    text = _PART.sub(lambda part: parts[part[1]].format(part[2]), text)
+    lines = text.replace("~", "[nAxis]" if axes > 1 else "").splitlines(keepends=True)
+    return "".join(line.replace("%", "", 1) for line in lines if axes > 1 or not line.startswith("%"))
+
+
+def _declaration(constant: tuple[str, str, str, str]) -> str:
+    name, type_, initial, comment = constant
+    return f"    {name} : {_DECLARED.get(type_, type_)} := {initial};{comment and f' (* {comment} *)'}\n"
+
+
+def _checked(constants: Sequence[tuple[str, str, str, str]], axes: int) -> str:
+    """Give the checksum's value in a row behind the table: each constant, for each axis."""
+    indent, count = " " * 12, len(constants)
+    lines = [f"{indent}CASE nCheckRow OF"]
+    if axes > 1:
+        lines = [
+            f"{indent}nAxis := nCheckRow / {count} + 1;",
+            f"{indent}CASE nCheckRow - (nAxis - 1) * {count} OF",
+        ]
+    for number, (name, type_, _, _) in enumerate(constants):
+        value = _CHECKED[type_.removesuffix("~")].format(name + "~" * type_.endswith("~"))
+        lines.append(f"{indent}    {number}: {value}")
+    return "\n".join([*lines, f"{indent}END_CASE;", ""])
+
+
+def _bare(text: str) -> str:
+    return "".join(text.split()).lower()
+
+
+def _tokens(text: str) -> list[Token]:
+    """Split program text; comments are left out, but their line ends counted."""
+    program = _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n") or " ", text)
+    tokens = []
+    line, counted = 1, 0
+    for piece in _TOKEN.finditer(program):
+        line += program.count("\n", counted, piece.start())
+        counted = piece.start()
+        tokens.append(Token(text=piece[0], line=line))
+    return tokens

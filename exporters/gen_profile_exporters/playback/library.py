@@ -1,0 +1,292 @@
+"""Many motions in one playback block: an input selects which one it plays.
+
+The block is that of a single motion (`structured_text`), with a handful of changes that can be undone: tables
+of all motions stand one after the other in the same arrays, everything else that is a motion's own becomes an
+array, and the statements look these up at the motion that is selected. So every motion keeps its literals and
+its own checksum, and what is known of the single block holds for the library.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import accumulate
+
+import attrs
+
+from gen_profile.errors import ExportError
+from gen_profile.motion.profile import SampledProfile
+from gen_profile_exporters.block_source import BlockSource, Variable
+from gen_profile_exporters.exporter import Target
+from gen_profile_exporters.playback.structured_text import (
+    axis_lines,
+    block_name,
+    initialiser,
+    plain,
+    read_block,
+    read_table,
+    table_checksum,
+)
+from gen_profile_exporters.playback.table import MOST_SAMPLES
+
+SCALARS = ("cLast", "cRows", "cChecks", "cPlayOn", "cSlope", "cSlopeRate", "cChecksum", "cLastSegment")
+PER_AXIS = ("cRoom", "cInverse", "cStopJerk", "cStart", "cTarget", "cLeastScale", "cMirrors", "cShifts")
+TABLES = ("cPosition", "cVelocity", "cAcceleration", *(f"cPower{power}" for power in range(6)))
+SEGMENTS = "cFirst"
+ROWS, FIRST_ROW, FIRST_SEGMENT = "cRows", "cFirstRow", "cFirstSegment"
+
+SELECTION = """\
+(* Another motion is taken over while none is played; its checksum then begins anew. *)
+IF (nState <> cWaiting) AND (nState <> cMoving) AND (nProfile <> nSelected)
+        AND (nProfile >= 0) AND (nProfile < cProfiles) THEN
+    nSelected := nProfile;
+    nCheckRow := 0;
+    nCheckColumn := 0;
+    fSum := 0.0;
+    bChecked := FALSE;
+    bLeft := FALSE;
+END_IF;
+
+"""
+REFUSAL = "    IF nProfile <> nSelected THEN nErrorId := 6; END_IF;\n"
+_LAST_REFUSAL = "THEN nErrorId := 1; END_IF;\n"  # after it comes ours: others mean nothing without a motion
+
+OUTPUTS = ("fPosition",)  # which begins at the start
+OWN = (*SCALARS, *PER_AXIS, *TABLES, SEGMENTS, *OUTPUTS)
+ADDED = ("nProfile", "nSelected", "cProfiles", FIRST_ROW, FIRST_SEGMENT)
+
+_SCALAR = re.compile(rf"\b({'|'.join((*SCALARS, *PER_AXIS))})\b(?!\[)")
+_AXIS = re.compile(rf"\b({'|'.join(PER_AXIS)})\[nAxis\]")
+_TABLE = re.compile(rf"\b({'|'.join(TABLES)})\[([^\[\]]*)\]")
+_SEGMENT = re.compile(rf"\b{SEGMENTS}\[([^\[\]]*)\]")
+
+_OFFSET = re.compile(rf"\b(\w+)\[(?:{FIRST_ROW}|{FIRST_SEGMENT})\[nSelected\] \+ ([^\[\]]*)\]")
+_WAIT = re.compile(r"(\d+) cycles after power-up")
+
+
+@attrs.frozen(kw_only=True)
+class LibraryEntry:
+    """A motion to put in.
+
+    Attributes
+    ----------
+    source : BlockSource
+        Its playback block.
+    label : str
+        What it is for, a few words.
+    """
+
+    source: BlockSource
+    label: str
+
+
+def library_source(entries: Sequence[LibraryEntry], target: Target) -> BlockSource:
+    """Write a block that plays any of several motions, which `nProfile` counts from 0.
+
+    Parameters
+    ----------
+    entries : sequence of LibraryEntry
+        One or more, for the same axes and cycle, in the same layout.
+    target : Target
+        Whose name is that of the library.
+
+    Raises
+    ------
+    ExportError
+        They differ in more than their motions, were altered, or are too much to compile.
+    """
+    sources = [entry.source for entry in entries]
+    for number, source in enumerate(sources):
+        if _common(source) != _common(sources[0]):
+            raise ExportError(
+                f"Profile {number} ({entries[number].label}) is for other axes, units, layouts or cycles "
+                "than the first one; put such profiles into libraries of their own."
+            )
+    rows = sum(map(_rows, sources))
+    if rows > MOST_SAMPLES:
+        raise ExportError(
+            f"The tables of all profiles have {rows} rows, and no more than {MOST_SAMPLES} were seen to "
+            "compile; split them into several libraries."
+        )
+    return _assembled(sources, _header(entries, target), block_name(target.name))
+
+
+def read_library(library: BlockSource, target: Target) -> tuple[SampledProfile, ...]:
+    """Work out what a library's block issues for each of its motions.
+
+    Each is taken out of the library as a block of its own, which must be one to the letter, with a checksum
+    that is right.
+
+    Raises
+    ------
+    ExportError
+        The block is no such library, or was altered.
+    """
+    arrays = {variable.name: variable.elements for variable in library.variables if variable.array}
+    try:
+        singles = [_single(library, arrays, number) for number in range(len(arrays[FIRST_ROW]))]
+    except (KeyError, ValueError, IndexError) as error:
+        raise ExportError("The block is no library of motions, or was altered; export it again.") from error
+    motions = tuple(read_block(single.text(), target) for single in singles)
+    if _program(_assembled(singles, library.header, library.name)) != _program(library):
+        raise ExportError(
+            "The block does not select its motions as it should: it was altered; export it again."
+        )
+    return motions
+
+
+def _program(source: BlockSource) -> tuple[object, ...]:
+    """Give what a block does, however its text is laid out."""
+    variables = {
+        (v.section, v.name, v.type, *(v.elements if v.array else [v.initial])) for v in source.variables
+    }
+    return variables, source.body.split()
+
+
+def _assembled(sources: Sequence[BlockSource], header: str, name: str) -> BlockSource:
+    """Put blocks together that differ in their motions only."""
+    merged = [_merged(same) for same in zip(*(source.variables for source in sources), strict=True)]
+    return BlockSource(
+        header=header,
+        name=name,
+        variables=(*merged, *_selector(sources)),
+        body=_selecting(sources[0].body),
+    )
+
+
+def _common(source: BlockSource) -> tuple[object, ...]:
+    """Give what is to be the same in all blocks of a library."""
+    return (
+        source.body,
+        *(
+            (variable.section, variable.name, variable.array[2] if variable.array else variable.type)
+            if variable.name in OWN
+            else variable
+            for variable in source.variables
+        ),
+    )
+
+
+def _rows(source: BlockSource) -> int:
+    """Count the rows of a motion's table."""
+    return next(int(variable.initial) for variable in source.variables if variable.name == ROWS)
+
+
+def _merged(same: Sequence[Variable]) -> Variable:
+    """Make one variable of those of the same name in all blocks."""
+    first = same[0]
+    if first.name not in OWN or first.name in OUTPUTS:
+        return first
+    values = [
+        text for variable in same for text in (variable.elements if variable.array else [variable.initial])
+    ]
+    return _array(first.name, first.array[2] if first.array else first.type, values, first.comment)
+
+
+def _array(name: str, type_: str, values: Sequence[str], comment: str = "") -> Variable:
+    return Variable(
+        section="VAR CONSTANT",
+        name=name,
+        type=f"ARRAY [0..{len(values) - 1}] OF {type_}",
+        initial=initialiser(values),
+        comment=comment,
+    )
+
+
+def _selector(sources: Sequence[BlockSource]) -> list[Variable]:
+    """Declare what selects a motion, and where its tables begin and end."""
+    last, rows = len(sources) - 1, [_rows(source) for source in sources]
+    added = [
+        Variable(section="VAR_INPUT", name="nProfile", type="DINT", comment=f"which motion, 0 to {last}"),
+        Variable(section="VAR", name="nSelected", type="DINT", comment="nProfile, once nothing moved"),
+        Variable(section="VAR CONSTANT", name="cProfiles", type="DINT", initial=str(len(sources))),
+        _array(FIRST_ROW, "DINT", _starts(rows)),
+    ]
+    segments = [len(v.elements) for source in sources for v in source.variables if v.name == SEGMENTS]
+    return [*added, _array(FIRST_SEGMENT, "DINT", _starts(segments))] if segments else added
+
+
+def _starts(lengths: Sequence[int]) -> list[str]:
+    return [str(start) for start in accumulate(lengths[:-1], initial=0)]
+
+
+def _selecting(body: str) -> str:
+    """Make the statements look up what is the selected motion's own."""
+    body = _SCALAR.sub(r"\1[nSelected]", body)
+    body = _AXIS.sub(r"\1[nSelected * cAxes + nAxis - 1]", body)
+    body = _TABLE.sub(rf"\1[{FIRST_ROW}[nSelected] + \2]", body)
+    body = _SEGMENT.sub(rf"{SEGMENTS}[{FIRST_SEGMENT}[nSelected] + \1]", body)
+    return SELECTION + body.replace(_LAST_REFUSAL, _LAST_REFUSAL + REFUSAL)
+
+
+def _single(library: BlockSource, arrays: Mapping[str, list[str]], number: int) -> BlockSource:
+    """Undo all that, for one motion."""
+    body = library.body.removeprefix(SELECTION).replace(_LAST_REFUSAL + REFUSAL, _LAST_REFUSAL)
+    body = _OFFSET.sub(r"\1[\2]", body)
+    body = body.replace("[nSelected * cAxes + nAxis - 1]", "[nAxis]").replace("[nSelected]", "")
+    axes = len(arrays["cStart"]) // len(arrays[FIRST_ROW])
+    rows, first_row = int(arrays[ROWS][number]), int(arrays[FIRST_ROW][number])
+    parts = {name: slice(number, number + 1) for name in SCALARS}
+    parts |= {name: slice(number * axes, (number + 1) * axes) for name in PER_AXIS}
+    parts |= {name: slice(first_row, first_row + rows) for name in TABLES}
+    if SEGMENTS in arrays:
+        first_segment = int(arrays[FIRST_SEGMENT][number])
+        parts[SEGMENTS] = slice(first_segment, first_segment + rows // axes)
+    variables = [
+        _part(variable, arrays, parts, axes) for variable in library.variables if variable.name not in ADDED
+    ]
+    return attrs.evolve(library, variables=tuple(variables), body=body)
+
+
+def _part(
+    variable: Variable, arrays: Mapping[str, list[str]], parts: Mapping[str, slice], axes: int
+) -> Variable:
+    """Declare a variable as the block of a single motion does."""
+    source = "cStart" if variable.name in OUTPUTS else variable.name
+    if source not in parts:
+        return variable
+    values, type_ = arrays[source][parts[source]], variable.array[2] if variable.array else variable.type
+    if variable.name in SCALARS or (axes == 1 and variable.name in (*PER_AXIS, *OUTPUTS)):
+        return attrs.evolve(variable, type=type_, initial=values[0])
+    low = 1 if variable.name in (*PER_AXIS, *OUTPUTS) else 0
+    return attrs.evolve(
+        variable,
+        type=f"ARRAY [{low}..{len(values) - 1 + low}] OF {type_}",
+        initial=f"[{', '.join(values)}]",
+    )
+
+
+def _header(entries: Sequence[LibraryEntry], target: Target) -> str:
+    """Describe the library; how to use it is what the header of a single motion says."""
+    headers = [entry.source.header for entry in entries]
+    _, start, use = headers[0].partition("    Call the block once")
+    waits = [int(found) for header in headers for found in _WAIT.findall(header)]
+    use = _WAIT.sub(f"{max(waits, default=0)} cycles after power-up or another nProfile", use)
+    use = use.replace("the peaks above and to the stop jerk", "the motion's own peaks and stop jerk")
+    use = use.removesuffix("\n").removesuffix("*)")
+    listed = [line for number, entry in enumerate(entries) for line in _listed(number, entry, target)]
+    lines = [
+        "(*",
+        f"    {plain(target.name)}: playback function block for {len(entries)} motions,",
+        "    IEC 61131-3 Structured Text, from gen-profile.",
+        "",
+        "    nProfile selects the motion; another one is taken over while none is played.",
+        "",
+        f"{start}{use}              6 nProfile counts no motion",
+        "",
+        "    nProfile  checksum  motion",
+        *listed,
+        "*)",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _listed(number: int, entry: LibraryEntry, target: Target) -> list[str]:
+    """Tell what a motion is for, how long it takes, and what it asks of each axis."""
+    table = read_table(entry.source.text(), target)
+    duration = f"{table.last * table.cycle_time:g} s, {table.last} cycles"
+    return [
+        f"    {number:6d}  {table_checksum(table):>10}  {plain(entry.label)}: {duration}",
+        *(f"          {line}" for lines in axis_lines(table) for line in lines.splitlines()),
+    ]

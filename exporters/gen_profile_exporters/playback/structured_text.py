@@ -1,0 +1,363 @@
+"""Playback function block in IEC 61131-3 Structured Text, for any controller that takes this language.
+
+The block (`gen_profile_exporters.playback.template`) holds the motion as a table, by default as quintic
+segments, and issues position, velocity and acceleration every cycle of its task. It keeps to what independent
+compilers have in common: ASCII, ``(* *)`` comments, one-dimensional arrays in ``VAR CONSTANT``, literals such
+as ``-1.5E-7`` that a REAL could hold.
+Each literal reads back to the same double, and the block counts cycles instead of adding up times.
+
+- A rising edge of ``bExecute`` starts, if the task's cycle, the actual position and the checksum of all
+  constants are right. Dropping it does not stop the motion; at the end the target is held until it drops.
+- ``bHold``, ``bAbort`` and ``rOverride`` change the rate at which the path is played: all axes stay on it,
+  and keep to the motion's own peaks of velocity and acceleration (`path_limits`).
+- Where there are several axes, inputs and outputs are arrays, in the order of the machine's axes.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from gen_profile.errors import ExportError
+from gen_profile.motion.profile import Array, Profile, SampledProfile
+from gen_profile.units import AxisScale
+from gen_profile_exporters.block_source import BlockSource, take_apart
+from gen_profile_exporters.exporter import File, Target
+from gen_profile_exporters.machine_variants import AxisVariants
+from gen_profile_exporters.playback import block as playback_block
+from gen_profile_exporters.playback.block import Token
+from gen_profile_exporters.playback.quintic_segments import ACCELERATION_ERROR, POSITION_ERROR
+from gen_profile_exporters.playback.table import PlaybackTable, counted_axes, tabulate
+from gen_profile_exporters.playback.table_checksum import checksum
+from gen_profile_exporters.setpoints import plausible_cycle_time
+
+START_TOLERANCE = 1e-3  # m (or rad), the default
+VALUES_PER_LINE = 4
+SEGMENT_COLUMNS = tuple(f"power{power}" for power in range(6))
+SAMPLE_COLUMNS = ("position", "velocity", "acceleration")
+ROUNDING = 1e-12  # relative, of an evaluated quintic
+MOST_CYCLES = 10_000_000  # of a motion that is read
+
+_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_SWITCH = {"FALSE": "0", "TRUE": "1"}
+_NUMBER = re.compile(r"\s*[-+]?\d+(\.\d+)?([eE][-+]?\d+)?\s*", re.ASCII)
+
+
+def encode(profile: Profile, target: Target) -> tuple[File, ...]:
+    """Write the block with the motion, on the grid of the target's cycle time.
+
+    Raises
+    ------
+    ExportError
+        A position does not fit the axis's counts, or the table is too long to compile.
+    """
+    return (File(filename=f"{target.name}.st", content=block_text(profile, target).encode("ascii")),)
+
+
+def replay(content: bytes, target: Target) -> SampledProfile:
+    """Work out what the block issues, after making sure that it is one and that its checksum is right.
+
+    Raises
+    ------
+    ExportError
+        The text is no such block, was altered or cut off, or is for other axes than the target's.
+    """
+    return read_block(content.decode("latin-1"), target)
+
+
+def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
+    """Write any block."""
+    return (File(filename=f"{target.name}.st", content=source.text().encode("ascii")),)
+
+
+def unwrap(content: bytes, target: Target) -> BlockSource:
+    """Read a block.
+
+    Raises
+    ------
+    ExportError
+        The text is none.
+    """
+    return take_apart(content.decode("latin-1"))
+
+
+def block_text(profile: Profile, target: Target) -> str:
+    """Write the block, see `encode`."""
+    table = tabulate(profile, target)
+    values = _values(table) | _header_values(table, target)
+    return playback_block.fill(values, table.layout, len(table.axes))
+
+
+def read_block(text: str, target: Target) -> SampledProfile:
+    """Work out what a block issues, see `replay`."""
+    return read_table(text, target).motion()
+
+
+def read_table(text: str, target: Target) -> PlaybackTable:
+    """Read a block's table; raises as `replay` does."""
+    layout = playback_block.layout_of(text)
+    found = playback_block.match(text, layout, len(target.axes))
+    if not _NAME.fullmatch(found["block"].text):
+        raise ExportError(f"line {found['block'].line}: {found['block'].text!r} stands where a name is due.")
+    _array(found["start_tolerance"])
+    table = _table(found, layout, target)
+    _verify(found, table)
+    return table
+
+
+def block_name(name: str) -> str:
+    """Name the block after the motion: letters, digits and single underscores, as every compiler takes."""
+    return f"FB_{re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_') or 'motion'}"
+
+
+def literal(value: float) -> str:
+    """Shortest LREAL literal that reads back to the same double, such as ``-0.25`` or ``1.5E-7``."""
+    mantissa, _, exponent = repr(float(value)).partition("e")
+    if not exponent:
+        return mantissa
+    return f"{mantissa}{'' if '.' in mantissa else '.0'}E{int(exponent):+d}"
+
+
+def plain(name: str) -> str:
+    """Text that can neither end a comment nor leave ASCII."""
+    return re.sub(r"[^A-Za-z0-9._ ,+\[\]-]", "_", name)
+
+
+def _values(table: PlaybackTable) -> dict[str, str]:
+    """Fill every hole of the program that follows from the table."""
+    return _constants(table) | {"checksum": str(table_checksum(table))}
+
+
+def table_checksum(table: PlaybackTable) -> int:
+    """Checksum that a block works out: of the table, then of all other constants, axis by axis."""
+    constants = playback_block.constants(_constants(table), table.layout, len(table.axes))
+    numbers = np.array([_array(Token(text, 0)) * np.ones(len(table.axes)) for text in constants])
+    return checksum(np.append(table.values(), numbers.T))
+
+
+def _constants(table: PlaybackTable) -> dict[str, str]:
+    limits = table.limits()
+    write = _whole_numbers if table.layout == "counts" else _literals
+    names = SAMPLE_COLUMNS if table.first is None else SEGMENT_COLUMNS
+    values = {name: write(column.ravel()) for name, column in zip(names, table.columns, strict=True)}
+    rows = table.columns[0].size
+    if table.first is not None:
+        values |= {
+            "last_segment": str(len(table.first) - 1),
+            "segments": f"[0..{len(table.first) - 1}]",
+            "first": _whole_numbers(table.first),
+        }
+    return values | {
+        "last": str(table.last),
+        "row_count": str(rows),
+        "checks": str(table.checks()),
+        "play_on": str(table.play_on),
+        "rows": f"[0..{rows - 1}]",
+        "cycle_time": literal(table.cycle_time),
+        "slope": literal(limits.slope),
+        "slope_rate": literal(limits.slope_rate),
+        "room": _per_axis(limits.room),
+        "inverse": _per_axis(limits.inverse_velocity),
+        "stop_jerk": _per_axis(limits.jerk),
+        "start": _per_axis(table.start),
+        "target": _per_axis(table.target),
+        "least_scale": _per_axis(np.array([variant.least_scale for variant in table.variants])),
+        "mirrors": _switches([variant.mirror for variant in table.variants]),
+        "shifts": _switches([variant.shift for variant in table.variants]),
+    }
+
+
+def _header_values(table: PlaybackTable, target: Target) -> dict[str, str]:
+    units = [axis.unit for axis in table.axes]
+    size = table.columns.size * (4 if table.layout == "counts" else 8)
+    return {
+        "name": plain(target.name),
+        "block": block_name(target.name),
+        "layout": table.layout if table.first is None else f"{len(table.first)} quintic segments",
+        "accuracy": "Every cycle is tabulated."
+        if table.first is None
+        else f"Fit error at the cycles below\n    {POSITION_ERROR:g} m and {ACCELERATION_ERROR:g} m/s2.",
+        "samples": str(table.last),
+        "cycle": repr(table.cycle_time),
+        "kilobytes": f"{size / 1000:.3g}",
+        "check_cycles": str(-(-_checked(table) // table.checks())),
+        "axis_lines": "\n".join(axis_lines(table)),
+        "units": units[0] if len(set(units)) == 1 else ", ".join(units),
+        "sha256": table.motion().payload_hash(),
+        "start_tolerance": _per_axis(np.array([START_TOLERANCE * abs(axis.factor) for axis in table.axes])),
+    }
+
+
+def _checked(table: PlaybackTable) -> int:
+    """Count what enters the checksum."""
+    return len(table.values()) + playback_block.constant_count(table.layout, len(table.axes))
+
+
+def axis_lines(table: PlaybackTable) -> list[str]:
+    """Tell for each axis from where to where it moves, its peaks, and what the machine allows."""
+    velocity, acceleration, _ = table.peaks()
+    jerk = table.limits().jerk
+    return [
+        f"    Axis {number + 1}, {plain(axis.name)}: {table.start[number]:g} to {table.target[number]:g} "
+        f"{axis.unit}, peaks {velocity[number]:.4g} {axis.unit}/s and {acceleration[number]:.4g} "
+        f"{axis.unit}/s2,\n"
+        f"        stop jerk {jerk[number]:.4g} {axis.unit}/s3; {_allowed(table.variants[number])}."
+        for number, axis in enumerate(table.axes)
+    ]
+
+
+def _allowed(variants: AxisVariants) -> str:
+    """Say which variants of the motion the machine allows."""
+    allowed = [f"fScale from {variants.least_scale:g}"] if variants.least_scale < 1.0 else []
+    allowed += ["bMirror"] * variants.mirror + ["fStartOffset"] * variants.shift
+    return f"allows {', '.join(allowed)}" if allowed else "allows no variants"
+
+
+def _table(found: Mapping[str, Token], layout: str, target: Target) -> PlaybackTable:
+    """Read the table; too few values would compile all the same, and leave zeros."""
+    axes = counted_axes(target, layout)
+    names = SEGMENT_COLUMNS if layout == "segments" else SAMPLE_COLUMNS
+    columns = [_array(found[name]) for name in names]
+    rows = len(columns[0])
+    first = _array(found["first"]) if layout == "segments" else None
+    lengths = [(found[name], len(column), rows) for name, column in zip(names, columns, strict=True)]
+    if first is not None:
+        lengths.append((found["first"], len(first) * len(axes), rows))
+    for token, length, due in lengths:
+        if length != due or due % len(axes) or found["rows"].text != f"[0..{due - 1}]":
+            raise ExportError(
+                f"line {token.line}: {length} values in an array {found['rows'].text[:40]} for {len(axes)} "
+                "axes; values are missing or too many, export the block again."
+            )
+    cycle, last = found["cycle_time"], _number(found["last"].text, found["last"].line)
+    cycles = rows // len(axes) - 1 if first is None else last
+    if last != cycles or not 1 <= last <= MOST_CYCLES or (first is not None and not _rise(first, last)):
+        raise ExportError(
+            f"line {found['last'].line}: cLast = {last:g} does not belong to the table; "
+            "export the block again."
+        )
+    columns_by_axis = np.array(columns).reshape(len(names), -1, len(axes))
+    return PlaybackTable(
+        layout=layout,
+        cycle_time=plausible_cycle_time(_number(cycle.text, cycle.line), cycle.line),
+        axes=axes,
+        first=first,
+        columns=columns_by_axis,
+        last=int(last),
+        target=columns_by_axis[0, -1] if first is None else _end(found["target"], axes),
+        play_on=_within(found["play_on"], last),
+        variants=_variants(found, axes),
+    )
+
+
+def _within(token: Token, last: float) -> int:
+    number = _number(token.text, token.line)
+    if not (0.0 <= number <= last and number.is_integer()):
+        raise ExportError(
+            f"line {token.line}: {token.text[:40]} is no cycle of the motion; export the block again."
+        )
+    return int(number)
+
+
+def _variants(found: Mapping[str, Token], axes: Sequence[AxisScale]) -> tuple[AxisVariants, ...]:
+    columns = [_array(found[name]) for name in ("least_scale", "mirrors", "shifts")]
+    if any(len(column) != len(axes) for column in columns):
+        raise ExportError(
+            f"line {found['least_scale'].line}: {len(axes)} axes, but values for another number of them; "
+            "export the block again."
+        )
+    return tuple(
+        AxisVariants(least_scale=float(scale), mirror=bool(mirror), shift=bool(shift))
+        for scale, mirror, shift in zip(*columns, strict=True)
+    )
+
+
+def _end(token: Token, axes: Sequence[AxisScale]) -> Array:
+    target = _array(token)
+    if len(target) != len(axes):
+        raise ExportError(
+            f"line {token.line}: {len(target)} targets for {len(axes)} axes; export the block again."
+        )
+    return target
+
+
+def _rise(first: Array, last: float) -> bool:
+    """Whether segments begin at whole cycles, one after the other, before the end."""
+    cycles = np.append(first, last)
+    return bool(first[0] == 0.0 and (cycles == np.floor(cycles)).all() and (np.diff(cycles) >= 1.0).all())
+
+
+def _verify(found: Mapping[str, Token], table: PlaybackTable) -> None:
+    """Refuse a block that would refuse to start, or whose limits are those of another motion."""
+    due, written = _values(table), found["checksum"]
+    if written.text != due["checksum"]:
+        raise ExportError(
+            f"line {written.line}: the checksum of the constants is {due['checksum']}, not "
+            f"{written.text[:40]}: one was altered, and the block would refuse to start (nErrorId 5); "
+            "export it again."
+        )
+    for name, token in found.items():
+        if name in due and _numbers(token) != _numbers(Token(due[name], 0)):
+            raise ExportError(
+                f"line {token.line}: {token.text[:40]} stands where the table asks for {due[name][:40]}; "
+                "export the block again."
+            )
+    missed = np.abs(table.arrival() - table.target)
+    factor = np.abs([axis.factor for axis in table.axes])
+    if (missed > POSITION_ERROR * factor + ROUNDING * np.abs(table.target)).any():
+        raise ExportError(
+            f"line {found['target'].line}: cTarget = {found['target'].text[:40]} is not where the table "
+            "ends; export the block again."
+        )
+
+
+def _per_axis(values: Array) -> str:
+    texts = [literal(value) for value in values.tolist()]
+    return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
+
+
+def _switches(values: Sequence[bool]) -> str:
+    texts = [str(value).upper() for value in values]
+    return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
+
+
+def _literals(values: Array) -> str:
+    return initialiser([literal(value) for value in values.tolist()])
+
+
+def _whole_numbers(values: Array) -> str:
+    return initialiser([str(int(value)) for value in values.tolist()])
+
+
+def initialiser(texts: Sequence[str]) -> str:
+    """Write an array's initial values, a few in a line."""
+    rows = [", ".join(texts[k : k + VALUES_PER_LINE]) for k in range(0, len(texts), VALUES_PER_LINE)]
+    return "[\n        " + ",\n        ".join(rows) + "\n    ]"
+
+
+def _array(token: Token) -> Array:
+    """Read an initialiser, or a single number."""
+    numbers = []
+    line = token.line
+    for text in token.text.strip("[]").split(","):
+        line += text.rstrip().count("\n")
+        numbers.append(_number(text, line))
+    return np.array(numbers)
+
+
+def _numbers(token: Token) -> list[float] | str:
+    """Compare by value where it is numbers, else by text."""
+    if token.text.startswith("[0.."):
+        return token.text.upper()
+    return [float(number) for number in _array(token).tolist()]
+
+
+def _number(text: str, line: int) -> float:
+    text = _SWITCH.get(text.strip().upper(), text)
+    number = float(text) if _NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(number):
+        raise ExportError(f"line {line}: {text.strip()[:40]!r} is no finite number; export the block again.")
+    return number

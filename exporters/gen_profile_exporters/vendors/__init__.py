@@ -1,0 +1,1 @@
+"""The playback block, or the motion as a cam, in the formats of vendors' engineering tools."""

@@ -1,0 +1,176 @@
+"""TIA Portal: the playback block as an external source in SCL, a wrapper, and the motion as points of a cam.
+
+SCL differs from the portable text: names of the block's own are marked by ``#``, arrays cannot be constants
+and so stand among the static variables. Replay undoes that and reads the rest.
+The wrapper calls ``MC_MOTIONINPOSITION`` of the S7-1500T. The data block holds an array of
+``TO_Cam_Struct_PointData`` per axis, to be copied into a TO_Cam (up to 1000 points) or TO_Cam_10k, whose
+spline through points at a regular distance keeps within the error stated.
+"""
+
+from __future__ import annotations
+
+import re
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import ExportError
+from gen_profile.motion.profile import Profile, SampledProfile, sample
+from gen_profile_exporters.block_source import BlockSource, Variable, ordered, take_apart
+from gen_profile_exporters.exporter import File, Target
+from gen_profile_exporters.playback.axis_wrapper import SIEMENS, axis_wrapper
+from gen_profile_exporters.playback.block import layout_of, variable_names
+from gen_profile_exporters.playback.structured_text import block_text, literal, read_block
+from gen_profile_exporters.setpoints import axis_table
+from gen_profile_exporters.vendors.cam_points import spline_cycles, spline_error
+
+MOST_BYTES = 64_000  # of a data block that is not optimised
+MOST_POINTS = 10_000  # TO_Cam_10k
+POINT_ERROR = 1e-6  # m (or rad)
+BYTES = {"LREAL": 8, "DINT": 4}
+
+_BLOCK = re.compile(
+    r'((?:\(\*(?:(?!\*\)).)*\*\)\s*)?)FUNCTION_BLOCK\s+"(\w+)"\s*\{[^}]*\}\s*VERSION\s*:\s*[\d.]+(.*?)\bBEGIN\b(.*?)END_FUNCTION_BLOCK',
+    re.DOTALL,
+)
+_WORD = re.compile(r"[()]|(?<![.#\w])[A-Za-z]\w*(\s*:=)?")
+
+
+def encode(profile: Profile, target: Target) -> tuple[File, ...]:
+    """Write the source with block and wrapper, and the one with the points.
+
+    Raises
+    ------
+    ExportError
+        As for Structured Text; the table is larger than a data block, or the cam needs too many points.
+    """
+    source = take_apart(block_text(profile, target))
+    blocks = wrap(source, target)
+    cams = _cams(source.name, profile, target)
+    return (*blocks, File(filename=f"{target.name}_cam.scl", content=cams.encode("ascii")))
+
+
+def replay(content: bytes, target: Target) -> SampledProfile:
+    """Work out what the first block issues.
+
+    Raises
+    ------
+    ExportError
+        The text is no such block, or it was altered.
+    """
+    return read_block(unwrap(content, target).text(), target)
+
+
+def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
+    """Write the source with any playback block, and its wrapper.
+
+    Raises
+    ------
+    ExportError
+        The tables are larger than a data block.
+    """
+    size = sum(_bytes(variable) for variable in source.variables)
+    if size > MOST_BYTES:
+        raise ExportError(
+            f"export.plc_layout: the table takes {size / 1000:.1f} kB, a data block holds "
+            f"{MOST_BYTES / 1000:g} kB; "
+            'take "segments", a longer export.cycle_time, or fewer motions in a library.'
+        )
+    wrapper = axis_wrapper(source, len(target.axes), SIEMENS)
+    text = "\n".join([_scl(source), _scl(wrapper)])
+    return (File(filename=f"{target.name}.scl", content=text.encode("ascii")),)
+
+
+def unwrap(content: bytes, target: Target) -> BlockSource:
+    """Read the first block, and turn it back into portable text.
+
+    Raises
+    ------
+    ExportError
+        There is none.
+    """
+    text = content.decode("latin-1")
+    found = _BLOCK.search(text)
+    if found is None:
+        raise ExportError("There is no SCL block of this export; export it again.")
+    header, name, declarations, body = found.groups()
+    portable = _unmarked(body)
+    source = take_apart(
+        f"{header}FUNCTION_BLOCK {name}\n{declarations.lstrip()}\n{portable.lstrip()}END_FUNCTION_BLOCK\n"
+    )
+    arrays_back = [
+        attrs.evolve(variable, section="VAR CONSTANT") if _is_table(variable) else variable
+        for variable in source.variables
+    ]
+    names = variable_names(layout_of(text), len(target.axes))
+    return ordered(attrs.evolve(source, variables=tuple(arrays_back)), names)
+
+
+def _scl(source: BlockSource) -> str:
+    """Turn portable text into SCL."""
+    variables = tuple(
+        attrs.evolve(variable, section="VAR") if _is_table(variable) else variable
+        for variable in source.variables
+    )
+    declaration = attrs.evolve(source, variables=variables, name=f'"{source.name}"').declaration()
+    first, rest = declaration.split("\n", 1)
+    body = _marked(source.body, {variable.name for variable in source.variables})
+    return (
+        f"{source.header}{first}\n{{ S7_Optimized_Access := 'TRUE' }}\nVERSION : 0.1\n"
+        f"{_quoted(rest)}\nBEGIN\n{body}END_FUNCTION_BLOCK\n"
+    )
+
+
+def _quoted(declarations: str) -> str:
+    """Quote the names of other blocks used as types."""
+    return re.sub(r": (FB_\w+);", r': "\1";', declarations)
+
+
+def _marked(body: str, own: set[str]) -> str:
+    """Mark the block's own names; before ``:=`` in a call they are those of the called block's parameters."""
+    depth = 0
+
+    def mark(word: re.Match[str]) -> str:
+        nonlocal depth
+        depth += {"(": 1, ")": -1}.get(word[0], 0)
+        name = word[0].split(":")[0].strip()
+        return f"#{word[0]}" if name in own and not (word[1] and depth) else word[0]
+
+    return _WORD.sub(mark, body)
+
+
+def _unmarked(body: str) -> str:
+    """Take the marks off."""
+    return body.replace("#", "")
+
+
+def _is_table(variable: Variable) -> bool:
+    return variable.array is not None and variable.name.startswith("c")
+
+
+def _bytes(variable: Variable) -> int:
+    if variable.array is None:
+        return BYTES.get(variable.type, 2)
+    lower, upper, type_ = variable.array
+    return (int(upper) - int(lower) + 1) * BYTES.get(type_, 2)
+
+
+def _cams(block: str, profile: Profile, target: Target) -> str:
+    motion = sample(profile, target.cycle_time)
+    cycles = spline_cycles(motion, MOST_POINTS, POINT_ERROR, "siemens-scl, TO_Cam", single=False)
+    positions = axis_table(motion, target.axes).position[cycles]
+    names = [f"Point{number + 1 if len(target.axes) > 1 else ''}" for number in range(len(target.axes))]
+    arrays = "\n".join(f"    {name} : Array[1..{len(cycles)}] of TO_Cam_Struct_PointData;" for name in names)
+    times = list(map(literal, motion.times[cycles].tolist()))
+    values = "\n".join(
+        f"    {name}[{index}].x := {time};\n    {name}[{index}].y := {literal(position)};"
+        for name, column in zip(names, np.asarray(positions).T.tolist(), strict=True)
+        for index, (time, position) in enumerate(zip(times, column, strict=True), 1)
+    )
+    error = spline_error(motion, cycles, single=False)
+    return (
+        f"(* {block}: points of a time cam, x in s. A cubic spline through them that stands still at both\n"
+        f"   ends is within {error:.2g} m of the motion at every cycle. *)\n"
+        f"DATA_BLOCK \"{block.replace('FB_', 'DB_', 1)}_Cam\"\n{{ S7_Optimized_Access := 'TRUE' }}\n"
+        f"VERSION : 0.1\nNON_RETAIN\nSTRUCT\n{arrays}\nEND_STRUCT;\nBEGIN\n{values}\nEND_DATA_BLOCK\n"
+    )

@@ -1,0 +1,110 @@
+"""TwinCAT 3: the playback block as a .TcPOU, a wrapper for an NC axis, and the motion as cam points.
+
+The wrapper streams setpoints with ``MC_ExtSetPointGenEnable`` and ``MC_ExtSetPointGenFeed`` (Tc2_MC2). The
+global variable list holds ``MC_MotionFunctionPoint`` (TF5050), the quintic between two points being
+``MOTIONFUNCTYPE_POLYNOM5_MM``, for playing the motion as a cam over the time in s.
+"""
+
+from __future__ import annotations
+
+from uuid import NAMESPACE_URL, uuid5
+
+from lxml import etree
+
+from gen_profile.errors import ExportError
+from gen_profile.motion.profile import Profile, SampledProfile
+from gen_profile_exporters.block_source import BlockSource, take_apart
+from gen_profile_exporters.exporter import File, Target
+from gen_profile_exporters.playback.axis_wrapper import TWINCAT, axis_wrapper
+from gen_profile_exporters.playback.structured_text import block_name, block_text, literal, read_block
+from gen_profile_exporters.vendors.cam_points import QuinticPoints, quintic_points
+from gen_profile_exporters.vendors.xml_documents import child, parse_xml, write_xml
+
+
+def encode(profile: Profile, target: Target) -> tuple[File, ...]:
+    """Write the block, its wrapper and the points.
+
+    Raises
+    ------
+    ExportError
+        As for Structured Text.
+    """
+    source = take_apart(block_text(profile, target))
+    points = quintic_points(profile, target)
+    name = f"GVL_{block_name(target.name).removeprefix('FB_')}"
+    return (*wrap(source, target), _variable_list(name, points))
+
+
+def replay(content: bytes, target: Target) -> SampledProfile:
+    """Work out what the block issues.
+
+    Raises
+    ------
+    ExportError
+        The document is no such block, or it was altered.
+    """
+    return read_block(unwrap(content, target).text(), target)
+
+
+def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
+    """Write any playback block, and its wrapper."""
+    return (_pou(source), _pou(axis_wrapper(source, len(target.axes), TWINCAT)))
+
+
+def unwrap(content: bytes, target: Target) -> BlockSource:
+    """Read a block.
+
+    Raises
+    ------
+    ExportError
+        The document is none.
+    """
+    root = parse_xml(content)
+    if root.tag != "TcPlcObject":
+        raise ExportError("The document is no TcPlcObject; export it again.")
+    pou = child(root, "POU")
+    declaration, body = child(pou, "Declaration").text, child(pou, "Implementation/ST").text
+    return take_apart(f"{declaration or ''}\n{body or ''}END_FUNCTION_BLOCK\n")
+
+
+def _pou(source: BlockSource) -> File:
+    root, pou = _object("POU", source.name)
+    pou.set("SpecialFunc", "None")
+    etree.SubElement(pou, "Declaration").text = etree.CDATA(source.header + source.declaration())
+    implementation = etree.SubElement(pou, "Implementation")
+    etree.SubElement(implementation, "ST").text = etree.CDATA(source.body)
+    return File(filename=f"{source.name}.TcPOU", content=write_xml(root))
+
+
+def _variable_list(name: str, points: QuinticPoints) -> File:
+    axes = range(points.position.shape[1])
+    arrays = [_points(f"aCam{number + 1 if len(axes) > 1 else ''}", points, number) for number in axes]
+    text = "\n".join(["{attribute 'qualified_only'}", "VAR_GLOBAL CONSTANT", *arrays, "END_VAR", ""])
+    root, element = _object("GVL", name)
+    etree.SubElement(element, "Declaration").text = etree.CDATA(text)
+    return File(filename=f"{name}.TcGVL", content=write_xml(root))
+
+
+def _points(name: str, points: QuinticPoints, axis: int) -> str:
+    columns = (points.time, *(q[:, axis] for q in (points.position, points.velocity, points.acceleration)))
+    last = len(points.time)
+    rows = []
+    for index, values in enumerate(
+        zip(*(map(literal, column.tolist()) for column in columns), strict=True), 1
+    ):
+        time, position, velocity, acceleration = values
+        rows.append(
+            f"        (PointIndex := {index}, FunctionType := MOTIONFUNCTYPE_POLYNOM5_MM, "
+            f"PointType := MOTIONPOINTTYPE_MOTION, RelIndexNextPoint := {int(index < last)}, "
+            f"MasterPos := {time}, SlavePos := {position}, "
+            f"SlaveVelo := {velocity}, SlaveAcc := {acceleration})"
+        )
+    body = ",\n".join(rows)
+    return f"    {name} : ARRAY [1..{last}] OF MC_MotionFunctionPoint := [\n{body}\n    ];"
+
+
+def _object(kind: str, name: str) -> tuple[etree._Element, etree._Element]:
+    """Begin a document; the identifier follows from the name, so that exporting again replaces the object."""
+    root = etree.Element("TcPlcObject", {"Version": "1.1.0.1", "ProductVersion": "3.1.4024.0"})
+    identifier = uuid5(NAMESPACE_URL, f"gen-profile:{kind}:{name}")
+    return root, etree.SubElement(root, kind, {"Name": name, "Id": f"{{{identifier}}}"})

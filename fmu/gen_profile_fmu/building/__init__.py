@@ -1,0 +1,1 @@
+"""Binaries for every platform, compiled once, and whole FMUs made of them."""

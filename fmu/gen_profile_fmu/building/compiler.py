@@ -1,0 +1,131 @@
+"""The C compiler that makes an FMU's binary: Zig's from PyPI, or the one that the environment names."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shlex
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from platform import machine
+from tempfile import TemporaryDirectory
+
+import attrs
+
+from gen_profile.errors import CosimulationError
+from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
+
+ENVIRONMENT_VARIABLE = "GEN_PROFILE_CC"
+FLAGS = (
+    "-std=c99",
+    "-O2",
+    "-ffp-contract=off",  # fused multiply-add would make results depend on the processor
+    "-fno-math-errno",  # sine and cosine of an angle in one call, with the same bits: a third of the time
+    *("-fPIC", "-fvisibility=hidden", "-shared"),
+)
+# names as they are in a shared library; a library of several FMUs linked statically has prefixed ones
+DEFINITIONS = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
+
+
+@attrs.frozen(kw_only=True)
+class Compiler:
+    """A C compiler and all of its options.
+
+    Attributes
+    ----------
+    command : tuple of str
+        Program and options, without files.
+    identity : str
+        Names version and options: the same sources and identity give the same binary.
+    """
+
+    command: tuple[str, ...]
+    identity: str
+
+
+def find_compiler(platform: str | None = None) -> Compiler:
+    """Choose the compiler: Zig's or, for this computer, `GEN_PROFILE_CC` where that is set.
+
+    Parameters
+    ----------
+    platform : str, optional
+        One of `PLATFORMS`; this computer's if not given.
+
+    Raises
+    ------
+    CosimulationError
+        When there is none, or the one named does not run.
+    """
+    named = os.environ.get(ENVIRONMENT_VARIABLE, "").strip()
+    if named and platform is None:
+        return _named_compiler(named)
+    return _zig_compiler(PLATFORMS[platform or host_platform()].target)
+
+
+def _named_compiler(text: str) -> Compiler:
+    command = (*shlex.split(text), *FLAGS, *DEFINITIONS)
+    reported = _run((command[0], "--version"), folder=None, environment=None)
+    return Compiler(command=command, identity="\n".join((text, *FLAGS, sys.platform, machine(), reported)))
+
+
+def _zig_compiler(target: str) -> Compiler:
+    spec = importlib.util.find_spec("ziglang")
+    if spec is None or not spec.submodule_search_locations:
+        raise CosimulationError(
+            "There is no compiler for the plant's FMU. Install the package ziglang, "
+            f"or name a C compiler in the environment variable {ENVIRONMENT_VARIABLE}."
+        )
+    program = Path(spec.submodule_search_locations[0]) / ("zig.exe" if sys.platform == "win32" else "zig")
+    options = ("-target", target, *FLAGS, *DEFINITIONS, "-s")
+    return Compiler(
+        command=(str(program), "cc", *options), identity="\n".join(("ziglang", version("ziglang"), *options))
+    )
+
+
+def compile_library(compiler: Compiler, folder: Path, source: str, output: str, zig_cache: Path) -> None:
+    """Compile a C file of a folder to a shared library beside it.
+
+    Parameters
+    ----------
+    compiler : Compiler
+    folder : Path
+        Files are named relative to it, so that no path of this computer gets into the library.
+    source, output : str
+        File names of the C file and the library.
+    zig_cache : Path
+        Where Zig keeps the parts of a C library that it has built.
+
+    Raises
+    ------
+    CosimulationError
+        With the compiler's words.
+    """
+    # old Zigs at work side by side take each other's object files from a shared local cache
+    with TemporaryDirectory(prefix="zig-") as local_cache:
+        environment = {
+            **os.environ,
+            "ZIG_GLOBAL_CACHE_DIR": str(zig_cache),
+            "ZIG_LOCAL_CACHE_DIR": local_cache,
+        }
+        _run((*compiler.command, "-I.", "-o", output, source, "-lm"), folder=folder, environment=environment)
+
+
+def _run(command: tuple[str, ...], folder: Path | None, environment: dict[str, str] | None) -> str:
+    try:
+        done = subprocess.run(
+            command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, check=False
+        )
+    except OSError as error:
+        raise CosimulationError(
+            f"The C compiler {command[0]} does not run: {error.strerror}. "
+            f"Reinstall ziglang, or name another in the environment variable {ENVIRONMENT_VARIABLE}."
+        ) from error
+    words = (done.stdout + done.stderr).decode("utf-8", errors="replace").strip()
+    if done.returncode != 0:
+        raise CosimulationError(
+            f"The C compiler {command[0]} could not build the plant's FMU (exit code {done.returncode}). "
+            f"It says:\n{words[-2000:]}"
+        )
+    return words

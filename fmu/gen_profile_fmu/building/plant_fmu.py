@@ -1,0 +1,82 @@
+"""A plant's FMU for the check: built once per content, then taken from the cache."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import attrs
+import fmpy
+
+from gen_profile.plants.plant import Plant
+from gen_profile_fmu.building.build import compile_texts, sources_key
+from gen_profile_fmu.building.cache import cached
+from gen_profile_fmu.building.compiler import find_compiler
+from gen_profile_fmu.description.fmu_files import SOURCE_FILE, Version, archive, fmu_files, sources
+from gen_profile_fmu.model.contents import Model, plant_model
+from gen_profile_fmu.model.plant_variables import InputKind, Machine
+from gen_profile_fmu.model.variables import VariableTable
+
+
+@attrs.frozen(kw_only=True)
+class PlantFmu:
+    """An FMU on disk, as an archive and unpacked.
+
+    Attributes
+    ----------
+    archive : Path
+        The ``.fmu`` file.
+    folder : Path
+        The same, unpacked.
+    guid, model_identifier : str
+        As in its model description.
+    variables : VariableTable
+    """
+
+    archive: Path
+    folder: Path
+    guid: str
+    model_identifier: str
+    variables: VariableTable
+
+
+def plant_fmu(plant: Plant, on_build: Callable[[], None] | None = None) -> PlantFmu:
+    """Build the FMI 2.0 FMU of a plant that follows setpoints, or find it in the cache.
+
+    Parameters
+    ----------
+    plant : Plant
+    on_build : callable, optional
+        Called before a compilation, which takes seconds.
+
+    Raises
+    ------
+    CosimulationError
+        When there is no compiler, it fails, or no cache folder can be written.
+    """
+    machine = Machine(plant=plant, parameters=plant.nominal())
+    return cached_fmu(plant_model(machine, InputKind.SETPOINT), Version.FMI2, on_build)
+
+
+def cached_fmu(model: Model, version: Version, on_build: Callable[[], None] | None = None) -> PlantFmu:
+    """Build a model's FMU for this computer, without documentation, or find it in the cache.
+
+    Raises as `plant_fmu` does.
+    """
+    made, compiler = sources(model, version), find_compiler()
+    library = model.identifier + fmpy.sharedLibraryExtension
+    platform = fmpy.platform if version is Version.FMI2 else fmpy.platform_tuple
+
+    def make(cache: Path) -> dict[str, bytes]:
+        binary = compile_texts(made.compiled, SOURCE_FILE, compiler, library, cache, on_build=on_build)
+        laid = fmu_files(made, {f"binaries/{platform}/{library}": binary}, with_extras=False)
+        return {**laid, f"{model.identifier}.fmu": archive(laid)}
+
+    entry = cached(f"{model.identifier}-{sources_key(made, compiler)}", make)
+    return PlantFmu(
+        archive=entry / f"{model.identifier}.fmu",
+        folder=entry,
+        guid=made.identity,
+        model_identifier=model.identifier,
+        variables=model.variables,
+    )

@@ -1,0 +1,186 @@
+"""A profile and a plant as a system of FMUs: System Structure and Parameterization (SSP) 1.0.
+
+Importers look for the names of XML elements with the prefixes that the standard writes them with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from importlib.metadata import version
+from xml.etree import ElementTree
+
+import attrs
+
+from gen_profile_fmu.description.base_units import BASE_UNITS
+from gen_profile_fmu.description.common import to_bytes
+from gen_profile_fmu.description.fmu_files import archive
+from gen_profile_fmu.model.contents import Model
+from gen_profile_fmu.model.variables import Type, Variable
+
+STRUCTURE = "SystemStructure.ssd"
+PARAMETER_SET = "initialValues"  # as others call it, and as Ecos is told to take
+_OSP = "com.opensimulationplatform"  # whose annotation states a step, for which SSP 1.0 has no words
+_NAMESPACES = {
+    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+    "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
+}
+_WIDTH, _HEIGHT, _GAP = 60.0, 40.0, 40.0
+
+
+@attrs.frozen(kw_only=True)
+class Component:
+    """An FMU of a system.
+
+    Attributes
+    ----------
+    name : str
+        Within the system.
+    model : Model
+    """
+
+    name: str
+    model: Model
+
+    @property
+    def fmu(self) -> str:
+        """Path of the FMU in the archive."""
+        return f"resources/{self.model.identifier}.fmu"
+
+    @property
+    def parameters(self) -> str:
+        """Path of the FMU's parameters in the archive."""
+        return f"resources/{self.model.identifier}.ssv"
+
+    def variables(self, *causalities: str) -> list[Variable]:
+        """List the variables of some causalities."""
+        return [v for v in self.model.variables.variables if v.kind.causality in causalities]
+
+
+def ssp(name: str, profile: Model, plant: Model, step: float, build: Callable[[Model], bytes]) -> bytes:
+    """Write a system in which a plant follows a profile.
+
+    Parameters
+    ----------
+    name : str
+        Of the system.
+    profile, plant : Model
+        Each output of the profile goes to the plant's input of the same name, where there is one.
+    step : float
+        In which a master shall go on, in s.
+    build : Model → bytes
+        Makes an FMU.
+
+    Returns
+    -------
+    bytes
+        The archive: the same for the same models, step and FMUs.
+    """
+    components = Component(name="profile", model=profile), Component(name="plant", model=plant)
+    return archive(
+        {
+            STRUCTURE: _structure(name, *components, step),
+            **{component.parameters: _parameters(component) for component in components},
+            **{component.fmu: build(component.model) for component in components},
+        }
+    )
+
+
+def _root(tag: str, name: str, others: Iterable[str]) -> ElementTree.Element:
+    own, _, _ = tag.partition(":")
+    spaces = {f"xmlns:{space}": _NAMESPACES[space] for space in (own, *others)}
+    tool = f"gen-profile {version('gen-profile')}"
+    return ElementTree.Element(tag, {**spaces, "version": "1.0", "name": name, "generationTool": tool})
+
+
+def _structure(name: str, profile: Component, plant: Component, step: float) -> bytes:
+    root = _root("ssd:SystemStructureDescription", name, ("ssc", "osp"))
+    system = ElementTree.SubElement(root, "ssd:System", name=name)
+    elements = ElementTree.SubElement(system, "ssd:Elements")
+    for place, component in enumerate((profile, plant)):
+        _add_component(elements, component, place * (_WIDTH + _GAP))
+    connections = ElementTree.SubElement(system, "ssd:Connections")
+    given = {variable.name for variable in profile.variables("output")}
+    for variable in plant.variables("input"):
+        if variable.name in given:
+            ElementTree.SubElement(
+                connections,
+                "ssd:Connection",
+                startElement=profile.name,
+                startConnector=variable.name,
+                endElement=plant.name,
+                endConnector=variable.name,
+            )
+    connectors = [*_connectors(profile), *_connectors(plant)]
+    _add_units(ElementTree.SubElement(root, "ssd:Units"), connectors)
+    _add_experiment(root, max(profile.model.stop_time, plant.model.stop_time), step)
+    return to_bytes(root)
+
+
+def _connectors(component: Component) -> list[Variable]:
+    """List what can be connected, but for the trigger: an input that nothing feeds stops some importers."""
+    return [v for v in component.variables("input", "output") if v.name != "trigger"]
+
+
+def _add_component(elements: ElementTree.Element, component: Component, left: float) -> None:
+    kind = "application/x-fmu-sharedlibrary"
+    element = ElementTree.SubElement(
+        elements, "ssd:Component", name=component.name, type=kind, source=component.fmu
+    )
+    connectors = ElementTree.SubElement(element, "ssd:Connectors")
+    for variable in _connectors(component):
+        connector = ElementTree.SubElement(
+            connectors, "ssd:Connector", name=variable.name, kind=variable.kind.causality
+        )
+        ElementTree.SubElement(connector, f"ssc:{_type_name(variable)}", _unit(variable))
+    ElementTree.SubElement(
+        element,
+        "ssd:ElementGeometry",
+        x1=repr(left),
+        y1="0.0",
+        x2=repr(left + _WIDTH),
+        y2=repr(_HEIGHT),
+    )
+    bindings = ElementTree.SubElement(element, "ssd:ParameterBindings")
+    ElementTree.SubElement(bindings, "ssd:ParameterBinding", source=component.parameters)
+
+
+def _add_experiment(root: ElementTree.Element, stop_time: float, step: float) -> None:
+    experiment = ElementTree.SubElement(
+        root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(stop_time)
+    )
+    annotations = ElementTree.SubElement(experiment, "ssd:Annotations")
+    annotation = ElementTree.SubElement(annotations, "ssc:Annotation", type=_OSP)
+    algorithm = ElementTree.SubElement(annotation, "osp:Algorithm")
+    ElementTree.SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(step))
+
+
+def _parameters(component: Component) -> bytes:
+    """Write a component's parameters with the values that they have in its FMU."""
+    root = _root("ssv:ParameterSet", PARAMETER_SET, ("ssc",))
+    parameters = ElementTree.SubElement(root, "ssv:Parameters")
+    variables = component.variables("parameter")
+    for variable in variables:
+        parameter = ElementTree.SubElement(parameters, "ssv:Parameter", name=variable.name)
+        real = variable.type is Type.REAL
+        value = repr(float(variable.start)) if real else str(bool(variable.start)).lower()
+        ElementTree.SubElement(parameter, f"ssv:{_type_name(variable)}", {"value": value, **_unit(variable)})
+    _add_units(ElementTree.SubElement(root, "ssv:Units"), variables)
+    return to_bytes(root)
+
+
+def _type_name(variable: Variable) -> str:
+    return "Real" if variable.type is Type.REAL else "Boolean"
+
+
+def _unit(variable: Variable) -> dict[str, str]:
+    """Name a variable's unit, where its base units are known: without them, SSP takes none."""
+    return {"unit": variable.unit} if variable.unit in BASE_UNITS else {}
+
+
+def _add_units(units: ElementTree.Element, variables: Iterable[Variable]) -> None:
+    for name in sorted({unit for variable in variables for unit in _unit(variable).values()}):
+        unit = ElementTree.SubElement(units, "ssc:Unit", name=name)
+        exponents = {base: str(exponent) for base, exponent in BASE_UNITS[name].items()}
+        ElementTree.SubElement(unit, "ssc:BaseUnit", exponents)

@@ -1,0 +1,348 @@
+"""The variables of FMUs that hold a plant, a motion, or both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from enum import Enum
+
+import attrs
+
+from gen_profile.motion.profile import Profile
+from gen_profile.plants.plant import Coordinate, Plant
+from gen_profile_fmu.model.variables import (
+    DERIVATIVES,
+    STATES,
+    Kind,
+    Type,
+    Variable,
+    VariableTable,
+    require_good_names,
+    variable_name,
+)
+
+TAU = "tau"
+MAX_STEP = "max_step"
+PERIOD = "interpolation_period"
+_STANDING = 1e-9  # m or rad, less than which a motion leads nowhere
+Blocks = dict[str, tuple[Variable, ...]]
+
+
+class InputKind(Enum):
+    """What a plant's drives are asked for."""
+
+    ACCELERATION = "acceleration"
+    VELOCITY = "velocity"
+    SETPOINT = "setpoint"
+
+
+@attrs.frozen(kw_only=True)
+class Machine:
+    """A plant with the values it starts from.
+
+    Attributes
+    ----------
+    plant : Plant
+    parameters : mapping of str to float
+        Value of every parameter.
+    tau : float
+        Lag of the drives in s; 0 for ideal ones.
+    period : float
+        Cycle of the setpoints in s.
+    position : sequence of float
+        Where the axes rest at the start, in m or rad; zeros if not given.
+    initial : mapping of str to float
+        What swings at the start: unactuated coordinates by name, their rates as ``NAME.rate``.
+    nominal : mapping of str to float
+        Size of the states by their variables' names; 1 for those not given.
+    """
+
+    plant: Plant
+    parameters: Mapping[str, float]
+    tau: float = 0.0
+    period: float = 0.004
+    position: Sequence[float] = attrs.field()
+    initial: Mapping[str, float] = attrs.field(factory=dict)
+    nominal: Mapping[str, float] = attrs.field(factory=dict)
+
+    @position.default
+    def _origin(self) -> Sequence[float]:
+        return [0.0] * len(self.plant.actuated)
+
+
+def plant_variables(machine: Machine, kind: InputKind) -> VariableTable:
+    """List the variables of a plant with inputs.
+
+    Raises
+    ------
+    CosimulationError
+        When two variables would share a name, or a name is none that importers take.
+    """
+    axes, words = machine.plant.actuated, "position at rest at the start"
+    table = VariableTable(
+        blocks={
+            **_parameters(machine, kind),
+            "START": _at(machine.position, _per_axis(axes, "start", words, 0, Kind.FIXED_PARAMETER)),
+            "INPUTS": _inputs(machine, kind),
+            "PERIOD": _period(machine.period, kind),
+            **_states_and_outputs(machine),
+            "TIME": (_time(),),
+        }
+    )
+    _check_names(machine.plant, table)
+    return table
+
+
+def profile_variables(axes: Sequence[Coordinate], motion: Profile) -> VariableTable:
+    """List the variables of a motion alone; raises as `plant_variables` does."""
+    table = VariableTable(blocks={**_way(axes, motion), **_trigger(), **_command(axes), "TIME": (_time(),)})
+    require_good_names("Profile", [axis.name for axis in axes], table)
+    return table
+
+
+def system_variables(machine: Machine, motion: Profile) -> VariableTable:
+    """List the variables of a plant that follows a motion; raises as `plant_variables` does."""
+    table = VariableTable(
+        blocks={
+            **_parameters(machine, InputKind.SETPOINT),
+            **_way(machine.plant.actuated, motion),
+            **_trigger(),
+            **_states_and_outputs(machine),
+            **_command(machine.plant.actuated),
+            "TIME": (_time(),),
+        }
+    )
+    _check_names(machine.plant, table)
+    return table
+
+
+def _parameters(machine: Machine, kind: InputKind) -> Blocks:
+    parameters = tuple(
+        Variable(
+            name=parameter.name,
+            description=parameter.description,
+            unit=parameter.unit,
+            kind=Kind.TUNABLE_PARAMETER,
+            start=machine.parameters[parameter.name],
+            lower=parameter.lower if math.isfinite(parameter.lower) else None,
+            upper=parameter.upper if math.isfinite(parameter.upper) else None,
+        )
+        for parameter in machine.plant.parameters
+    )
+    lag = () if kind is InputKind.ACCELERATION else (_lag(machine.tau),)
+    return {"P": parameters, "TAU": lag, "MAX_STEP": (_longest_step(),)}
+
+
+def _lag(tau: float) -> Variable:
+    # fixed: position + tau * velocity is the interpolated setpoint only while tau stays as it is
+    return Variable(
+        name=TAU,
+        description="time constant of the drives' first-order lag; 0: ideal drives",
+        unit="s",
+        kind=Kind.FIXED_PARAMETER,
+        start=tau,
+        lower=0.0,
+    )
+
+
+def _longest_step() -> Variable:
+    return Variable(
+        name=MAX_STEP,
+        description="longest integration step in co-simulation (Runge-Kutta, fourth order)",
+        unit="s",
+        kind=Kind.TUNABLE_PARAMETER,
+        start=1e-3,
+        lower=1e-6,
+        upper=1.0,
+    )
+
+
+def _period(period: float, kind: InputKind) -> tuple[Variable, ...]:
+    words = {
+        InputKind.SETPOINT: "in which drives go on to a setpoint",
+        InputKind.VELOCITY: "for which ideal drives hold a velocity",
+    }
+    if kind not in words:
+        return ()
+    period_variable = Variable(
+        name=PERIOD,
+        description=f"time {words[kind]}, in model exchange; in co-simulation, the step",
+        unit="s",
+        kind=Kind.FIXED_PARAMETER,
+        start=period,
+        lower=1e-6,
+    )
+    return (period_variable,)
+
+
+def _way(axes: Sequence[Coordinate], motion: Profile) -> Blocks:
+    """List the parameters that shift and scale a motion; an axis that comes back to its start only shifts."""
+    start = motion.coefficients[0, 0]
+    distances = _per_axis(axes, "distance", "how far the motion leads, scaled", 0, Kind.FIXED_PARAMETER)
+    return {
+        "START": _at(start, _per_axis(axes, "start", "where the motion begins", 0, Kind.FIXED_PARAMETER)),
+        "DISTANCE": tuple(
+            attrs.evolve(variable, start=float(distance))
+            if abs(distance) > _STANDING
+            else attrs.evolve(variable, lower=0.0, upper=0.0)
+            for variable, distance in zip(distances, motion.target - start, strict=True)
+        ),
+    }
+
+
+def _per_axis(
+    axes: Sequence[Coordinate], suffix: str, description: str, order: int, kind: Kind
+) -> tuple[Variable, ...]:
+    """List a quantity of every axis; `order` is that of the time derivative."""
+    return tuple(
+        Variable(
+            name=f"{axis.name}.{suffix}", description=description, unit=_unit(axis.unit, order), kind=kind
+        )
+        for axis in axes
+    )
+
+
+def _unit(unit: str, order: int) -> str:
+    return (unit, f"{unit}/s", f"{unit}/s^2", f"{unit}/s^3")[order]
+
+
+def _at(position: Iterable[float], variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+    return tuple(
+        attrs.evolve(variable, start=float(start))
+        for variable, start in zip(variables, position, strict=True)
+    )
+
+
+def _inputs(machine: Machine, kind: InputKind) -> tuple[Variable, ...]:
+    axes = machine.plant.actuated
+    match kind:
+        case InputKind.ACCELERATION:
+            return _per_axis(axes, "setpoint_acceleration", "acceleration of the axis", 2, Kind.INPUT)
+        case InputKind.VELOCITY:
+            return _per_axis(axes, "setpoint_velocity", "velocity that the drive follows", 1, Kind.INPUT)
+        case InputKind.SETPOINT:
+            words = "position to reach at the end of the step"
+            return _at(machine.position, _per_axis(axes, "setpoint", words, 0, Kind.INPUT))
+
+
+def _states_and_outputs(machine: Machine) -> Blocks:
+    blocks = _of_plant(machine)
+    sized = {
+        block: tuple(
+            attrs.evolve(state, nominal=machine.nominal.get(state.name, 1.0)) for state in blocks[block]
+        )
+        for block in STATES
+    }
+    return {**blocks, **sized}
+
+
+def _of_plant(machine: Machine) -> Blocks:
+    plant, axes = machine.plant, machine.plant.actuated
+    accelerations = _per_axis(axes, "velocity", "acceleration of the axis", 2, Kind.DERIVATIVE)
+    velocities = _per_axis(axes, "position", "velocity of the axis", 1, Kind.DERIVATIVE)
+    return {
+        "Q_U": _swinging(machine.initial, _unactuated(plant, "{}", "unactuated coordinate", 0, Kind.STATE)),
+        "DQ_U": _swinging(
+            machine.initial,
+            _unactuated(plant, "{}.rate", "rate of an unactuated coordinate", 1, Kind.STATE),
+        ),
+        "Q_A": _per_axis(axes, "position", "position of the axis", 0, Kind.OUTPUT),
+        "DQ_A": _per_axis(axes, "velocity", "velocity of the axis", 1, Kind.OUTPUT),
+        DERIVATIVES: (
+            *_unactuated(plant, "der({})", "rate of an unactuated coordinate", 1, Kind.DERIVATIVE),
+            *_unactuated(plant, "der({}.rate)", "its acceleration", 2, Kind.DERIVATIVE),
+            *(attrs.evolve(variable, name=f"der({variable.name})") for variable in velocities),
+            *(attrs.evolve(variable, name=f"der({variable.name})") for variable in accelerations),
+        ),
+        "SWAY": _of_loads(plant, "sway", "m", "horizontal distance from the place at rest", "mm"),
+        "HEIGHT": _of_loads(plant, "height", "m", "height above the suspension point", "m"),
+        "ANGLE": _of_loads(plant, "angle", "rad", "angle of the rope from the vertical", "deg"),
+        **_of_bodies(plant),
+    }
+
+
+def _swinging(initial: Mapping[str, float], states: tuple[Variable, ...]) -> tuple[Variable, ...]:
+    started = {variable_name(name): value for name, value in initial.items()}
+    return tuple(attrs.evolve(state, start=started.get(state.name, 0.0)) for state in states)
+
+
+def _unactuated(plant: Plant, pattern: str, description: str, order: int, kind: Kind) -> tuple[Variable, ...]:
+    return tuple(
+        Variable(
+            name=pattern.format(coordinate.name),
+            description=description,
+            unit=_unit(coordinate.unit, order),
+            kind=kind,
+        )
+        for coordinate in plant.unactuated
+    )
+
+
+def _of_loads(
+    plant: Plant, quantity: str, unit: str, description: str, display_unit: str
+) -> tuple[Variable, ...]:
+    return tuple(
+        Variable(
+            name=f"{quantity}.{load}",
+            description=description,
+            unit=unit,
+            kind=Kind.OUTPUT,
+            display_unit=display_unit,
+        )
+        for load in plant.loads
+    )
+
+
+def _of_bodies(plant: Plant) -> Blocks:
+    places = tuple(
+        Variable(name=f"position.{body}.{direction}", description=words, unit="m", kind=Kind.OUTPUT)
+        for body in plant.bodies
+        for direction, words in (
+            ("x", "where the load is, horizontally"),
+            ("y", "where the load is, horizontally across"),
+            ("z", "where the load is, above the suspension point"),
+        )
+    )
+    words = "mechanical energy of all loads: kinetic, of springs, and of weight, from the suspension point on"
+    energy = Variable(name="energy", description=words, unit="J", kind=Kind.OUTPUT)
+    return {"PLACE": places, "ENERGY": (energy,) if plant.bodies else ()}
+
+
+def _trigger() -> Blocks:
+    def boolean(name: str, description: str, kind: Kind) -> tuple[Variable, ...]:
+        return (Variable(name=name, description=description, unit="", kind=kind, type=Type.BOOLEAN),)
+
+    start = Variable(
+        name="start_time",
+        description="time before which the motion does not begin",
+        unit="s",
+        kind=Kind.FIXED_PARAMETER,
+    )
+    return {
+        "START_TIME": (start,),
+        "WAIT": boolean("wait_for_trigger", "whether the motion waits for the trigger", Kind.FIXED_PARAMETER),
+        "TRIGGER": boolean("trigger", "begin the motion, once", Kind.DISCRETE_INPUT),
+        "MOVING": boolean("moving", "the motion has begun and not ended", Kind.DISCRETE_OUTPUT),
+        "DONE": boolean("done", "the target is reached", Kind.DISCRETE_OUTPUT),
+    }
+
+
+def _command(axes: Sequence[Coordinate]) -> Blocks:
+    suffixes = ("setpoint", "setpoint_velocity", "setpoint_acceleration", "setpoint_jerk")
+    return {
+        "COMMAND": tuple(
+            variable
+            for order, suffix in enumerate(suffixes)
+            for variable in _per_axis(axes, suffix, "of the motion", order, Kind.OUTPUT)
+        )
+    }
+
+
+def _time() -> Variable:
+    return Variable(name="time", description="simulation time", unit="s", kind=Kind.INDEPENDENT)
+
+
+def _check_names(plant: Plant, table: VariableTable) -> None:
+    coordinates = (q.name for q in (*plant.actuated, *plant.unactuated))
+    names = [*(p.name for p in plant.parameters), *coordinates, *plant.loads, *plant.bodies]
+    require_good_names(f"Plant {plant.type}", names, table)

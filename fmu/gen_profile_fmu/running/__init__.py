@@ -1,0 +1,1 @@
+"""FMUs run: ours in memory, one or thousands, and somebody else's in a child process."""

@@ -1,0 +1,243 @@
+"""Co-simulation of a plant FMU that is fed with a controller's setpoints, by FMPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from ctypes import byref, c_double, c_uint, sizeof
+from types import TracebackType
+from typing import Any, Self
+
+import attrs
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import fmi2True
+
+from gen_profile.errors import CosimulationError
+from gen_profile.evaluation.simulation import AT_REST, Response
+from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
+from gen_profile.plants.plant import Plant
+from gen_profile_fmu.building.plant_fmu import plant_fmu
+from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
+from gen_profile_fmu.model.variables import variable_name
+from gen_profile_fmu.running.instances import slave
+
+# blocks of variables that are read after every step, and what a Response calls them
+_OBSERVED = {
+    "Q_A": "position",
+    "DQ_A": "velocity",
+    "Q_U": "q_u",
+    "DQ_U": "dq_u",
+    "SWAY": "sway",
+    "ANGLE": "angle",
+}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Steps:
+    """Communication steps, one after the other.
+
+    Step k begins at ``times[k]``, lasts ``sizes[k]`` and leads to ``setpoints[k]`` at ``times[k + 1]``.
+
+    Attributes
+    ----------
+    times : (steps + 1,) array
+        s.
+    sizes : (steps,) array
+        s.
+    setpoints : (steps, axes) array
+        m (or rad).
+    """
+
+    times: Array
+    sizes: Array
+    setpoints: Array
+
+
+class PlantCosimulation:
+    """A plant FMU in memory, to be run as often as wanted; a context manager.
+
+    Parameters
+    ----------
+    plant : Plant
+    on_build : callable, optional
+        Called before the FMU is compiled, when it is not in the cache.
+
+    Raises
+    ------
+    CosimulationError
+        When the FMU cannot be built or loaded.
+    """
+
+    def __init__(self, plant: Plant, on_build: Callable[[], None] | None = None) -> None:
+        self._plant = plant
+        self._fmu = plant_fmu(plant, on_build)
+        self._messages: list[str] = []
+        self._slave = slave(self._fmu, Version.FMI2, self._messages)
+        variables = self._fmu.variables
+        self._setpoints = _references(variables.references("INPUTS"))
+        self._outputs = _references(variables.references(*_OBSERVED))
+        self._output_blocks = np.cumsum([len(variables.blocks[block]) for block in _OBSERVED])[:-1]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the instance; it cannot be run again."""
+        if self._slave is not None:
+            self._slave.freeInstance()
+            self._slave = None
+
+    def run(
+        self,
+        setpoints: SampledProfile,
+        parameters: Mapping[str, float],
+        *,
+        tau: float = 0.0,
+        max_step: float,
+        settle: float,
+        output_step: float | None = None,
+        initial: Mapping[str, float] = AT_REST,
+        final_velocity: Sequence[float] = (),
+    ) -> Response:
+        """Let drives follow the setpoints, then hold the last one, or go on from it.
+
+        Parameters
+        ----------
+        setpoints : SampledProfile
+            Of which only the positions are used: the drives interpolate them linearly (CiA 402, 60C2h).
+        parameters : mapping of str to float
+            Value of every parameter of the plant.
+        tau : float
+            Lag of the drives in s; 0 for ideal ones.
+        max_step : float
+            Longest integration step in s.
+        settle : float
+            How long to go on after the last setpoint, in s.
+        output_step : float, optional
+            Spacing of samples after the last setpoint, in s; the cycle time if it is longer or not given.
+        initial : mapping of str to float, optional
+            What swings at time 0: unactuated coordinates by name, their rates as ``NAME.rate``.
+        final_velocity : (axes,) sequence of float, optional
+            With which setpoints go on after the last one, in m/s (or rad/s); by default it is held.
+
+        Returns
+        -------
+        Response
+            At time 0, after every cycle, and every `output_step` after the last setpoint.
+
+        Raises
+        ------
+        CosimulationError
+            When a parameter is missing, unknown or out of range, or the FMU refuses a step.
+        """
+        steps = _steps(setpoints, settle, output_step, final_velocity)
+        self._begin(setpoints, parameters, {**initial, TAU: tau, MAX_STEP: max_step})
+        return Response(times=steps.times, **self._observe(steps))
+
+    def _begin(
+        self, setpoints: SampledProfile, parameters: Mapping[str, float], values: Mapping[str, float]
+    ) -> None:
+        """Start anew, at the first setpoint."""
+        values = {**self._plant_values(parameters), **self._start_values(setpoints), **values}
+        table = {variable.name: reference for reference, variable in enumerate(self._fmu.variables.variables)}
+        references = [table[variable_name(name)] for name in values]
+        if self._slave is None:
+            raise CosimulationError("This co-simulation has been closed; make a new one.")
+        with self._explained():
+            self._slave.reset()
+            self._slave.setupExperiment(startTime=0.0)
+            self._slave.setReal(references, list(values.values()))
+            self._slave.enterInitializationMode()
+            self._slave.exitInitializationMode()
+
+    def _observe(self, steps: Steps) -> dict[str, Array]:
+        """Take steps from where the FMU is; what is observed before the first and after each, by name."""
+        with self._explained():
+            samples = np.split(self._march(steps), self._output_blocks, axis=1)
+        return dict(zip(_OBSERVED.values(), samples, strict=True))
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        """Make a sentence of a refusal, with the FMU's own words where it has some."""
+        self._messages.clear()
+        try:
+            yield
+        except FMICallException as error:
+            reason = " ".join(self._messages) or f"{error.function} returned status {error.status}."
+            raise CosimulationError(
+                f"The FMU of plant {self._plant.type} could not go on: {reason}"
+            ) from error
+
+    def _plant_values(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        known = {parameter.name for parameter in self._plant.parameters}
+        unknown, missing = sorted(parameters.keys() - known), sorted(known - parameters.keys())
+        if unknown or missing:
+            faults = [f"no parameter {name}" for name in unknown] + [
+                f"no value of {name}" for name in missing
+            ]
+            raise CosimulationError(
+                f"The co-simulation of plant {self._plant.type} needs the values of exactly its parameters "
+                f"{', '.join(sorted(known))}: found {', '.join(faults)}."
+            )
+        return {name: float(value) for name, value in parameters.items()}
+
+    def _start_values(self, setpoints: SampledProfile) -> dict[str, float]:
+        axes, columns = self._plant.actuated, setpoints.position.shape[1]
+        if columns != len(axes):
+            raise CosimulationError(
+                f"The setpoints are for {columns} axes, but plant {self._plant.type} has {len(axes)}."
+            )
+        return {
+            f"{axis.name}.{suffix}": float(position)
+            for axis, position in zip(axes, setpoints.position[0], strict=True)
+            for suffix in ("start", "setpoint")
+        }
+
+    def _march(self, steps: Steps) -> Array:
+        """Take all steps, reading setpoints and writing samples in place; a step costs a few microseconds."""
+        fmu, component = self._slave, self._slave.component
+        set_real, do_step, get_real = fmu.fmi2SetReal, fmu.fmi2DoStep, fmu.fmi2GetReal
+        inputs, outputs = self._setpoints, self._outputs
+        n_inputs, n_outputs = len(inputs), len(outputs)
+        samples = np.empty((len(steps.times), n_outputs))
+        given = np.array(steps.setpoints)
+        first_setpoint, first_sample = c_double.from_buffer(given.data), c_double.from_buffer(samples.data)
+        input_row, output_row = n_inputs * sizeof(c_double), n_outputs * sizeof(c_double)
+
+        get_real(component, outputs, n_outputs, byref(first_sample))
+        for k, (time, size) in enumerate(zip(steps.times.tolist(), steps.sizes.tolist(), strict=False)):
+            set_real(component, inputs, n_inputs, byref(first_setpoint, k * input_row))
+            do_step(component, time, size, fmi2True)
+            get_real(component, outputs, n_outputs, byref(first_sample, (k + 1) * output_row))
+        return samples
+
+
+def _steps(
+    setpoints: SampledProfile, settle: float, output_step: float | None, final_velocity: Sequence[float]
+) -> Steps:
+    cycle = setpoints.cycle_time
+    hold = cycle if output_step is None else min(output_step, cycle)
+    if not (np.isfinite(hold) and hold > 0.0 and np.isfinite(settle) and settle >= 0.0):
+        raise CosimulationError(
+            "The time to settle must not be negative, and the output step must be positive."
+        )
+    moving = setpoints.times
+    held = grid_times(grid_length(settle, hold), hold)[1:]
+    onward = np.array(final_velocity) if len(final_velocity) else np.zeros(setpoints.position.shape[1])
+    last = setpoints.position[-1] + held[:, None] * onward
+    return Steps(
+        times=np.concatenate((moving, moving[-1] + held)),
+        sizes=np.concatenate((np.full(len(moving) - 1, cycle), np.full(len(held), hold))),
+        setpoints=np.concatenate((setpoints.position[1:], last)),
+    )
+
+
+def _references(references: Any) -> Any:
+    return (c_uint * len(references))(*references)

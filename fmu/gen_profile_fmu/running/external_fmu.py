@@ -1,0 +1,100 @@
+"""Somebody else's FMU, co-simulated in a child process: whatever its native code does, it does it there."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import CosimulationError
+from gen_profile.motion.profile import Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class ForeignRun:
+    """Co-simulations of one FMU, one per machine.
+
+    Attributes
+    ----------
+    archive : Path
+    times : (samples,) array
+        Communication points in s.
+    inputs : (samples - 1, inputs) array
+        Held from each point to the next.
+    input_names, output_names : sequence of str
+        Variables of the FMU.
+    machines : sequence of mapping of str to float
+        Start values of the FMU's parameters, for each run.
+    time_limit : float
+        For all runs together, in s.
+    """
+
+    archive: Path
+    times: Array
+    inputs: Array
+    input_names: Sequence[str]
+    output_names: Sequence[str]
+    machines: Sequence[Mapping[str, float]]
+    time_limit: float
+
+
+def run_foreign(run: ForeignRun) -> Array:
+    """Co-simulate.
+
+    Returns
+    -------
+    (machines, samples, outputs) array
+
+    Raises
+    ------
+    CosimulationError
+        The FMU is damaged, lacks a variable, refuses a step, crashes, hangs, or ends its process.
+    """
+    with tempfile.TemporaryDirectory(prefix="gen-profile-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        write_job(run, folder)
+        _run_child(run, folder)
+        return _result(run, folder)
+
+
+def write_job(run: ForeignRun, folder: Path) -> None:
+    """Tell the child what to do."""
+    names = {"input_names": list(run.input_names), "output_names": list(run.output_names)}
+    job = {"archive": str(run.archive.absolute()), "machines": [dict(m) for m in run.machines], **names}
+    (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+    np.savez(folder / "motion.npz", times=run.times, inputs=run.inputs)
+
+
+def _run_child(run: ForeignRun, folder: Path) -> None:
+    command = [sys.executable, "-m", "gen_profile_fmu.running.external_child", str(folder)]
+    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    try:
+        code = subprocess.run(command, timeout=run.time_limit, check=False, **quiet).returncode  # type: ignore[call-overload]
+    except subprocess.TimeoutExpired as error:
+        raise CosimulationError(
+            f"{run.archive.name}: the FMU was not done after {run.time_limit:g} s; "
+            "if it only needs longer, raise check.time_limit."
+        ) from error
+    if code < 0:
+        raise CosimulationError(
+            f"{run.archive.name}: the FMU crashed ({signal.Signals(-code).name}). Its maker must mend it."
+        )
+
+
+def _result(run: ForeignRun, folder: Path) -> Array:
+    refusal, result = folder / "refusal.txt", folder / "result.npy"
+    if refusal.exists():
+        raise CosimulationError(refusal.read_text(encoding="utf-8"))
+    if not result.exists():
+        raise CosimulationError(f"{run.archive.name}: the FMU ended its process before the simulation's end.")
+    found: Array = np.load(result, allow_pickle=False)
+    if not np.isfinite(found).all():
+        raise CosimulationError(f"{run.archive.name}: the FMU's outputs are not finite numbers.")
+    return found

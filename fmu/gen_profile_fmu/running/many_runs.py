@@ -1,0 +1,256 @@
+"""Many co-simulations of an FMU by a compiled loop over its own functions, as for Monte Carlo."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint, c_void_p
+from functools import cache
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import attrs
+import fmpy
+import numpy as np
+
+from gen_profile.errors import CosimulationError
+from gen_profile.motion.profile import Array
+from gen_profile_fmu.building.build import compile_texts
+from gen_profile_fmu.building.cache import cached
+from gen_profile_fmu.building.compiler import find_compiler
+from gen_profile_fmu.building.plant_fmu import PlantFmu
+from gen_profile_fmu.description.fmu_files import Version, digest, standard_headers
+from gen_profile_fmu.model.c_sources import FOLDER
+from gen_profile_fmu.model.variables import variable_name
+from gen_profile_fmu.running.instances import slave
+
+_SOURCE = "many_runs.c"
+_FUNCTIONS = {
+    Version.FMI2: (
+        "fmi2Reset",
+        "fmi2SetupExperiment",
+        "fmi2EnterInitializationMode",
+        "fmi2ExitInitializationMode",
+        "fmi2SetReal",
+        "fmi2GetReal",
+        "fmi2DoStep",
+    ),
+    Version.FMI3: (
+        "fmi3Reset",
+        "fmi3EnterInitializationMode",
+        "fmi3ExitInitializationMode",
+        "fmi3SetFloat64",
+        "fmi3GetFloat64",
+        "fmi3DoStep",
+    ),
+}
+
+
+class _Fmu(Structure):
+    _fields_ = [
+        *((name, c_void_p) for names in _FUNCTIONS.values() for name in names),
+        ("instance", c_void_p),
+    ]
+
+
+class _PerRun(Structure):
+    _fields_ = [("values", POINTER(c_double)), ("size", c_size_t)]
+
+
+class _Plan(Structure):
+    _fields_ = [
+        *((name, _PerRun) for name in ("times", "inputs", "parameters")),
+        *((name, c_size_t) for name in ("steps", "n_inputs", "n_parameters", "n_outputs")),
+        *(
+            (name, POINTER(c_uint))
+            for name in ("input_references", "parameter_references", "output_references")
+        ),
+        ("since", c_double),
+    ]
+
+
+class ManyRuns:
+    """An FMU in memory, for runs that differ in their parameters or inputs; a context manager.
+
+    Parameters
+    ----------
+    fmu : PlantFmu
+        Of this computer.
+    version : Version
+        That the FMU is of.
+    workers : int
+        Instances that share the runs, each in a thread: compiled code, they run side by side. What is found
+        does not depend on their number.
+
+    Raises
+    ------
+    CosimulationError
+        When the FMU cannot be loaded, or the loop cannot be compiled (once).
+    """
+
+    def __init__(self, fmu: PlantFmu, version: Version, *, workers: int = 1) -> None:
+        self._references = {variable.name: i for i, variable in enumerate(fmu.variables.variables)}
+        self._workers = [_Worker(fmu, version) for _ in range(workers)]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for worker in self._workers:
+            worker.close()
+
+    def peaks(
+        self,
+        times: Array,
+        inputs: Mapping[str, Array],
+        parameters: Mapping[str, Array],
+        outputs: Sequence[str],
+        *,
+        since: float = 0.0,
+    ) -> Array:
+        """Simulate all runs, and keep the greatest magnitude of each output.
+
+        Parameters
+        ----------
+        times : (samples,) or (runs, samples) array
+            Communication points in s, rising; those of all runs, or of each.
+        inputs : mapping of str to (samples - 1,) or (runs, samples - 1) array
+            Held from each point to the next; a setpoint is reached at the step's end.
+        parameters : mapping of str to (runs,) array
+            Start values; what is not named keeps the value of the model description.
+        outputs : sequence of str
+        since : float
+            Time in s from which peaks count.
+
+        Returns
+        -------
+        (runs, outputs) array
+
+        Raises
+        ------
+        CosimulationError
+            A name is unknown, lengths differ, or the FMU refuses a value or a step.
+        """
+        given = _Given.of(times, inputs, parameters)
+        plan = _Plan(
+            times=_per_run(given.times),
+            inputs=_per_run(given.inputs),
+            parameters=_per_run(given.parameters),
+            steps=given.times.shape[1] - 1,
+            n_inputs=len(inputs),
+            n_parameters=len(parameters),
+            n_outputs=len(outputs),
+            input_references=self._numbers(inputs),
+            parameter_references=self._numbers(parameters),
+            output_references=self._numbers(outputs),
+            since=since * (1.0 - 1e-12),
+        )
+        return self._run(plan, np.empty((given.runs, len(outputs))))
+
+    def _run(self, plan: _Plan, found: Array) -> Array:
+        """Let the workers fill the rows of what is to be found."""
+        edges = np.linspace(0, len(found), len(self._workers) + 1, dtype=int).tolist()
+        shares = list(zip(self._workers, edges, edges[1:], strict=False))
+        with ThreadPoolExecutor(len(shares)) as pool:
+            reached = list(pool.map(lambda share: share[0].run(plan, *share[1:], found), shares))
+        for run, (worker, _, end) in zip(reached, shares, strict=True):
+            if run < end:
+                reason = " ".join(worker.messages)
+                raise CosimulationError(f"The FMU could not go on in run {run}, counted from 0: {reason}")
+        return found
+
+    def _numbers(self, names: Iterable[str]) -> Any:
+        references = []
+        for name in names:
+            reference = self._references.get(variable_name(name))
+            if reference is None:
+                raise CosimulationError(f"The FMU has no variable {name!r}.")
+            references.append(reference)
+        return (c_uint * len(references))(*references)
+
+
+class _Worker:
+    """An instance with the loop over its functions."""
+
+    def __init__(self, fmu: PlantFmu, version: Version) -> None:
+        self.messages: list[str] = []
+        self._loop = _loop()
+        self._slave = slave(fmu, version, self.messages)
+        self._fmu = _Fmu(instance=self._slave.component)
+        for name in _FUNCTIONS[version]:
+            setattr(self._fmu, name, ctypes.cast(getattr(self._slave.dll, name), c_void_p).value)
+
+    def run(self, plan: _Plan, first: int, end: int, found: Array) -> int:
+        """Fill rows of what is to be found; the first bad run, or `end`."""
+        self.messages.clear()
+        room = np.empty(plan.n_outputs)
+        return int(self._loop(byref(self._fmu), byref(plan), first, end, _doubles(room), _doubles(found)))
+
+    def close(self) -> None:
+        """Free the instance."""
+        self._slave.freeInstance()
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Given:
+    """What runs are given: arrays of one row for all runs, or one row for each of them."""
+
+    times: Array
+    inputs: Array
+    parameters: Array
+    runs: int
+
+    @classmethod
+    def of(cls, times: Array, inputs: Mapping[str, Array], parameters: Mapping[str, Array]) -> Self:
+        """Order and check what a caller gives by name."""
+        points = np.ascontiguousarray(np.atleast_2d(times), dtype=np.float64)
+        columns = {name: np.reshape(values, (-1, 1)) for name, values in parameters.items()}
+        rows = {
+            "times": points,
+            "inputs": _stacked("inputs", inputs, points.shape[1] - 1),
+            "parameters": _stacked("parameters", columns, 1),
+        }
+        counts = {len(array) for array in rows.values()} - {1}
+        if len(counts) > 1:
+            raise CosimulationError(f"Times, inputs and parameters are of {sorted(counts)} runs.")
+        return cls(runs=counts.pop() if counts else 1, **rows)
+
+
+def _stacked(what: str, arrays: Mapping[str, Array], length: int) -> Array:
+    """Join arrays, each (length,) or (runs, length), to one of (runs or 1, length, arrays)."""
+    rows = [np.atleast_2d(np.asarray(array, dtype=np.float64)) for array in arrays.values()]
+    shapes = {(len(array), array.shape[1]) for array in rows} | {(1, length)}
+    if len({size for _, size in shapes}) > 1 or len({runs for runs, _ in shapes} - {1}) > 1:
+        raise CosimulationError(f"The {what} of many runs differ in length: {sorted(shapes)}.")
+    return np.stack(np.broadcast_arrays(*rows), axis=-1) if rows else np.empty((1, length, 0))
+
+
+def _per_run(rows: Array) -> _PerRun:
+    return _PerRun(values=_doubles(rows), size=rows[0].size if len(rows) > 1 else 0)
+
+
+def _doubles(array: Array) -> Any:
+    return array.ctypes.data_as(POINTER(c_double))
+
+
+@cache
+def _loop() -> Any:
+    """Compile the loop, or find it in the cache, and load it."""
+    compiler, name = find_compiler(), f"many_runs{fmpy.sharedLibraryExtension}"
+    texts = {_SOURCE: (FOLDER / _SOURCE).read_text(encoding="utf-8")}
+    for version in Version:
+        texts |= standard_headers(version)
+
+    def make(cache: Path) -> dict[str, bytes]:
+        return {name: compile_texts(texts, _SOURCE, compiler, name, cache)}
+
+    parts = (part.encode("utf-8") for part in (compiler.identity, *texts.values()))
+    function = ctypes.CDLL(str(cached(f"many-runs-{digest(*parts)[:32]}", make) / name)).many_runs
+    places = (POINTER(c_double), POINTER(c_double))
+    function.argtypes = [POINTER(_Fmu), POINTER(_Plan), c_size_t, c_size_t, *places]
+    function.restype = c_size_t
+    return function

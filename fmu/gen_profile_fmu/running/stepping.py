@@ -1,0 +1,86 @@
+"""A plant FMU that is led on step by step, by somebody who does not know the next setpoint yet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import attrs
+import numpy as np
+
+from gen_profile.motion.profile import Array, SampledProfile
+from gen_profile.plants.plant import Plant
+from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
+from gen_profile_fmu.running.cosimulation import PlantCosimulation, Steps
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Instant:
+    """A machine at one instant.
+
+    Attributes
+    ----------
+    position : (axes,) array
+        Of the axes, in m (or rad).
+    sway : (outputs,) array
+        Of the loads, in m.
+    """
+
+    position: Array
+    sway: Array
+
+
+class SteppedPlant(PlantCosimulation):
+    """A plant FMU in memory, run in steps; a context manager.
+
+    Parameters
+    ----------
+    plant : Plant
+    position : sequence of float
+        Where the axes stand at first, in m (or rad); the loads hang at rest.
+    parameters : mapping of str to float
+        Value of every parameter of the plant.
+    tau : float
+        Lag of the drives in s; 0 for ideal ones.
+    max_step : float
+        Longest integration step in s.
+    on_build : callable, optional
+        Called before the FMU is compiled, when it is not in the cache.
+
+    Raises
+    ------
+    CosimulationError
+        When the FMU cannot be built, loaded or started.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        position: Sequence[float],
+        parameters: Mapping[str, float],
+        *,
+        tau: float,
+        max_step: float,
+        on_build: Callable[[], None] | None = None,
+    ) -> None:
+        super().__init__(plant, on_build)
+        rest = SampledProfile(cycle_time=1.0, position=[position, position])
+        self._begin(rest, parameters, {TAU: tau, MAX_STEP: max_step})
+        self._time = 0.0
+
+    def advance(self, position: Sequence[float], duration: float) -> Instant:
+        """Lead the axes evenly to a position, which ideal drives reach after `duration` s.
+
+        Raises
+        ------
+        CosimulationError
+            The FMU refuses the step.
+        """
+        end = self._time + duration
+        step = Steps(
+            times=np.array([self._time, end]),
+            sizes=np.array([duration]),
+            setpoints=np.array([position], dtype=np.float64),
+        )
+        found = self._observe(step)
+        self._time = end
+        return Instant(position=found["position"][-1], sway=found["sway"][-1])
