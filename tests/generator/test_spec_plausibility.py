@@ -87,3 +87,10 @@ def test_a_doubt_is_told_once_and_is_among_the_warnings_of_the_check(tmp_path):
     assert outcome.code == 0
     assert [f"Beware: {told}" for told in outcome.document["check"]["warnings"]] == [said]
     assert said.startswith("Beware: can.start_tolerance: 1 m are more than half of the move")
+
+
+def test_a_limit_that_nobody_typed_is_no_slip():
+    """The payload's default is 1 % of the move, which is far for so short a rope."""
+    spec = preset_spec("paper", ["check.residual_sway={ hook = 0.06 }", "move.distance=33"])
+    assert dict(spec.check.residual_sway) == {"hook": 0.06, "payload": 0.33}
+    assert not any("payload" in doubt for doubt in doubts(spec))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.errors import SpecError
-from gen_profile.spec.model import CanSpec, Spec
+from gen_profile.spec.model import RESIDUAL_SHARE, CanSpec, Spec
 
 Array = NDArray[np.float64]
 
@@ -167,14 +167,16 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
 
 def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
     """Doubt limits of the residual sway that every motion keeps."""
-    if spec.check.default:
-        return
     limits = spec.check.residual_sway
+    axes = zip(spec.machine().actuated, spec.move.distance, strict=True)
+    usual = RESIDUAL_SHARE * max((abs(way) for axis, way in axes if axis.unit == "m"), default=0.0)
     alike = len(set(limits.values())) == 1
     from_rest = not spec.move.initial and spec.move.stops
     end_load = spec.machine().end_load
     ends = spec.machine().loads[end_load]  # others, such as a hook, may be left to swing
     for load, limit in reversed(list(limits.items())):  # the end load, which hangs lowest, speaks for all
+        if spec.check.default or math.isclose(limit, usual):
+            continue  # what nobody typed is no slip
         column = list(limits).index(load)
         place = "check.residual_sway" if alike else f"check.residual_sway.{load}"
         directions = end_load if load in ends else slice(column, column + 1)
