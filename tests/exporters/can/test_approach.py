@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 import pytest
-from exporters.can.bench import Bench
+from exporters.can.bench import MS, Bench
 from motions import quintic
 
 from gen_profile_exporters.can.streaming.record import Phase
@@ -50,7 +50,7 @@ def test_velocities_lead_there_too():
 
 def test_an_axis_that_the_motion_leaves_at_rest_creeps():
     profile = quintic((0.1, 0.4), (0.5, 0.5))
-    with Bench("bridge", "trolley", profile=profile, stand=[100_000, 500_500]) as bench:
+    with Bench("bridge", "trolley", profile=profile, stand=[100_000, 500_500], step=MS) as bench:
         record = bench.run()
     assert record.final == (400_000, 500_000)
     way = approached(bench, 2)

@@ -69,6 +69,14 @@ def test_one_that_was_refused_is_left_so_too():
         assert [held(drive) for drive in bench.drives.drives] == before
 
 
+def test_a_heartbeat_is_watched_again_where_another_drive_was_unfit_from_the_beginning():
+    with Bench("bridge", "trolley", profile=quintic((0.1, 0.4), (1.2, -0.7))) as bench:
+        before = own_settings(bench)
+        bench.drives.drives[1].store(0x1000, 0, 0x0002_0191)
+        assert "no CiA 402 drive" in bench.run().reason
+        assert held(bench.drive) == before
+
+
 def test_a_heartbeat_that_a_killed_stream_left_watched_is_not():
     with Bench() as bench:
         own_settings(bench, watched=OURS)

@@ -7,7 +7,7 @@ import attrs
 import can
 import numpy as np
 import pytest
-from exporters.can.bench import OTHER_MAKE, QUICK_STOP, Bench, RigidLoad
+from exporters.can.bench import MS, OTHER_MAKE, QUICK_STOP, Bench, RigidLoad
 from motions import quintic
 
 from gen_profile_exporters.can.cia402 import State
@@ -107,14 +107,14 @@ class TestWholeStream:
             def advance(self, position, duration):
                 return [0.99 * at for at in super().advance(position, duration)]
 
-        with Bench(load=Leaning([0.1]), stand=[99_500]) as bench:
+        with Bench(load=Leaning([0.1]), stand=[99_500], step=MS) as bench:
             record = bench.run()
         assert record.phase is Phase.ABORTED
         assert "do not settle" in record.reason
 
     def test_no_drift_in_an_hour(self):
         hour = quintic((0.0, 1.0), duration=3600.0)
-        with Bench(profile=hour, sync_period=1.0, step=250_000_000) as bench:
+        with Bench(profile=hour, sync_period=1.0, step=500 * MS) as bench:
             record = bench.run()
         assert record.sent == 3601
         assert abs(record.lateness.drift) < 1e-12
@@ -363,7 +363,7 @@ def assert_quick_stop_is_last(bench):
 
 
 def test_a_drive_that_does_not_switch_on():
-    with Bench() as bench:
+    with Bench(step=MS) as bench:
         tamper_feedback(lambda word: 0x0250)(bench)
         record = bench.run()
     assert re.search(

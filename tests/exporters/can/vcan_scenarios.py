@@ -24,10 +24,19 @@ import can
 from can.interfaces.socketcan import SocketcanBus
 
 import gen_profile.streaming.load
+import gen_profile.streaming.stream
+import gen_profile_exporters.can.simulation.drive_bank
 import gen_profile_exporters.can.streaming.streamer
 from gen_profile.cli import main as gen_profile_command
+from gen_profile.spec.reading import preset_spec
 
-LOADED = (gen_profile.streaming.load, gen_profile_exporters.can.streaming.streamer)
+LOADED = (
+    gen_profile.streaming.load,
+    gen_profile.streaming.stream,
+    gen_profile_exporters.can.simulation.drive_bank,
+    gen_profile_exporters.can.streaming.streamer,
+    preset_spec("paper"),  # loads the machine, and what reads specs
+)
 BUS = ("--interface", "socketcan", "--channel", "vcan0")
 PATIENCE = 60.0  # s, for what takes a second or two; a machine may be busy
 SIOCSIFFLAGS = 0x8914  # linux/sockios.h

@@ -31,6 +31,11 @@ class Restoration:
     def __init__(self) -> None:
         self._found: dict[int, list[Setting]] = {}
 
+    @property
+    def any(self) -> bool:
+        """Whether there is anything to put back."""
+        return any(self._found.values())
+
     def remember(self, node: int, settings: Iterable[Setting]) -> None:
         """Keep what a drive held, in the order in which it is to be put back."""
         self._found.setdefault(node, []).extend(settings)

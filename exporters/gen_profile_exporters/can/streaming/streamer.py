@@ -230,7 +230,7 @@ class Streamer:
             said = stop.words
             if stop.unconfirmed:
                 return said  # and those drives watch our heartbeat, which has ended
-        if self._pacer.beating:
+        if self._pacer.beating or self._found.any:
             self._release()
         return said
 
