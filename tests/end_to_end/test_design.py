@@ -25,6 +25,7 @@ FIGURES = {
     "sway_residual_peak_m",
     "sway_residual_peak_perturbed_m",
     "sway_residual_worst_m",
+    "sway_transient_worst_m",
 }
 
 

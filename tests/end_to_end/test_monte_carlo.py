@@ -304,7 +304,7 @@ def test_draws_of_any_machine_agree_with_the_exact_motion(overrides):
     rows = (*machines, *further_scenarios(spec, machines))
     check = _verdict(spec, setpoints, rows, None, lambda _, __: None)
     drawn, still = check.groups["samples"], standstill(spec, setpoints)
-    watched = np.linspace(still, still + watch_time(spec, machines), 8001)
+    watched = np.linspace(still, still + watch_time(spec), 8001)
     drawn_machines = [finding.scenario.parameters for finding in drawn]
     exact = Swing(spec.machine(), motion, drawn_machines, watched[-1], spec.move.initial).at(watched)
     expected = [peak(response.sway) for response in exact]

@@ -86,4 +86,4 @@ def test_a_case_of_a_sweep_takes_one(workers, monkeypatch):
         versions=versions(),
     )
     assert run_case(recipe, 0, {}).record["status"] in {"passed", "check failed"}
-    assert workers == [1]
+    assert set(workers) == {1}

@@ -42,5 +42,5 @@ def test_a_table_of_another_program_is_judged(tmp_path, monkeypatch):
         outcome = run_here(*shlex.split(command)[1:], "--json")
         assert outcome.code == 4, outcome.err  # it sways by 21 mm, and 3 mm are allowed
         peaks.append([row["residual_peaks_m"]["payload"] for row in outcome.document["check"]["scenarios"]])
-    assert peaks[0] == pytest.approx([0.00975, 0.02101, 0.00099], rel=0.01)
+    assert peaks[0][:3] == pytest.approx([0.00975, 0.02101, 0.00099], rel=0.01)
     assert peaks[1] == pytest.approx(peaks[0], rel=1e-9)

@@ -3,6 +3,7 @@
  * For each run: reset, set the parameters, initialise, step through the inputs, keep the outputs' peaks.
  */
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "fmi2FunctionTypes.h"
@@ -46,7 +47,8 @@ typedef struct {
     PerRun parameters;                   /* n_parameters */
     size_t steps, n_inputs, n_parameters, n_outputs;
     const unsigned *input_references, *parameter_references, *output_references;
-    double since;                        /* time from which peaks count */
+    size_t n_components;                 /* of the last outputs: of a vector whose greatest length is kept, too */
+    double since;                        /* time from which peaks of single outputs count */
 } Plan;
 
 static const double *of_run(const PerRun *numbers, size_t run) { return numbers->values + run * numbers->size; }
@@ -81,25 +83,37 @@ static int begin(const Fmu *fmu, const Plan *plan, size_t run) {
            fmu->enter3(fmu->instance, false, 0.0, start, false, 0.0) || fmu->exit3(fmu->instance);
 }
 
+/* Length of the vector that the last outputs make up. */
+static double length(const Plan *plan, const double *values) {
+    double squares = 0.0;
+    for (size_t i = plan->n_outputs - plan->n_components; i < plan->n_outputs; i++) squares += values[i] * values[i];
+    return sqrt(squares);
+}
+
+/* What is kept of every run. */
+static size_t columns(const Plan *plan) { return plan->n_outputs + (plan->n_components > 0); }
+
 /* One run; `values` is room for the outputs. */
 static int simulate(const Fmu *fmu, const Plan *plan, size_t run, double *values, double *peaks) {
     const double *times = of_run(&plan->times, run), *input = of_run(&plan->inputs, run);
-    for (size_t i = 0; i < plan->n_outputs; i++) peaks[i] = 0.0;
+    for (size_t i = 0; i < columns(plan); i++) peaks[i] = 0.0;
     int status = begin(fmu, plan, run);
     for (size_t k = 0; k < plan->steps && status == GOOD; k++, input += plan->n_inputs) {
         status = set(fmu, plan->input_references, plan->n_inputs, input);
         if (status == GOOD) status = step(fmu, times[k], times[k + 1] - times[k]);
-        if (status != GOOD || times[k + 1] < plan->since) continue;
+        const bool counts = times[k + 1] >= plan->since;
+        if (status != GOOD || (!counts && plan->n_components == 0)) continue;
         status = get(fmu, plan->output_references, plan->n_outputs, values);
-        for (size_t i = 0; i < plan->n_outputs; i++) peaks[i] = fmax(peaks[i], fabs(values[i]));
+        for (size_t i = 0; counts && i < plan->n_outputs; i++) peaks[i] = fmax(peaks[i], fabs(values[i]));
+        if (plan->n_components > 0) peaks[plan->n_outputs] = fmax(peaks[plan->n_outputs], length(plan, values));
     }
     return status;
 }
 
-/* Greatest magnitudes of the outputs in runs [first, end), runs x outputs. The first bad run, or `end`. */
+/* Greatest magnitudes of the outputs in runs [first, end), runs x columns. The first bad run, or `end`. */
 EXPORT size_t many_runs(const Fmu *fmu, const Plan *plan, size_t first, size_t end, double *values, double *peaks) {
     for (size_t run = first; run < end; run++) {
-        if (simulate(fmu, plan, run, values, peaks + run * plan->n_outputs) != GOOD) return run;
+        if (simulate(fmu, plan, run, values, peaks + run * columns(plan)) != GOOD) return run;
     }
     return end;
 }

@@ -67,6 +67,7 @@ class _Plan(Structure):
             (name, POINTER(c_uint))
             for name in ("input_references", "parameter_references", "output_references")
         ),
+        ("n_components", c_size_t),
         ("since", c_double),
     ]
 
@@ -111,6 +112,7 @@ class ManyRuns:
         outputs: Sequence[str],
         *,
         since: float = 0.0,
+        components: int = 0,
     ) -> Array:
         """Simulate all runs, and keep the greatest magnitude of each output.
 
@@ -125,10 +127,13 @@ class ManyRuns:
         outputs : sequence of str
         since : float
             Time in s from which peaks count.
+        components : int
+            So many of the last outputs are the components of a vector: its greatest length at any time, also
+            before `since`, is one more column.
 
         Returns
         -------
-        (runs, outputs) array
+        (runs, outputs) or (runs, outputs + 1) array
 
         Raises
         ------
@@ -147,9 +152,10 @@ class ManyRuns:
             input_references=self._numbers(inputs),
             parameter_references=self._numbers(parameters),
             output_references=self._numbers(outputs),
+            n_components=components,
             since=since * (1.0 - 1e-12),
         )
-        return self._run(plan, np.empty((given.runs, len(outputs))))
+        return self._run(plan, np.empty((given.runs, len(outputs) + (components > 0))))
 
     def _run(self, plan: _Plan, found: Array) -> Array:
         """Let the workers fill the rows of what is to be found."""

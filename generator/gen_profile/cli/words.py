@@ -55,7 +55,7 @@ COLUMNS = {
 
 def design(outcome: Design) -> str:
     """Tell what was designed, how it was judged and where it lies."""
-    solution, figures = outcome.plan.solution, outcome.plan.figures
+    solution, figures = outcome.plan.solution, outcome.figures
     found = f"{outcome.spec.solver.method} shaper, fed with a {outcome.spec.solver.base} move"
     if solution is not None:
         status, seconds = solution.status.name.lower(), outcome.plan.solver_time

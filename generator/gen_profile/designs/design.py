@@ -15,7 +15,8 @@ from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_m
 from gen_profile.artefacts.writing import Staging, staged
 from gen_profile.designs.plan import Plan, plan, timed
 from gen_profile.errors import OutputError
-from gen_profile.evaluation.scenarios import further_scenarios
+from gen_profile.evaluation.motion_evaluation import Trial
+from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec.model import Spec
@@ -23,6 +24,7 @@ from gen_profile.verification.cosimulation import cosimulate, judge, sample_spac
 from gen_profile.verification.external_fmu import judge_foreign
 from gen_profile.verification.monte_carlo import with_further
 from gen_profile.verification.verdict import Check
+from gen_profile.verification.worst_machines import worst_machines
 from gen_profile_exporters.exporter import Exporter, target_of
 from gen_profile_exporters.registry import find_exporter, format_named, require_end
 
@@ -56,13 +58,21 @@ class Design:
         """Whether no check failed."""
         return self.check is None or self.check.passed
 
+    @property
+    def figures(self) -> dict[str, float]:
+        """Figures of the plan, and the worst residual sway that the check's search has found."""
+        if self.check is None:
+            return self.plan.figures
+        worst = "sway_residual_worst_m"
+        return self.plan.figures | {worst: max(self.plan.figures[worst], self.check.worst_in_ranges)}
+
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
             "solver": self._solver(),
-            "figures": self.plan.figures,
+            "figures": self.figures,
             "check": None if self.check is None else self.check.to_dict(),
             "artefacts": [
                 {
@@ -200,28 +210,35 @@ def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progre
     further = further_scenarios(spec, machines)
     checks = []
     for setpoints in replayed:
+        worst = worst_machines(spec, setpoints, [*machines, *further], _compiling(progress))
+        rows = [*machines, *further, *worst.machines]
         if spec.check.foreign is not None:
-            checks.append(judge_foreign(spec, spec.check.foreign, setpoints, [*machines, *further]))
-            continue
-        found = cosimulate(
-            spec,
-            setpoints,
-            machines,
-            output_step=sample_spacing(spec, setpoints, machines),
-            on_build=lambda: progress("compiling the plant's FMU, once"),
-        )
-        expected = planned.trial.swing.at(found[0].times)
-        check = judge(spec, setpoints, machines, found, expected)
-        checks.append(
-            with_further(
-                spec,
-                setpoints,
-                check,
-                further,
-                lambda done, total: progress(f"checking by co-simulation, {done} of {total} scenarios"),
-            )
-        )
+            check = judge_foreign(spec, spec.check.foreign, setpoints, rows)
+        else:
+            check = _judged(spec, planned.trial, setpoints, rows, progress)
+        checks.append(attrs.evolve(check, searched=worst.tried))
     return max(checks, key=lambda check: check.demand)
+
+
+def _judged(
+    spec: Spec, trial: Trial, setpoints: SampledProfile, rows: Sequence[Scenario], progress: Progress
+) -> Check:
+    """Judge one artefact in all its scenarios, of which the trial's machines are the first."""
+    machines = [row for row in rows if row.followed]
+    spacing = sample_spacing(spec, setpoints)
+    found = cosimulate(spec, setpoints, machines, output_step=spacing, on_build=_compiling(progress))
+    expected = trial.followed(found[0].times, machines[len(trial.machines) :])
+    return with_further(
+        spec,
+        setpoints,
+        judge(spec, setpoints, machines, found, expected),
+        [row for row in rows if not row.followed],
+        lambda done, total: progress(f"checking by co-simulation, {done} of {total} scenarios"),
+    )
+
+
+def _compiling(progress: Progress) -> Callable[[], None]:
+    return lambda: progress("compiling the plant's FMU, once")
 
 
 def _manifest(spec: Spec, planned: Plan, artefacts: tuple[Artefact, ...], check: Check | None) -> Manifest:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import attrs
@@ -10,12 +11,17 @@ import numpy as np
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, watch_time
 from gen_profile.evaluation.scenarios import Scenario, scenarios
-from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, Swing
+from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, Response, Swing
 from gen_profile.motion.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
-from gen_profile.motion.profile import Profile
+from gen_profile.motion.profile import Array, Profile
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import rounded_down
+from gen_profile.problem.parameter_box import machines_inside
+from gen_profile.problem.problem import problem_of
 from gen_profile.spec.model import Spec
+
+COARSE_SAMPLES = 501  # of machines all over the ranges, between which the greatest is a parabola's
+ACCURACY = 1e-6  # of their integration, relative
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -32,6 +38,8 @@ class Trial:
         Nominal first.
     swing : Swing
         Of these machines.
+    everywhere : Swing
+        Of machines all over the ranges, less accurately; of the same where nothing has a range.
     watch : float
         How long a residual is watched, in s.
     """
@@ -40,12 +48,22 @@ class Trial:
     command: Profile
     machines: tuple[Scenario, ...]
     swing: Swing
+    everywhere: Swing
     watch: float
 
     @cached_property
     def figures(self) -> dict[str, float]:
         """Of the first axis and the end load: sway on the way of the nominal machine, afterwards of all."""
         return _figures(self)
+
+    def followed(self, times: Array, others: Sequence[Scenario] = ()) -> tuple[Response, ...]:
+        """Tell what the machines, and others, do at rising times in s."""
+        found = self.swing.at(times)
+        if not others:
+            return found
+        parameters, initial = [machine.parameters for machine in others], self.swing.initial
+        more = Swing(self.swing.plant, self.motion, parameters, float(times[-1]), initial)
+        return (*found, *more.at(times))
 
 
 def evaluate(spec: Spec, motion: Profile) -> Trial:
@@ -58,13 +76,27 @@ def evaluate(spec: Spec, motion: Profile) -> Trial:
     """
     plant, machines = spec.machine(), scenarios(spec)
     tau = spec.actuator.tau
-    watch = watch_time(spec, machines)
+    watch = watch_time(spec)
     settle = 2.0 * max(spec.export.cycle_time, spec.can.sync_period) + STANDSTILL * (tau or 0.0)
     until = motion.duration + settle + watch
     _require_room(spec, until)
     swing = Swing(plant, motion, [m.parameters for m in machines], until, spec.move.initial)
+    known = np.array([list(machine.parameters.values()) for machine in machines])
+    inside = [
+        values
+        for values in machines_inside(problem_of(spec), spec.checked_ranges())
+        if not np.isclose(known, [values[name] for name in machines[0].parameters], 1e-9).all(axis=1).any()
+    ]
+    everywhere = swing
+    if inside:
+        everywhere = Swing(plant, motion, inside, until, spec.move.initial, accuracy=ACCURACY)
     return Trial(
-        motion=motion, command=lag_compensated(motion, tau), machines=machines, swing=swing, watch=watch
+        motion=motion,
+        command=lag_compensated(motion, tau),
+        machines=machines,
+        swing=swing,
+        everywhere=everywhere,
+        watch=watch,
     )
 
 
@@ -86,16 +118,29 @@ def _require_room(spec: Spec, until: float) -> None:
 def keeps_residual_sway(spec: Spec, trial: Trial, share: float = 1.0) -> bool:
     """Whether every load keeps a share of its limit of residual sway on all machines."""
     limits = share * np.array(list(spec.check.residual_sway.values()))
-    after = trial.swing.at(trial.motion.duration + np.linspace(0.0, trial.watch, RESIDUAL_SAMPLES))
-    return all(bool((peak(response.sway) <= limits).all()) for response in after)
+    return all(bool((peak(response.sway) <= limits).all()) for response in _afterwards(trial))
+
+
+def _afterwards(trial: Trial) -> tuple[Response, ...]:
+    """Response after the motion of the trial's machines, and of others all over the ranges."""
+    begin, watch = trial.motion.duration, trial.watch
+    named = trial.swing.at(np.linspace(begin, begin + watch, RESIDUAL_SAMPLES))
+    others = trial.everywhere.at(np.linspace(begin, begin + watch, COARSE_SAMPLES))
+    return (*named, *others)
 
 
 def _figures(trial: Trial) -> dict[str, float]:
     motion, command, duration = trial.motion, trial.command, trial.motion.duration
     end_load = trial.swing.plant.end_load
-    during = length(trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES))[0].sway[:, end_load])
-    after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
-    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in after]
+    on_the_way = [
+        length(response.sway[:, end_load])
+        for response in (
+            *trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES)),
+            *trial.everywhere.at(np.linspace(0.0, duration, COARSE_SAMPLES)),
+        )
+    ]
+    during = on_the_way[0]
+    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in _afterwards(trial)]
     names = ("velocity", "acceleration", "jerk")
     units = ("m_per_s", "m_per_s2", "m_per_s3")
     table = {"duration_s": duration}
@@ -105,9 +150,10 @@ def _figures(trial: Trial) -> dict[str, float]:
             table[f"{name}_rms_{unit}"] = root_mean_square(motion, order)
     table |= {
         "sway_transient_peak_m": float(peak(during)[0]),
+        "sway_transient_worst_m": max(float(peak(sway)[0]) for sway in on_the_way),
         "sway_transient_rms_m": float(mean_square_root(during)[0]),
         "sway_residual_peak_m": residuals[0],
-        "sway_residual_peak_perturbed_m": residuals[min(1, len(residuals) - 1)],
+        "sway_residual_peak_perturbed_m": residuals[min(1, len(trial.machines) - 1)],
         "sway_residual_worst_m": max(residuals),
     }
     if command is not motion:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from gen_profile.evaluation.scenarios import Scenario
+from gen_profile.evaluation.scenarios import Scenario, scenarios
 from gen_profile.evaluation.simulation import Response
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
@@ -18,10 +16,10 @@ STANDSTILL = 10.0  # time constants after which a lagging drive counts as standi
 RESIDUAL_SAMPLES = 4001
 
 
-def watch_time(spec: Spec, machines: Sequence[Scenario]) -> float:
-    """Time in s in which every mode of every machine shows its greatest sway at the target."""
+def watch_time(spec: Spec) -> float:
+    """Time in s in which every mode of every machine of a spec shows its greatest sway at the target."""
     plant, target = spec.machine(), spec.move.target
-    slowest = min(linearize(plant, machine.parameters, target).frequencies[0] for machine in machines)
+    slowest = min(linearize(plant, row.parameters, target).frequencies[0] for row in scenarios(spec))
     return max(SHORTEST_WATCH, 2.0 * 2.0 * np.pi / float(slowest))
 
 

@@ -13,9 +13,11 @@ from gen_profile.motion.profile import Array
 from gen_profile.spec.model import Spec
 
 TIMING = "timing"
+SEARCH = "search"
 GROUPS = {
     "machines": "nominal, ends and corners of the ranges",
     "corners": "all other corners of more than three ranges",
+    SEARCH: "the worst that a search found anywhere in the ranges",
     "drives": "the same with drives that follow otherwise",
     "samples": "drawn from all ranges",
     TIMING: "setpoints late, at uneven times, or lost",
@@ -49,6 +51,11 @@ class Scenario:
     group: str = "machines"
     row: int = 0
     lag: float | None = None
+
+    @property
+    def followed(self) -> bool:
+        """Whether its whole trajectory is looked at, not its peaks alone."""
+        return self.group in ("machines", SEARCH)
 
 
 def scenarios(spec: Spec) -> tuple[Scenario, ...]:
@@ -119,15 +126,15 @@ def _off_nominal(spec: Spec, corners: Sequence[Mapping[str, int]]) -> Iterator[S
     ranges, nominal = spec.checked_ranges(), spec.plant.parameters
     for corner in corners:
         shifted = {name: ranges[name][end] for name, end in corner.items()}
-        words = [_offset(spec, name, value) for name, value in shifted.items()]
+        words = [named(spec, name, value) for name, value in shifted.items()]
         yield Scenario(name=", ".join(words), parameters={**nominal, **shifted})
 
 
-def _offset(spec: Spec, name: str, value: float) -> str:
+def named(spec: Spec, name: str, value: float, digits: int = 6) -> str:
     """Name a parameter's value relative to the nominal one, but where it is stated as it is."""
     if name in spec.check.spans:
-        return f"{name} {value:.6g}"
-    return f"{name} {100.0 * (value / spec.plant.parameters[name] - 1.0):+.6g} %"
+        return f"{name} {value:.{digits}g}"
+    return f"{name} {100.0 * (value / spec.plant.parameters[name] - 1.0):+.{digits}g} %"
 
 
 def _draws(spec: Spec) -> list[Scenario]:

@@ -54,7 +54,7 @@ class Response:
 
 
 class Swing:
-    """Machines whose axes follow one profile exactly, integrated all at once to nearly rounding accuracy.
+    """Machines whose axes follow one profile exactly, integrated all at once.
 
     Parameters
     ----------
@@ -67,6 +67,8 @@ class Swing:
     initial : mapping of str to float, optional
         What swings at time 0, on all machines; see `gen_profile.problem.initial_state`. All hang at rest by
         default.
+    accuracy : float, optional
+        Of a step, relative; to nearly rounding accuracy by default.
 
     Raises
     ------
@@ -83,9 +85,11 @@ class Swing:
         machines: Sequence[Mapping[str, float]],
         until: float,
         initial: Mapping[str, float] = AT_REST,
+        *,
+        accuracy: float = RELATIVE_TOLERANCE,
     ) -> None:
         acceleration, self._outputs = _functions(plant)
-        self.plant, self._profile = plant, profile
+        self.plant, self.initial, self._profile = plant, initial, profile
         self._p = p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
         self._shape = shape = (2, len(machines), len(plant.unactuated))
         motion = _motion(profile)
@@ -105,8 +109,8 @@ class Swing:
             np.repeat(initial_state(plant, initial).reshape(2, 1, -1), len(machines), axis=1).ravel(),
             method="DOP853",
             dense_output=True,
-            rtol=RELATIVE_TOLERANCE,
-            atol=ABSOLUTE_TOLERANCE,
+            rtol=accuracy,
+            atol=ABSOLUTE_TOLERANCE / RELATIVE_TOLERANCE * accuracy,
             max_step=longest,
         )
         if not integral.success:

@@ -87,6 +87,26 @@ def linearize(
     return _linearized(plant, tuple(parameters.items()), tuple(axes))
 
 
+def eigenvalues(plant: Plant, machines: Array, q_a: Sequence[float]) -> NDArray[np.complex128]:
+    """Find the eigenvalues of many machines at rest in 1/s, shape (machines, 2 n_u).
+
+    Parameters
+    ----------
+    plant : Plant
+    machines : (machines, parameters) array
+        In the order of `Plant.parameters`.
+    q_a : (m,) sequence of float
+        Where the axes stand.
+    """
+    n_u, m = len(plant.unactuated), len(plant.actuated)
+    still_u, still_a = np.zeros((1, n_u)), np.zeros((1, m))
+    terms = _terms(plant)[0](still_u, still_u, np.array([q_a], dtype=np.float64), still_a, machines)
+    state = np.zeros((len(machines), 2 * n_u, 2 * n_u))
+    state[:, :n_u, n_u:] = np.eye(n_u)
+    state[:, n_u:] = terms[:, :, : 2 * n_u]
+    return np.asarray(np.linalg.eigvals(state), dtype=np.complex128)
+
+
 @lru_cache(maxsize=64)
 def _linearized(
     plant: Plant, parameters: tuple[tuple[str, float], ...], q_a: tuple[float, ...]

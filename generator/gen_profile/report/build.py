@@ -64,7 +64,7 @@ class Report:
         return {
             "name": self.design.spec.name,
             "spec_sha256": self.design.spec.sha256(),
-            "figures": self.design.plan.figures,
+            "figures": self.design.figures,
             "check": self.check.to_dict(),
             "measured": None if self.measured is None else self.measured.to_dict(),
             "report": {"path": str(path), "sha256": sha256(self.content), "bytes": len(self.content)},
@@ -132,7 +132,7 @@ def _page(outcome: Design, comparison: Comparison | None, measured: Measured | N
         title=spec.name,
         subtitle=f"{spec.machine().summary}: {move(spec)}; uncertain: {uncertain(spec)}",
         verdicts=[verdict(check), *([] if measured is None else [measured_verdict(measured)])],
-        facts=facts(spec, outcome.plan.trial, outcome.plan.figures, check),
+        facts=facts(spec, outcome.plan.trial, outcome.figures, check),
         sections=list(sections(outcome, check, comparison, measured)),
         colophon=f"Made by {libraries}.",
     )

@@ -103,7 +103,7 @@ def sections(
     )
     yield Section(
         title="Limits and margins",
-        blocks=[_limits(spec, trial, outcome.plan.figures, check)],
+        blocks=[_limits(spec, trial, outcome.figures, check)],
     )
     yield Section(title="The motion", blocks=[motion_figure(spec, trial), spectrum_figure(spec, trial)])
     yield Section(

@@ -39,7 +39,7 @@ class CraneLoad:
             )
         machines = scenarios(spec)
         tau = spec.actuator.tau or 0.0
-        self._settle, self._watch = STANDSTILL * tau, watch_time(spec, machines)
+        self._settle, self._watch = STANDSTILL * tau, watch_time(spec)
         self._end_load = spec.machine().end_load
         self._position: Sequence[float] = spec.move.start
         self._fmu = SteppedPlant(

@@ -64,6 +64,7 @@ def residual_peaks(
     tau: Array,
     max_step: Array,
     since: float,
+    on_the_way: bool = False,
 ) -> Array:
     """Feed every machine, and find the greatest sway of every load once the axes stand.
 
@@ -82,10 +83,12 @@ def residual_peaks(
         Longest integration step in s.
     since : float
         When the axes stand, in s.
+    on_the_way : bool
+        Whether the end load's greatest sway at any time is one more column.
 
     Returns
     -------
-    (runs, loads) array
+    (runs, loads) or (runs, loads + 1) array
         m.
 
     Raises
@@ -104,7 +107,9 @@ def residual_peaks(
     inputs = {
         f"{axis.name}.setpoint": feed.position[..., 1:, column] for column, axis in enumerate(plant.actuated)
     }
-    return runs.peaks(feed.times, inputs, values, [f"sway.{load}" for load in plant.loads], since=since)
+    outputs = [f"sway.{load}" for load in plant.loads]
+    components = plant.directions if on_the_way else 0
+    return runs.peaks(feed.times, inputs, values, outputs, since=since, components=components)
 
 
 def _present() -> int:

@@ -21,6 +21,7 @@ from gen_profile.verification.external_fmu import judge_foreign
 from gen_profile.verification.monte_carlo import Progress, with_further
 from gen_profile.verification.motion_variant import parse_variant, varied
 from gen_profile.verification.verdict import Check
+from gen_profile.verification.worst_machines import worst_machines
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
@@ -118,25 +119,32 @@ def check_artefact(
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     judged = varied(spec, setpoints, variant) if variant.told() else (spec, setpoints)
-    check = _verdict(*judged, _rows(judged[0], row), on_build, progress)
+    rows, searched = _rows(*judged, row, on_build)
+    check = _verdict(*judged, rows, on_build, progress)
     faults = (*check.faults, *_alterations(path, standing))
-    check = attrs.evolve(check, strict=strict, faults=faults)
+    check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
     return Judgement(
         path=path, format=format_, spec=spec, check=check, manifest=standing, variant=variant.told()
     )
 
 
-def _rows(spec: Spec, row: int | None) -> tuple[Scenario, ...]:
-    """List all scenarios, or the one of a number."""
+def _rows(
+    spec: Spec, setpoints: SampledProfile, row: int | None, on_build: Callable[[], None] | None
+) -> tuple[tuple[Scenario, ...], int]:
+    """List all scenarios, or the one of a number, and say how many machines were looked at for the worst."""
     machines = scenarios(spec)
     rows = (*machines, *further_scenarios(spec, machines))
+    if row is not None and 0 <= row < len(rows):
+        return (rows[row],), 0
+    worst = worst_machines(spec, setpoints, rows, on_build)
+    rows = (*rows, *worst.machines)
     if row is None:
-        return rows
+        return rows, worst.tried
     if not 0 <= row < len(rows):
         raise SpecError(
             f"--scenario {row}: the scenarios of this spec are numbered from 0 to {len(rows) - 1}."
         )
-    return (rows[row],)
+    return (rows[row],), worst.tried
 
 
 def _verdict(
@@ -154,14 +162,14 @@ def _verdict(
     if spec.check.foreign is not None:
         check = judge_foreign(spec, spec.check.foreign, setpoints, rows)
         return attrs.evolve(check, error_bound=check.error_bound + resolution)
-    further = [row for row in rows if row.group != "machines"]
+    further = [row for row in rows if not row.followed]
     # where a single scenario is asked for, the nominal machine tells what cycles err by
-    machines = [row for row in rows if row.group == "machines"] or scenarios(spec)[:1]
-    spacing = sample_spacing(spec, setpoints, machines)
+    machines = [row for row in rows if row.followed] or scenarios(spec)[:1]
+    spacing = sample_spacing(spec, setpoints)
     followed = _of_even_cycles(setpoints, spec)
     found = cosimulate(spec, followed, machines, output_step=spacing, on_build=on_build)
     expected = cosimulate(spec, _every_other(followed), machines, output_step=spacing)
-    check = judge(spec, setpoints, machines, found, expected)
+    check = judge(spec, setpoints, machines, found, expected, followed=followed)
     check = attrs.evolve(check, error_bound=check.error_bound + resolution)
     if len(rows) == len(further):
         check = attrs.evolve(check, findings=())

@@ -9,7 +9,7 @@ import numpy as np
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, modal_amplitudes, watch_time
 from gen_profile.evaluation.scenarios import Scenario
 from gen_profile.evaluation.simulation import Response
-from gen_profile.motion.metrics import peak
+from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.problem.linearization import linearize
 from gen_profile.spec.model import Spec
@@ -47,7 +47,7 @@ def cosimulate(
     Returns
     -------
     tuple of Response
-        One per machine, from the standstill of the axes on.
+        One per machine, from the first setpoint on.
 
     Raises
     ------
@@ -57,18 +57,15 @@ def cosimulate(
     tau = spec.actuator.tau or 0.0
     with PlantCosimulation(spec.machine(), on_build) as fmu:
         return tuple(
-            _from(
-                fmu.run(
-                    setpoints,
-                    machine.parameters,
-                    tau=tau,
-                    max_step=max_step(spec, machine),
-                    settle=STANDSTILL * tau + watch_time(spec, machines),
-                    output_step=output_step,
-                    initial=spec.move.initial,
-                    final_velocity=spec.move.final_velocity,
-                ),
-                arrival(spec, setpoints),
+            fmu.run(
+                setpoints,
+                machine.parameters,
+                tau=tau,
+                max_step=max_step(spec, machine),
+                settle=STANDSTILL * tau + watch_time(spec),
+                output_step=output_step,
+                initial=spec.move.initial,
+                final_velocity=spec.move.final_velocity,
             )
             for machine in machines
         )
@@ -80,6 +77,8 @@ def judge(
     machines: Sequence[Scenario],
     found: Sequence[Response],
     expected: Sequence[Response],
+    *,
+    followed: SampledProfile | None = None,
 ) -> Check:
     """Compare what swings on with what is allowed.
 
@@ -88,29 +87,43 @@ def judge(
     found : sequence of Response
         Of `cosimulate`, one per machine.
     expected : sequence of Response
-        Of another simulation at the same times, such that how far the two are apart bounds the error of
-        `found`.
+        Of another simulation, at some of the same times, such that how far the two are apart bounds the error
+        of `found`.
+    followed : SampledProfile, optional
+        What `found` followed, where it goes on for longer than the setpoints.
     """
-    error = max(
-        float(np.abs(one.sway - other.sway).max()) for one, other in zip(found, expected, strict=True)
-    )
-    between = max(above_samples(one.sway) for one in found)
+    standing = arrival(spec, followed or setpoints)
+    after = [_from(response, standing) for response in found]
+    since = standing if spec.limits.sway is None else 0.0
+    error = max(_distance(one, _from(other, since)) for one, other in zip(found, expected, strict=True))
+    between = max(above_samples(response.sway) for response in after)
+    if spec.limits.sway is not None:  # until the last setpoint samples are farther apart
+        moving = len(setpoints.times)
+        between = max(between, *(above_samples(response.sway[:moving]) for response in found))
     return Check(
         limit=dict(spec.check.residual_sway),
         error_bound=error + between + ERROR_FLOOR,
         arrival=arrival(spec, setpoints),
         findings=tuple(
-            _finding(spec, machine, response) for machine, response in zip(machines, found, strict=True)
+            _finding(spec, machine, response, standing)
+            for machine, response in zip(machines, found, strict=True)
         ),
+        sway_limit=spec.limits.sway,
         directions=spec.machine().directions,
         faults=implausibilities(spec, setpoints),
         doubts=doubts(spec),
     )
 
 
-def sample_spacing(spec: Spec, setpoints: SampledProfile, machines: Sequence[Scenario]) -> float:
+def _distance(found: Response, expected: Response) -> float:
+    """Greatest difference of sways in m at the times of the second response, which the first one has, too."""
+    middles = 0.5 * (found.times[:-1] + found.times[1:])
+    return float(np.abs(found.sway[np.searchsorted(middles, expected.times)] - expected.sway).max())
+
+
+def sample_spacing(spec: Spec, setpoints: SampledProfile) -> float:
     """Choose the spacing in s at which residuals are sampled."""
-    return min(setpoints.cycle_time, watch_time(spec, machines) / (RESIDUAL_SAMPLES - 1))
+    return min(setpoints.cycle_time, watch_time(spec) / (RESIDUAL_SAMPLES - 1))
 
 
 def above_samples(values: Array) -> float:
@@ -135,9 +148,9 @@ def longest_step(spec: Spec, machine: Scenario) -> float:
     return STEP_PHASE / float(fastest)
 
 
-def _from(response: Response, arrival: float) -> Response:
+def _from(response: Response, since: float) -> Response:
     """Cut what comes before."""
-    kept = response.times >= arrival * (1.0 - 1e-12)
+    kept = response.times >= since * (1.0 - 1e-12)
     return Response(
         times=response.times[kept],
         position=response.position[kept],
@@ -149,11 +162,13 @@ def _from(response: Response, arrival: float) -> Response:
     )
 
 
-def _finding(spec: Spec, machine: Scenario, response: Response) -> Finding:
-    plant = spec.machine()
-    modal = modal_amplitudes(plant, machine, response)
+def _finding(spec: Spec, machine: Scenario, response: Response, arrival: float) -> Finding:
+    plant, standing = spec.machine(), _from(response, arrival)
+    modal = modal_amplitudes(plant, machine, standing)
+    end_load = length(response.sway[:, plant.end_load])
     return Finding(
         scenario=machine,
-        residual=dict(zip(plant.loads, map(float, peak(response.sway)), strict=True)),
+        residual=dict(zip(plant.loads, map(float, peak(standing.sway)), strict=True)),
         modal=dict(zip(plant.loads, map(float, modal), strict=True)),
+        on_the_way=None if spec.limits.sway is None else float(np.abs(end_load).max()),
     )

@@ -8,7 +8,7 @@ from itertools import groupby
 import numpy as np
 
 from gen_profile.evaluation.residual_sway import STANDSTILL, watch_time
-from gen_profile.evaluation.scenarios import TIMING, Scenario, scenarios
+from gen_profile.evaluation.scenarios import TIMING, Scenario
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.spec.model import ForeignFmu, Spec
@@ -86,7 +86,7 @@ def _judged(
         feed = Feed(times=feed.times[0], position=feed.position[0])
     velocity = setpoints.velocity if exact else None
     times, inputs = _axis_inputs(foreign.input, feed, velocity, lag_of(spec, first))
-    settle = max(since - times[-1], 0.0) + watch_time(spec, scenarios(spec))
+    settle = max(since - times[-1], 0.0) + watch_time(spec)
     held = grid_times(grid_length(settle, SPACING), SPACING)[1:]
     rest = inputs[-1:] if foreign.input == "setpoint" else np.zeros_like(inputs[-1:])
     times = np.concatenate([times, times[-1] + held])

@@ -13,7 +13,7 @@ from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_
 from gen_profile.spec.model import Spec
 from gen_profile.verification.batch import Feed, many_machines, parameter_rows, residual_peaks
 from gen_profile.verification.cosimulation import STEP_PHASE, longest_step
-from gen_profile.verification.setpoint_path import delay, followed_up, lag_of, transmitted
+from gen_profile.verification.setpoint_path import delay, followed_up, follows_exactly, lag_of, transmitted
 from gen_profile.verification.verdict import Check, Finding
 from gen_profile_fmu.running.many_runs import ManyRuns
 
@@ -89,7 +89,8 @@ def _batch(
     spec: Spec, setpoints: SampledProfile, rows: Sequence[Scenario], runs: ManyRuns
 ) -> tuple[Array, float]:
     """Peaks of some rows, shape (rows, loads), and the error bound of them all in m."""
-    plant, since, after = spec.machine(), standstill(spec, setpoints), _watched(spec, setpoints)
+    plant, since, after = spec.machine(), standstill(spec, setpoints), watched(spec, setpoints)
+    on_the_way = spec.limits.sway is not None
     max_step = np.array([longest_step(spec, row) for row in rows])
     tau = np.array([lag_of(spec, row) for row in rows])
 
@@ -102,12 +103,13 @@ def _batch(
             tau=tau,
             max_step=steps,
             since=since,
+            on_the_way=on_the_way,
         )
 
     feed = transmitted(spec, setpoints, rows)
     found = peaks(feed, max_step)
     straight = rows[0].group == "samples" and spec.check.path.between == "linear"
-    if straight or rows[0].group == "corners":
+    if straight or follows_exactly(rows[0]):
         other = peaks(_every_other(feed), max_step)
     else:
         other = peaks(feed, 0.5 * np.minimum(max_step, setpoints.cycle_time))
@@ -115,12 +117,18 @@ def _batch(
     return found, float(np.abs(found - other).max()) + between
 
 
-def _watched(spec: Spec, setpoints: SampledProfile) -> Array:
-    """Choose times in s after the last setpoint, alike for all rows: no row depends on another."""
+def watched(spec: Spec, setpoints: SampledProfile, phase: float = SAMPLE_PHASE) -> Array:
+    """Choose times in s after the last setpoint, alike for all rows: no row depends on another.
+
+    Parameters
+    ----------
+    phase : float
+        rad of the fastest mode between two of them.
+    """
     machines = scenarios(spec)
     begin = float(setpoints.times[-1]) + setpoints.cycle_time + delay(spec.check.path)
-    spacing = SAMPLE_PHASE / STEP_PHASE * min(longest_step(spec, machine) for machine in machines)
-    until = standstill(spec, setpoints) + watch_time(spec, machines)
+    spacing = phase / STEP_PHASE * min(longest_step(spec, machine) for machine in machines)
+    until = standstill(spec, setpoints) + watch_time(spec)
     return begin + grid_times(grid_length(until - begin, spacing), spacing)
 
 
@@ -132,5 +140,6 @@ def _every_other(feed: Feed) -> Feed:
 
 def _finding(spec: Spec, row: Scenario, peaks: Array) -> Finding:
     """Take the peaks; amplitudes of modes are known of the machines' trajectories only."""
-    residual = dict(zip(spec.machine().loads, map(float, peaks), strict=True))
-    return Finding(scenario=row, residual=residual, modal=residual)
+    residual = dict(zip(spec.machine().loads, map(float, peaks), strict=False))
+    transient = None if spec.limits.sway is None else float(peaks[-1])
+    return Finding(scenario=row, residual=residual, modal=residual, on_the_way=transient)

@@ -33,7 +33,8 @@ def table(spec: Spec, check: Check) -> str:
     loads = (f"{load}_m" for load in check.limit)
     path = (f"path.{name}" for name in PATH)
     writer.writerow(["row", "group", "name", *parameters, *path, *loads, "error_bound_m", "verdict"])
-    writer.writerows([*_cells(spec, check, finding)] for finding in check.findings)
+    by_group = (finding for findings in check.groups.values() for finding in findings)
+    writer.writerows([*_cells(spec, check, finding)] for finding in by_group)
     return text.getvalue()
 
 

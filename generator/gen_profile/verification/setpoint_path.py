@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.evaluation.scenarios import TIMING, Scenario
+from gen_profile.evaluation.scenarios import SEARCH, TIMING, Scenario
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.spec.model import PathSpec, Spec
 from gen_profile.verification.batch import Feed
@@ -67,7 +67,7 @@ def lag_of(spec: Spec, scenario: Scenario) -> float:
 
 def follows_exactly(scenario: Scenario) -> bool:
     """Whether the drives follow the setpoints as the artefact has them."""
-    return scenario.group in ("machines", "corners")
+    return scenario.group in ("machines", "corners", SEARCH)
 
 
 def delay(path: PathSpec) -> float:

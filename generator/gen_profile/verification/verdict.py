@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
 from gen_profile.errors import CheckFailed
-from gen_profile.evaluation.scenarios import GROUPS, TIMING, Scenario
+from gen_profile.evaluation.scenarios import GROUPS, SEARCH, TIMING, Scenario
 
 QUANTILES = (0.5, 0.9, 0.99)
 FINE = 1e3  # µm, up to which an error is told in these
@@ -27,11 +27,14 @@ class Finding:
         Greatest sway of every load in m.
     modal : mapping of str to float
         Sum of the modes' amplitudes at standstill in m: what the sway of every load can ever reach.
+    on_the_way : float or None
+        Greatest sway of the end load at any time in m, where that is limited.
     """
 
     scenario: Scenario
     residual: Mapping[str, float]
     modal: Mapping[str, float]
+    on_the_way: float | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -53,6 +56,10 @@ class Check:
         What else is wrong with the artefact, a sentence each.
     strict : bool
         Whether faults in the timing of setpoints count as well.
+    sway_limit : float or None
+        Allowed sway of the end load at any time in m.
+    searched : int
+        Number of machines that were looked at for the worst ones in the ranges.
     doubts : tuple of str
         What the spec states and hardly means, a sentence each.
     """
@@ -64,6 +71,8 @@ class Check:
     directions: int = 1
     faults: tuple[str, ...] = ()
     strict: bool = False
+    sway_limit: float | None = None
+    searched: int = 0
     doubts: tuple[str, ...] = ()
 
     @property
@@ -98,7 +107,13 @@ class Check:
 
     def keeps_limit(self, finding: Finding) -> bool:
         """Whether every load keeps its limit in one scenario, the error bound included."""
-        return all(finding.residual[load] + self.error_bound <= limit for load, limit in self.limit.items())
+        return self._share(finding) <= 1.0
+
+    def _share_on_the_way(self, finding: Finding) -> float:
+        """Share of the limit of sway at any time, the error bound included; 0 where there is none."""
+        if self.sway_limit is None or finding.on_the_way is None:
+            return 0.0
+        return (finding.on_the_way + self.error_bound) / self.sway_limit
 
     @property
     def worst(self) -> tuple[str, Finding]:
@@ -108,36 +123,59 @@ class Check:
     def worst_of(self, findings: Sequence[Finding]) -> tuple[str, Finding]:
         """Find the load that takes up the greatest share of its limit in some scenarios, and where."""
         pairs = [(load, finding) for finding in findings for load in self.limit]
-        return max(pairs, key=lambda pair: pair[1].residual[pair[0]] / self.limit[pair[0]])
+        return max(pairs, key=lambda pair: self._share_after(pair[1], pair[0]))
+
+    def _share_after(self, finding: Finding, load: str) -> float:
+        """Share of a load's limit of residual sway, the error bound included."""
+        return (finding.residual[load] + self.error_bound) / self.limit[load]
 
     @property
     def demand(self) -> float:
         """Share of its limit that the worst load takes up; infinite where something else is wrong."""
-        load, finding = self.worst
-        share = (finding.residual[load] + self.error_bound) / self.limit[load]
-        return float("inf") if self.faults else share
+        return float("inf") if self.faults else max(map(self._share, self.judged))
+
+    @property
+    def worst_in_ranges(self) -> float:
+        """Greatest residual sway of the end load in m that was found by the search; 0 where it found none."""
+        return max(map(self._end_load, self.groups.get(SEARCH, ())), default=0.0)
 
     def reasons(self) -> tuple[str, ...]:
         """Say why the check failed, a sentence each; none when it passed."""
-        if all(self.keeps_limit(finding) for finding in self.judged):
-            return self.faults
-        return (self._sentence(*self.worst), *self.faults)
+        return (*self._sentences(self.judged), *self.faults)
 
     def warnings(self) -> tuple[str, ...]:
-        """Say what is wrong without counting: doubtful values, and sway under faults of timing."""
+        """Say what is wrong without counting: doubtful values, sway on the way, faults of timing."""
         timing = () if self.strict else self.groups.get(TIMING, ())
-        if all(map(self.keeps_limit, timing)):
-            return self.doubts
-        return (*self.doubts, self._sentence(*self.worst_of(timing)) + " It counts with --strict.")
+        late = (f"{sentence} It counts with --strict." for sentence in self._sentences(timing))
+        return (*self.doubts, *self._sentences_on_the_way(), *late)
 
-    def _sentence(self, load: str, finding: Finding) -> str:
-        micrometres = float(f"{1e6 * self.error_bound:.2g}")
-        error = f"{micrometres:g} µm" if micrometres < FINE else f"{micrometres / 1e3:g} mm"
-        return (
+    def _sentences(self, findings: Sequence[Finding]) -> Iterator[str]:
+        """Say which limit the worst of some scenarios breaks."""
+        if all(map(self.keeps_limit, findings)):
+            return
+        load, finding = self.worst_of(findings)
+        yield (
             f"The {load} sways by {1e3 * finding.residual[load]:.4g} mm after the move "
             f"({finding.scenario.name}), and {1e3 * self.limit[load]:.4g} mm are allowed "
-            f"(check.residual_sway; numerical error up to {error})."
+            f"(check.residual_sway; numerical error up to {self._error()})."
         )
+
+    def _sentences_on_the_way(self) -> Iterator[str]:
+        """Say which machine sways more on the way than the limits allow."""
+        swaying = max(self.judged, key=self._share_on_the_way)
+        if self.sway_limit is not None and self._share_on_the_way(swaying) > 1.0:
+            yield (
+                f"The {self._end_load_name()} sways by {1e3 * (swaying.on_the_way or 0.0):.4g} mm on the way "
+                f"({swaying.scenario.name}), and {1e3 * self.sway_limit:.4g} mm are allowed "
+                f"(limits.sway; numerical error up to {self._error()})."
+            )
+
+    def _error(self) -> str:
+        micrometres = float(f"{1e6 * self.error_bound:.2g}")
+        return f"{micrometres:g} µm" if micrometres < FINE else f"{micrometres / 1e3:g} mm"
+
+    def _end_load_name(self) -> str:
+        return list(self.limit)[-1] if self.directions == 1 else "load"
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON and the manifest."""
@@ -148,6 +186,8 @@ class Check:
             "error_bound_m": self.error_bound,
             "arrival_s": self.arrival,
             "strict": self.strict,
+            "sway_limit_m": self.sway_limit,
+            "machines_searched": self.searched,
             "groups": [self._group(name, findings) for name, findings in self.groups.items()],
             "scenarios": [
                 {
@@ -159,6 +199,7 @@ class Check:
                     "residual_peak_m": self._end_load(finding),
                     "residual_peaks_m": dict(finding.residual),
                     "residual_modal_m": dict(finding.modal),
+                    "sway_peak_m": finding.on_the_way,
                     "passed": self.keeps_limit(finding),
                 }
                 for finding in self.listed()
@@ -177,7 +218,7 @@ class Check:
         return tuple(kept)
 
     def _share(self, finding: Finding) -> float:
-        return max(finding.residual[load] / limit for load, limit in self.limit.items())
+        return max(self._share_after(finding, load) for load in self.limit)
 
     def _end_load(self, finding: Finding) -> float:
         return max(finding.residual[load] for load in list(self.limit)[-self.directions :])

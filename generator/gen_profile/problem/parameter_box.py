@@ -1,0 +1,228 @@
+"""Where in the ranges of parameters to look for the worst machine, and the search for it from there.
+
+A motion leaves of a mode what its acceleration's spectrum has at the mode's frequency ω. The spectrum of a
+motion that lasts T changes over ω no faster than e^{iωT} does; so among machines whose modes' phases ω T are
+a fraction of a radian apart, the best starts for a local search are found.
+
+A place is a row of shares from 0 to 1, one per range: from its least value to its greatest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from gen_profile.plants.plant import Plant
+from gen_profile.problem.linearization import eigenvalues
+from gen_profile.problem.problem import Problem
+from gen_profile.problem.symbolic import Array
+
+Phases = Callable[[Array], Array]  # of every mode in rad at the end of the motion, (places, modes)
+Shares = Callable[[Array], Array]  # of their limits that several figures take up, (places, figures)
+
+TURN = 0.6  # rad by which phases may differ between neighbours on a line
+FEWEST = 9  # places on a line
+FINE = 513  # places at which a line's phases are found
+CORNERS = 6  # ranges up to which all corners are places
+FEWEST_SPREAD = 32  # places per range that are spread over a box
+MOST = 512  # places that are spread at most, and twice as many on all lines together
+FEW = 64  # likewise, where machines cost more
+STARTS = 8  # of local searches for each figure
+APART = 2.5  # steps between two starts
+ROUNDS = 8  # of a local search along one range, and two more for each further one
+POLLS = 4096  # places that all local searches may look at, however many ranges there are
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Start:
+    """Places to begin a search at.
+
+    Attributes
+    ----------
+    places : (places, ranges) array
+    steps : (ranges,) array
+        How far apart places are along each range, about.
+    """
+
+    places: Array
+    steps: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Box:
+    """Ranges of a machine's parameters under a motion.
+
+    Attributes
+    ----------
+    plant : Plant
+    nominal : mapping of str to float
+        Value of every parameter.
+    ranges : mapping of str to (float, float)
+        Least and greatest values; at least one. What is no parameter of the plant changes no machine.
+    ends : sequence of (m,) sequences of float
+        Where the axes start and stop.
+    duration : float
+        Of the motion in s.
+    """
+
+    plant: Plant
+    nominal: Mapping[str, float]
+    ranges: Mapping[str, tuple[float, float]]
+    ends: Sequence[Sequence[float]]
+    duration: float
+
+    def machines(self, places: Array) -> Array:
+        """Parameters at some places, shape (places, parameters), in the plant's order."""
+        columns = {name: np.full(len(places), self.nominal[name]) for name in self._names()}
+        for (name, (low, high)), share in zip(self.ranges.items(), places.T, strict=True):
+            if name in columns:
+                columns[name] = low + share * (high - low)
+        return np.stack(list(columns.values()), axis=1)
+
+    def parameters(self, places: Array) -> list[dict[str, float]]:
+        """Parameters at some places by name."""
+        return [dict(zip(self._names(), row, strict=True)) for row in self.machines(places).tolist()]
+
+    def phases(self, places: Array) -> Array:
+        """Find how far in rad the modes turn during the motion, shape (places, modes).
+
+        Frequencies are the mean of those at both ends.
+        """
+        machines, modes = self.machines(places), len(self.plant.unactuated)
+        found = [np.sort(eigenvalues(self.plant, machines, q_a).imag, axis=1) for q_a in self.ends]
+        return np.asarray(self.duration * np.mean(found, axis=0)[:, modes:])
+
+    def _names(self) -> list[str]:
+        return [parameter.name for parameter in self.plant.parameters]
+
+
+def machines_inside(
+    problem: Problem, ranges: Mapping[str, tuple[float, float]], most: int = FEW
+) -> list[dict[str, float]]:
+    """List the parameters of machines all over some ranges, for a problem's move; none of no ranges.
+
+    Parameters
+    ----------
+    problem : Problem
+    ranges : mapping of str to (float, float)
+        Least and greatest values.
+    most : int
+        Of `start`.
+    """
+    wide = {name: ends for name, ends in ranges.items() if ends[1] > ends[0]}
+    if not wide:
+        return []
+    box = Box(
+        plant=problem.plant,
+        nominal=problem.parameters,
+        ranges=wide,
+        ends=(problem.start, problem.target),
+        duration=problem.duration,
+    )
+    return box.parameters(start(box.phases, len(wide), most).places)
+
+
+def start(turned: Phases, ranges: int, most: int = MOST) -> Start:
+    """Choose places all over a box: on the lines through its middle, at its corners, and spread within.
+
+    Parameters
+    ----------
+    turned : callable
+        Such as `Box.phases`.
+    ranges : int
+        At least 1.
+    most : int
+        Number of places to spread within at most; on all lines together twice as many.
+    """
+    lines = [_line(turned, ranges, axis, max(2 * most // ranges, FEWEST)) for axis in range(ranges)]
+    steps = np.array([1.0 / (len(line) - 1) for line in lines])
+    if ranges == 1:
+        return Start(places=lines[0], steps=steps)
+    corners = list(product((0.0, 1.0), repeat=ranges)) if ranges <= CORNERS else []
+    sequence = qmc.Halton(ranges, scramble=False)
+    coarse = sequence.random(min(FEWEST_SPREAD * ranges, most))
+    span = np.ptp(turned(np.concatenate([coarse, *lines])), axis=0)
+    count = int(min(np.prod(1.0 + span), most))
+    spread = [coarse, sequence.random(max(count - len(coarse), 0))]
+    return Start(places=np.concatenate([np.array(corners).reshape(-1, ranges), *lines, *spread]), steps=steps)
+
+
+def _line(turned: Phases, ranges: int, axis: int, most: int) -> Array:
+    """Choose places on the line along one range through the middle, evenly by the fastest turning mode."""
+    fine = np.linspace(0.0, 1.0, FINE)
+    places = np.full((FINE, ranges), 0.5)
+    places[:, axis] = fine
+    turns = np.abs(np.diff(turned(places), axis=0)).max(axis=1)
+    measure = np.concatenate([[0.0], np.cumsum(turns / TURN)]) + (FEWEST - 1) * fine
+    count = min(int(np.ceil(measure[-1])) + 1, most)
+    line = np.full((count, ranges), 0.5)
+    line[:, axis] = np.interp(np.linspace(0.0, measure[-1], count), measure, fine)
+    return line
+
+
+def worst_places(shares: Shares, begun: Start, keep: int = 1) -> tuple[Array, int]:
+    """Search a box for the places where figures are greatest: pattern searches from the best starts.
+
+    The directions are turned at random between rounds (C. Audet and J. E. Dennis, Mesh adaptive direct search
+    algorithms, SIAM J. Optim. 17, 2006), which gets along the ridges of equal frequency.
+
+    Parameters
+    ----------
+    shares : callable
+    begun : Start
+    keep : int
+        How many local maxima of each figure are wanted at most.
+
+    Returns
+    -------
+    places : (places, ranges) array
+        Local maxima of each figure, those of the first figure first, each figure's greatest first.
+    tried : int
+        Number of places looked at.
+    """
+    values, ranges = shares(begun.places), begun.places.shape[1]
+    rounds = ROUNDS + 2 * (ranges - 1)
+    starts = min(STARTS, max(POLLS // (rounds * 2 * ranges * values.shape[1]), keep))
+    chosen = [
+        (place, figure)
+        for figure, column in enumerate(values.T)
+        for place in _separate(begun.places, column, begun.steps)[:starts]
+    ]
+    index, figure = (np.array(column) for column in zip(*chosen, strict=True))
+    places, best = begun.places[index], values[index, figure]
+    random, reach, tried = np.random.default_rng(0), np.ones(len(places)), len(values)
+    for _ in range(rounds):
+        basis = np.linalg.qr(random.standard_normal((ranges, ranges)))[0]
+        ways = np.concatenate([basis, -basis]) * begun.steps
+        polls = np.clip(places[:, None] + reach[:, None, None] * ways, 0.0, 1.0)
+        found = shares(polls.reshape(-1, ranges)).reshape(*polls.shape[:2], -1)
+        tried += polls.shape[0] * polls.shape[1]
+        own = np.take_along_axis(found, figure[:, None, None], axis=2)[:, :, 0]
+        top, rows = own.argmax(axis=1), np.arange(len(places))
+        better = own[rows, top] > best
+        places = np.where(better[:, None], polls[rows, top], places)
+        best = np.where(better, own[rows, top], best)
+        reach = np.where(better, reach, 0.5 * reach)
+    kept = [
+        place
+        for number in range(values.shape[1])
+        for place in places[figure == number][
+            _separate(places[figure == number], best[figure == number], begun.steps)[:keep]
+        ]
+    ]
+    return np.array(kept), tried
+
+
+def _separate(places: Array, values: Array, steps: Array) -> NDArray[np.intp]:
+    """Choose the greatest values' places that are not close to one another, greatest first."""
+    left = np.argsort(-values, kind="stable")
+    chosen: list[int] = []
+    while len(left) and len(chosen) < STARTS:
+        chosen.append(int(left[0]))
+        left = left[np.linalg.norm((places[left] - places[left[0]]) / steps, axis=1) >= APART]
+    return np.array(chosen, dtype=np.intp)
