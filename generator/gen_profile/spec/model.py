@@ -455,6 +455,25 @@ class CanSpec:
 
 
 @attrs.frozen(kw_only=True)
+class PlannerSpec:
+    """What a planner block is told at run time, and how it brakes at once.
+
+    Attributes
+    ----------
+    live : mapping of str to (float, float)
+        Ranges of the machine's parameters, or places of its hoist, that the controller knows.
+    quick_stop : float or None
+        Deceleration of a stop that lets the load swing, in m/s²; None takes twice the limit.
+    quick_stop_jerk : float or None
+        m/s³; None takes four times the limit.
+    """
+
+    live: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=_frozen_mapping)
+    quick_stop: Positive | None = None
+    quick_stop_jerk: Positive | None = None
+
+
+@attrs.frozen(kw_only=True)
 class Spec:
     """One motion task, complete: nothing downstream looks anything else up."""
 
@@ -470,6 +489,7 @@ class Spec:
     axis: Mapping[str, AxisSpec] = attrs.field(converter=_frozen_mapping)
     export: ExportSpec
     can: CanSpec
+    planner: PlannerSpec = attrs.field(factory=PlannerSpec)
 
     def machine(self) -> Plant:
         """Load the plant."""
@@ -505,6 +525,8 @@ class Spec:
         if self.cost.sway_scale is None:
             document["cost"]["sway_scale"] = "auto"
         del document["check"]["default"]
+        if self.planner == PlannerSpec():  # a spec without hashes as it did
+            del document["planner"]
         if self.check.foreign is not None:
             del document["check"]["foreign"]
             document["check"] |= self.check.foreign.to_dict()

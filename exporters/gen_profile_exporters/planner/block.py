@@ -1,0 +1,207 @@
+"""The planner block as Structured Text: constants of a machine put into the portable text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from textwrap import indent
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile_exporters.planner.interface_text import HEADER, INTERFACE
+from gen_profile_exporters.planner.motion_text import INPUTS, OUTPUTS, SLOTS
+from gen_profile_exporters.planner.planning_text import PLANNING, ROW, STEP
+
+Array = NDArray[np.float64]
+
+COLUMNS = 96  # slots of a committed future
+MOST = 56  # slots of a plan
+FUTURE = 128
+WORK = 2850  # floating-point operations that a cycle may spend, by a cautious count
+ITERATIONS = 7
+SLOTS_PER_PERIOD = 20.0  # of the slowest mode
+INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class PlannerConstants:
+    """What the block needs to know of a machine, in m and s.
+
+    Attributes
+    ----------
+    name, machine, axis : str
+    start : float
+        m, where the axis stands in the block's example.
+    cycle : float
+    velocity, acceleration, jerk : float
+    quick_deceleration, quick_jerk : float
+    travel : (float, float)
+    live : mapping of str to (float, float)
+        Ranges of the live parameters.
+    nominal : tuple of float
+        Their values where the controller gives none.
+    drift : tuple of float
+        By how much each may change on the way before the promise is lost.
+    degrees : int
+        Chebyshev polynomials per live parameter.
+    exponents : (parameters, terms) array of int
+        Which of them are multiplied.
+    frequencies, decays : (modes, terms) arrays
+        Coefficients for the sum of the squared frequencies (and, of two, the product), and for the decays.
+    reach_first, reach_step : int
+    reaches : (slot counts, terms) array
+        Coefficients for the distance from rest to rest in so many slots.
+    """
+
+    name: str
+    machine: str
+    axis: str
+    start: float
+    cycle: float
+    velocity: float
+    acceleration: float
+    jerk: float
+    quick_deceleration: float
+    quick_jerk: float
+    travel: tuple[float, float]
+    live: Mapping[str, tuple[float, float]]
+    nominal: tuple[float, ...]
+    drift: tuple[float, ...]
+    degrees: int
+    exponents: NDArray[np.int64]
+    frequencies: Array
+    decays: Array
+    reach_first: int
+    reach_step: int
+    reaches: Array
+
+
+def block_text(constants: PlannerConstants) -> str:
+    """Write the function block."""
+    body = PLANNING
+    for hole, part in (("@row\n", ROW), ("@step\n", STEP)):
+        body = body.replace(hole, indent(part, 20 * " "))
+    text = HEADER + INTERFACE + INPUTS + SLOTS + body + OUTPUTS
+    values = _values(constants)
+    return re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
+
+
+def block_name(name: str) -> str:
+    """Name of the function block type: letters, digits and single underscores."""
+    return "FB_" + re.sub(r"_+", "_", re.sub(r"[^A-Za-z0-9]", "_", name)).strip("_").upper() + "_PLANNER"
+
+
+def _values(c: PlannerConstants) -> dict[str, str]:
+    modes, terms = c.frequencies.shape
+    conditions = 1 + 4 * modes
+    lives = list(c.live)
+    ranges = [f"f{name}: live parameter {name}, {low:g} to {high:g}" for name, (low, high) in c.live.items()]
+    inputs = [
+        f"    f{name} : LREAL := {real_literal(value)}; (* {low:g} to {high:g} *)"
+        for (name, (low, high)), value in zip(c.live.items(), c.nominal, strict=True)
+    ]
+    lasts = {
+        "future": FUTURE,
+        "power": max(1, len(lives)) * c.degrees,
+        "live": max(1, len(lives)),
+        "mode": modes,
+        "column": COLUMNS,
+        "wide": MOST + 8,
+        "conditions": conditions * COLUMNS,
+        "row": conditions,
+        "gram": conditions**2,
+        "bounds": 3 * (MOST + 8),
+        "reach": len(c.reaches),
+    }
+    return {
+        "name": c.name,
+        "block": block_name(c.name),
+        "machine": c.machine,
+        "axis": c.axis,
+        "start": real_literal(c.start),
+        "cycle_time": real_literal(c.cycle),
+        "cycle": f"{c.cycle:g}",
+        "velocity": f"{c.velocity:g}",
+        "acceleration": f"{c.acceleration:g}",
+        "jerk": f"{c.jerk:g}",
+        "travel": f"{c.travel[0]:g} to {c.travel[1]:g}",
+        "quick_deceleration": f"{c.quick_deceleration:g}",
+        "quick_jerk": f"{c.quick_jerk:g}",
+        "live_lines": "\n    ".join(ranges) or "No live parameters.",
+        "live_inputs": "\n".join(inputs),
+        "take_live": "\n".join(f"aLiveNow[{k}] := f{name};" for k, name in enumerate(lives)),
+        "constants": _constants(c, terms, conditions),
+        **{f"last_{name}": str(length - 1) for name, length in lasts.items()},
+    }
+
+
+def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
+    whole = {
+        "cModes": len(c.frequencies),
+        "cConditions": conditions,
+        "cLives": len(c.live),
+        "cTerms": terms,
+        "cDegrees": c.degrees,
+        "cColumns": COLUMNS,
+        "cMost": MOST,
+        "cLongKernel": 40,
+        "cWide": MOST + 8,
+        "cFuture": FUTURE,
+        "cWork": WORK,
+        "cIterations": ITERATIONS,
+        "cColumnWork": 285 + 9 * conditions + conditions * conditions + 2 * conditions,
+        "cReaches": len(c.reaches),
+        "cReachFirst": c.reach_first,
+        "cReachStep": c.reach_step,
+    }
+    real = {
+        "cCycle": c.cycle,
+        "cVelocity": c.velocity,
+        "cAcceleration": c.acceleration,
+        "cJerk": c.jerk,
+        "cQuickDeceleration": c.quick_deceleration,
+        "cQuickJerk": c.quick_jerk,
+        "cTravelLow": c.travel[0],
+        "cTravelHigh": c.travel[1],
+        "cSlotsPerPeriod": SLOTS_PER_PERIOD,
+        "cInside": INSIDE,
+        "cReachShare": 0.985,  # reached by these iterations of the shortest plan's distance
+        "cCentre": 0.15,
+        "cStep": 0.93,
+    }
+    lives = c.live or {"": (0.0, 1.0)}
+    exponents = c.exponents if c.live else np.zeros((1, terms), dtype=np.int64)
+    arrays = {
+        "cLiveLow": [low for low, _ in lives.values()],
+        "cLiveHigh": [high for _, high in lives.values()],
+        "cLiveDrift": c.drift or (0.0,),
+        "cFrequency": c.frequencies.ravel(),
+        "cDecay": c.decays.ravel(),
+        "cReach": c.reaches.ravel(),
+    }
+    lines = [f"    {name} : DINT := {value};" for name, value in whole.items()]
+    lines += [f"    {name} : LREAL := {real_literal(value)};" for name, value in real.items()]
+    lines += [_array(name, "LREAL", [real_literal(v) for v in values]) for name, values in arrays.items()]
+    lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))
+    return "\n".join(lines)
+
+
+def _array(name: str, type_: str, values: list[str]) -> str:
+    lines, line = [], ""
+    for value in values:
+        if len(line) + len(value) > 96:
+            lines.append(line)
+            line = ""
+        line += f"{value}, "
+    text = "\n        ".join([*lines, line]).removesuffix(", ")
+    return f"    {name} : ARRAY [0..{len(values) - 1}] OF {type_} := [{text}];"
+
+
+def real_literal(value: float) -> str:
+    """Write a number so that every compiler reads the same double."""
+    text = repr(float(value)).upper()
+    mantissa, _, exponent = text.partition("E")
+    mantissa += "" if "." in mantissa else ".0"
+    return mantissa + (f"E{exponent}" if exponent else "")

@@ -1,0 +1,194 @@
+"""Header and declarations of the planner block, in portable Structured Text with holes (``@name``)."""
+
+HEADER = """\
+(*
+    @name: planner function block, IEC 61131-3 Structured Text, from gen-profile.
+
+    Machine: @machine. Axis @axis, in m and s. Cycle @cycle s.
+    It plans every motion itself: to a position, at a velocity, and each stop; no load sways afterwards.
+    Limits: velocity @velocity m/s, acceleration @acceleration m/s2, jerk @jerk m/s3, travel @travel m.
+    @live_lines
+
+    Call it once in every cycle of its task. bEnable takes over fActPosition; the axis follows fPosition
+    (with fVelocity and fAcceleration fed forward) while bEnabled is set.
+    A rising edge of bExecute moves to fTarget, also on the way to another target. While bVelocity is set, the
+    axis follows fVelocityCommand (a stick). bStop stops without sway, as does dropping bVelocity or bEnable.
+    bQuickStop brakes at once, with @quick_deceleration m/s2 and @quick_jerk m/s3: the load swings then.
+    rOverride (above 0, to 1) and fVelocityLimit (0: none) slow down what is planned from then on.
+    The live parameters are taken over at standstill. bPromise drops where they change on the way.
+
+    nErrorId: 0 none
+              1 fCycleTime is not the cycle time of this block
+              2 a live parameter is out of its range
+              3 fTarget or fVelocityCommand is no number, or fTarget is outside the travel
+              4 fActPosition is no number, or outside the travel
+              5 rOverride does not lie above 0 and up to 1, or fVelocityLimit is negative or no number
+              6 contradictory commands: a rising edge of bExecute while bVelocity is set
+    An error stops the axis without sway; it goes with the next command, or when its cause does.
+    nPromise: 0 holds; 1 a live parameter changed on the way; 2 quick stop, until bEnable is dropped;
+              3 not ready: no live parameters taken over yet
+*)
+"""
+
+INTERFACE = """\
+FUNCTION_BLOCK @block
+VAR_INPUT
+    bEnable : BOOL;
+    bExecute : BOOL; (* rising edge: move to fTarget *)
+    bVelocity : BOOL; (* follow fVelocityCommand *)
+    bStop : BOOL; (* stop without sway *)
+    bQuickStop : BOOL; (* brake at once: the load swings *)
+    fTarget : LREAL; (* m *)
+    fVelocityCommand : LREAL; (* m/s *)
+    fVelocityLimit : LREAL; (* m/s; 0.0: none but the machine's *)
+    rOverride : LREAL := 1.0; (* of the velocity limit *)
+    fActPosition : LREAL := @start; (* m, where the axis stands *)
+    fCycleTime : LREAL := @cycle_time; (* s, of the task that calls this block *)
+@live_inputs
+END_VAR
+VAR_OUTPUT
+    fPosition : LREAL; (* m *)
+    fVelocity : LREAL; (* m/s *)
+    fAcceleration : LREAL; (* m/s2 *)
+    bEnabled : BOOL;
+    bBusy : BOOL; (* moves, or is about to *)
+    bDone : BOOL; (* stands at the target *)
+    bInVelocity : BOOL; (* has the velocity of the command *)
+    bCommandAborted : BOOL; (* a command to a position was replaced before it ended *)
+    bError : BOOL;
+    nErrorId : DINT;
+    bPromise : BOOL; (* no sway remains after the motion *)
+    nPromise : DINT; (* why not *)
+    fTimeToGo : LREAL; (* s, to standstill as far as planned *)
+    fDistanceToGo : LREAL; (* m, to the target *)
+    fStopDistance : LREAL; (* m, which a stop without sway takes at most *)
+END_VAR
+VAR
+    nState : DINT; (* 0 disabled, 1 stands, 2 moves, 3 brakes at once *)
+    nCommand : DINT; (* 0 stop, 1 position, 2 velocity *)
+    bExecuteBefore : BOOL;
+    bVelocityBefore : BOOL;
+    bFault : BOOL;
+    bReady : BOOL; (* kernel and frequencies are those of the live parameters *)
+    bSettled : BOOL; (* of the quick stop: no sway known *)
+    fGoal : LREAL; (* m, of the command to a position *)
+    fTop : LREAL; (* m/s, velocity limit of now *)
+    fLow : LREAL;
+    fHigh : LREAL;
+    fValue : LREAL;
+    fWanted : LREAL;
+    fShare : LREAL;
+    bLiveGood : BOOL;
+    bDrifted : BOOL; (* a live parameter changed on the way *)
+    bNew : BOOL; (* a slot begins *)
+    bPulse : BOOL;
+    bSurrender : BOOL; (* planning failed: go there by pulses *)
+
+    (* The committed future: v(t) is the quadratic B-spline with these coefficients, one a slot. *)
+    aFuture : ARRAY [0..@last_future] OF LREAL; (* m/s; the first three belong to the slot of now *)
+    nFuture : DINT; (* how many of them differ from zero, at most *)
+    fFinal : LREAL; (* m, where it ends *)
+    fFrom : LREAL; (* m, at the beginning of the slot *)
+    bPulses : BOOL; (* made of the kernel's pulses alone: ends one kernel after the last pulse *)
+    bStopPlanned : BOOL;
+    nSlot : DINT := 1; (* cycles in a slot *)
+    fSlot : LREAL := 1.0; (* s *)
+    nTick : DINT; (* cycle within the slot *)
+    fPart : LREAL; (* of the slot that has passed *)
+
+    (* Modes of the machine. *)
+    aPower : ARRAY [0..@last_power] OF LREAL; (* Chebyshev polynomials of the live parameters *)
+    aLive : ARRAY [0..@last_live] OF LREAL;
+    aLiveNow : ARRAY [0..@last_live] OF LREAL;
+    aFrequency : ARRAY [0..@last_mode] OF LREAL; (* rad/s *)
+    aDecay : ARRAY [0..@last_mode] OF LREAL; (* 1/s *)
+    aTurnRe : ARRAY [0..@last_mode] OF LREAL; (* of the mode in half a slot *)
+    aTurnIm : ARRAY [0..@last_mode] OF LREAL;
+    aNow : ARRAY [0..@last_mode] OF LREAL;
+    fRe : LREAL;
+    fIm : LREAL;
+    fSquare : LREAL;
+    fGrowth : LREAL;
+    fHalf : LREAL;
+
+    (* Kernel: a pulse of the velocity that leaves no sway. *)
+    aKernelWide : ARRAY [0..@last_column] OF LREAL; (* with zeros at both ends *)
+    aKernel : ARRAY [0..@last_column] OF LREAL;
+    nKernel : DINT;
+
+    (* Planning, spread over cycles: nJob 0 none, 1 kernel, 2 position, 3 stop. *)
+    nJob : DINT;
+    nPhase : DINT;
+    nPart : DINT;
+    bPlanned : BOOL; (* the plan waits for its slot *)
+    nAhead : DINT; (* slots until the plan takes over *)
+    nColumns : DINT; (* slots that are planned *)
+    nOld : DINT; (* slots of the committed future from there *)
+    nIteration : DINT;
+    nWork : DINT; (* floating-point operations of this cycle *)
+    nCost : DINT;
+    bRoom : BOOL;
+    bGood : BOOL;
+    fSign : LREAL;
+    fScale : LREAL; (* m/s: velocities are planned as shares of it *)
+    fLower : LREAL;
+    fUpper : LREAL;
+    fRate : LREAL; (* greatest change of the share in a slot *)
+    fCurve : LREAL; (* greatest change of this change *)
+    fNeed : LREAL; (* sum of shares that the target asks for beyond the old future *)
+    fOldSum : LREAL;
+    fSum : LREAL;
+    fGap : LREAL; (* complementarity *)
+    fStepX : LREAL;
+    fStepZ : LREAL;
+    fBound : LREAL;
+    fSlackA : LREAL;
+    fSlackB : LREAL;
+    fDelta : LREAL;
+    fPath : LREAL;
+    nRow : DINT;
+    nColumn : DINT;
+    nOther : DINT;
+    nIndex : DINT;
+    nMode : DINT;
+    nFirst : DINT;
+    nLast : DINT;
+    nTerm : DINT;
+    nReach : DINT;
+    aOld : ARRAY [0..@last_column] OF LREAL; (* committed shares from the slot of the plan *)
+    aX : ARRAY [0..@last_wide] OF LREAL; (* two committed shares, then those that are sought *)
+    aDx : ARRAY [0..@last_wide] OF LREAL;
+    aWork : ARRAY [0..@last_wide] OF LREAL;
+    aReach : ARRAY [0..@last_reach] OF LREAL; (* m, from rest in so many slots *)
+    aPlan : ARRAY [0..@last_column] OF LREAL; (* m/s *)
+    aE : ARRAY [0..@last_conditions] OF LREAL; (* conditions: modes and their derivatives; row 0: the sum *)
+    aY : ARRAY [0..@last_conditions] OF LREAL;
+    aB : ARRAY [0..@last_row] OF LREAL;
+    aMiss : ARRAY [0..@last_row] OF LREAL;
+    aS : ARRAY [0..@last_gram] OF LREAL;
+    aSlackA : ARRAY [0..@last_bounds] OF LREAL; (* upper bounds of value, change and its change *)
+    aSlackB : ARRAY [0..@last_bounds] OF LREAL; (* lower ones *)
+    aPriceA : ARRAY [0..@last_bounds] OF LREAL;
+    aPriceB : ARRAY [0..@last_bounds] OF LREAL;
+    aWeight : ARRAY [0..@last_bounds] OF LREAL;
+    aPush : ARRAY [0..@last_bounds] OF LREAL;
+    aH0 : ARRAY [0..@last_wide] OF LREAL; (* five diagonals of the normal matrix, and its factors *)
+    aH1 : ARRAY [0..@last_wide] OF LREAL;
+    aH2 : ARRAY [0..@last_wide] OF LREAL;
+
+    (* Quick stop. *)
+    fQuickTime : LREAL;
+    fQuickSign : LREAL;
+    fQuickX : LREAL;
+    fQuickV : LREAL;
+    fQuickA : LREAL;
+    fRise : LREAL;
+    fHold : LREAL;
+    fFall : LREAL;
+    fTime : LREAL;
+    fPeak : LREAL;
+END_VAR
+VAR CONSTANT
+@constants
+END_VAR
+"""

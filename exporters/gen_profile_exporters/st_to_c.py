@@ -1,0 +1,328 @@
+"""From Structured Text to C99: the subset of IEC 61131-3 that the planner block is written in.
+
+One function block per text: scalars of BOOL, DINT and LREAL and one-dimensional arrays of them, assignments,
+IF, CASE, FOR, WHILE, and ABS, SQRT, LREAL_TO_DINT, DINT_TO_LREAL. The C code needs no library but libm and
+allocates nothing; an instance is one structure. Compiled without contraction of products and sums, it
+computes bit for bit what the text says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any, NamedTuple
+
+from lark import Lark, Token, Transformer
+from lark.exceptions import LarkError
+
+from gen_profile.errors import ExportError
+
+_GRAMMAR = r"""
+    start: "FUNCTION_BLOCK"i NAME section* body "END_FUNCTION_BLOCK"i
+    section: SECTION CONSTANT? declaration* "END_VAR"i
+    declaration: NAME ":" type [":=" initial] ";"
+    type: TYPE | "ARRAY"i "[" INTEGER ".." INTEGER "]" "OF"i TYPE
+    ?initial: literal | "[" literal ("," literal)* "]" -> listed
+    literal: [SIGN] (REAL | INTEGER | TRUTH)
+    body: statement*
+    ?statement: variable ":=" expression ";" -> assignment
+        | "IF"i branch ("ELSIF"i branch)* [otherwise] "END_IF"i ";" -> choice
+        | "CASE"i expression "OF"i label+ [otherwise] "END_CASE"i ";" -> switch
+        | "FOR"i NAME ":=" expression "TO"i expression "DO"i body "END_FOR"i ";" -> count
+        | "WHILE"i expression "DO"i body "END_WHILE"i ";" -> repeat
+    otherwise: "ELSE"i body
+    branch: expression "THEN"i body
+    label: INTEGER ("," INTEGER)* ":" body
+    ?expression: conjunction | expression OR conjunction -> binary
+    ?conjunction: equality | conjunction AND equality -> binary
+    ?equality: comparison | equality EQUALS comparison -> binary
+    ?comparison: sum | comparison ORDER sum -> binary
+    ?sum: term | sum SIGN term -> binary
+    ?term: unary | term FACTOR unary -> binary
+    ?unary: primary | NOT unary -> prefixed | SIGN unary -> prefixed
+    ?primary: REAL -> real | INTEGER -> whole | TRUTH -> truth
+        | "(" expression ")" -> grouped
+        | FUNCTION "(" expression ")" -> call
+        | variable
+    variable: NAME ["[" expression "]"]
+    SECTION.3: /VAR_INPUT\b|VAR_OUTPUT\b|VAR\b/i
+    CONSTANT.3: /CONSTANT\b/i
+    TYPE.3: /BOOL\b|DINT\b|LREAL\b/i
+    TRUTH.3: /TRUE\b|FALSE\b/i
+    FUNCTION.3: /ABS\b|SQRT\b|LREAL_TO_DINT\b|DINT_TO_LREAL\b/i
+    OR.3: /OR\b/i
+    AND.3: /AND\b/i
+    NOT.3: /NOT\b/i
+    REAL.2: /[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?/
+    INTEGER: /[0-9]+/
+    EQUALS.2: "=" | "<>"
+    ORDER: "<=" | ">=" | "<" | ">"
+    SIGN: "+" | "-"
+    FACTOR: "*" | "/"
+    NAME: /[A-Za-z](_?[A-Za-z0-9])*/
+    %ignore /\(\*(.|\n)*?\*\)/
+    %ignore /\s+/
+"""
+
+_TYPES = {"BOOL": "bool", "DINT": "int32_t", "LREAL": "double"}
+_OPERATORS = {"=": "==", "<>": "!=", "AND": "&&", "OR": "||"}
+_FUNCTIONS = {
+    "ABS": ("fabs", "LREAL"),
+    "SQRT": ("sqrt", "LREAL"),
+    "LREAL_TO_DINT": ("(int32_t)nearbyint", "DINT"),
+    "DINT_TO_LREAL": ("(double)", "LREAL"),
+}
+
+
+class StVariable(NamedTuple):
+    """A declaration: its section, name, type, length (0: a scalar) and initial values as C writes them."""
+
+    section: str
+    name: str
+    type: str
+    length: int
+    initial: tuple[str, ...]
+
+
+class Translation(NamedTuple):
+    """A function block in C99.
+
+    Attributes
+    ----------
+    name : str
+        Of the structure, and prefix of its functions ``NAME_init`` and ``NAME_step``.
+    inputs, outputs : tuple of StVariable
+        All scalars.
+    header, source : str
+        `source` includes ``NAME.h``. Compiled with ``COUNT_OPERATIONS``, it adds up floating-point operations
+        in ``NAME_operations``.
+    """
+
+    name: str
+    inputs: tuple[StVariable, ...]
+    outputs: tuple[StVariable, ...]
+    header: str
+    source: str
+
+
+class _Code(NamedTuple):
+    """C code of an expression, its type, and how many floating-point operations it takes."""
+
+    text: str
+    type: str
+    work: int = 0
+
+
+def translate(text: str) -> Translation:
+    """Translate a function block.
+
+    Raises
+    ------
+    ExportError
+        It is no function block of this subset of the language.
+    """
+    try:
+        tree = _parser().parse(text)
+        variables = [v for section in tree.find_data("section") for v in _declared(section)]
+        translated: Any = _Translator(variables).transform(tree)
+        name, *_, body = translated.children
+    except (LarkError, KeyError) as error:
+        reason = getattr(error, "orig_exc", error)
+        raise ExportError(
+            f"The text is no function block that can be executed here: {str(reason).splitlines()[0]}."
+        ) from error
+    inputs, outputs = (
+        tuple(v for v in variables if v.section == section) for section in ("VAR_INPUT", "VAR_OUTPUT")
+    )
+    return Translation(
+        str(name), inputs, outputs, _header(str(name), variables), _source(str(name), variables, body)
+    )
+
+
+@cache
+def _parser() -> Lark:
+    return Lark(_GRAMMAR, parser="lalr", propagate_positions=False)
+
+
+def _declared(section: Any) -> Iterator[StVariable]:
+    kind, *rest = section.children
+    constant = bool(rest) and isinstance(rest[0], Token)
+    for declaration in rest[constant:]:
+        name, type_, initial = declaration.children
+        *bounds, scalar = map(str, type_.children)
+        length = int(bounds[1]) - int(bounds[0]) + 1 if bounds else 0
+        if bounds and int(bounds[0]) != 0:
+            raise KeyError(f"{name} does not begin with index 0")
+        literals = [] if initial is None else initial.children if initial.data == "listed" else [initial]
+        values = tuple("".join(part.lower() for part in v.children if part is not None) for v in literals)
+        yield StVariable(
+            "VAR CONSTANT" if constant else kind.upper(), str(name), scalar.upper(), length, values
+        )
+
+
+class _Translator(Transformer[Token, object]):
+    """Expressions become `_Code`, statements lines of C."""
+
+    def __init__(self, variables: list[StVariable]) -> None:
+        super().__init__()
+        self._variables = {v.name.lower(): v for v in variables}
+
+    def real(self, parts):  # type: ignore[no-untyped-def]
+        return _Code(str(parts[0]), "LREAL")
+
+    def whole(self, parts):  # type: ignore[no-untyped-def]
+        return _Code(str(parts[0]), "DINT")
+
+    def truth(self, parts):  # type: ignore[no-untyped-def]
+        return _Code(parts[0].lower(), "BOOL")
+
+    def grouped(self, parts):  # type: ignore[no-untyped-def]
+        return _Code(f"({parts[0].text})", *parts[0][1:])
+
+    def variable(self, parts):  # type: ignore[no-untyped-def]
+        name, index = parts
+        declared = self._variables.get(name.lower())
+        if declared is None:
+            raise KeyError(f"{name} is not declared")
+        owner = "" if declared.section == "VAR CONSTANT" else "fb->"
+        element = "" if index is None else f"[{index.text}]"
+        return _Code(f"{owner}{declared.name}{element}", declared.type)
+
+    def prefixed(self, parts):  # type: ignore[no-untyped-def]
+        sign, operand = parts
+        return _Code(("!" if sign.upper() == "NOT" else sign) + operand.text, *operand[1:])
+
+    def binary(self, parts):  # type: ignore[no-untyped-def]
+        left, operator, right = parts
+        operator = operator.upper()
+        if left.type != right.type:
+            raise KeyError(f"{left.text} {operator} {right.text} mixes {left.type} and {right.type}")
+        type_ = left.type if operator in "+-*/" else "BOOL"
+        work = left.work + right.work + (left.type == "LREAL")
+        left_text, right_text = left.text, right.text
+        if operator == "OR":
+            left_text, right_text = f"({left_text})", f"({right_text})"
+        return _Code(f"{left_text} {_OPERATORS.get(operator, operator)} {right_text}", type_, work)
+
+    def call(self, parts):  # type: ignore[no-untyped-def]
+        function, type_ = _FUNCTIONS[parts[0].upper()]
+        return _Code(f"{function}({parts[1].text})", type_, parts[1].work + 1)
+
+    def assignment(self, parts):  # type: ignore[no-untyped-def]
+        target, value = parts
+        if target.type != value.type:
+            raise KeyError(f"{target.text} takes no {value.type}")
+        return [*_counted(value.work), f"{target.text} = {value.text};"]
+
+    def body(self, statements):  # type: ignore[no-untyped-def]
+        return [line for statement in statements for line in statement]
+
+    def otherwise(self, parts):  # type: ignore[no-untyped-def]
+        return parts[0]
+
+    def branch(self, parts):  # type: ignore[no-untyped-def]
+        return parts
+
+    def label(self, parts):  # type: ignore[no-untyped-def]
+        return [str(number) for number in parts[:-1]], parts[-1]
+
+    def choice(self, parts):  # type: ignore[no-untyped-def]
+        *branches, otherwise = parts
+        lines = _counted(sum(condition.work for condition, _ in branches))
+        word = "if"
+        for condition, body in branches:
+            lines += [f"{word} ({condition.text}) {{", *_indented(body)]
+            word = "} else if"
+        return [*lines, *(["} else {", *_indented(otherwise)] if otherwise else []), "}"]
+
+    def switch(self, parts):  # type: ignore[no-untyped-def]
+        selector, *labels, otherwise = parts
+        lines = [f"switch ({selector.text}) {{"]
+        for numbers, body in labels:
+            lines += [f"case {number}:" for number in numbers] + _indented([*body, "break;"])
+        return [*lines, "default:", *_indented([*(otherwise or []), "break;"]), "}"]
+
+    def count(self, parts):  # type: ignore[no-untyped-def]
+        name, first, last, body = parts
+        variable = f"fb->{self._variables[name.lower()].name}"
+        loop = f"for ({variable} = {first.text}; {variable} <= last; ++{variable}) {{"
+        return ["{", f"    const int32_t last = {last.text};", *_indented([loop, *_indented(body), "}"]), "}"]
+
+    def repeat(self, parts):  # type: ignore[no-untyped-def]
+        condition, body = parts
+        return [f"while ({condition.text}) {{", *_indented(body), "}"]
+
+
+def _counted(work: int) -> list[str]:
+    return [f"OPERATIONS({work});"] if work else []
+
+
+def _indented(lines: list[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
+def _member(variable: StVariable) -> str:
+    return f"{_TYPES[variable.type]} {variable.name}" + (f"[{variable.length}]" if variable.length else "")
+
+
+def _header(name: str, variables: list[StVariable]) -> str:
+    members = "\n".join(f"    {_member(v)};" for v in variables if v.section != "VAR CONSTANT")
+    return f"""\
+#ifndef {name}_H
+#define {name}_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct {{
+{members}
+}} {name};
+
+/* Once, before all else. */
+void {name}_init({name} *fb);
+
+/* Once in every cycle, the inputs set; then read the outputs. */
+void {name}_step({name} *fb);
+
+#endif
+"""
+
+
+def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
+    constants = [
+        f"static const {_member(v)} = {_initial(v)};" for v in variables if v.section == "VAR CONSTANT"
+    ]
+    initials = [
+        f"    fb->{v.name} = {v.initial[0]};" for v in variables if v.section != "VAR CONSTANT" and v.initial
+    ]
+    return "\n".join(
+        [
+            "/* Compile without contraction of products and sums (-ffp-contract=off). */",
+            f'#include "{name}.h"',
+            "#include <math.h>",
+            "#include <string.h>",
+            "",
+            "#ifdef COUNT_OPERATIONS",
+            f"long {name}_operations;",
+            f"#define OPERATIONS(number) ({name}_operations += (number))",
+            "#else",
+            "#define OPERATIONS(number) ((void)0)",
+            "#endif",
+            "",
+            *constants,
+            "",
+            f"void {name}_init({name} *fb) {{",
+            "    memset(fb, 0, sizeof *fb);",
+            *initials,
+            "}",
+            "",
+            f"void {name}_step({name} *fb) {{",
+            *_indented(body),
+            "}",
+            "",
+        ]
+    )
+
+
+def _initial(variable: StVariable) -> str:
+    return f"{{{', '.join(variable.initial)}}}" if variable.length else variable.initial[0]

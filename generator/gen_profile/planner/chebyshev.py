@@ -1,0 +1,62 @@
+"""Chebyshev interpolation in any number of variables, each from −1 to 1."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import product
+
+import attrs
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Interpolant:
+    """Sums of products of Chebyshev polynomials.
+
+    Attributes
+    ----------
+    exponents : (variables, terms) array of int
+        Degree of the polynomial of each variable in each term.
+    coefficients : (functions, terms) array
+    """
+
+    exponents: NDArray[np.int64]
+    coefficients: Array
+
+    def __call__(self, point: Sequence[float]) -> Array:
+        """Evaluate all functions at a point, as the block does."""
+        factors = [
+            chebyshev.chebvander(np.array([x]), int(degrees.max()))[0, degrees]
+            for x, degrees in zip(point, self.exponents, strict=True)
+        ]
+        return np.asarray(self.coefficients @ np.prod([np.ones(self.exponents.shape[1]), *factors], axis=0))
+
+    def without(self, negligible: float) -> Interpolant:
+        """Leave out terms whose coefficients are all that small, each relative to its function's largest."""
+        scale = np.abs(self.coefficients).max(axis=1, keepdims=True)
+        kept = (np.abs(self.coefficients) > negligible * np.where(scale > 0.0, scale, 1.0)).any(axis=0)
+        return Interpolant(exponents=self.exponents[:, kept], coefficients=self.coefficients[:, kept])
+
+
+def interpolate(function: Callable[[Sequence[float]], Array], variables: int, degree: int) -> Interpolant:
+    """Interpolate functions at the Chebyshev points of a degree.
+
+    Parameters
+    ----------
+    function : point → (functions,) array
+    variables, degree : int
+    """
+    nodes = chebyshev.chebpts1(degree + 1)
+    values = np.array([function(point) for point in product(nodes, repeat=variables)])
+    table = values.T.reshape(-1, *(degree + 1,) * variables)
+    inverse = np.linalg.inv(chebyshev.chebvander(nodes, degree))
+    for axis in range(1, variables + 1):
+        table = np.moveaxis(np.tensordot(inverse, table, axes=(1, axis)), 0, axis)
+    exponents = np.array(list(product(range(degree + 1), repeat=variables)), dtype=np.int64)
+    return Interpolant(
+        exponents=exponents.T.reshape(variables, -1), coefficients=table.reshape(len(table), -1)
+    )

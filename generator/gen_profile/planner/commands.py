@@ -1,0 +1,184 @@
+"""Playing a table of commands to a written planner block, and the table of setpoints that it issues."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import SpecError
+from gen_profile.planner.chebyshev import Array
+from gen_profile.planner.execution import BlockInstance
+
+COMMANDS = ("position", "velocity", "stop", "quick-stop")
+FIRST = ("time_s", "command", "value")
+COLUMNS = {
+    "position_m": "fPosition",
+    "velocity_m_per_s": "fVelocity",
+    "acceleration_m_per_s2": "fAcceleration",
+    "busy": "bBusy",
+    "done": "bDone",
+    "error_id": "nErrorId",
+    "promise": "bPromise",
+    "stop_distance_m": "fStopDistance",
+}
+WHOLE = ("busy", "done", "error_id", "promise")
+CHUNK = 10_000  # cycles between looks at whether the axis stands
+LONGEST = 3600.0  # s, of what follows the last command
+STILL = 0.5  # s of standing after which nothing more is expected
+
+
+@attrs.frozen(kw_only=True)
+class Command:
+    """What holds from a time on: one of `COMMANDS`, its value, and live parameters by name."""
+
+    time: float
+    command: str
+    value: float
+    live: Mapping[str, float]
+
+
+def read_commands(text: str, live: tuple[str, ...]) -> tuple[Command, ...]:
+    """Read the table of commands.
+
+    Parameters
+    ----------
+    text : str
+        CSV with the columns ``time_s, command, value`` and one for each live parameter that changes.
+    live : tuple of str
+        The block's.
+
+    Raises
+    ------
+    SpecError
+        With the line and the cure.
+    """
+    rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
+    names = [name.strip() for name in rows.fieldnames or ()]
+    if missing := [name for name in FIRST if name not in names]:
+        raise SpecError(
+            f"commands: there is no column {missing[0]}; the first line must name {', '.join(FIRST)}."
+        )
+    if unknown := [name for name in names if name not in (*FIRST, *live)]:
+        known = ", ".join(live) or "none"
+        raise SpecError(f"commands: the block has no live parameter {unknown[0]!r}; it has {known}.")
+    rows.fieldnames = names
+    commands = [_command(row, number, live) for number, row in enumerate(rows, start=2)]
+    if not commands:
+        raise SpecError("commands: there is no row; write one such as 0.0,position,1.0.")
+    for number, (before, after) in enumerate(pairwise(commands), start=3):
+        if after.time < before.time:
+            raise SpecError(
+                f"commands, line {number}: time_s goes back from {before.time:g} to {after.time:g}."
+            )
+    return tuple(commands)
+
+
+def _command(row: Mapping[str, str | None], line: int, live: tuple[str, ...]) -> Command:
+    command = (row["command"] or "").strip()
+    if command not in COMMANDS:
+        known = ", ".join(COMMANDS)
+        raise SpecError(f"commands, line {line}: unknown command {command!r}; known are {known}.")
+    time = _number(row["time_s"], "time_s", line)
+    if not 0.0 <= time <= 1e6:
+        raise SpecError(f"commands, line {line}: time_s must lie between 0 and 1e6 s, found {time:g}.")
+    valued = command in ("position", "velocity")
+    value = _number(row["value"], "value", line) if valued else 0.0
+    given = {name: _number(text, name, line) for name in live if (text := row.get(name)) and text.strip()}
+    return Command(time=time, command=command, value=value, live=given)
+
+
+def _number(text: str | None, name: str, line: int) -> float:
+    """Read a number; nan is one, as a controller may be given it."""
+    try:
+        return float(text or "")
+    except ValueError:
+        raise SpecError(f"commands, line {line}: {name} must be a number, found {text!r}.") from None
+
+
+def play(text: str, commands_text: str) -> str:
+    """Execute a written block under a table of commands.
+
+    Parameters
+    ----------
+    text : str
+        The block.
+    commands_text : str
+        Table of commands; each row holds until the next, and the last one until the axis stands still.
+
+    Returns
+    -------
+    str
+        CSV of the setpoints, one row per cycle.
+
+    Raises
+    ------
+    ExportError, SpecError, CosimulationError
+    """
+    block = BlockInstance(text)
+    initial = block.inputs
+    live = tuple(name[1:] for name in initial if name not in STANDARD)
+    if missing := [name for name in STANDARD if name not in initial]:
+        raise SpecError(f"The function block has no input {missing[0]}, so it is no planner block.")
+    commands = read_commands(commands_text, live)
+    cycle = initial["fCycleTime"]
+    issued = np.vstack(list(_issued(block, commands, cycle)))
+    places = {name: block.outputs.index(output) for name, output in COLUMNS.items()}
+    lines = ["time_s," + ",".join(COLUMNS)]
+    for number, row in enumerate(issued):
+        cells = (str(int(row[at])) if name in WHOLE else repr(float(row[at])) for name, at in places.items())
+        lines.append(f"{number * cycle:.9g}," + ",".join(cells))
+    return "\n".join(lines) + "\n"
+
+
+STANDARD = (
+    *("bEnable", "bExecute", "bVelocity", "bStop", "bQuickStop", "fTarget", "fVelocityCommand"),
+    *("fVelocityLimit", "rOverride", "fActPosition", "fCycleTime"),
+)
+
+
+def _issued(block: BlockInstance, commands: tuple[Command, ...], cycle: float) -> Iterator[Array]:
+    """Give the outputs, row of commands by row of commands."""
+    names, values = list(block.inputs), dict(block.inputs) | {"bEnable": 1.0}
+    starts = [math.ceil(command.time / cycle - 1e-9) for command in commands]
+    if starts[0] > 0:
+        yield block.call(np.tile([values[name] for name in names], (starts[0], 1)))
+    for command, start, end in zip(commands, starts, [*starts[1:], None], strict=True):
+        values |= {f"f{name}": value for name, value in command.live.items()}
+        values |= {
+            "bVelocity": float(command.command == "velocity"),
+            "bStop": float(command.command == "stop"),
+            "bQuickStop": float(command.command == "quick-stop"),
+            "bExecute": float(command.command == "position"),
+        }
+        values["fTarget" if command.command == "position" else "fVelocityCommand"] = command.value
+        row = np.array([values[name] for name in names])
+        after = row.copy()
+        after[names.index("bExecute")] = 0.0  # an edge, so that the next row makes another
+        if end is not None:
+            if end > start:
+                yield block.call(np.vstack([row, np.tile(after, (end - start - 1, 1))]))
+            continue
+        yield block.call(row[None])
+        yield from _until_still(block, after, cycle)
+
+
+def _until_still(block: BlockInstance, row: Array, cycle: float) -> Iterator[Array]:
+    busy, velocity = (block.outputs.index(name) for name in ("bBusy", "fVelocity"))
+    still = math.ceil(STILL / cycle)
+    most = math.ceil(LONGEST / cycle)
+    done = 0
+    while done < most:
+        issued = block.call(np.tile(row, (min(CHUNK, most - done), 1)))
+        moving = (issued[:, busy] > 0.0) | (issued[:, velocity] != 0.0)
+        last = int(np.flatnonzero(moving)[-1]) + 1 if moving.any() else 0
+        if last + still <= len(issued):
+            yield issued[: last + still]
+            return
+        yield issued
+        done += len(issued)

@@ -1,0 +1,146 @@
+"""From a spec to its planner block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import SpecError
+from gen_profile.planner.chebyshev import Array, Interpolant, interpolate
+from gen_profile.planner.machine import LiveModes, frequencies, live_modes
+from gen_profile.planner.reach import reach
+from gen_profile.spec.model import Spec
+from gen_profile_exporters.planner.block import MOST, SLOTS_PER_PERIOD, PlannerConstants, block_text
+
+REACH_DEGREE = 3
+REACH_FIRST, REACH_STEP = 16, 4
+FEWEST_CYCLES = 4  # in a slot
+STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
+QUICK = 2.0  # default deceleration of a quick stop, relative to the limit of the acceleration
+QUICK_JERK = 4.0
+
+
+@attrs.frozen(kw_only=True)
+class PlannerBlock:
+    """A planner block and what is known of it.
+
+    Attributes
+    ----------
+    filename, text : str
+    modes : int
+    frequency_error : float
+        Relative, over the live ranges.
+    """
+
+    filename: str
+    text: str
+    modes: int
+    frequency_error: float
+
+
+def planner_block(spec: Spec) -> PlannerBlock:
+    """Write the planner block of a spec.
+
+    Raises
+    ------
+    SpecError
+        A limit is not stated, or the block does not take this machine.
+    """
+    velocity, acceleration, jerk, travel = _limits(spec)
+    found = live_modes(spec)
+    fastest = max(_rates(found, point)[0][0] for point in _corners(found))
+    if 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * spec.export.cycle_time) < FEWEST_CYCLES:
+        most = 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * FEWEST_CYCLES)
+        raise SpecError(f"export.cycle_time: at most {most:.2g} s for a machine that swings this fast.")
+    reaches = _reaches(found, (velocity, acceleration, jerk))
+    interpolant = found.interpolant
+    coefficients = interpolant.coefficients
+    constants = PlannerConstants(
+        name=spec.name,
+        machine=spec.machine().type,
+        axis=spec.machine().actuated[0].name,
+        start=spec.move.start[0],
+        cycle=spec.export.cycle_time,
+        velocity=velocity,
+        acceleration=acceleration,
+        jerk=jerk,
+        quick_deceleration=spec.planner.quick_stop or QUICK * acceleration,
+        quick_jerk=spec.planner.quick_stop_jerk or QUICK_JERK * jerk,
+        travel=travel,
+        live=found.live,
+        nominal=tuple(_nominal(spec, name) for name in found.live),
+        drift=tuple(STEADY * high for _, high in found.live.values()),
+        degrees=int(interpolant.exponents.max(initial=0)) + 1,
+        exponents=interpolant.exponents,
+        frequencies=coefficients[: found.modes],
+        decays=coefficients[found.modes :],
+        reach_first=REACH_FIRST,
+        reach_step=REACH_STEP,
+        reaches=_in_terms_of(reaches, interpolant),
+    )
+    return PlannerBlock(
+        filename=f"{spec.name}.st",
+        text=block_text(constants),
+        modes=found.modes,
+        frequency_error=found.error,
+    )
+
+
+def _limits(spec: Spec) -> tuple[float, float, float, tuple[float, float]]:
+    own = spec.limits.of(0)
+    for name in ("velocity", "acceleration", "jerk", "travel"):
+        if getattr(own, name) is None:
+            raise SpecError(f"limits.{name}: required for a planner block, which keeps it in every motion.")
+    velocity, acceleration, jerk, travel = own.velocity, own.acceleration, own.jerk, own.travel
+    assert velocity and acceleration and jerk and travel
+    quick, quick_jerk = spec.planner.quick_stop, spec.planner.quick_stop_jerk
+    if quick is not None and quick < acceleration:
+        raise SpecError(
+            f"planner.quick_stop: at least limits.acceleration ({acceleration:g}), found {quick:g}."
+        )
+    if quick_jerk is not None and quick_jerk < jerk:
+        raise SpecError(f"planner.quick_stop_jerk: at least limits.jerk ({jerk:g}), found {quick_jerk:g}.")
+    return velocity, acceleration, jerk, travel
+
+
+def _nominal(spec: Spec, name: str) -> float:
+    axes = [axis.name for axis in spec.machine().actuated]
+    value = (
+        spec.plant.parameters[name] if name in spec.plant.parameters else spec.move.start[axes.index(name)]
+    )
+    low, high = spec.planner.live[name]
+    return min(max(value, low), high)
+
+
+def _corners(found: LiveModes) -> list[Sequence[float]]:
+    return list(product((-1.0, 1.0), repeat=len(found.live)))
+
+
+def _rates(found: LiveModes, point: Sequence[float]) -> tuple[Array, Array]:
+    invariants, decays = np.split(found.interpolant(point), [found.modes])
+    return frequencies(invariants), decays
+
+
+def _reaches(found: LiveModes, limits: tuple[float, float, float]) -> Interpolant:
+    """Distances from rest to rest by number of slots, over the live ranges."""
+
+    def distances(point: Sequence[float]) -> Array:
+        rates, decays = _rates(found, point)
+        slot = 2.0 * np.pi / (SLOTS_PER_PERIOD * rates[0])
+        counts = range(REACH_FIRST, MOST + 1, REACH_STEP)
+        return np.array([reach(count, slot, rates, decays, limits) for count in counts])
+
+    return interpolate(distances, len(found.live), REACH_DEGREE if found.live else 0)
+
+
+def _in_terms_of(own: Interpolant, other: Interpolant) -> Array:
+    """Write coefficients in the terms of another interpolant; those that it lacks are left out."""
+    places = {tuple(column): number for number, column in enumerate(own.exponents.T)}
+    table = np.zeros((len(own.coefficients), other.exponents.shape[1]))
+    for number, column in enumerate(other.exponents.T):
+        if tuple(column) in places:
+            table[:, number] = own.coefficients[:, places[tuple(column)]]
+    return table

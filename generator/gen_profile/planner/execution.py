@@ -1,0 +1,118 @@
+"""Executing a written planner block: its own text, translated to C, compiled and called cycle by cycle."""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import POINTER, c_char_p, c_double, c_long, c_void_p
+from functools import lru_cache
+from pathlib import Path
+
+import fmpy
+import numpy as np
+
+from gen_profile.planner.chebyshev import Array
+from gen_profile_exporters.st_to_c import StVariable, Translation, translate
+from gen_profile_fmu.building.build import compile_texts
+from gen_profile_fmu.building.cache import cached
+from gen_profile_fmu.building.compiler import find_compiler
+from gen_profile_fmu.description.fmu_files import digest
+
+
+class BlockInstance:
+    """An instance of a function block.
+
+    Parameters
+    ----------
+    text : str
+        Structured Text, as `gen_profile_exporters.st_to_c` takes it.
+
+    Raises
+    ------
+    ExportError
+        It is no such text.
+    CosimulationError
+        There is no C compiler, or no folder to keep the library in.
+    """
+
+    def __init__(self, text: str) -> None:
+        self._translation, self._library = _loaded(text)
+        self._memory = ctypes.create_string_buffer(self._library.instance_size())
+        self._library.instance_init(self._memory)
+
+    @property
+    def inputs(self) -> dict[str, float]:
+        """Initial values of the inputs, by name."""
+        return {v.name: _number(v) for v in self._translation.inputs}
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the outputs."""
+        return [v.name for v in self._translation.outputs]
+
+    def call(self, inputs: Array) -> Array:
+        """Call the block once for every row of inputs.
+
+        Parameters
+        ----------
+        inputs : (cycles, inputs) array
+            In the order of `inputs`; truth values as 0 and 1.
+
+        Returns
+        -------
+        (cycles, outputs) array
+        """
+        given = np.ascontiguousarray(inputs, dtype=np.float64)
+        issued = np.empty((len(given), len(self._translation.outputs)))
+        self._library.instance_play(self._memory, _doubles(given), len(given), _doubles(issued))
+        return issued
+
+
+def _number(variable: StVariable) -> float:
+    text = variable.initial[0] if variable.initial else "0"
+    return {"true": 1.0, "false": 0.0}[text] if text in ("true", "false") else float(text)
+
+
+def _doubles(array: Array) -> ctypes._Pointer[c_double]:
+    return array.ctypes.data_as(POINTER(c_double))
+
+
+@lru_cache(maxsize=4)
+def _loaded(text: str) -> tuple[Translation, ctypes.CDLL]:
+    translation = translate(text)
+    return translation, _compiled(translation)
+
+
+def _compiled(translation: Translation) -> ctypes.CDLL:
+    """Compile a block with a loop over cycles, or find it in the cache, and load it."""
+    block, library = translation.name, f"block{fmpy.sharedLibraryExtension}"
+    taken = "".join(f"        fb->{v.name} = *inputs++;\n" for v in translation.inputs)
+    given = "".join(f"        *outputs++ = fb->{v.name};\n" for v in translation.outputs)
+    loop = f"""\
+#include "{block}.c"
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+EXPORT long instance_size(void) {{ return sizeof({block}); }}
+EXPORT void instance_init({block} *fb) {{ {block}_init(fb); }}
+EXPORT void instance_play({block} *fb, const double *inputs, long cycles, double *outputs) {{
+    for (long cycle = 0; cycle < cycles; ++cycle) {{
+{taken}        {block}_step(fb);
+{given}    }}
+}}
+"""
+    texts = {f"{block}.h": translation.header, f"{block}.c": translation.source, "loop.c": loop}
+    compiler = find_compiler()
+
+    def make(cache: Path) -> dict[str, bytes]:
+        return {library: compile_texts(texts, "loop.c", compiler, library, cache)}
+
+    parts = (part.encode("utf-8") for part in (compiler.identity, *texts.values()))
+    loaded = ctypes.CDLL(str(cached(f"block-{digest(*parts)[:32]}", make) / library))
+    loaded.instance_size.restype = c_long
+    loaded.instance_init.argtypes = [c_char_p]
+    loaded.instance_play.argtypes = [c_void_p, POINTER(c_double), c_long, POINTER(c_double)]
+    for function in (loaded.instance_init, loaded.instance_play):
+        function.restype = None
+    return loaded

@@ -1,0 +1,301 @@
+"""The planner block, executed: against a strict interpreter, linear programming, and a nonlinear crane."""
+
+import csv
+
+import numpy as np
+import pytest
+from command_line import run_here
+from scipy.integrate import solve_ivp
+from scipy.optimize import linprog
+from st_interpreter import FunctionBlock
+
+from gen_profile.errors import ExportError, SpecError
+from gen_profile.planner.commands import play
+from gen_profile.planner.design import planner_block
+from gen_profile.planner.execution import BlockInstance
+from gen_profile.spec.reading import parse_spec, preset_spec
+
+G = 9.81
+VELOCITY, ACCELERATION, JERK, LOW, HIGH = 1.0, 0.3, 1.0, 0.0, 40.0
+CYCLE = 0.004
+BAY = f"""
+name = "bay 3"
+plant = {{ type = "double-pendulum-crane", m1 = 350.0, m2 = 2000.0, L1 = 6.0, L2 = 1.5 }}
+move = {{ distance = 8.0, duration = 14.0 }}
+limits = {{ velocity = {VELOCITY}, acceleration = {ACCELERATION}, jerk = {JERK}, travel = [{LOW}, {HIGH}] }}
+planner = {{ live = {{ L1 = [3.0, 9.0], m2 = [0.0, 2000.0] }} }}
+export = {{ cycle_time = {CYCLE} }}
+"""
+
+
+@pytest.fixture(scope="module")
+def text():
+    return planner_block(parse_spec(BAY)).text
+
+
+class Driver:
+    """An instance that is given inputs by name, and all that it issued."""
+
+    def __init__(self, text, **inputs):
+        self.block = BlockInstance(text)
+        self.inputs = self.block.inputs | {"bEnable": 1.0} | inputs
+        self.rows = []
+
+    def hold(self, seconds, **inputs):
+        """Hold inputs; bExecute is an edge."""
+        self.inputs |= {"bExecute": 0.0} | inputs
+        names = list(self.inputs)
+        rows = np.tile([self.inputs[name] for name in names], (max(1, round(seconds / CYCLE)), 1))
+        rows[1:, names.index("bExecute")] = 0.0
+        self.rows.append(self.block.call(rows))
+        return self
+
+    @property
+    def outputs(self):
+        return dict(zip(self.block.outputs, np.vstack(self.rows).T, strict=True))
+
+
+def frequencies(L1, m2, m1=350.0, L2=1.5):
+    mass = np.array([[(m1 + m2) * L1**2, m2 * L1 * L2], [m2 * L1 * L2, m2 * L2**2]])
+    stiffness = np.diag([(m1 + m2) * G * L1, m2 * G * L2])
+    return np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)
+
+
+def require_limits(out, rounding=1e-9):
+    velocity, acceleration, position = out["fVelocity"], out["fAcceleration"], out["fPosition"]
+    assert np.abs(velocity).max() <= VELOCITY + rounding
+    assert np.abs(acceleration).max() <= ACCELERATION + rounding
+    assert np.abs(np.diff(acceleration)).max() <= (JERK + rounding) * CYCLE
+    assert position.min() >= LOW - rounding
+    assert position.max() <= HIGH + rounding
+    # the three agree: acceleration is linear within a slot
+    advance = CYCLE * (velocity[1:] + velocity[:-1]) / 2 - CYCLE**2 * np.diff(acceleration) / 12
+    assert np.abs(np.diff(position) - advance).max() < rounding
+
+
+def residual(out, rates):
+    """Amplitude that each mode is left with, relative to that of a step to the greatest velocity."""
+    turned = np.exp(1j * np.outer(rates, CYCLE * np.arange(len(out["fVelocity"]))))
+    left = np.trapezoid(out["fAcceleration"] * turned, dx=CYCLE)
+    return np.abs(left).max() / max(np.abs(out["fVelocity"]).max(), 1e-3)
+
+
+def random_history(text, seed):
+    random = np.random.default_rng(seed)
+    live = {"fL1": random.uniform(3.0, 9.0), "fm2": random.uniform(0.0, 2000.0)}
+    driver = Driver(text, **live, fActPosition=random.uniform(LOW, HIGH)).hold(0.5)
+    for _ in range(random.integers(2, 8)):
+        seconds = random.choice([random.uniform(0.05, 2.0), random.uniform(2.0, 12.0)])
+        match random.choice(["position", "velocity", "stop", "stick"]):
+            case "position":
+                target = random.choice([random.uniform(LOW, HIGH), LOW, HIGH])
+                driver.hold(seconds, bVelocity=0, bStop=0, bExecute=1, fTarget=target)
+            case "velocity":
+                value = random.choice([random.uniform(-VELOCITY, VELOCITY), VELOCITY, -VELOCITY])
+                driver.hold(seconds, bVelocity=1, bStop=0, fVelocityCommand=value)
+            case "stop":
+                driver.hold(seconds, bVelocity=0, bStop=1)
+            case "stick":
+                for value in random.normal(size=20):
+                    driver.hold(seconds / 20, bVelocity=1, bStop=0, fVelocityCommand=value)
+    return driver.hold(60.0, bVelocity=0, bStop=1).outputs, frequencies(live["fL1"], max(live["fm2"], 1e-3))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_any_commands_keep_the_limits_and_leave_no_sway(text, seed):
+    out, rates = random_history(text, seed)
+    require_limits(out)
+    assert not out["bBusy"][-1]
+    assert out["bPromise"][-1]
+    assert residual(out, rates) < 1e-8
+
+
+def test_it_computes_what_the_text_says(text):
+    """Bit for bit, against an interpreter that also refuses indices out of bounds."""
+    oracle, block = FunctionBlock(text), BlockInstance(text)
+    inputs = block.inputs | {"bEnable": 1.0}
+    for cycles, given in (
+        (40, {}),
+        (160, {"bExecute": 1.0, "fTarget": 3.0}),
+        (2, {"bExecute": 0.0}),
+        (140, {"bExecute": 1.0, "fTarget": 9.0}),
+        (120, {"bExecute": 0.0, "bVelocity": 1.0, "fVelocityCommand": -0.4}),
+        (20, {"bQuickStop": 1.0}),
+    ):
+        inputs |= given
+        issued = block.call(np.tile(list(inputs.values()), (cycles, 1)))
+        plain = {name: bool(value) if name[0] == "b" else value for name, value in inputs.items()}
+        for row in issued:
+            due = oracle.call(**plain)
+            assert [float(due[name.lower()]) for name in block.outputs] == row.tolist()
+    assert not issued[-1, block.outputs.index("bPromise")]
+
+
+def shortest_is_longer(duration, distance, rates, limits, slots=120):
+    """Whether no motion of piecewise constant jerk comes so far in that time with each mode insensitive."""
+    step = duration / slots
+    middle = step * (np.arange(slots) + 0.5) - duration / 2
+    below = np.tri(slots)
+    accelerations = step * below
+    velocities = step * (below @ accelerations) - 0.5 * step**2 * below
+    ends = [np.ones(slots), duration / 2 - middle]
+    for rate in rates:
+        for factor in (1.0, middle / duration):
+            ends += [factor * np.cos(rate * middle), factor * np.sin(rate * middle)]
+    velocity, acceleration, jerk = limits
+    found = linprog(
+        -(((duration / 2 - middle) ** 2) / 2 * step + step**3 / 24),
+        A_ub=np.vstack([velocities, -velocities, accelerations, -accelerations]),
+        b_ub=np.repeat([velocity, acceleration], 2 * slots),
+        A_eq=np.array(ends),
+        b_eq=np.zeros(len(ends)),
+        bounds=(-jerk, jerk),
+    )
+    return found.status == 2 or -found.fun < distance
+
+
+@pytest.mark.parametrize(
+    ("rope", "load", "distance"),
+    [(6.0, 2000.0, 1.0), (6.0, 2000.0, 8.0), (4.3, 700.0, 4.0), (9.0, 1500.0, 4.0)],
+)
+def test_moves_take_little_longer_than_the_shortest(text, rope, load, distance):
+    out = Driver(text, fL1=rope, fm2=load).hold(1.0).hold(25.0, bExecute=1, fTarget=distance).outputs
+    duration = np.argmax(out["bDone"]) * CYCLE - 1.0
+    require_limits(out)
+    assert out["fPosition"][-1] == distance
+    limits = (VELOCITY, ACCELERATION, JERK)
+    assert shortest_is_longer(duration / 1.10, distance, frequencies(rope, load), limits)
+
+
+def test_played_on_the_nonlinear_crane_it_leaves_a_thousandth_of_the_sway(text):
+    out = Driver(text).hold(0.5).hold(15.0, bExecute=1, fTarget=4.0).outputs
+    time = CYCLE * np.arange(len(out["fAcceleration"]))
+    m1, m2, L1, L2 = 350.0, 2000.0, 6.0, 1.5
+
+    def slope(t, state):
+        """Two point masses below a cart, by absolute angles."""
+        a, b, da, db = state
+        push = np.interp(t, time, out["fAcceleration"])
+        mass = [[(m1 + m2) * L1, m2 * L2 * np.cos(a - b)], [L1 * np.cos(a - b), L2]]
+        force = [
+            (m1 + m2) * (push * np.cos(a) - G * np.sin(a)) - m2 * L2 * db**2 * np.sin(a - b),
+            push * np.cos(b) - G * np.sin(b) + L1 * da**2 * np.sin(a - b),
+        ]
+        return [da, db, *np.linalg.solve(mass, force)]
+
+    swing = solve_ivp(slope, (0.0, time[-1]), np.zeros(4), max_step=0.05, rtol=1e-8, atol=1e-10, t_eval=time)
+    sway = np.abs(L1 * np.sin(swing.y[0]) + L2 * np.sin(swing.y[1]))
+    arrived = np.argmax(out["bDone"])
+    assert sway[arrived:].max() < 1e-3 * sway.max()
+
+
+@pytest.mark.parametrize(
+    ("given", "number"),
+    [
+        ({"bExecute": 1.0, "fTarget": np.nan}, 3),
+        ({"bExecute": 1.0, "fTarget": HIGH + 0.1}, 3),
+        ({"bVelocity": 1.0, "fVelocityCommand": np.nan}, 3),
+        ({"fL1": np.nan}, 2),
+        ({"fm2": 2001.0}, 2),
+        ({"rOverride": 0.0}, 5),
+        ({"rOverride": np.nan}, 5),
+        ({"fVelocityLimit": -1.0}, 5),
+        ({"fCycleTime": 0.002}, 1),
+        ({"bVelocity": 1.0, "bExecute": 1.0}, 6),
+    ],
+)
+def test_a_senseless_input_stops_the_axis_without_sway(text, given, number):
+    driver = Driver(text).hold(0.5).hold(6.0, bExecute=1, fTarget=20.0).hold(25.0, **given)
+    out = driver.outputs
+    assert out["nErrorId"][-1] == number
+    assert not out["bBusy"][-1]
+    assert 0.0 < out["fPosition"][-1] < 19.0
+    require_limits(out)
+    assert residual(out, frequencies(6.0, 2000.0)) < 1e-8
+
+
+def test_a_quick_stop_brakes_at_once_and_gives_no_promise(text):
+    driver = Driver(text).hold(0.5).hold(6.0, bExecute=1, fTarget=20.0)
+    moving = driver.outputs["fVelocity"][-1]
+    stopped = driver.hold(4.0, bQuickStop=1).outputs
+    late = {name: values[-1000:] for name, values in stopped.items()}
+    standing = np.argmax(late["fVelocity"] == 0.0) * CYCLE
+    assert standing < moving / (2 * ACCELERATION) + 2 * ACCELERATION / (4 * JERK) + 0.5
+    assert np.abs(np.diff(late["fAcceleration"])).max() <= (4 * JERK + 1e-9) * CYCLE
+    assert np.abs(late["fAcceleration"]).max() <= 2 * ACCELERATION + 1e-12
+    assert not late["bPromise"][-1]
+    again = driver.hold(0.1, bQuickStop=0, bEnable=0).hold(0.5, bEnable=1).outputs
+    assert again["bPromise"][-1]
+
+
+def test_a_rope_that_changes_on_the_way_ends_the_promise(text):
+    driver = Driver(text).hold(0.5).hold(6.0, bExecute=1, fTarget=20.0)
+    assert driver.outputs["bPromise"][-1]
+    assert driver.hold(0.1, fL1=6.2).outputs["nPromise"][-1] == 1
+
+
+def test_the_command_line_writes_and_executes_a_block(tmp_path):
+    (tmp_path / "bay.toml").write_text(BAY.replace("L1 = [3.0, 9.0], m2 = [0.0, 2000.0]", "L1 = [5.0, 7.0]"))
+    written = run_here("planner", "write", tmp_path / "bay.toml", "--out", tmp_path, "--json")
+    assert written.document["modes"] == 2
+    commands = tmp_path / "commands.csv"
+    commands.write_text("time_s,command,value,L1\n0.5,position,4.0,5.5\n30,velocity,0.5,\n33,stop,,\n")
+    out = tmp_path / "setpoints.csv"
+    run_here("planner", "play", tmp_path / "bay 3.st", "--commands", commands, "--out", out, "--json")
+    rows = list(csv.DictReader(out.read_text().splitlines()))
+    columns = "position_m velocity_m_per_s acceleration_m_per_s2 busy done error_id promise stop_distance_m"
+    assert list(rows[0]) == ["time_s", *columns.split()]
+    assert rows[round(30 / CYCLE) - 1] | {"position_m": "4.0", "done": "1"} == rows[round(30 / CYCLE) - 1]
+    assert float(rows[-1]["position_m"]) > 4.5
+    assert rows[-1]["velocity_m_per_s"] == "0.0"
+
+
+@pytest.mark.parametrize(
+    ("commands", "words"),
+    [
+        ("time,command,value\n", "no column time_s"),
+        ("time_s,command,value\n", "there is no row"),
+        ("time_s,command,value\n0,jump,1\n", "line 2: unknown command 'jump'"),
+        ("time_s,command,value\n0,position,far\n", "line 2: value must be a number"),
+        ("time_s,command,value\n2,stop,\n1,stop,\n", "line 3: time_s goes back"),
+        ("time_s,command,value,L9\n0,stop,,1\n", "no live parameter 'L9'; it has L1, m2"),
+    ],
+)
+def test_a_fault_in_the_commands_is_told_with_its_line(text, commands, words):
+    with pytest.raises(SpecError, match=words):
+        play(text, commands)
+
+
+def test_what_is_no_block_is_refused():
+    with pytest.raises(ExportError, match="no function block"):
+        play("FUNCTION_BLOCK x VAR END_VAR y := 1; END_FUNCTION_BLOCK", "")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (["limits.jerk=0"], "limits.jerk"),
+        (["planner.live={L3=[1.0, 2.0]}"], "planner.live.L3: unknown parameter"),
+        (["planner.live={L1=[2.0, 1.0]}"], "planner.live.L1: must be two rising numbers"),
+        (["planner.quick_stop=0.1"], "planner.quick_stop: at least limits.acceleration"),
+        (["export.cycle_time=0.2"], "export.cycle_time: at most"),
+    ],
+)
+def test_a_fault_in_the_spec_is_told_with_its_place(changes, words):
+    with pytest.raises(SpecError, match=words):
+        planner_block(parse_spec(BAY, changes))
+
+
+@pytest.mark.parametrize(
+    ("preset", "words"),
+    [
+        ("paper", "limits.velocity: required"),
+        ("gantry-crane", "plans one axis"),
+        ("flexible-joint", "moves an axis in metres"),
+    ],
+)
+def test_a_machine_that_it_does_not_take_is_refused(preset, words):
+    limits = [f"limits.{name}=1.0" for name in ("velocity", "acceleration", "jerk")]
+    changes = [] if preset == "paper" else [*limits, "limits.travel=[-99.0, 99.0]"]
+    with pytest.raises(SpecError, match=words):
+        planner_block(preset_spec(preset, changes))
