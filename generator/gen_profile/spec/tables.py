@@ -15,7 +15,7 @@ import attrs
 
 from gen_profile.errors import SpecError
 from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_machine_file
-from gen_profile.plants.plant import Coordinate, Parameter, Plant
+from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.spec.check_table import KEYS as CHECK_KEYS
 from gen_profile.spec.check_table import check_table
@@ -31,6 +31,7 @@ from gen_profile.spec.model import (
     SolverSpec,
     Spec,
 )
+from gen_profile.spec.planner_table import planner_table
 from gen_profile.spec.structure import Faults, Table, finite, found, place
 from gen_profile.suggestion import listed, meant, suggestion
 from gen_profile.units import UNITS
@@ -89,7 +90,7 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     tables["axis"] = _axis(tables["axis"], plant, faults)
     _check_columns(tables["export"].get("csv_columns"), faults)
     tables["can"] = _can(tables["can"], plant, faults)
-    tables["planner"] = _planner(tables["planner"], plant, faults)
+    tables["planner"] = planner_table(tables["planner"], plant, faults)
     return tables
 
 
@@ -467,36 +468,6 @@ def _nodes(nodes: Mapping[str, Any], names: Sequence[str] | None, faults: Faults
     for axis in names or ():
         if nodes and known and axis not in nodes:
             faults.add(place("can.nodes", axis), "required beside the other axes' nodes")
-
-
-def _planner(table: Table, plant: Plant | None, faults: Faults) -> Table:
-    """Hold the ranges of live parameters to the machine's; its least value counts as 0 where it is little."""
-    live = table.get("live", {})
-    if not isinstance(live, Mapping):
-        faults.add("planner.live", f"must be a table such as {{ L1 = [3.0, 9.0] }}, found {found(live)}")
-        return {**table, "live": {}}
-    if plant is None:
-        return {**table, "live": {}}
-    known: dict[str, Parameter | Coordinate] = {
-        **{p.name: p for p in plant.parameters},
-        **{axis.name: axis for axis in plant.actuated[1:]},
-    }
-    ranges: Table = {}
-    for name, ends in live.items():
-        where = place("planner.live", name)
-        if name not in known:
-            faults.add(where, f"unknown parameter{suggestion(name, known)}")
-            continue
-        numbers = [finite(end) for end in ends] if isinstance(ends, list | tuple) else []
-        low, high = numbers if len(numbers) == 2 else (None, None)
-        least, most = known[name].lower, known[name].upper
-        if low is None or high is None or not min(0.0, least) <= low < high <= most or high <= least:
-            faults.add(where, f"must be two rising numbers from {least:g} to {most:g}, found {found(ends)}")
-        elif low < least > 1e-3 * high:
-            faults.add(where, f"begins below the least that the machine takes, {least:g}")
-        else:
-            ranges[name] = (low, high)
-    return {**table, "live": ranges}
 
 
 def _check_columns(columns: Any, faults: Faults) -> None:
