@@ -189,6 +189,17 @@ def test_played_on_the_nonlinear_crane_it_leaves_a_thousandth_of_the_sway(text):
     assert sway[arrived:].max() < 1e-3 * sway.max()
 
 
+def test_a_machine_of_one_mode_without_live_parameters():
+    changes = [f"limits.velocity={VELOCITY}", f"limits.acceleration={ACCELERATION}", f"limits.jerk={JERK}"]
+    changes += [f"limits.travel=[{LOW}, {HIGH}]", f"export.cycle_time={CYCLE}", "plant.c=0.0"]
+    spec = preset_spec("single-pendulum-crane", changes)
+    out = Driver(planner_block(spec).text).hold(0.5).hold(15.0, bExecute=1, fTarget=2.0).outputs
+    require_limits(out)
+    assert out["fPosition"][-1] == 2.0
+    rope = spec.plant.parameters["L0"] + spec.move.start[1]
+    assert residual(out, np.sqrt([spec.plant.parameters["g"] / rope])) < 1e-8
+
+
 @pytest.mark.parametrize(
     ("given", "number"),
     [

@@ -58,5 +58,6 @@ def interpolate(function: Callable[[Sequence[float]], Array], variables: int, de
         table = np.moveaxis(np.tensordot(inverse, table, axes=(1, axis)), 0, axis)
     exponents = np.array(list(product(range(degree + 1), repeat=variables)), dtype=np.int64)
     return Interpolant(
-        exponents=exponents.T.reshape(variables, -1), coefficients=table.reshape(len(table), -1)
+        exponents=exponents.T.reshape(variables, (degree + 1) ** variables),
+        coefficients=table.reshape(len(table), -1),
     )
