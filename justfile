@@ -25,3 +25,7 @@ fix:
 # Timings, printed and not judged.
 bench:
     pytest -s tests/benchmarks
+
+# Random specs of all machines: how planning each one ends, and how long it takes.
+battery *arguments:
+    python tests/generator/battery.py {{ arguments }}

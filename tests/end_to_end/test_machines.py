@@ -1,5 +1,6 @@
 """The preset of every machine, through the whole job, and against separately written machines."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -90,5 +91,7 @@ def test_a_machine_too_stiff_to_be_followed_is_refused(tmp_path):
         "--preset", "paper-beta0", "--set", "plant.c1=1e5", "--method", "direct", "--out", tmp_path / "new"
     )
     assert outcome.code == 3
-    assert "changes within 4e-07 s, too fast to be followed for 7.04 s; look at" in outcome.errors[-1]
+    assert re.search(
+        r"changes within 4e-07 s, too fast to be followed for 7\.\d+ s; look at", outcome.errors[-1]
+    )
     assert not (tmp_path / "new").exists()

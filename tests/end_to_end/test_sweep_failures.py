@@ -11,7 +11,6 @@ import pytest
 from command_line import run_here
 from distributed import LocalCluster
 
-from gen_profile.cli.progress import counting
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.reading import preset_text
 from gen_profile.sweep import case as sweep_case
@@ -224,15 +223,6 @@ def test_workers_that_cannot_work_stop_the_sweep(tmp_path, monkeypatch, raised, 
         pytest.raises(seen, match=sentence),
     ):
         workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler=cluster.scheduler_address)
-
-
-def test_counts_on_a_terminal(monkeypatch, capsys):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with counting("cases") as tell:
-        tell(3, 10, "")
-        tell(10, 10, "2 failed")
-    shown = capsys.readouterr().err
-    assert "cases" in shown and "10/10" in shown and "2 failed" in shown
 
 
 # Its table

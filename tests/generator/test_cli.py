@@ -6,6 +6,7 @@ import logging
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -158,9 +159,20 @@ def test_a_terminal_sees_a_spinner_and_nothing_stays(monkeypatch):
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setenv("TERM", "xterm")
     with progress.progress() as tell:
-        tell("solving")
-    assert "solving …" in terminal.getvalue() or terminal.getvalue() == ""
+        tell("solving", 3, 14, "zvd")
+    assert "solving, 3 of 14, zvd …" in terminal.getvalue()
     assert not terminal.getvalue().endswith("…\n")
+
+
+def test_a_log_hears_of_work_that_lasts(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "FIRST_LINE", 0.02)
+    with progress.progress() as tell:
+        tell("sweeping", 2, 10)
+        tell("sweeping", 4, 10, "1 failed")
+        time.sleep(0.2)
+    first, second, *_ = capsys.readouterr().err.splitlines()
+    assert first.startswith("sweeping, 2 of 10")
+    assert re.fullmatch(r"sweeping, 4 of 10, 1 failed, \d+ s, about \d+ s left …", second)
 
 
 @pytest.mark.slow

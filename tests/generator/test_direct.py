@@ -5,13 +5,16 @@ import numpy as np
 import pytest
 from generator.crane_problems import EFFORTS, crane_problem
 
+from gen_profile.motion.metrics import greatest
 from gen_profile.problem.actuator import lag_compensated
+from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
+from gen_profile.spec.reading import preset_spec
 
 LIMITS = {"velocity": 0.15, "acceleration": 0.4, "jerk": 6.0}
 
@@ -110,3 +113,19 @@ def test_programs_that_overshoot_back_and_forth_settle(weight):
     problem = crane_problem(machine, target=(1.0,), duration=5.5, sway_scale=None, sway_weight=weight)
     one, other = direct.solve(problem).raise_for_status(), indirect.solve(problem).raise_for_status()
     assert one.cost == pytest.approx(other.cost, rel=1e-6 if weight == 0.0 else 3e-5)
+
+
+def test_snap_within_a_limit_of_the_sway_takes_few_programs_and_intervals(monkeypatch):
+    task = ["cost.effort=snap", "move.duration=6.0", "limits.sway=0.003"]
+    few = direct.solve(problem_of(preset_spec("slosh-tank", task)))
+    assert few.iterations <= 20
+    monkeypatch.setattr(direct, "INTERVALS", 60)  # of which there are twice as many, with limits
+    many = direct.solve(problem_of(preset_spec("slosh-tank", task)))
+    assert many.raise_for_status().cost == pytest.approx(few.raise_for_status().cost, rel=0.01)
+
+
+def test_a_limit_that_makes_the_cost_of_sway_steep_is_kept():
+    """The sway is three times what the cost expects, at whose exponential programs fail that leap there."""
+    task = ["cost.effort=snap", "move.duration=6.0", "limits.velocity=0.2"]
+    solution = direct.solve(problem_of(preset_spec("slosh-tank", task)))
+    assert greatest(optimal_profile(solution), 1) == pytest.approx(0.2, rel=1e-3)

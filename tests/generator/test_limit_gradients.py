@@ -53,7 +53,7 @@ def local_coordinates(transcription, paths):
     blocks = []
     for path in paths:
         blocks += [path.deriv(order)(knots)[:, None] for order in range(piece.order)]
-        blocks.append(path.deriv(piece.order)(knots[:, None] + piece.length * inside) @ control.T)
+        blocks.append(path.deriv(piece.order)(knots[:, None] + piece.length[:, None] * inside) @ control.T)
     return np.concatenate(blocks, axis=1)
 
 

@@ -216,7 +216,7 @@ def check(
             scale=scale,
             mirror=mirror,
             offset=offset,
-            progress=lambda done, total: tell(f"checking by co-simulation, {done} of {total} scenarios"),
+            progress=lambda done, total: tell("checking by co-simulation", done, total),
         )
     if table_path is not None:
         deliver(table_path, table(judgement.spec, judgement.check).encode("utf-8"))

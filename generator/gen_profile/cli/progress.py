@@ -1,80 +1,129 @@
-"""What a person sees on stderr while work goes on."""
+"""What a person sees on stderr while work goes on: the stage, how far it is, and for how long."""
 
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import Any
 
+import attrs
 import click
 
+from gen_profile.progress import Progress
+
+FIRST_LINE, LONGEST_PAUSE = 2.0, 30.0  # s after which a log hears of work again, and at the longest
+REFRESH = 4.0  # times a second, on a terminal
+
+
+@attrs.define
+class _Step:
+    """How far a stage is."""
+
+    stage: str = ""
+    done: int = 0
+    total: int = 0
+    remark: str = ""
+    began: float = 0.0
+    before: int = 0  # steps that were done when the stage began
+
+    def take(self, stage: str, done: int, total: int, remark: str) -> bool:
+        """Take what is told, and find out whether a stage begins."""
+        new = stage != self.stage
+        if new:
+            self.began, self.before = time.monotonic(), done
+        self.stage, self.done, self.total, self.remark = stage, done, total, remark
+        return new
+
+    def words(self) -> str:
+        """Say it: the stage, steps, remark, time so far and, where it can be known, time to go."""
+        seconds = time.monotonic() - self.began
+        parts = [self.stage]
+        if self.total:
+            parts.append(f"{self.done} of {self.total}")
+        if self.remark:
+            parts.append(self.remark)
+        if seconds >= FIRST_LINE:
+            parts.append(f"{seconds:.0f} s")
+            if self.before < self.done < self.total:
+                left = seconds / (self.done - self.before) * (self.total - self.done)
+                parts.append(f"about {left:.0f} s left")
+        return f"{', '.join(parts)} …"
+
 
 @contextmanager
-def progress() -> Iterator[Callable[[str], None]]:
-    """Show the current step with a spinner on a terminal, and as lines elsewhere."""
-    if not sys.stderr.isatty():
-        yield _print_line
-        return
-    from rich.console import Console
+def progress() -> Iterator[Progress]:
+    """Show the current stage: one line that changes on a terminal, lines now and then elsewhere."""
+    shown = _OnTerminal() if sys.stderr.isatty() else _InLog()
+    with shown:
+        yield shown.tell
 
-    status = Console(stderr=True).status("starting …")
-    status.start()
-    try:
-        yield lambda text: status.update(f"{text} …")
-    finally:
+
+class _InLog:
+    """A line for every stage and its end, and for one that lasts further ones, ever more rarely."""
+
+    def __init__(self) -> None:
+        self._step, self._lock, self._over = _Step(), threading.Lock(), threading.Event()
+        self._due, self._pause = float("inf"), FIRST_LINE
+        self._clock = threading.Thread(target=self._remind, daemon=True)
+
+    def __enter__(self) -> None:
+        self._clock.start()
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._clock.join()
+
+    def tell(self, stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
+        with self._lock:
+            new = self._step.take(stage, done, total, remark)
+            if new:
+                self._pause = FIRST_LINE
+            if new or 0 < total == done:
+                self._print()
+
+    def _print(self) -> None:
+        click.echo(self._step.words(), err=True)
+        self._due = time.monotonic() + self._pause
+
+    def _remind(self) -> None:
+        while not self._over.wait(FIRST_LINE / 4.0):
+            with self._lock, suppress(OSError):  # who is told may be gone
+                if time.monotonic() >= self._due:
+                    self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
+                    self._print()
+
+
+class _OnTerminal:
+    """A spinner, and beside it the words."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.live import Live
+        from rich.spinner import Spinner
+        from rich.text import Text
+
+        self._step, self._spinner, self._text = _Step(stage="starting"), Spinner("dots"), Text
+        self._step.began = time.monotonic()
+        self._live = Live(
+            get_renderable=self._shown,
+            console=Console(stderr=True),
+            refresh_per_second=REFRESH,
+            transient=True,
+        )
+
+    def __enter__(self) -> None:
+        self._live.__enter__()
+
+    def __exit__(self, *error: Any) -> None:
         with suppress(OSError, SystemExit):  # of Rich, on a terminal that is gone
-            status.stop()
+            self._live.__exit__(*error)
 
+    def tell(self, stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
+        self._step.take(stage, done, total, remark)
 
-def _print_line(text: str) -> None:
-    click.echo(f"{text} …", err=True)
-
-
-@contextmanager
-def counting(things: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Show how many of some things are done and the time left: a bar on a terminal, lines elsewhere.
-
-    What it yields takes how many are done, of how many, and a remark.
-    """
-    if not sys.stderr.isatty():
-        yield _Lines(things)
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn(things),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[remark]}"),
-        TimeRemainingColumn(elapsed_when_finished=True),
-    )
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(things, total=None, remark="")
-
-        def tell(done: int, total: int, remark: str) -> None:
-            if bar.tasks[0].total is None:  # what was done before says nothing about the speed
-                bar.reset(task, total=total, completed=done, remark=remark)
-            bar.update(task, completed=done, remark=remark)
-
-        yield tell
-
-
-class _Lines:
-    """A line at every tenth of the way, for logs."""
-
-    def __init__(self, things: str) -> None:
-        self._things = things
-        self._began: tuple[float, int] | None = None
-        self._tenth = -1
-
-    def __call__(self, done: int, total: int, remark: str) -> None:
-        now = time.monotonic()
-        began, before = self._began = self._began or (now, done)
-        if (tenth := 10 * done // total) > self._tenth:
-            self._tenth = tenth
-            left = ""
-            if before < done < total:
-                left = f", {(now - began) / (done - before) * (total - done):.0f} s left"
-            _print_line(f"{done} of {total} {self._things}{remark and f', {remark}'}{left}")
+    def _shown(self) -> Any:
+        self._spinner.update(text=self._text(self._step.words()))
+        return self._spinner

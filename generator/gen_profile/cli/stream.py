@@ -23,6 +23,7 @@ from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import OutputError, SpecError, StreamAborted
 
 if TYPE_CHECKING:
+    from gen_profile.progress import Progress
     from gen_profile.streaming.outcome import Outcome, Source
     from gen_profile_exporters.can.host.lateness import Lateness
     from gen_profile_exporters.can.host.port import Port
@@ -191,7 +192,7 @@ def drive_sim(
         port.open(spec.can.bitrate) as bus,
     ):
         bank = run.drive_bank(spec, bus, load, make)
-        tell("waiting for a stream")
+        tell("waiting for a stream, or serving it")
         run.serve(bank, lambda: bank.finished)
         sway = load.residual_sway()
     scales = [axis.counts_per_si for axis in spec.axis_scales()]
@@ -262,7 +263,7 @@ def _source(
     *,
     accept_unverified: bool,
     require_bus: Callable[[int], None],
-    tell: Callable[[str], None],
+    tell: Progress,
 ) -> Source:
     """Take an artefact, or design one for a spec, once there is a bus for it."""
     from gen_profile.streaming.stream import designed, require_rest, verified
@@ -291,7 +292,7 @@ def _require_moving_alone(to_start: bool, jog: tuple[str, ...], dry_run: bool) -
 
 
 def _slow(
-    source: Source, port: Port, jog: tuple[str, ...], simulate_drive: bool, tell: Callable[[str], None]
+    source: Source, port: Port, jog: tuple[str, ...], simulate_drive: bool, tell: Progress
 ) -> Source | None:
     from gen_profile.streaming import slow_motion
 
@@ -308,7 +309,7 @@ def _at_start(source: Source) -> tuple[dict[str, Any], str]:
     return {"state": "at start", "reason": ""}, words
 
 
-def _self_test(source: Source, tell: Callable[[str], None]) -> str:
+def _self_test(source: Source, tell: Progress) -> str:
     """Measure this machine, and say before anything moves what came of it."""
     from gen_profile.streaming.stream import self_test
 

@@ -71,7 +71,7 @@ def sweep(
     Cases that fail are rows of the table with their reason; the exit code is 0 once all are done.
     """
     from gen_profile.cli import words
-    from gen_profile.cli.progress import counting
+    from gen_profile.cli.progress import progress
     from gen_profile.sweep.grid import parse_grid
     from gen_profile.sweep.plan import prepare, require_libraries
 
@@ -82,12 +82,14 @@ def sweep(
 
     text = chosen_text(spec_path, preset)
     store = prepare(text, overrides, parse_grid(axes), formats, folder)
-    with counting("cases") as tell:
+    with progress() as tell:
         done = run(
             store,
             scheduler=scheduler,
             workers=workers,
-            progress=lambda at: tell(at.done, at.total, f"{at.failed} failed" if at.failed else ""),
+            progress=lambda at: tell(
+                "designing cases", at.done, at.total, f"{at.failed} failed" if at.failed else ""
+            ),
         )
     print_outcome(done.to_dict(), words.sweep(done), as_json)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import attrs
@@ -13,9 +13,8 @@ from gen_profile.errors import GenProfileError, InfeasibleProblem
 from gen_profile.evaluation.motion_evaluation import Trial, evaluate, keeps_residual_sway
 from gen_profile.evaluation.phrases import mm
 from gen_profile.motion.profile import Profile
+from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
-
-Progress = Callable[[str], None]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -80,7 +79,7 @@ class Comparison:
         }
 
 
-def compare(spec: Spec, progress: Progress = lambda _: None, *, own: Sequence[Profile] = ()) -> Comparison:
+def compare(spec: Spec, progress: Progress = untold, *, own: Sequence[Profile] = ()) -> Comparison:
     """Try every shaper and variants of the optimal motion on the machines of a spec.
 
     Parameters
@@ -94,8 +93,9 @@ def compare(spec: Spec, progress: Progress = lambda _: None, *, own: Sequence[Pr
     rows: list[Row] = []
     left_out: dict[str, str] = {}
     impossible: dict[str, str] = {}
-    for contender in contenders(spec, own):
-        progress(contender.method)
+    listed = tuple(contenders(spec, own))
+    for done, contender in enumerate(listed):
+        progress("comparing", done, len(listed), contender.method)
         try:
             if contender.requirements in impossible:
                 left_out[contender.method] = impossible[contender.requirements]

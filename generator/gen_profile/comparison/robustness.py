@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -15,11 +15,10 @@ from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.motion.profile import Array, Profile, grid_length, grid_times, read_only
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.linearization import linearize
+from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
 from gen_profile.suggestion import suggestion
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
-
-Progress = Callable[[str], None]
 
 POINTS = {1: 61, 2: 25}  # per parameter, of a curve and of a map
 USUAL_RANGE = 0.3  # relative, of a parameter that the spec takes for certain
@@ -130,7 +129,7 @@ def robustness(
     own: Sequence[Profile] = (),
     points: int | None = None,
     half_range: float | None = None,
-    progress: Progress = lambda _: None,
+    progress: Progress = untold,
 ) -> Robustness:
     """Try shapers and variants of the optimal motion over errors of one or two parameters.
 
@@ -162,8 +161,9 @@ def robustness(
     for method in methods:
         if method not in listed:
             raise SpecError(f"--method {method[:60]}: unknown method{suggestion(method, list(listed))}")
-    for method in [*methods, *(motion.method for motion in own)] if methods else listed:
-        progress(method)
+    chosen = [*methods, *(motion.method for motion in own)] if methods else list(listed)
+    for done, method in enumerate(chosen):
+        progress("designing", done, len(chosen), method)
         try:
             motions[method] = listed[method].design()
         except GenProfileError as error:

@@ -13,11 +13,12 @@ import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256
 from gen_profile.artefacts.writing import Staging, staged
-from gen_profile.designs.plan import Plan, plan, timed
+from gen_profile.designs.plan import Plan, plan
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.motion_evaluation import Trial
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
+from gen_profile.progress import Progress, untold
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec.model import Spec
 from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
@@ -28,7 +29,6 @@ from gen_profile.verification.worst_machines import worst_machines
 from gen_profile_exporters.exporter import Exporter, target_of
 from gen_profile_exporters.registry import find_exporter, format_named, require_end
 
-Progress = Callable[[str], None]
 LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")
 
 
@@ -124,7 +124,7 @@ def design(
     check: bool = True,
     keep_failed: bool = False,
     near: Trajectory | None = None,
-    progress: Progress = lambda _: None,
+    progress: Progress = untold,
 ) -> Design:
     """Solve, export, replay what was written, co-simulate, and deliver what passes.
 
@@ -152,9 +152,8 @@ def design(
     folder = Path(folder)
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
     require_end(exporters, stops=spec.move.stops)
-    progress("solving")
-    spec = timed(spec)
-    planned = plan(spec, near)
+    planned = plan(spec, near, progress)
+    spec = planned.spec
     with staged(folder) as staging:
         progress("exporting")
         artefacts, replayed = _export(spec, planned.trial.command, exporters, staging)
@@ -233,7 +232,7 @@ def _judged(
         setpoints,
         judge(spec, setpoints, machines, found, expected),
         [row for row in rows if not row.followed],
-        lambda done, total: progress(f"checking by co-simulation, {done} of {total} scenarios"),
+        lambda done, total: progress("checking by co-simulation", done, total),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,11 @@ import attrs
 import numpy as np
 
 from gen_profile.artefacts.writing import deliver
-from gen_profile.designs.plan import plan, timed
+from gen_profile.designs.plan import plan
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.motion.profile import Profile
 from gen_profile.problem.linearization import linearize
+from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.build import build_fmu
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
@@ -78,7 +79,7 @@ def export_fmu(
     input_kind: InputKind = InputKind.SETPOINT,
     platforms: tuple[str, ...] | None = None,
     author: str = AUTHOR,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = untold,
 ) -> Export:
     """Write an FMU, or a system of two.
 
@@ -132,12 +133,11 @@ def platform_names(choice: str) -> tuple[str, ...]:
     return (choice,)
 
 
-def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Callable[[str], None]) -> Model:
+def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Progress) -> Model:
     name = identifier_of(f"{spec.name} {kind}")
     if kind == "plant":
         return plant_model(_machine(spec, _rough_nominals(spec)), input_kind, name)
-    progress("solving")
-    trial = plan(timed(spec)).trial
+    trial = plan(spec, progress=progress).trial
     if kind == "profile":
         return profile_model(name, spec.machine().actuated, trial.command)
     return system_model(name, _machine(spec, _nominals(spec, trial.motion)), trial.command)

@@ -9,21 +9,25 @@ import attrs
 import numpy as np
 
 from gen_profile.designs.shape import shaped_motion
-from gen_profile.errors import InfeasibleProblem, LimitViolation
+from gen_profile.errors import InfeasibleProblem, LimitViolation, SolverDiverged
 from gen_profile.evaluation.motion_evaluation import Trial, evaluate, keeps_residual_sway
 from gen_profile.motion.profile import Profile, grid_length, grid_times
 from gen_profile.problem.limits import breaches, rounded_up
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
+from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.minimum_time import least_beyond
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
+from gen_profile.work import OutOfWork, budget
 
 SLOW = 5.0  # periods of the slowest mode, which are time enough where no duration keeps the limits
 CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
+EXPLAINING = "looking for what would do"
+SEARCHING = 14.0  # s of work to find the shortest duration
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
@@ -33,6 +37,8 @@ class Plan:
 
     Attributes
     ----------
+    spec : Spec
+        What was planned, its duration found where the shortest was asked for.
     solution : Solution or None
         What the solver found; None where a shaper made the motion.
     solver_time : float
@@ -42,6 +48,7 @@ class Plan:
     figures : dict of str to float
     """
 
+    spec: Spec
     solution: Solution | None
     solver_time: float
     trial: Trial
@@ -58,7 +65,7 @@ class Plan:
         return self.trial.command
 
 
-def timed(spec: Spec) -> Spec:
+def timed(spec: Spec, progress: Progress = untold) -> Spec:
     """Find the shortest duration where a spec asks for it; it ends on a cycle of the controller.
 
     An optimal motion takes longer than its limits make it where it would otherwise leave more sway than the
@@ -68,13 +75,26 @@ def timed(spec: Spec) -> Spec:
     ------
     InfeasibleProblem
         No duration was found to do.
+    SolverDiverged
+        None was found in the work that a search may take.
     """
     if not spec.move.shortest:
         return spec
     if spec.solver.shaper is not None:
         return _lasting(spec, shaped_motion(spec, spec.solver.shaper).duration)
+    try:
+        with budget(SEARCHING * choice.patience(problem_of(spec))):
+            return _shortest(spec, progress)
+    except OutOfWork as error:
+        raise SolverDiverged(
+            "move.duration: the search for the shortest duration was given up, for it took too long; "
+            "state a duration in s, or fewer limits."
+        ) from error
+
+
+def _shortest(spec: Spec, progress: Progress) -> Spec:
     problem = problem_of(spec)
-    shortest = choice.minimum_time(problem)
+    shortest = choice.minimum_time(problem, progress)
     if shortest is None:
         slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
         slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * 2.0 * np.pi / slowest)))
@@ -85,7 +105,12 @@ def timed(spec: Spec) -> Spec:
     quickest = _lasting(spec, shortest)
     if _calms(quickest):
         return quickest
-    calm = least_beyond(lambda time: _calms(_lasting(spec, time)), shortest, LONGEST * shortest)
+
+    def calms(duration: float) -> bool:
+        progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
+        return _calms(_lasting(spec, duration))
+
+    calm = least_beyond(calms, shortest, LONGEST * shortest)
     if calm is None:
         raise InfeasibleProblem(
             "check.residual_sway: no duration leaves so little sway on every machine of "
@@ -112,7 +137,7 @@ def _is_calm(spec: Spec, solution: Solution) -> bool:
     return keeps_residual_sway(spec, evaluate(spec, optimal_profile(solution)), CALM)
 
 
-def plan(spec: Spec, near: Trajectory | None = None) -> Plan:
+def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold) -> Plan:
     """Solve a spec, or shape a move for it, and try the motion on all machines.
 
     Parameters
@@ -120,24 +145,39 @@ def plan(spec: Spec, near: Trajectory | None = None) -> Plan:
     spec : Spec
     near : Trajectory, optional
         Of a similar spec's solution, to begin at.
+    progress : Progress
 
     Raises
     ------
     InfeasibleProblem, SolverDiverged, LimitViolation
     """
-    began = time.perf_counter()
-    if spec.solver.shaper is not None:
-        solution, motion = None, shaped_motion(spec, spec.solver.shaper)
-    else:
-        attempt = choice.attempt(problem_of(spec), spec.solver.solver, near)
-        solution = choice.explained(attempt, spec.solver.solver, partial(_is_calm, spec))
-        motion = optimal_profile(solution)
-    solver_time = time.perf_counter() - began
+    try:
+        with budget(choice.ANSWER):
+            spec = timed(spec, progress)
+            progress("solving")
+            began = time.perf_counter()
+            solution, motion = _designed(spec, near, progress)
+            solver_time = time.perf_counter() - began
+    except OutOfWork:
+        choice.given_up(problem_of(spec)).raise_for_status()
+        raise
     trial = evaluate(spec, motion)
     found = trial.figures
     broken = breaches(spec.limits, trial.command, found["sway_transient_peak_m"])
     if broken:
         sentences = [breach.sentence() for breach in broken]
+        progress(EXPLAINING)
         cure = choice.remedy(problem_of(spec), spec.solver.solver, partial(_is_calm, spec))
         raise LimitViolation("\n".join([*sentences, cure]).strip())
-    return Plan(solution=solution, solver_time=solver_time, trial=trial, figures=found)
+    return Plan(spec=spec, solution=solution, solver_time=solver_time, trial=trial, figures=found)
+
+
+def _designed(spec: Spec, near: Trajectory | None, progress: Progress) -> tuple[Solution | None, Profile]:
+    """Solve a spec that has a duration, or find out what would help; or shape a move for it."""
+    if spec.solver.shaper is not None:
+        return None, shaped_motion(spec, spec.solver.shaper)
+    attempt = choice.attempt(problem_of(spec), spec.solver.solver, near)
+    if attempt.optimum is None:
+        progress(EXPLAINING)
+    solution = choice.explained(attempt, spec.solver.solver, partial(_is_calm, spec))
+    return solution, optimal_profile(solution)

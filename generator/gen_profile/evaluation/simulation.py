@@ -20,11 +20,13 @@ from gen_profile.problem.dynamics import dynamics, parameter_column
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.symbolic import Function
+from gen_profile.work import spend
 
 RELATIVE_TOLERANCE = 1e-10
 ABSOLUTE_TOLERANCE = 1e-13
 TRANSIENT_SAMPLES = 4001
 LONGEST = 1e6  # greatest rate of a machine times its time: some hundred thousand steps, and minutes
+RATE, MACHINE = 4e-5, 2e-6  # s of work to evaluate the equations, and more for each machine
 AT_REST: Mapping[str, float] = MappingProxyType({})
 
 
@@ -96,7 +98,10 @@ class Swing:
         for values in machines:
             _require_pace(plant, values, profile, until)
 
+        work = RATE + MACHINE * len(machines)
+
         def rate(t: float, state: Array) -> Array:
+            spend(work)
             q_u, dq_u = state.reshape(shape)
             ddq_u = acceleration(q_u, dq_u, motion(t), p)[:, :, 0]
             return np.concatenate([dq_u.ravel(), ddq_u.ravel()])

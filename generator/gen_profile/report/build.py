@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +14,7 @@ from gen_profile.artefacts.manifest import sha256
 from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.designs.design import LIBRARIES, Design, design
 from gen_profile.evaluation.phrases import move, uncertain
+from gen_profile.progress import Progress, untold
 from gen_profile.report.content import Page
 from gen_profile.report.log import read_log
 from gen_profile.report.measured import Measured, compare_measured
@@ -22,8 +23,6 @@ from gen_profile.report.page import render, require_pages
 from gen_profile.report.sections import facts, sections, verdict
 from gen_profile.spec.model import Spec
 from gen_profile.verification.verdict import Check
-
-Progress = Callable[[str], None]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -80,7 +79,7 @@ def report(
     log_columns: str | None = None,
     compared: bool = True,
     fields: Sequence[tuple[str, str]] = (),
-    progress: Progress = lambda _: None,
+    progress: Progress = untold,
 ) -> Report:
     """Design, check and compare, and put what was found on one page.
 

@@ -22,8 +22,10 @@ from scipy.special import roots_jacobi
 
 from gen_profile.motion.profile import Array
 from gen_profile.one_thread import one_thread
+from gen_profile.work import spend
 
 STAGES = 4  # of the schemes for fine meshes
+WORK = 1e-9  # s of work for each interval and the cube of its unknowns
 
 IntArray = NDArray[np.intp]
 
@@ -231,6 +233,7 @@ def linearize(flow: Array, current: Trajectory) -> Linearized:
     """
     nodes, stages, scheme = current.nodes, current.stages, current.scheme
     intervals, count, size = stages.shape
+    spend(WORK * intervals * (count * size) ** 3)
     lengths = np.diff(current.mesh)[:, None, None]
     values = flow.reshape(intervals, count, size, 1 + size)
     states, costates = slice(0, size // 2), slice(size // 2, size)

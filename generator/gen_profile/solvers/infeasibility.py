@@ -6,7 +6,7 @@ Values are solved for (see `solvers.relaxation`), rounded to the safe side, and 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
@@ -16,9 +16,12 @@ from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.direct.relaxation import least_duration, relaxed
 from gen_profile.solvers.solution import Solution
+from gen_profile.work import OutOfWork, budget, left, spend
 
 FACTORS = (1.01, 1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
 NEAR = 1.05  # how many times a value that will not do the one that is named may be
+WORK = 20.0  # s to look for all cures
+SHARE = 0.5  # of the work that is left, which one cure may take
 FARTHER = 1.7  # times the least value with a solution, up to which one that is welcome is looked for
 
 
@@ -33,11 +36,14 @@ class Trial:
         Whether it is one that will do.
     welcome : Solution → bool
         Whether it is one that is better named than others near by.
+    work : float
+        In s, that it may take to look for all cures.
     """
 
     solve: Callable[[Problem], Solution]
     keeps: Callable[[Solution], bool]
     welcome: Callable[[Solution], bool]
+    work: float = WORK
 
     def pleases(self, problem: Problem) -> bool:
         """Whether a problem has a solution that will do and is welcome."""
@@ -83,37 +89,47 @@ def cures(problem: Problem, trial: Trial, *, in_time: bool = False) -> str:
     in_time : bool
         Look for what would do in the duration asked for only.
     """
-    sentences = []
-    longer = None if in_time else _longer(problem, trial)
-    if longer is not None:
+    longer, instead, sentences = "", list[str](), list[str]()
+    try:
+        with budget(trial.work):
+            longer = "" if in_time else _in_time(lambda: _longer(problem, trial))
+            instead = _wider(problem, trial)
+            if not instead and (less := _in_time(lambda: _less_robust(problem, trial))):
+                instead = [less]
+    except OutOfWork:  # of the budget for the whole answer: what was found so far is told
+        pass
+    if longer:
         within = "With these limits it" if problem.limits.stated() else "It"
         sentences.append(f"{within} takes at least {longer} s (move.duration).")
-    instead = list(_wider(problem, trial)) or list(_less_robust(problem, trial))
     if instead:
         sentences.append(f"In {problem.duration:g} s it would do with {', or with '.join(instead)}.")
     return " ".join(sentences)
 
 
-def _longer(problem: Problem, trial: Trial) -> str | None:
-    """Find the least duration that will do, in s, rounded up to three digits."""
+def _longer(problem: Problem, trial: Trial) -> str:
+    """Find the least duration that will do, in s, rounded up to three digits; empty where there is none."""
     enough = least_duration(problem)
     if enough is None:
-        return None
+        return ""
 
     def lasting(factor: float) -> Problem:
         return attrs.evolve(problem, duration=float(rounded_up(factor * enough)))
 
     factor = trial.least(lasting)
-    return None if factor is None else rounded_up(factor * enough)
+    return "" if factor is None else rounded_up(factor * enough)
 
 
-def _wider(problem: Problem, trial: Trial) -> Iterator[str]:
+def _wider(problem: Problem, trial: Trial) -> list[str]:
     """Widen one limit by itself as little as will do; all of them alike where one is not enough."""
     stated = problem.limits.stated()
-    alone = [found for place, value in stated.items() if (found := _widened(problem, {place: value}, trial))]
-    if not alone and len(stated) > 1 and (together := _widened(problem, stated, trial)):
+
+    def widened(limits: Mapping[str, Any]) -> str:
+        return _in_time(lambda: _widened(problem, limits, trial))
+
+    alone = [found for place, value in stated.items() if (found := widened({place: value}))]
+    if not alone and len(stated) > 1 and (together := widened(stated)):
         alone = [together]
-    yield from alone
+    return alone
 
 
 def _widened(problem: Problem, limits: Mapping[str, Any], trial: Trial) -> str:
@@ -132,12 +148,23 @@ def _widened(problem: Problem, limits: Mapping[str, Any], trial: Trial) -> str:
     return " and ".join(f"{place} = {_written(value)}" for place, value in wider(factor).items())
 
 
-def _less_robust(problem: Problem, trial: Trial) -> Iterator[str]:
+def _less_robust(problem: Problem, trial: Trial) -> str:
     """Ask for less robustness."""
     if problem.order > 1 and trial.pleases(attrs.evolve(problem, order=1)):
-        yield "robustness.order = 1"
-    elif problem.desensitized and trial.pleases(attrs.evolve(problem, desensitized=(), order=1)):
-        yield 'robustness.method = "none"'
+        return "robustness.order = 1"
+    if problem.desensitized and trial.pleases(attrs.evolve(problem, desensitized=(), order=1)):
+        return 'robustness.method = "none"'
+    return ""
+
+
+def _in_time(find: Callable[[], str]) -> str:
+    """Find words for a cure in a share of the work that is left; none where that is not enough."""
+    try:
+        with budget(SHARE * left()):
+            return find()
+    except OutOfWork:
+        spend(0.0)
+        return ""
 
 
 def _times(value: Any, share: float) -> Any:

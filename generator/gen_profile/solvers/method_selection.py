@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from itertools import count
 
 import attrs
 
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.problem import Problem
+from gen_profile.progress import Progress, untold
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct import worst_case
 from gen_profile.solvers.direct.relaxation import relaxed
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way
 from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.infeasibility import Trial, cures
+from gen_profile.solvers.infeasibility import WORK, Trial, cures
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Solution
+from gen_profile.solvers.solution import Solution, Status
 from gen_profile.spec.model import LimitsSpec, SolverName
+from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]
+SHORTEST = "looking for the shortest duration"
+ANSWER = 30.0  # s of work for all that a spec asks for, and for what would do where it cannot be had
+SOLVING = 5.0  # s of work for one method; twice that where there is no other
+RANGE = 2.0  # times the work for a whole range
 
 
 def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
@@ -35,7 +43,11 @@ def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None
     near : Trajectory, optional
         Of the solution of a similar problem: the indirect method begins there.
     """
-    return explained(attempt(problem, method, near), method)
+    try:
+        with budget(ANSWER):
+            return explained(attempt(problem, method, near), method)
+    except OutOfWork:
+        return given_up(problem)
 
 
 def explained(solution: Solution, method: SolverName = "auto", welcome: Judge = lambda _: True) -> Solution:
@@ -61,24 +73,61 @@ def explained(solution: Solution, method: SolverName = "auto", welcome: Judge = 
 
 def remedy(problem: Problem, method: SolverName = "auto", welcome: Judge = lambda _: True) -> str:
     """Say which other values would let a method find a motion within the limits; nothing where none will."""
-    trial = Trial(solve=lambda other: attempt(other, method), keeps=keeps_limits, welcome=welcome)
+    trial = Trial(
+        solve=lambda other: attempt(other, method),
+        keeps=keeps_limits,
+        welcome=welcome,
+        work=WORK * patience(problem),
+    )
     found = cures(problem, trial)
-    if method == "indirect" and keeps_limits(attempt(problem)):
-        return f'With solver.method = "auto" the limits are kept. {found}'.strip()
+    elsewhere = method == "indirect" and problem.worst_case is None
+    try:
+        if elsewhere and keeps_limits(_in_time(_direct, problem, SOLVING)):
+            return f'With solver.method = "auto" the limits are kept. {found}'.strip()
+    except OutOfWork:  # of the budget for the whole answer
+        pass
     return found
+
+
+def patience(problem: Problem) -> float:
+    """Tell how many times the usual work a problem may take."""
+    return 1.0 if problem.worst_case is None else RANGE
 
 
 def attempt(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
     """Solve a problem without finding out what would help where that fails."""
     if problem.worst_case is not None:
-        return worst_case.solve(problem)
+        return _in_time(worst_case.solve, problem, 2.0 * SOLVING)
     if method == "direct":
-        return _direct(problem)
-    solution = indirect.solve(problem, near)
+        return _in_time(_direct, problem, 2.0 * SOLVING)
+    solution = _in_time(partial(indirect.solve, near=near), problem, SOLVING)
     if method == "indirect" or keeps_limits(solution):
         return solution
-    other = _direct(problem)
+    other = _in_time(_direct, problem, SOLVING)
     return solution if other.optimum is None and solution.optimum is None else other
+
+
+def _in_time(solve: Callable[[Problem], Solution], problem: Problem, seconds: float) -> Solution:
+    """Solve a problem, or give it up."""
+    try:
+        with budget(seconds * patience(problem)):
+            return solve(problem)
+    except OutOfWork:
+        spend(0.0)
+        return given_up(problem)
+
+
+def given_up(problem: Problem) -> Solution:
+    """Tell that a problem takes too much work."""
+    return Solution(
+        status=Status.GIVEN_UP,
+        method="none",
+        problem=problem,
+        optimum=None,
+        iterations=0,
+        residual=float("inf"),
+        cure="See whether all numbers of the spec are in its units; else change the duration or limits.",
+    )
 
 
 def _direct(problem: Problem) -> Solution:
@@ -96,11 +145,16 @@ def requirements(problem: Problem) -> str:
     return cures(problem, trial, in_time=True)
 
 
-def minimum_time(problem: Problem) -> float | None:
+def minimum_time(problem: Problem, progress: Progress = untold) -> float | None:
     """Find the shortest duration in s for a problem's limits and robustness; None where none was found."""
-    if problem.worst_case is None:
-        return shortest_duration(problem, direct.solve)
-    return shortest_duration(problem, worst_case.solve_within_limits)
+    solve = direct.solve if problem.worst_case is None else worst_case.solve_within_limits
+    tries = count(1)
+
+    def attempted(other: Problem) -> Solution:
+        progress(SHORTEST, remark=f"trying {other.duration:.3g} s ({next(tries)})")
+        return _in_time(solve, other, SOLVING)
+
+    return shortest_duration(problem, attempted)
 
 
 def keeps_limits(solution: Solution) -> bool:

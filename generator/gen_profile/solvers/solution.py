@@ -20,6 +20,7 @@ class Status(Enum):
     INFEASIBLE = "No motion meets the end conditions within the limits."
     NOT_CONTROLLABLE = "Some part of the machine swings on, whatever the axes do."
     DIVERGED = "The solver found no motion that meets the optimality conditions."
+    GIVEN_UP = "The search for a motion was given up, for it took too long."
 
 
 ERRORS: dict[Status, type[GenProfileError]] = {
@@ -27,6 +28,7 @@ ERRORS: dict[Status, type[GenProfileError]] = {
     Status.INFEASIBLE: InfeasibleProblem,
     Status.NOT_CONTROLLABLE: InfeasibleProblem,
     Status.DIVERGED: SolverDiverged,
+    Status.GIVEN_UP: SolverDiverged,
 }
 
 

@@ -7,12 +7,13 @@ motion is, with all that stops it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import attrs
 
 from gen_profile.errors import SpecError
 from gen_profile.evaluation.residual_sway import watch_time
+from gen_profile.progress import Progress
 from gen_profile.spec.model import Spec
 from gen_profile.streaming.outcome import Source
 from gen_profile.streaming.stream import designed, standing
@@ -25,10 +26,8 @@ from gen_profile_exporters.can.streaming.approach import CREEP, SHARE
 PEAK_VELOCITY, PEAK_ACCELERATION = 4.0, 16.0
 SETTLE = 1.5  # of the time in which residual sway is watched; shorter motions ask for greater accelerations
 
-Tell = Callable[[str], None]
 
-
-def to_start(source: Source, port: Port, *, simulate_drive: bool, tell: Tell) -> Source | None:
+def to_start(source: Source, port: Port, *, simulate_drive: bool, tell: Progress) -> Source | None:
     """Design a slow motion from where the axes stand to the first setpoint; None where they stand there.
 
     Raises
@@ -46,7 +45,9 @@ def to_start(source: Source, port: Port, *, simulate_drive: bool, tell: Tell) ->
     return designed(slow(source, at, spec.move.start), tell)
 
 
-def jog(source: Source, port: Port, distances: Sequence[str], *, simulate_drive: bool, tell: Tell) -> Source:
+def jog(
+    source: Source, port: Port, distances: Sequence[str], *, simulate_drive: bool, tell: Progress
+) -> Source:
     """Design a slow motion by distances from where the axes stand, each as ``AXIS=DISTANCE`` in m (or rad).
 
     Raises

@@ -16,6 +16,7 @@ import attrs
 from gen_profile.artefacts.manifest import FILENAME, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import CheckFailed, OutputError, SpecError, StreamAborted
+from gen_profile.progress import Progress
 from gen_profile.spec.model import CanSpec, Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.streaming.outcome import Outcome, Source
@@ -94,7 +95,7 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
     return Source(spec=spec, plan=plan_of(content, target_of(spec)))
 
 
-def designed(spec: Spec, tell: Tell) -> Source:
+def designed(spec: Spec, tell: Progress) -> Source:
     """Design a motion, check it, and take the log that was written of it.
 
     Raises

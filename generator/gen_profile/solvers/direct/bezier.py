@@ -49,7 +49,7 @@ def power_basis(degree: int) -> Array:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Piece:
-    """One interval of a motion, as linear maps of its local coordinates.
+    """One interval of a motion, or many, as linear maps of their local coordinates.
 
     The local coordinates are the position and its derivatives at the interval's beginning, up to order − 1,
     then the Bézier coefficients of the derivative of that order, the control.
@@ -58,12 +58,12 @@ class Piece:
     ----------
     order : int
         Of the control: 3 for jerk, 4 for snap.
-    length : float
-        Of the interval.
+    length : float or (intervals,) array
+        Of the interval, or of each: what follows then has one dimension more in front.
     """
 
     order: int
-    length: float
+    length: Array = attrs.field(converter=np.asarray)
 
     @property
     def size(self) -> int:
@@ -72,18 +72,19 @@ class Piece:
 
     def derivative(self, order: int) -> Array:
         """Bézier coefficients of a derivative, shape (degree + 1, size)."""
-        rows = np.eye(self.size)[self.order :]
+        length = self.length[..., None, None]
+        rows = np.broadcast_to(
+            np.eye(self.size)[self.order :], (*self.length.shape, CONTROL_DEGREE + 1, self.size)
+        )
         for k in range(self.order - 1, order - 1, -1):
-            start = np.eye(self.size)[k]
-            rows = start + np.vstack(
-                [np.zeros(self.size), np.cumsum(rows, axis=0) * (self.length / len(rows))]
-            )
+            gained = np.cumsum(rows, axis=-2) * (length / rows.shape[-2])
+            rows = np.eye(self.size)[k] + np.concatenate([np.zeros_like(gained[..., :1, :]), gained], axis=-2)
         return rows
 
     def at(self, order: int, times: Array) -> Array:
         """Values of a derivative at times from 0 to 1 of the interval, shape (times, size)."""
         rows = self.derivative(order)
-        return bernstein(len(rows) - 1, times) @ rows
+        return bernstein(rows.shape[-2] - 1, times) @ rows
 
     def leading(self, order: int, lag: float) -> Array:
         """Bézier coefficients of a derivative plus lag times the next one: what leads a first-order drive."""
@@ -91,4 +92,4 @@ class Piece:
         if lag == 0.0:
             return rows
         ahead = self.derivative(order + 1)
-        return rows + lag * elevation(len(ahead) - 1) @ ahead
+        return rows + lag * elevation(ahead.shape[-2] - 1) @ ahead

@@ -18,7 +18,7 @@ class AxesMap:
 
     Attributes
     ----------
-    matrix : (STAGES, 3 m, m · size) array
+    matrix : (intervals, STAGES, 3 m, m · size) array
         To position, velocity and acceleration of the axes in SI units.
     offset : (STAGES, 3 m) array
         Their values where all local coordinates are zero.
@@ -29,20 +29,22 @@ class AxesMap:
 
     def __call__(self, local: Array) -> Array:
         """Evaluate for (intervals, m · size) coordinates: (intervals, STAGES, 3 m)."""
-        return np.asarray(np.einsum("sal,kl->ksa", self.matrix, local) + self.offset)
+        return np.asarray(np.einsum("ksal,kl->ksa", self.matrix, local) + self.offset)
 
 
 def axes_map(piece: Piece, start: Array, reach: Array, duration: float) -> AxesMap:
     """Measure axes by `reach` from `start`, and time by `duration`."""
     m = len(start)
-    matrix = np.zeros((STAGES, 3, m, m, piece.size))
+    matrix = np.zeros((len(piece.length), STAGES, 3, m, m, piece.size))
     for order in range(3):
         values = piece.at(order, GAUSS.c)
         for axis in range(m):
-            matrix[:, order, axis, axis] = values * reach[axis] / duration**order
+            matrix[:, :, order, axis, axis] = values * reach[axis] / duration**order
     offset = np.zeros((STAGES, 3, m))
     offset[:, 0] = start
-    return AxesMap(matrix=matrix.reshape(STAGES, 3 * m, m * piece.size), offset=offset.reshape(STAGES, 3 * m))
+    return AxesMap(
+        matrix=matrix.reshape(-1, STAGES, 3 * m, m * piece.size), offset=offset.reshape(STAGES, 3 * m)
+    )
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -78,7 +80,7 @@ def interval_maps(
     *,
     stages: Array,
     local: Array,
-    length: float,
+    lengths: Array,
 ) -> IntervalMaps:
     """Linearise the collocation equations of every interval about given stages.
 
@@ -90,8 +92,8 @@ def interval_maps(
     stages : (intervals, STAGES, n) array
     local : (intervals, m · size) array
         Axis coordinates that belong to them.
-    length : float
-        Of an interval, in s.
+    lengths : (intervals,) array
+        In s.
 
     Raises
     ------
@@ -104,7 +106,7 @@ def interval_maps(
         - np.einsum("ksab,ksb->ksa", by_state, stages)
         + np.einsum("ksab,ksb->ksa", by_axes, axes.offset - axes(local))
     )
-    return _eliminated(constant, by_state, by_axes @ axes.matrix, length * GAUSS.A)
+    return _eliminated(constant, by_state, by_axes @ axes.matrix, lengths[:, None, None] * GAUSS.A)
 
 
 def _linearized(
@@ -122,14 +124,14 @@ def _linearized(
 def _eliminated(constant: Array, by_state: Array, driven: Array, integration: Array) -> IntervalMaps:
     """Solve ``Y = y_k + h A (constant + by_state Y + driven ξ)`` for the stages Y of every interval."""
     intervals, _, n = constant.shape
-    inner = np.einsum("ij,kjab->kiajb", -integration, by_state).reshape(intervals, STAGES * n, -1)
+    inner = np.einsum("kij,kjab->kiajb", -integration, by_state).reshape(intervals, STAGES * n, -1)
     diagonal = np.arange(STAGES * n)
     inner[:, diagonal, diagonal] += 1.0
     right = np.concatenate(
         [
-            np.einsum("ij,kja->kia", integration, constant)[..., None],
+            np.einsum("kij,kja->kia", integration, constant)[..., None],
             np.broadcast_to(np.eye(n), (intervals, STAGES, n, n)),
-            np.einsum("ij,kjal->kial", integration, driven),
+            np.einsum("kij,kjal->kial", integration, driven),
         ],
         axis=-1,
     )

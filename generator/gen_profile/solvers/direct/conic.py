@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from itertools import count
 from typing import Any
 
 import attrs
@@ -12,10 +13,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gen_profile.motion.profile import Array
+from gen_profile.solvers.interrupts import interrupts_collected
+from gen_profile.work import spend
 
 Matrix = Any  # scipy.sparse matrix or array
 TOLERANCE = 1e-10
 MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
+STEEP = 100.0  # slope of a cost from which on our units alone may scale it better than with Clarabel's on top
+POSING, ITERATION = 5e-7, 1e-7  # s of work for each entry of the constraints, and for each of an iteration's
 
 
 class Verdict(Enum):
@@ -87,7 +92,10 @@ class ConicProgram:
         self._add(*self._giving(matrix, side, gives), clarabel.SecondOrderConeT(len(side)))
 
     def solve(self, quadratic: Matrix, linear: Array) -> ConicSolution:
-        """Solve for a cost, P given whole and symmetric."""
+        """Solve for a cost, P given whole and symmetric; it should be of the order of 1 or more.
+
+        What is much smaller is not minimised: programs end when the cost is right to the tolerance.
+        """
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_iter = MAX_ITERATIONS
@@ -95,23 +103,33 @@ class ConicProgram:
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
         units = sparse.diags(self._units)
         scaled, slope = sparse.triu(units @ quadratic @ units, format="csc"), self._units * linear
-        size = max(float(np.abs(scaled.data).max(initial=0.0)), float(np.abs(slope).max()))
-        solver = clarabel.DefaultSolver(
-            scaled / size,
-            slope / size,
-            (sparse.vstack(self._rows) @ units).tocsc(),
-            np.concatenate(self._sides),
-            self._cones,
-            settings,
-        )
-        solution = solver.solve()
+        matrix = (sparse.vstack(self._rows) @ units).tocsc()
+        solution = self._run(scaled, slope, matrix, settings)
+        if (
+            str(solution.status) == "NumericalError"
+        ):  # the steepest costs are better scaled by our units alone
+            settings.equilibrate_enable = False
+            solution = self._run(scaled, slope, matrix, settings)
         ends = np.cumsum([len(side) for side in self._sides])[:-1]
         return ConicSolution(
             verdict=_VERDICTS.get(str(solution.status), Verdict.FAILED),
             exact=str(solution.status) == "Solved",
             x=self._units * np.array(solution.x),
-            multipliers=np.split(size * np.array(solution.z), ends),
+            multipliers=np.split(np.array(solution.z), ends),
         )
+
+    def _run(self, quadratic: Matrix, linear: Array, matrix: Matrix, settings: Any) -> Any:
+        """Run Clarabel, whose work counts, and which an interrupt ends."""
+        spend(POSING * matrix.nnz)
+        solver = clarabel.DefaultSolver(
+            quadratic, linear, matrix, np.concatenate(self._sides), self._cones, settings
+        )
+        calls = count()  # for Clarabel can circle without counting its iterations
+        with interrupts_collected() as came:
+            solver.set_termination_callback(lambda _: bool(came) or next(calls) > 2 * MAX_ITERATIONS)
+            solution = solver.solve()
+        spend(ITERATION * (matrix.nnz + quadratic.nnz) * solution.iterations)
+        return solution
 
     def _giving(self, matrix: Matrix, side: Array, gives: Array) -> tuple[Matrix, Array]:
         """Let the last variable widen rows."""

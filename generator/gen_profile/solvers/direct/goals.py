@@ -21,26 +21,42 @@ from gen_profile.solvers.direct.transcription import Iterate, Transcription
 
 WITHIN = 1.0 - 1e-6  # share of a limit that a program may use: its own tolerance must not break the limit
 
+STEEPER = 2.0  # by which the exponent of the sway's cost may grow from one expansion to the next
+USUAL_ACCELERATION, USUAL_JERK = 25.0, 1e3  # halves of squares, dimensionless; a quintic's are 9 and 360
 DERIVATIVES = {1: "velocity", 2: "acceleration", 3: "jerk", 0: "travel"}  # of the position, that have limits
 
 
 def effort_form(problem: Problem, piece: Piece) -> Array:
     """Write twice the effort of an axis as a quadratic form, for an axis measured by its own reach.
 
-    In units of reach² / duration⁶.
+    In units of reach² / duration⁶, shape (intervals, size, size).
     """
 
     def square(rows: Array) -> Array:
-        return np.asarray(rows.T @ gram(len(rows) - 1) @ rows * piece.length)
+        whole = rows.swapaxes(-1, -2) @ gram(rows.shape[-2] - 1) @ rows
+        return np.asarray(whole * piece.length[..., None, None])
 
     if problem.effort == "snap":
         return square(piece.derivative(3)) + (SNAP_TIME / problem.duration) ** 2 * square(piece.derivative(4))
     if problem.effort == "reference":
         # ÿ_ref = ÿ + τ y⃛, and ÿ counts as jerk times duration
         jerk = piece.derivative(3)
-        rows = piece.derivative(2) + (problem.tau or 0.0) / problem.duration * elevation(len(jerk) - 1) @ jerk
+        rows = (
+            piece.derivative(2)
+            + (problem.tau or 0.0) / problem.duration * elevation(jerk.shape[-2] - 1) @ jerk
+        )
         return square(rows) * problem.duration**2
     return square(piece.derivative(3))
+
+
+def usual_effort(problem: Problem) -> float:
+    """About the effort of a motion within limits, in the units of `effort_form`: more than a quintic's.
+
+    Programs end when their cost is right to an absolute tolerance, or a relative one, so it must be about 1.
+    """
+    if problem.effort == "reference":
+        return USUAL_ACCELERATION * problem.duration**2 + USUAL_JERK * (problem.tau or 0.0) ** 2
+    return USUAL_JERK
 
 
 def cost(
@@ -54,7 +70,7 @@ def cost(
 
     Parameters
     ----------
-    forms : sequence of (size, size) arrays
+    forms : sequence of (intervals, size, size) arrays
         Twice the effort of every axis, dimensionless.
     sway_cost : SwayCost
         Divided by the cost's scale.
@@ -71,6 +87,24 @@ def cost(
         quadratic = quadratic + matrix.T @ hessian @ matrix
         linear = matrix.T @ (slope.ravel() + hessian @ (offset - sway.ravel()))
     return quadratic, linear
+
+
+def approach(transcription: Transcription, sway_cost: SwayCost, before: Iterate, after: Iterate) -> Iterate:
+    """Go from one iterate towards the next, as far as the sway's cost resembles its expansion.
+
+    It is exponential: from far below, a quadratic model leads to where it is steep beyond all measure.
+    """
+    if sway_cost.beta == 0.0:
+        return after
+
+    def exponent(iterate: Iterate) -> float:
+        return float(sway_cost.exponents(transcription.end_sway_found(iterate)).max())
+
+    most, way = exponent(before) + STEEPER, after.flat() - before.flat()
+    while exponent(after) > most:
+        way = 0.5 * way
+        after = before.of_flat(before.flat() + way)
+    return after
 
 
 def keep_limits(

@@ -41,6 +41,7 @@ from gen_profile.spec.model import LimitsSpec
 METHOD = "direct"
 INTERVALS = 40
 MAX_INTERVALS = 480
+GROWTH, MAX_GRADED = 1.4, 30  # of intervals from the ends on, and how many there are at most
 RADIANS_PER_INTERVAL = 1.5  # of the fastest mode, which Gauss collocation then follows to 1e-7 of the cost
 STEP_TOLERANCE = 1e-8  # of the motion's coordinates, relative
 STALLED = 1e-5  # step that is still taken for the programs' own tolerance when it ceases to shrink
@@ -60,7 +61,7 @@ class Setup:
     ----------
     problem : Problem
     transcription : Transcription
-    forms : tuple of (size, size) arrays
+    forms : tuple of (intervals, size, size) arrays
         Twice the effort of every axis, in units of `cost_scale`.
     cost_scale : float
         Of the running cost.
@@ -111,6 +112,10 @@ class Goal(Protocol):
 
     def step(self, solutions: Sequence[ConicSolution]) -> float:
         """Measure by how much what counts changed from one program to the next."""
+        ...
+
+    def approach(self, before: Iterate, after: Iterate) -> Iterate:
+        """Go from one iterate towards the next, as far as what was expanded holds."""
         ...
 
 
@@ -180,11 +185,9 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     )
     jerks = [problem.limits.of(axis).jerk for axis in range(system.layout.m)]
     commands_jerk = problem.tau is not None and any(jerk is not None for jerk in jerks)
-    intervals = _intervals(problem)
-    piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=1.0 / intervals)
+    piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=_mesh(problem))
     reach = axis_reach(problem)
     transcription = Transcription(
-        intervals=intervals,
         piece=piece,
         axes=axes_map(piece, np.array(problem.start), reach, problem.duration),
         duration=problem.duration,
@@ -192,7 +195,8 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
         final_velocity=np.array(problem.final_velocity) * problem.duration / reach,
         machines=machines,
     )
-    form, cost_scale = goals.effort_form(problem, piece), canonical.data.cost_scale
+    form, usual = goals.effort_form(problem, piece), goals.usual_effort(problem)
+    cost_scale = canonical.data.cost_scale * usual
     unit = canonical.data.effort_weights * reach**2 / problem.duration**6 / cost_scale
     setup = Setup(
         problem=problem,
@@ -245,13 +249,18 @@ def _amplitudes(
     )
 
 
-def _intervals(problem: Problem) -> int:
-    """Resolve the fastest mode and, for snap, the layers at the ends in which it acts."""
+def _mesh(problem: Problem) -> Array:
+    """Choose relative lengths of intervals: resolve the fastest mode and, for snap, layers at the ends."""
     fastest = linearize(problem.plant, problem.parameters, problem.target).frequencies[-1]
     enough = fastest * problem.duration / RADIANS_PER_INTERVAL
-    if problem.effort == "snap":
-        enough = max(enough, problem.duration / SNAP_TIME)
-    return int(np.clip(np.ceil(enough), INTERVALS, MAX_INTERVALS))
+    bends = problem.effort == "snap" and bool(problem.limits.stated())  # where limits begin to bind, too
+    longest = 1.0 / float(np.clip(np.ceil(enough), (1 + bends) * INTERVALS, MAX_INTERVALS))
+    shortest = SNAP_TIME / problem.duration if problem.effort == "snap" else longest
+    graded = longest * GROWTH ** -np.arange(1.0, MAX_GRADED)
+    graded = graded[graded > shortest / GROWTH][::-1]
+    rest = 1.0 - 2.0 * graded.sum()
+    middle = np.ceil(rest / longest * (1.0 - 1e-9))
+    return np.concatenate([graded, np.full(int(middle), rest / middle), graded[::-1]])
 
 
 def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
@@ -275,8 +284,10 @@ def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
         stalled = step < STALLED and step > 0.5 * before
         if step < STEP_TOLERANCE or stalled or (step < ROUGH and not solutions[-1].exact):
             verdict = Verdict.SOLVED
-        elif step > SLOW * before:
-            iterate = iterate.of_flat(accelerate(points, images, transcription.importance))
+        else:
+            if step > SLOW * before:
+                iterate = iterate.of_flat(accelerate(points, images, transcription.importance))
+            iterate = goal.approach(iterate.of_flat(points[-1]), iterate)
     return Found(verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)
 
 
@@ -327,6 +338,10 @@ class LeastCost:
         before = solutions[-2].x[columns] if len(solutions) > 1 else np.zeros_like(after)
         return float(np.abs(after - before).max() / np.abs(after).max())
 
+    def approach(self, before: Iterate, after: Iterate) -> Iterate:
+        """Go as far as the sway's cost may be believed."""
+        return goals.approach(self.setup.transcription, self.sway_cost, before, after)
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class LeastWorst:
@@ -358,6 +373,10 @@ class LeastWorst:
         before = solutions[-2].x[-1] if len(solutions) > 1 else float("inf")
         noticed = WORTHWHILE * max(abs(float(solutions[-1].x[-1])), LEAST_SHARE)
         return STEP_TOLERANCE * abs(float(solutions[-1].x[-1] - before)) / noticed
+
+    def approach(self, before: Iterate, after: Iterate) -> Iterate:
+        """Go all the way: what it minimises is no expansion."""
+        return after
 
 
 def _widen(matrix: Matrix, width: int) -> Matrix:
@@ -393,7 +412,9 @@ def _optimum(setup: Setup, found: Found, sway_cost: SwayCost) -> Optimum:
     piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
     intervals, axes = transcription.intervals, len(reach)
     local = found.iterate.local.reshape(intervals, axes, piece.size)
-    knots = duration * np.arange(intervals + 1) / intervals
+    lengths = duration * piece.length
+    shares = np.append(0.0, np.cumsum(piece.length))
+    knots = duration * (shares / shares[-1])  # the last one is the duration, to the last bit
     control = np.einsum("pb,kab->kpa", power_basis(3), local[:, :, piece.order :])
     stages, machine = found.iterate.stages[0], transcription.machines[0]
     points = stages.reshape(-1, stages.shape[2])
@@ -406,7 +427,7 @@ def _optimum(setup: Setup, found: Found, sway_cost: SwayCost) -> Optimum:
         hamiltonian=None,
         top_derivative=control
         * (reach / duration**piece.order)
-        / (duration / intervals) ** np.arange(control.shape[1])[:, None],
+        / lengths[:, None, None] ** np.arange(control.shape[1])[:, None],
         top_order=piece.order,
         sway=machine.equations.sway(points, felt, machine.parameters)[:, :, 0],
         angle=greatest_angle(setup, found.iterate),
@@ -433,7 +454,7 @@ def _nodes(setup: Setup, found: Found) -> tuple[Array, Array]:
         transcription.machines[0].scale,
     )
     local = x[: intervals * transcription.breadth].reshape(intervals, axes, piece.size)
-    last = np.stack([piece.derivative(order)[-1] for order in range(orders)])
+    last = np.stack([piece.derivative(order)[-1, -1] for order in range(orders)])
     moved = np.concatenate([local[:, :, :orders], (local[-1:] @ last.T)])
     moved_costates = np.concatenate([-multipliers[0], multipliers[1]]).reshape(intervals + 1, axes, orders)
     units = reach[:, None] / duration ** np.arange(orders)
@@ -465,7 +486,7 @@ def _cost(setup: Setup, iterate: Iterate, sway_cost: SwayCost) -> float:
     transcription, duration = setup.transcription, setup.problem.duration
     local = iterate.local.reshape(transcription.intervals, len(setup.forms), -1)
     effort = sum(
-        0.5 * float(np.einsum("ka,ab,kb->", local[:, axis], form, local[:, axis]))
+        0.5 * float(np.einsum("ka,kab,kb->", local[:, axis], form, local[:, axis]))
         for axis, form in enumerate(setup.forms)
     )
     sway = transcription.end_sway_found(iterate)

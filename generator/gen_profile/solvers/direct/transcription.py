@@ -22,7 +22,7 @@ from gen_profile.solvers.direct.condensing import AxesMap, IntervalMaps, interva
 from gen_profile.solvers.direct.conic import ConicProgram, Matrix, place
 
 IntArray = NDArray[np.intp]
-INTERVALS_PER_CHANGE = 4.0
+QUINTIC_PEAKS = np.array([1.0, 1.9, 5.8, 60.0])  # of position, velocity, acceleration and jerk
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -81,7 +81,6 @@ class Transcription:
 
     Attributes
     ----------
-    intervals : int
     piece : Piece
         Of every axis on every interval, in time from 0 to 1.
     axes : AxesMap
@@ -93,13 +92,17 @@ class Transcription:
         The nominal one first.
     """
 
-    intervals: int
     piece: Piece
     axes: AxesMap
     duration: float
     target: Array
     final_velocity: Array
     machines: tuple[Machine, ...]
+
+    @property
+    def intervals(self) -> int:
+        """Number of intervals."""
+        return len(self.piece.length)
 
     @property
     def breadth(self) -> int:
@@ -113,10 +116,11 @@ class Transcription:
 
     @property
     def units(self) -> Array:
-        """About how large each variable is: derivatives grow as if the motion changed every few intervals."""
-        growth = self.intervals / INTERVALS_PER_CHANGE
+        """About how large each variable is: as a quintic's, the snap as if jerk changed in an interval."""
+        quintic = np.broadcast_to(QUINTIC_PEAKS, (self.intervals, len(QUINTIC_PEAKS)))
+        sizes = np.column_stack([quintic, QUINTIC_PEAKS[-1] / self.piece.length])
         orders = np.minimum(np.arange(self.piece.size), self.piece.order)
-        local = np.tile(growth**orders, self.intervals * len(self.target))
+        local = np.tile(sizes[:, orders], len(self.target)).ravel()
         return np.concatenate([local, np.ones(self.variables - len(local))])
 
     @property
@@ -154,7 +158,7 @@ class Transcription:
                 self.axes,
                 stages=stages,
                 local=iterate.local,
-                length=self.duration / self.intervals,
+                lengths=self.duration * self.piece.length,
             )
             scale = machine.scale
             found.append(
@@ -178,15 +182,16 @@ class Transcription:
         program = ConicProgram(np.concatenate([self.units, np.ones(extra)]))
         orders = self.piece.order
         first = self._per_axis(np.eye(self.piece.size)[:orders])
-        last = self._per_axis(np.stack([self.piece.derivative(order)[-1] for order in range(orders)]))
+        ends = [self.piece.derivative(order)[:, -1] for order in range(orders)]
+        last = self._per_axis(np.stack(ends, axis=1))
         columns = self.local_columns
         program.equal(
-            self._repeat(first, columns, width) - _after(self._repeat(last, columns[:-1], width), len(first)),
+            self._repeat(first, columns, width) - _after(place(last[:-1], columns[:-1], width), len(first)),
             np.zeros(len(first) * self.intervals),
         )
         end = np.zeros((len(self.target), orders))
         end[:, 0], end[:, 1] = self.target, self.final_velocity
-        program.equal(place(last[None], columns[-1:], width), end.ravel())
+        program.equal(place(last[-1:], columns[-1:], width), end.ravel())
         for index, (machine, linear) in enumerate(zip(self.machines, maps, strict=True)):
             n = len(machine.scale)
             nodes = self.node_columns(index)
@@ -205,25 +210,25 @@ class Transcription:
 
         Parameters
         ----------
-        rows : (coefficients, size) array
+        rows : (intervals, coefficients, size) array
         bounds : (float, float)
             Lower and upper one.
         give : float
             By how much either bound is wider for every 1 by which the program's last variable exceeds 1.
         """
-        wide = np.zeros((len(rows), len(self.target), self.piece.size))
-        wide[:, axis] = rows
-        matrix = self._repeat(wide.reshape(len(rows), -1), self.local_columns, program.variables)
+        wide = np.zeros((*rows.shape[:2], len(self.target), self.piece.size))
+        wide[:, :, axis] = rows
+        matrix = place(wide.reshape(*rows.shape[:2], -1), self.local_columns, program.variables)
         lower, upper = (np.full(matrix.shape[0], bound) for bound in bounds)
         program.at_most(matrix, upper, give)
         program.at_most(-matrix, -lower, give)
 
     def effort(self, blocks: Sequence[Array], width: int) -> Matrix:
-        """Join one quadratic form per axis, each of the local coordinates, into one of all variables."""
-        whole = np.zeros((len(self.target), self.piece.size) * 2)
+        """Join quadratic forms per axis, of every interval's local coordinates, into one of all variables."""
+        whole = np.zeros((self.intervals, *(len(self.target), self.piece.size) * 2))
         for axis, block in enumerate(blocks):
-            whole[axis, :, axis] = block
-        square = self._repeat(whole.reshape(self.breadth, -1), self.local_columns, width)
+            whole[:, axis, :, axis] = block
+        square = place(whole.reshape(self.intervals, self.breadth, -1), self.local_columns, width)
         return sparse.vstack([square, sparse.csc_matrix((width - square.shape[0], width))], format="csc")
 
     def end_sway(self, iterate: Iterate, maps: IntervalMaps, width: int) -> tuple[Array, Matrix, Array]:
@@ -282,10 +287,12 @@ class Transcription:
 
     def quadrature(self) -> Array:
         """Weights of the collocation points for integrals over dimensionless time, shape (points,)."""
-        return np.asarray(np.tile(GAUSS.b / self.intervals, self.intervals), dtype=np.float64)
+        return np.outer(self.piece.length, GAUSS.b).ravel()
 
     def _per_axis(self, rows: Array) -> Array:
-        return np.asarray(np.kron(np.eye(len(self.target)), rows), dtype=np.float64)
+        axes, (count, size) = len(self.target), rows.shape[-2:]
+        whole = np.einsum("ab,...rs->...arbs", np.eye(axes), rows)
+        return np.asarray(whole.reshape(*rows.shape[:-2], axes * count, axes * size))
 
     def _repeat(self, block: Array, columns: IntArray, width: int) -> Matrix:
         return place(np.broadcast_to(block, (len(columns), *block.shape)), columns, width)

@@ -35,7 +35,7 @@ from gen_profile.solvers.direct.transient_sway import within_sway
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
 
-TRACES = (1e-11, 1e-9, 1e-7)  # of effort, in the least worst case
+TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case
 MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
 SLACK = 1.003  # what the least cost may give away of the least worst case
 GOOD_ENOUGH = 0.01  # share of a load's limit below which nobody need seek less

@@ -19,11 +19,13 @@ from gen_profile.solvers.indirect.boundary_value_problem import Canonical
 from gen_profile.solvers.indirect.least_cost import LinearMachine, least_cost
 from gen_profile.solvers.indirect.linear_response import LinearResponse, linear_response
 from gen_profile.solvers.indirect.newton import NewtonOutcome
+from gen_profile.work import spend
 
 TOLERANCE = 1e-7  # distance to the solution, as the last steps let it be foreseen
 BELIEVED = 0.01  # least quotient of steps that is taken for the rate of convergence
 SLOW = 0.5  # share of the step before beyond which another method is the better one
 MAX_ITERATIONS = 20
+WORK = 1e-7  # s of work for the square of the number of controls
 MOST_CONTROLS = 800  # up to which to solve for all of them at once
 
 
@@ -89,6 +91,7 @@ def solve_simplified(problem: Canonical, start: Trajectory) -> NewtonOutcome:
         return NewtonOutcome(solution=None, iterations=iteration, residual=step)
     model, current = _model(problem, start, _hanging(problem, start)), _consistent(problem, start)
     for iteration in range(1, MAX_ITERATIONS + 1):
+        spend(WORK * (len(start.points) * problem.system.layout.m) ** 2)
         following = _corrected(problem, model, current)
         before, step = step, problem.distance(current.trajectory, following.trajectory)
         current, shrinkage = following, step / before

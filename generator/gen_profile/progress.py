@@ -1,0 +1,17 @@
+"""What long work tells of how far it is."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Progress(Protocol):
+    """Told what is being done, as often as it likes."""
+
+    def __call__(self, stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
+        """Take the stage, how many of its steps are done, of how many if that is known, and a remark."""
+        ...
+
+
+def untold(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
+    """Tell nobody."""

@@ -1,0 +1,78 @@
+"""What a search may cost at most, so that every spec is answered in bounded time.
+
+Work is counted where it is done, in seconds that it takes on a usual processor, by formulas of its size: so a
+search ends at the same place on every machine and every day. The processor's own clock is only looked at in
+case a formula is far off.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+import attrs
+
+CLOCK = 10.0  # times the budget by the processor's clock, after which the counted work is not believed
+LOOK = 0.05  # s of work between looks at the clock, which take time themselves
+
+
+class OutOfWork(Exception):
+    """A search has used up its budget."""
+
+
+@attrs.define
+class _Budget:
+    left: float
+    ends: float  # by the clock
+    look: float  # at the clock, when so much is left
+    outer: _Budget | None
+
+    def take(self, seconds: float) -> None:
+        self.left -= seconds
+        if self.left < 0.0:
+            raise OutOfWork
+        if self.left < self.look:
+            self.look = self.left - LOOK
+            if time.thread_time() > self.ends:
+                raise OutOfWork
+
+
+_current: ContextVar[_Budget | None] = ContextVar("budget", default=None)
+
+
+@contextmanager
+def budget(seconds: float) -> Iterator[None]:
+    """Let what is done in the context cost no more than this, nor more than budgets around it have left."""
+    outer = _current.get()
+    ends = time.thread_time() + CLOCK * seconds
+    token = _current.set(_Budget(seconds, ends, seconds, outer))
+    try:
+        yield
+    finally:
+        _current.reset(token)
+
+
+def left() -> float:
+    """Tell how much work in s the budgets have left: infinitely much without any."""
+    least, own = math.inf, _current.get()
+    while own is not None:
+        least, own = min(least, own.left), own.outer
+    return least
+
+
+def spend(seconds: float) -> None:
+    """Count work that is done next.
+
+    Raises
+    ------
+    OutOfWork
+        No budget is left for it. Whoever catches that spends nothing once more, to end as well where a budget
+        around its own is used up.
+    """
+    own = _current.get()
+    while own is not None:
+        own.take(seconds)
+        own = own.outer

@@ -1,0 +1,116 @@
+"""Plan random specs, each in a process of its own, and tell how that ended: ``just battery --count 500``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import resource
+import signal
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+sys.path.insert(0, str(Path(__file__).parent))
+from random_specs import random_spec
+
+from gen_profile.designs.plan import plan
+from gen_profile.errors import GenProfileError, SpecError
+from gen_profile.spec.reading import overridden, spec_from_dict
+
+KILLED_AFTER = 60  # s of processor
+
+
+@attrs.frozen
+class Outcome:
+    """How a spec ended: a kind, in words, and the processor's time in s."""
+
+    kind: str
+    words: str
+    seconds: float
+
+
+def planned(document: dict[str, Any]) -> tuple[str, str]:
+    """Plan a spec here."""
+    try:
+        spec = spec_from_dict(document)
+    except SpecError as error:
+        return "spec fault", str(error)
+    try:
+        found = plan(spec)
+    except GenProfileError as error:
+        return type(error).__name__, str(error)
+    except Exception as error:
+        return "CRASHED", repr(error)
+    solution = found.solution
+    return "solved", "" if solution is None else f"{solution.method}, {solution.iterations} iterations"
+
+
+def outcome(document: dict[str, Any]) -> Outcome:
+    """Plan a spec in a process of its own."""
+    with tempfile.TemporaryFile() as answer:
+        child = os.fork()
+        if child == 0:
+            resource.setrlimit(resource.RLIMIT_CPU, (KILLED_AFTER, KILLED_AFTER))
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            kind, words = planned(document)
+            os.write(answer.fileno(), f"{kind}\n{words}".encode())
+            os._exit(0)
+        _, _, usage = os.wait4(child, 0)
+        answer.seek(0)
+        kind, _, words = answer.read().decode().partition("\n")
+    return Outcome(kind or "KILLED", words, usage.ru_utime + usage.ru_stime)
+
+
+def cures(words: str) -> list[list[str]]:
+    """Read what a refusal names, each as overrides."""
+    named = [
+        [f"move.duration={value}"] for value in re.findall(r"at least (\S+) s \(move\.duration\)", words)
+    ]
+    named += [[f"move.duration={value}"] for value in re.findall(r"about (\S+) s \(move\.duration\)", words)]
+    for choices in re.findall(r"it would do with (.*)\.$", words, re.MULTILINE):
+        for choice in choices.split(", or with "):
+            named.append([re.sub(r" = ", "=", part, count=1) for part in choice.split(" and ")])
+    return named
+
+
+def main() -> None:
+    """Run the battery."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--seed", default="battery")
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--only", type=int, help="print and plan this one here")
+    parser.add_argument("--set", action="append", default=[], dest="overrides")
+    arguments = parser.parse_args()
+    if arguments.only is not None:
+        document = overridden(random_spec(f"{arguments.seed}-{arguments.only}"), arguments.overrides)
+        print(document, flush=True)
+        print(*planned(document), sep="\n")
+        return
+    kinds, tried, slow = Counter[str](), Counter[str](), []
+    for index in range(arguments.first, arguments.first + arguments.count):
+        document = overridden(random_spec(f"{arguments.seed}-{index}"), arguments.overrides)
+        found = outcome(document)
+        kinds[found.kind] += 1
+        slow.append((found.seconds, index, found.kind))
+        print(f"{index}: {found.seconds:.1f} s, {found.kind}: {found.words!r}", flush=True)
+        for changes in cures(found.words):
+            cured = outcome(overridden(document, changes))
+            works = "worked" if cured.kind == "solved" else "FAILED"
+            tried[works] += 1
+            print(f"    {works}: {changes}, {cured.seconds:.1f} s, {cured.words!r}", flush=True)
+    print(f"outcomes: {dict(kinds)}; cures: {dict(tried)}")
+    print(
+        "slowest:",
+        *(f"{seconds:.1f} s: {kind} ({index})" for seconds, index, kind in sorted(slow)[-10:]),
+        sep="\n  ",
+    )
+
+
+if __name__ == "__main__":
+    main()

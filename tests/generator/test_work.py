@@ -1,0 +1,81 @@
+"""What a search may cost, and what interrupts compiled code."""
+
+import signal
+
+import numpy as np
+import pytest
+from generator.crane_problems import crane_problem
+from scipy import sparse
+
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct.conic import ConicProgram
+from gen_profile.solvers.interrupts import interrupts_collected
+from gen_profile.solvers.solution import Status
+from gen_profile.work import OutOfWork, budget, left, spend
+
+
+def test_a_budget_within_another_takes_from_both():
+    with budget(3.0):
+        with budget(2.0):
+            spend(1.5)
+        with budget(2.0), pytest.raises(OutOfWork):
+            spend(1.6)
+
+
+def test_work_without_a_budget_is_free():
+    spend(1e9)
+
+
+def test_the_clock_counts_only_where_counted_work_is_far_off(monkeypatch):
+    now = 0.0
+    monkeypatch.setattr("gen_profile.work.time.thread_time", lambda: now)
+    with budget(2.0):
+        now = 19.0  # a processor that is nearly ten times as slow
+        spend(1.0)
+        assert left() == 1.0
+        now = 21.0
+        with pytest.raises(OutOfWork):
+            spend(0.5)
+
+
+def test_a_search_that_costs_too_much_is_given_up(monkeypatch):
+    monkeypatch.setattr(choice, "SOLVING", 1e-4)
+    solution = choice.attempt(crane_problem())
+    assert solution.status is Status.GIVEN_UP
+    assert "units" in solution.cure
+
+
+def test_an_interrupt_comes_when_compiled_code_has_ended():
+    came = []
+    before = signal.signal(signal.SIGTERM, lambda number, _: came.append(number))
+    try:
+        with interrupts_collected() as collected:
+            signal.raise_signal(signal.SIGTERM)
+            assert (collected, came) == ([signal.SIGTERM], [])
+        assert came == [signal.SIGTERM]
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_a_program_ends_at_once_when_interrupted(monkeypatch):
+    class Stopped:
+        status, iterations, x, z = "CallbackTerminated", 1, np.zeros(1), np.zeros(1)
+
+    class Solver:
+        def __init__(self, *_):
+            pass
+
+        def set_termination_callback(self, ended):
+            self.ended = ended
+
+        def solve(self):
+            assert not self.ended(None)
+            signal.raise_signal(signal.SIGINT)
+            assert self.ended(None)
+            return Stopped()
+
+    monkeypatch.setattr("gen_profile.solvers.direct.conic.clarabel.DefaultSolver", Solver)
+    program = ConicProgram(np.ones(1))
+    program.equal(sparse.csc_matrix([[1.0]]), np.ones(1))
+    with pytest.raises(KeyboardInterrupt):
+        program.solve(sparse.csc_matrix([[1.0]]), np.zeros(1))
