@@ -21,7 +21,7 @@ for start in (spec.move.start, (0.0, 1.0)):
     task = gp.preset_spec("single-pendulum-crane", move={"start": start})
     print(f"\n{task.move.distance[0]:g} m in {task.move.duration:g} s, hoist from {start[1]:g} m to 1 m")
     for row in gp.compare(task).rows:
-        if row.trial:
+        if row.evaluation:
             nominal, worst = (
                 1e3 * row.figures[key] for key in ("sway_residual_peak_m", "sway_residual_worst_m")
             )

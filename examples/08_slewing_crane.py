@@ -12,7 +12,7 @@ import numpy as np
 import gen_profile as gp
 
 spec = gp.preset_spec("tower-crane", move={"start": [0.0, 25.0], "target": [1.745, 25.0], "duration": 25.0})
-trials = {row.method: row.trial for row in gp.compare(spec).rows if row.trial}
+trials = {row.method: row.evaluation for row in gp.compare(spec).rows if row.evaluation}
 for method in ("zvd", "optimal-beta0"):
     trial = trials[method]
     times = np.linspace(0.0, trial.motion.duration, 501)

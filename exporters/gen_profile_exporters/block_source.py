@@ -25,7 +25,7 @@ _END = re.compile(r"END_FUNCTION_BLOCK\s*\Z", re.IGNORECASE)
 
 
 @attrs.frozen(kw_only=True)
-class Variable:
+class BlockVariable:
     """A declaration.
 
     Attributes
@@ -65,7 +65,7 @@ class BlockSource:
     header : str
         Comment before it.
     name : str
-    variables : tuple of Variable
+    variables : tuple of BlockVariable
         By section, in their order.
     body : str
         Statements.
@@ -73,7 +73,7 @@ class BlockSource:
 
     header: str
     name: str
-    variables: tuple[Variable, ...]
+    variables: tuple[BlockVariable, ...]
     body: str
 
     def text(self) -> str:
@@ -90,7 +90,7 @@ class BlockSource:
         return "\n".join(lines) + "\n"
 
 
-def take_apart(text: str) -> BlockSource:
+def parse_function_block(text: str) -> BlockSource:
     """Split Structured Text into a block's parts.
 
     Raises
@@ -102,7 +102,7 @@ def take_apart(text: str) -> BlockSource:
     name = _NAME.match(text, header.end() if header else 0)
     if name is None:
         raise ExportError("There is no FUNCTION_BLOCK; export it again.")
-    variables: list[Variable] = []
+    variables: list[BlockVariable] = []
     at = name.end() - 1
     while section := _SECTION.match(text, at):
         variables += _variables(" ".join(section[1].upper().split()), section[2])
@@ -122,16 +122,16 @@ def ordered(source: BlockSource, names: Iterable[str]) -> BlockSource:
     return attrs.evolve(source, variables=tuple(variables))
 
 
-def _variables(section: str, text: str) -> list[Variable]:
+def _variables(section: str, text: str) -> list[BlockVariable]:
     return [
-        Variable(
+        BlockVariable(
             section=section, name=name, type=type_.strip(), initial=initial.strip(), comment=comment.strip()
         )
         for name, type_, initial, comment in _VARIABLE.findall(text)
     ]
 
 
-def _declared(variable: Variable) -> str:
+def _declared(variable: BlockVariable) -> str:
     initial = f" := {variable.initial}" if variable.initial else ""
     comment = f" (* {variable.comment} *)" if variable.comment else ""
     return f"{variable.name} : {variable.type}{initial};{comment}"

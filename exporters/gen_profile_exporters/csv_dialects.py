@@ -30,7 +30,7 @@ Row = tuple[int, list[str]]
 
 
 @attrs.frozen(kw_only=True)
-class Dialect:
+class CsvDialect:
     """How a table is written.
 
     Attributes
@@ -58,21 +58,21 @@ class Dialect:
 
 
 DIALECTS = {
-    "rfc4180": Dialect(separator=",", line_end="\n", header=True),
-    "excel-de": Dialect(separator=";", decimal=",", header=True, most=1_048_575),
-    "sew": Dialect(separator=";", opening=("{}",), most=16_383),
-    "kollmorgen": Dialect(
+    "rfc4180": CsvDialect(separator=",", line_end="\n", header=True),
+    "excel-de": CsvDialect(separator=";", decimal=",", header=True, most=1_048_575),
+    "sew": CsvDialect(separator=";", opening=("{}",), most=16_383),
+    "kollmorgen": CsvDialect(
         separator=";",
         opening=("CYCLIC;NO;", "TABLE_BEGIN;;"),
         closing=("TABLE_END;;",),
         mark=";SPLINE",
         least=5,
     ),
-    "lenze": Dialect(separator="\t"),
+    "lenze": CsvDialect(separator="\t"),
 }
 
 
-def write(dialect: Dialect, header: Sequence[str], columns: Sequence[Sequence[str]]) -> str:
+def write(dialect: CsvDialect, header: Sequence[str], columns: Sequence[Sequence[str]]) -> str:
     """Put texts of numbers, column by column, into lines."""
     points = len(columns[0])
     lines = [line.format(points) for line in dialect.opening]
@@ -83,7 +83,7 @@ def write(dialect: Dialect, header: Sequence[str], columns: Sequence[Sequence[st
     return dialect.line_end.join([*lines, *dialect.closing, ""])
 
 
-def read(dialect: Dialect, text: str) -> list[Row]:
+def read(dialect: CsvDialect, text: str) -> list[Row]:
     """Split into rows of cells, the header among them where the dialect has one, decimals with a point.
 
     Raises
@@ -107,7 +107,7 @@ def _point(cell: str) -> str:
     return cell.replace(".", "thousands ").replace(",", ".")
 
 
-def _inner(dialect: Dialect, rows: list[Row]) -> list[Row]:
+def _inner(dialect: CsvDialect, rows: list[Row]) -> list[Row]:
     """Take off what stands around the points."""
     ends = len(rows) - len(dialect.closing)
     points = rows[len(dialect.opening) : ends]

@@ -31,7 +31,7 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile, grid_times
 from gen_profile.units import AXIS_UNITS, COUNTS, AxisScale
 from gen_profile_exporters import csv_dialects
-from gen_profile_exporters.csv_dialects import DIALECTS, Dialect, Row
+from gen_profile_exporters.csv_dialects import DIALECTS, CsvDialect, Row
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.setpoints import (
     AxisTable,
@@ -135,7 +135,7 @@ def _integrated(velocity: Array, cycle_time: float, start: Array) -> Array:
         return np.concatenate([start[None], start + np.cumsum(steps, axis=0)])
 
 
-def _dialect(target: Target) -> Dialect:
+def _dialect(target: Target) -> CsvDialect:
     dialect = DIALECTS[target.export.csv_dialect]
     if not dialect.header and (len(target.axes) > 1 or len(target.export.csv_columns) > 1):
         raise ExportError(

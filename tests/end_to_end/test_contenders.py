@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-from gen_profile.comparison.candidates import contenders
+from gen_profile.comparison.candidates import candidates
 from gen_profile.comparison.compare import compare
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.evaluation.motion_evaluation import evaluate
@@ -26,7 +26,7 @@ def limited(limits, **move):
 
 
 def designs(spec):
-    return {contender.method: contender.design for contender in contenders(spec)}
+    return {contender.method: contender.design for contender in candidates(spec)}
 
 
 @pytest.mark.parametrize("base", BASES)

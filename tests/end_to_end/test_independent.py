@@ -57,7 +57,7 @@ def residuals(command, tau, machine, arrival, watch):
 def test_every_load_sways_as_separate_equations_say(tmp_path, overrides):
     spec = preset_spec("paper", overrides)
     settings = [word for override in overrides for word in ("--set", override)]
-    command, tau = plan(spec).trial.command, spec.actuator.tau
+    command, tau = plan(spec).evaluation.command, spec.actuator.tau
     arrival = 3.0 if tau is None else 3.0 + 10.0 * tau
     machines = [dict(machine.parameters) for machine in scenarios(spec)]
     expected = []
@@ -78,7 +78,7 @@ def test_every_load_sways_as_separate_equations_say(tmp_path, overrides):
 
 def test_at_a_cycle_of_a_millisecond_the_figure_is_right_to_five_micrometres(tmp_path):
     spec = preset_spec("paper")
-    command = plan(spec).trial.command
+    command = plan(spec).evaluation.command
     expected = [residuals(command, None, machine.parameters, 3.0, 4.0) for machine in scenarios(spec)]
     for format_ in ("csv", "plc", "can"):
         words = ("--export", format_, "--cycle-time", "0.001", "--set", "can.bitrate=1000000")

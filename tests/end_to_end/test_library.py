@@ -12,7 +12,7 @@ from gen_profile.spec.reading import preset_spec
 from gen_profile.sweep import library as profile_library
 from gen_profile.sweep.store import grid_of
 from gen_profile.sweep.table import read_table
-from gen_profile_exporters.block_source import take_apart
+from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.playback.library import read_library
 from gen_profile_exporters.registry import container_of, find_container
@@ -69,7 +69,7 @@ def test_holds_the_profiles_that_passed_in_their_order(swept, library):
 def test_issues_what_was_checked(library):
     path, document = library
     target = target_of(preset_spec("paper-beta0", [CYCLE]))
-    motions = read_library(take_apart(path.read_text("ascii")), target)
+    motions = read_library(parse_function_block(path.read_text("ascii")), target)
     hashes = [entry["payload_sha256"] for entry in document["profiles"]]
     assert [motion.payload_hash() for motion in motions] == hashes
     assert len(set(hashes)) == len(hashes)

@@ -9,9 +9,9 @@ from command_line import run_here
 from generator.lagrangian_machines import Lagrange
 from scipy.integrate import solve_ivp
 
-from gen_profile.comparison.candidates import contenders
+from gen_profile.comparison.candidates import candidates
 from gen_profile.designs.plan import plan
-from gen_profile.evaluation.residual_sway import watch_time
+from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.motion.metrics import greatest, peak
 from gen_profile.spec.reading import preset_spec, presets
@@ -45,8 +45,8 @@ def test_machines_of_several_axes_sway_as_lagrange_says(preset):
     spec = preset_spec(preset)
     lagrange, plant = Lagrange(spec.plant.type), spec.machine()
     found = plan(spec)
-    motion, machines = found.trial.motion, scenarios(spec)
-    n_u, until = len(plant.unactuated), motion.duration + watch_time(spec)
+    motion, machines = found.evaluation.motion, scenarios(spec)
+    n_u, until = len(plant.unactuated), motion.duration + observation_time(spec)
     after = np.linspace(motion.duration, until, 4001)
     residuals = []
     for machine in machines:
@@ -65,14 +65,14 @@ def test_machines_of_several_axes_sway_as_lagrange_says(preset):
             for x in swing.y.T
         ]
         residuals.append(peak(np.array(sway)[:, None])[0])
-    expected = found.trial.figures
+    expected = found.evaluation.figures
     assert residuals[0] < 1e-6
     assert residuals[1] == pytest.approx(expected["sway_residual_peak_perturbed_m"], rel=1e-4)
     assert max(residuals) == pytest.approx(expected["sway_residual_worst_m"], rel=1e-4)
 
 
 def test_shapers_of_a_spherical_pendulum_shape_its_one_frequency_once():
-    designs = {method.method: method.design for method in contenders(preset_spec("gantry-crane"))}
+    designs = {method.method: method.design for method in candidates(preset_spec("gantry-crane"))}
     period = 2.0 * np.pi * np.sqrt(5.0 / 9.81)
     for name, delay in (("nzv", period / 3.0), ("zvd", period)):
         base = 12.0 - delay  # the quintic's share of the time; its greatest velocity bounds the shaped one's

@@ -15,9 +15,9 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from gen_profile.designs.plan import plan
-from gen_profile.evaluation.residual_sway import watch_time
+from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.evaluation.scenarios import further_scenarios, scenarios
-from gen_profile.evaluation.simulation import Swing
+from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import SampledProfile, sample
 from gen_profile.spec.reading import preset_spec
@@ -298,15 +298,17 @@ def test_draws_of_any_machine_agree_with_the_exact_motion(overrides):
     """Several axes, a hoist, a load that swings at the start, and axes that go on."""
     name, *rest = overrides
     spec = preset_spec(name, [*rest, "check.samples=6"])
-    motion = plan(spec).trial.motion
+    motion = plan(spec).evaluation.motion
     setpoints = sample(motion, spec.export.cycle_time)
     machines = scenarios(spec)
     rows = (*machines, *further_scenarios(spec, machines))
     check = _verdict(spec, setpoints, rows, None, lambda _, __: None)
     drawn, still = check.groups["samples"], standstill(spec, setpoints)
-    watched = np.linspace(still, still + watch_time(spec), 8001)
+    watched = np.linspace(still, still + observation_time(spec), 8001)
     drawn_machines = [finding.scenario.parameters for finding in drawn]
-    exact = Swing(spec.machine(), motion, drawn_machines, watched[-1], spec.move.initial).at(watched)
+    exact = PlantSimulation(spec.machine(), motion, drawn_machines, watched[-1], spec.move.initial).at(
+        watched
+    )
     expected = [peak(response.sway) for response in exact]
     found = [list(finding.residual.values()) for finding in drawn]
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=check.error_bound)

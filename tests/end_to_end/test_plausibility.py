@@ -56,7 +56,7 @@ MOVES = {
 @cache
 def planned(preset, *overrides):
     spec = preset_spec(preset, overrides)
-    return spec, plan(spec).trial.command
+    return spec, plan(spec).evaluation.command
 
 
 @pytest.fixture(scope="module")

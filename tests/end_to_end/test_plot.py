@@ -166,7 +166,7 @@ def test_sway_is_drawn_on_the_nominal_machine_and_at_both_ends_of_the_ranges(dra
     titles = [axis.get_title().replace("\N{NO-BREAK SPACE}", " ") for axis in figure.axes[3:8:2]]
     ends = [f"{name} {sign}{100 * share:g} %" for sign in "+−"]
     assert titles == ["nominal machine", *ends]
-    machines = [comparison.rows[0].trial.machines[index].parameters[name] for index in (0, 1, 2)]
+    machines = [comparison.rows[0].evaluation.machines[index].parameters[name] for index in (0, 1, 2)]
     assert machines[2] < machines[0] < machines[1]
 
 

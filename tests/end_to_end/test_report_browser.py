@@ -10,7 +10,7 @@ from command_line import run_here
 from headless import browser as start
 
 from gen_profile.charts.figure import Figure, Line, Map, Panel
-from gen_profile.report.content import Listing, Page, Row, Section, Share, Table, Terms, Verdict
+from gen_profile.report.content import Listing, Page, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.page import render
 from gen_profile.spec.reading import presets
 
@@ -323,7 +323,7 @@ def section(text):
     coloured = Map(title=text, x_label=text, y_label=text, unit=text, **grid)
     blocks = [
         Terms(rows=[(text, text)]),
-        Table(head=(text, text), rows=[Row(cells=(text, Share(0.5)), mark="own")], code=True),
+        Table(head=(text, text), rows=[TableRow(cells=(text, Share(0.5)), mark="own")], code=True),
         Figure(caption=text, panels=[panel, coloured]),
         Listing(title=text, text=text),
     ]

@@ -21,7 +21,7 @@ def spec():
 
 @pytest.fixture(scope="module")
 def motion(spec):
-    return plan(spec).trial.motion
+    return plan(spec).evaluation.motion
 
 
 def swing(motion, p, until):

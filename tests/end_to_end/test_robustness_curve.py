@@ -11,7 +11,7 @@ from matplotlib import image
 from gen_profile.comparison.robustness import Robustness, error_grid, robustness
 from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import SpecError
-from gen_profile.evaluation.simulation import Swing
+from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.motion.metrics import peak
 from gen_profile.spec.reading import preset_spec
 
@@ -25,7 +25,7 @@ def integrated(spec, method, offsets):
     motion = shaped_motion(spec, method)
     machines = [{**nominal, **{name: nominal[name] * (1.0 + off) for name, off in row}} for row in offsets]
     watch = np.linspace(motion.duration, motion.duration + 4.0, 4001)
-    return [peak(found.sway) for found in Swing(plant, motion, machines, watch[-1]).at(watch)]
+    return [peak(found.sway) for found in PlantSimulation(plant, motion, machines, watch[-1]).at(watch)]
 
 
 def test_a_curve_is_what_integration_finds():

@@ -98,7 +98,7 @@ def test_the_shortest_shaped_move_keeps_its_limits_and_a_shorter_one_does_not():
 
 
 def test_several_axes_make_one_shaped_move():
-    motion = plan(preset_spec("gantry-crane", ["solver.method=zvd"])).trial.motion
+    motion = plan(preset_spec("gantry-crane", ["solver.method=zvd"])).evaluation.motion
     times = np.linspace(0.0, motion.duration, 11)
     position = motion(times).position
     assert position[:, 0] == pytest.approx(3.0 * position[:, 1], abs=1e-12)

@@ -24,7 +24,7 @@ from gen_profile.artefacts.manifest import parse_manifest
 from gen_profile.streaming import stream as workflow
 from gen_profile_exporters.can.host.clock import SharedClock, SystemClock
 from gen_profile_exporters.can.simulation.drive_bank import FAREWELL, DriveBank
-from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
 from gen_profile_exporters.can.streaming.pacer import Pacer
 from gen_profile_exporters.can.streaming.streamer import Streamer
@@ -379,7 +379,7 @@ def drive_away(monkeypatch):
     """A drive whose axis stands away from the start, on a clock of its own."""
     clock = FakeClock(MS)
     with can.Bus(channel="away", interface="virtual") as bus:
-        bank = DriveBank(bus, clock, [SimulatedDrive(1, Make(), 70_000)], [1e6], RigidLoad([0.07]))
+        bank = DriveBank(bus, clock, [SimulatedDrive(1, DriveVariant(), 70_000)], [1e6], RigidLoad([0.07]))
         clock.actors.append(bank.poll)
         monkeypatch.setattr(workflow, "SystemClock", lambda *_: clock)
         yield bank.drives[0]

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from gen_profile.errors import SpecError
-from gen_profile.evaluation.residual_sway import watch_time
+from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.evaluation.scenarios import further_scenarios, scenarios
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.reading import preset_spec
@@ -65,7 +65,7 @@ def swaying(spec, times, accelerations, grid):
     def rate(t, x):
         return derivative(p, x.reshape(len(rest), count), pushes(t)).ravel()
 
-    watch = watch_time(spec)
+    watch = observation_time(spec)
     seen = np.concatenate([[0.0], np.linspace(spec.move.duration, spec.move.duration + watch, 2000)])
     began = np.repeat(np.array(rest)[:, None], count, axis=1).ravel()
     found = solve_ivp(

@@ -8,7 +8,7 @@ from motions import quintic, target
 from vendor_axes import VENDORS, Bench
 
 from gen_profile.motion.profile import sample
-from gen_profile_exporters.block_source import take_apart
+from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.playback.structured_text import block_text
 from gen_profile_exporters.vendors import codesys, siemens_scl, twincat
 
@@ -20,7 +20,7 @@ ERROR, OFF, WORK, AWAY = 20, 21, 22, 23
 
 def bench_of(vendor, move=ONE):
     goal = target(*("bridge", "trolley")[: move.axes], cycle_time=CYCLE)
-    return Bench(VENDORS[vendor], take_apart(block_text(move, goal)), STARTS[: move.axes])
+    return Bench(VENDORS[vendor], parse_function_block(block_text(move, goal)), STARTS[: move.axes])
 
 
 def under_way(vendor, move=ONE, cycles=20):
@@ -212,7 +212,7 @@ def test_a_block_that_ends_without_telling_an_error_is_noticed():
 def test_the_containers_carry_these_very_statements(move):
     """What was run above is what is exported; SCL marks names."""
     goal = target(*("bridge", "trolley")[: move.axes], cycle_time=CYCLE)
-    source = take_apart(block_text(move, goal))
+    source = parse_function_block(block_text(move, goal))
     texts = {
         "twincat": twincat.encode(move, goal)[1].content.decode(),
         "codesys": codesys.encode(move, goal)[0].content.decode().replace("&lt;", "<").replace("&gt;", ">"),

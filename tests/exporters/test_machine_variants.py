@@ -6,7 +6,7 @@ import pytest
 from motions import quintic, target
 from playing import checked, start
 
-from gen_profile.evaluation.simulation import Swing
+from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.machine_variants import AxisVariants, machine_variants
@@ -41,7 +41,7 @@ def sway_after(spec, gain, offset):
     begin, way = np.array(spec.move.start) + offset, gain * np.array(spec.move.distance)
     motion = quintic(*zip(begin, begin + way, strict=True), duration=spec.move.duration)
     end = motion.duration + 5.0
-    swing = Swing(spec.machine(), motion, [spec.plant.parameters], end)
+    swing = PlantSimulation(spec.machine(), motion, [spec.plant.parameters], end)
     return np.abs(swing.at(np.linspace(motion.duration, end, 400))[0].sway)
 
 

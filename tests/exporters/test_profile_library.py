@@ -10,7 +10,7 @@ from playing import IDLE, QUANTITIES, checked, column, play, start
 from st_interpreter import FunctionBlock
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters.block_source import take_apart
+from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.playback import structured_text
 from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library
 from gen_profile_exporters.registry import BUILT_IN, find_container
@@ -43,7 +43,7 @@ def words(variable):
 
 
 def entries_of(texts):
-    return [LibraryEntry(source=take_apart(text), label=f"L1 {n}") for n, text in enumerate(texts)]
+    return [LibraryEntry(source=parse_function_block(text), label=f"L1 {n}") for n, text in enumerate(texts)]
 
 
 def together(texts, goal):
@@ -51,7 +51,7 @@ def together(texts, goal):
 
 
 def read(text, goal):
-    return read_library(take_apart(text), goal)
+    return read_library(parse_function_block(text), goal)
 
 
 def selected(fb, number):

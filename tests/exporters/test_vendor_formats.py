@@ -15,7 +15,7 @@ from system_parts import missing
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
-from gen_profile_exporters.block_source import take_apart
+from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.playback import structured_text
 from gen_profile_exporters.playback.axis_wrapper import CODESYS, SIEMENS, TWINCAT, axis_wrapper
 from gen_profile_exporters.playback.structured_text import block_text
@@ -152,7 +152,7 @@ class TestPlcopenXml:
         )
         assert (
             statements.xpath("ns:p", namespaces=names)[0].text
-            == take_apart(block_text(MOVE, goal_of(MOVE))).body
+            == parse_function_block(block_text(MOVE, goal_of(MOVE))).body
         )
         # What it rewrites before parsing would need a prefix that our document does not declare.
         assert b"CDATA" not in etree.tostring(root) and b"]]>" not in etree.tostring(root)
@@ -163,7 +163,7 @@ class TestPlcopenXml:
         assert root.tag == "{http://www.plcopen.org/xml/tc6_0200}project"
         bodies = root.findall(f".//{{*}}body/{{*}}ST/{{{XHTML}}}xhtml")
         assert len(bodies) == len(root.findall(".//{*}pou")) == 3
-        assert bodies[0].text == take_apart(block_text(MOVE, goal_of(MOVE))).body
+        assert bodies[0].text == parse_function_block(block_text(MOVE, goal_of(MOVE))).body
 
     def test_no_entity_is_expanded(self):
         text = (
@@ -203,7 +203,7 @@ class TestCodesys:
 @pytest.mark.parametrize("library", [TWINCAT, CODESYS, SIEMENS])
 @pytest.mark.parametrize("move", [MOVE, TWO_MOVES])
 def test_a_wrapper_takes_and_tells_all_but_positions(library, move):
-    block = take_apart(block_text(move, goal_of(move)))
+    block = parse_function_block(block_text(move, goal_of(move)))
     wrapper = axis_wrapper(block, move.axes, library)
     outer, inner = (
         {v.name: v for v in source.variables if v.section in {"VAR_INPUT", "VAR_OUTPUT"}}
@@ -383,7 +383,7 @@ class TestTakingApart:
     def test_the_parts_make_the_same_program(self, profile, layout):
         goal = goal_of(profile, layout)
         text = structured_text.block_text(profile, goal)
-        again = take_apart(take_apart(text).text()).text()
+        again = parse_function_block(parse_function_block(text).text()).text()
         assert structured_text.read_block(again, goal).payload_hash()
         fb, other = checked(text), checked(again)
         rows = play(fb, start(fb))
@@ -392,4 +392,4 @@ class TestTakingApart:
     @pytest.mark.parametrize("text", ["", "PROGRAM x END_PROGRAM", "FUNCTION_BLOCK x VAR END_VAR"])
     def test_no_block_is_refused(self, text):
         with pytest.raises(ExportError, match="export it again"):
-            take_apart(text)
+            parse_function_block(text)

@@ -8,14 +8,14 @@ import numpy as np
 from gen_profile.motion.profile import Profile
 from gen_profile.plants.plant import Plant
 from gen_profile_fmu.model.contents import Model, plant_model, profile_model, system_model
-from gen_profile_fmu.model.plant_variables import InputKind, Machine
+from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 INPUTS = {f"plant-{kind.value}": kind for kind in InputKind}
 KINDS = (*INPUTS, "profile", "system")
 
 
-def machine_of(plant: Plant, **changes: float) -> Machine:
-    return Machine(plant=plant, parameters={**plant.nominal(), **changes})
+def machine_of(plant: Plant, **changes: float) -> PlantInstance:
+    return PlantInstance(plant=plant, parameters={**plant.nominal(), **changes})
 
 
 def motion(axes: int) -> Profile:

@@ -27,7 +27,7 @@ from gen_profile_fmu.building.plant_fmu import cached_fmu
 from gen_profile_fmu.description.fmu_files import Version, archive, fmu_files, sources
 from gen_profile_fmu.model.contents import system_model
 from gen_profile_fmu.model.nominals import smooth_move, state_nominals
-from gen_profile_fmu.model.plant_variables import Machine
+from gen_profile_fmu.model.plant_variables import PlantInstance
 
 CRANE = find_plant("double-pendulum-crane")
 HEADERS = Path(fmu_manipulation_toolbox.__file__).parent / "resources" / "fmi"  # the standard's, unaltered
@@ -132,7 +132,7 @@ def test_default_tolerances_of_model_exchange_do():
     plant = find_plant("tower-crane")
     move = smooth_move([0.0, 30.0], [2.0, 45.0], 30.0)
     nominal = state_nominals(plant, plant.nominal(), move)
-    machine = Machine(plant=plant, parameters=plant.nominal(), nominal=nominal)
+    machine = PlantInstance(plant=plant, parameters=plant.nominal(), nominal=nominal)
     path = str(cached_fmu(system_model("tower", machine, move), Version.FMI2).archive)
     exact, integrated = (
         simulate_fmu(path, fmi_type=interface, stop_time=40.0, output_interval=0.05)

@@ -16,7 +16,7 @@ from gen_profile.plants.registry import find_plant
 from gen_profile_fmu.building.plant_fmu import cached_fmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.contents import profile_model, system_model
-from gen_profile_fmu.model.plant_variables import Machine
+from gen_profile_fmu.model.plant_variables import PlantInstance
 
 CRANE = find_plant("double-pendulum-crane")
 OTHER = {"m1": 0.5, "m2": 0.1, "L1": 0.6, "L2": 0.25, "g": 9.7, "c1": 0.01, "c2": 0.02}
@@ -290,7 +290,7 @@ class TestCosimulation:
             knots=[0.0, 1.0], coefficients=given, target=[0.25], final_velocity=[0.3], method="test"
         )
         swing = {"theta1": 0.2, "theta2": -0.1, "theta2.rate": 0.3}
-        machine = Machine(plant=CRANE, parameters=OTHER, initial=swing)
+        machine = PlantInstance(plant=CRANE, parameters=OTHER, initial=swing)
         models = system_model("onward", machine, onward), profile_model("onward", CRANE.actuated, onward)
         outputs = OUTPUTS, ("cart.setpoint", "cart.setpoint_velocity")
         found = []

@@ -9,7 +9,7 @@ from fmu.hoisting_pendulum import PLANT as WINCH
 from fmu.kinds import model_of, motion
 from generator.lagrangian_machines import MACHINES, Lagrange
 
-from gen_profile.evaluation.simulation import Swing
+from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.plants.registry import BUILT_IN, find_plant
 from gen_profile_fmu.building.plant_fmu import cached_fmu
 from gen_profile_fmu.description.fmu_files import Version
@@ -28,7 +28,7 @@ def test_a_system_moves_as_its_equations_say(plant, version):
     axes = len(plant.actuated)
     profile = motion(axes)
     times = np.linspace(0.0, 3.0, 301)
-    (exact,) = Swing(plant, profile, [plant.nominal()], 3.0).at(times)
+    (exact,) = PlantSimulation(plant, profile, [plant.nominal()], 3.0).at(times)
     instance = Instance(cached_fmu(model_of("system", plant, profile), version), version, exchange=False)
     instance.begin({})
     sways = [f"sway.{variable_name(load)}" for load in plant.loads]
@@ -37,7 +37,7 @@ def test_a_system_moves_as_its_equations_say(plant, version):
     instance.close()
     size = np.abs(exact.sway).max()
     assert size > 1e-4
-    # limits of Swing's dense output where the acceleration jumps
+    # limits of PlantSimulation's dense output where the acceleration jumps
     np.testing.assert_allclose(found[:, :-axes], exact.sway, rtol=0.0, atol=2e-5 * size)
     np.testing.assert_allclose(found[:, -axes:], exact.position, rtol=0.0, atol=1e-12)
 

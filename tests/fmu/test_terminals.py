@@ -13,7 +13,7 @@ from lxml import etree
 from gen_profile.plants.registry import BUILT_IN, find_plant
 from gen_profile_fmu.description.fmu_files import Version, archive, fmu_files, sources
 from gen_profile_fmu.model.contents import plant_model
-from gen_profile_fmu.model.plant_variables import InputKind, Machine
+from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 
@@ -61,7 +61,7 @@ def test_are_what_the_standard_says(schema, kind):
 def test_connect_a_profile_with_a_plant(kind, plant):
     """Every input of the plant has an output of the profile to be connected with, and of its unit."""
     # a winch whose rope had no length could not be pictured
-    machine = Machine(plant=plant, parameters=plant.nominal(), position=[1.0] * len(plant.actuated))
+    machine = PlantInstance(plant=plant, parameters=plant.nominal(), position=[1.0] * len(plant.actuated))
     profile, driven = files_of(model_of("profile", plant)), files_of(plant_model(machine, kind))
     given, taken = variables(profile), variables(driven)
     connected = set()

@@ -13,7 +13,7 @@ from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import relaxation
 from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.infeasibility import Trial, cures
+from gen_profile.solvers.infeasibility import CandidateTest, cures
 from gen_profile.spec.reading import preset_spec
 
 HOIST = "limits.axis.hoist={travel=[0.9, 7.1], acceleration=0.3}"
@@ -103,7 +103,7 @@ def test_robustness_is_to_blame_where_nothing_else_is(order, less):
         hard = bool(other.desensitized) and other.order == order
         return choice.attempt(attrs.evolve(other, duration=0.3) if hard else other, "direct")
 
-    trial = Trial(solve=solve, keeps=choice.keeps_limits, welcome=lambda _: True)
+    trial = CandidateTest(solve=solve, keeps=choice.keeps_limits, welcome=lambda _: True)
     assert cures(problem, trial) == f"In 3 s it would do with {less}."
 
 

@@ -9,7 +9,7 @@ from generator.lagrangian_machines import MACHINES
 
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.estimation import estimate
-from gen_profile.identification.fit import Machine
+from gen_profile.identification.fit import SwingingMachine
 from gen_profile.identification.measurements import DirectReading, Period, SwingLog
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem.linearization import linearize
@@ -20,7 +20,7 @@ CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-
 def test_tape_and_stopwatch_hold_the_machine_in_their_ranges():
     """Read with stated noise, 300 times: the box of the ranges misses the machine in one of a hundred."""
     true = CRANE.nominal() | {"L1": 0.52, "L2": 0.36, "m2": 0.25}
-    machine = Machine(plant=CRANE, parameters=CRANE.nominal() | {"m2": 0.25}, q_a=(0.0,))
+    machine = SwingingMachine(plant=CRANE, parameters=CRANE.nominal() | {"m2": 0.25}, q_a=(0.0,))
     slow, fast = periods(**true)
     random, hits, errors = np.random.default_rng(7), 0, []
     for _ in range(300):
@@ -41,7 +41,7 @@ def test_tape_and_stopwatch_hold_the_machine_in_their_ranges():
 def test_a_logged_swing_holds_the_machine_in_its_ranges():
     """Rope and damping from 25 noisy logs of a crane that is a fifth off, zero error included."""
     true = HOIST.nominal() | {"L0": 2.3, "c": 300.0}
-    machine = Machine(plant=HOIST, parameters=HOIST.nominal() | {"c": 100.0}, q_a=(0.0, 4.0))
+    machine = SwingingMachine(plant=HOIST, parameters=HOIST.nominal() | {"c": 100.0}, q_a=(0.0, 4.0))
     times = np.arange(0.0, 25.0, 0.1)
     exact = swing(true, times, [0.15, -0.1])
     random, errors, hits = np.random.default_rng(11), [], 0
@@ -62,7 +62,7 @@ def test_a_log_and_a_tape_together_find_both_ropes_of_a_double_pendulum():
     exact = swing(true, times, [0.1, -0.05, 0.2, 0.3], (0.0,), "double-pendulum-crane")
     noisy = exact + np.random.default_rng(5).normal(0.0, 2e-3, len(times))
     log = SwingLog(times=times, values=noisy, quantity="angle", load="hook")
-    machine = Machine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
+    machine = SwingingMachine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
     tape = DirectReading(parameter="L1", value=0.523, uncertainty=0.005)
     found = estimate(machine, ["L1", "L2", "c1"], [tape], [log])
     assert inside(found, true)
@@ -97,7 +97,7 @@ def test_every_machine_is_told_by_its_swing(type_):
     exact = np.array([plant.outputs(q, axes, SimpleNamespace(**true)).sway[-1] for q in q_u.T])
     noise = np.random.default_rng(1).normal(0.0, 0.03 * np.abs(exact).max(), len(times))
     log = SwingLog(times=times, values=exact + noise, quantity="sway", load=plant.loads[-1])
-    found = estimate(Machine(plant=plant, parameters=given, q_a=tuple(axes)), [name], [], [log])
+    found = estimate(SwingingMachine(plant=plant, parameters=given, q_a=tuple(axes)), [name], [], [log])
     assert inside(found, true)
     assert found.half_range[name] < 0.02 * true[name]
 
@@ -106,7 +106,7 @@ def test_every_machine_is_told_by_its_swing(type_):
 def test_steps_of_an_encoder_do_not_average_out():
     """One degree of resolution and 4° of swing: errors repeat with the swing, wherever the zero lies."""
     true = HOIST.nominal() | {"L0": 2.3, "c": 300.0}
-    machine = Machine(plant=HOIST, parameters=true | {"c": 100.0}, q_a=(0.0, 4.0))
+    machine = SwingingMachine(plant=HOIST, parameters=true | {"c": 100.0}, q_a=(0.0, 4.0))
     times, step = np.arange(0.0, 25.0, 0.1), np.radians(1.0)
     exact = swing(true, times, [0.07, 0.0])
     errors = []
@@ -128,7 +128,9 @@ def test_ranges_that_are_not_straight_reach_as_far_as_the_measurement_allows():
     def damping(period):
         return 2.0 * inertia * np.sqrt(slow**2 - (2.0 * np.pi / period) ** 2)
 
-    machine = Machine(plant=HOIST, parameters=given | {"L0": 2.3, "c": 0.8 * damping(T)}, q_a=(0.0, 4.0))
+    machine = SwingingMachine(
+        plant=HOIST, parameters=given | {"L0": 2.3, "c": 0.8 * damping(T)}, q_a=(0.0, 4.0)
+    )
     found = estimate(machine, ["c"], [Period(mode=1, seconds=T, uncertainty=spread)])
     assert found.values["c"] == pytest.approx(damping(T), rel=1e-5)
     slope, reach = (damping(T + 1e-5) - damping(T - 1e-5)) / 2e-5, 2.576 * spread
@@ -146,14 +148,14 @@ def test_what_part_of_a_log_does_not_tell_stays_near_the_spec_meanwhile():
     random = np.random.default_rng(0)
     noises = [random.normal(0.0, 1e-3, len(times)) for _ in range(4)]
     log = SwingLog(times=times, values=exact + noises[3], quantity="sway", load="surface")
-    found = estimate(Machine(plant=plant, parameters=given, q_a=(0.0,)), ["h"], [], [log])
+    found = estimate(SwingingMachine(plant=plant, parameters=given, q_a=(0.0,)), ["h"], [], [log])
     assert inside(found, true)
 
 
 def test_noise_that_lasts_from_sample_to_sample_counts_for_less():
     times = np.arange(0.0, 25.0, 0.05)
     exact = swing(HOIST.nominal() | {"c": 300.0}, times, [0.15, 0.0])
-    machine = Machine(plant=HOIST, parameters=HOIST.nominal() | {"c": 300.0}, q_a=(0.0, 4.0))
+    machine = SwingingMachine(plant=HOIST, parameters=HOIST.nominal() | {"c": 300.0}, q_a=(0.0, 4.0))
     white = np.random.default_rng(2).normal(0.0, 3e-3, len(times) + 9)
     lasting = np.convolve(white, np.full(10, 10**-0.5), "valid")  # as strong, but alike over ten samples
 
@@ -169,12 +171,12 @@ def test_an_exact_log_is_identified_exactly():
     log = SwingLog(
         times=times, values=swing(HOIST.nominal(), times, [0.3, 0.0]), quantity="angle", load="payload"
     )
-    machine = Machine(plant=HOIST, parameters=HOIST.nominal() | {"L0": 1.5}, q_a=(0.0, 4.0))
+    machine = SwingingMachine(plant=HOIST, parameters=HOIST.nominal() | {"L0": 1.5}, q_a=(0.0, 4.0))
     assert estimate(machine, ["L0"], [], [log]).values["L0"] == pytest.approx(2.0, abs=1e-6)
 
 
 def test_contradictory_readings_widen_the_ranges():
-    machine = Machine(plant=HOIST, parameters=HOIST.nominal(), q_a=(0.0, 0.0))
+    machine = SwingingMachine(plant=HOIST, parameters=HOIST.nominal(), q_a=(0.0, 0.0))
 
     def read(*lengths):
         tape = [DirectReading(parameter="L0", value=length, uncertainty=0.01) for length in lengths]
@@ -200,7 +202,7 @@ def test_contradictory_readings_widen_the_ranges():
     ],
 )
 def test_what_is_not_determined_is_named(names, readings, blamed):
-    machine = Machine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
+    machine = SwingingMachine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
     with pytest.raises(InfeasibleProblem, match=rf"do not determine {blamed};"):
         estimate(machine, names, readings)
 
@@ -209,7 +211,7 @@ def test_what_is_not_determined_is_named(names, readings, blamed):
 def test_a_log_in_another_unit_of_time_is_refused(pace):
     times = np.arange(0.0, 25.0, 0.1)
     log = SwingLog(times=pace * times, values=np.sin(times), quantity="angle", load="payload")
-    machine = Machine(plant=HOIST, parameters=HOIST.nominal(), q_a=(0.0, 4.0))
+    machine = SwingingMachine(plant=HOIST, parameters=HOIST.nominal(), q_a=(0.0, 4.0))
     with pytest.raises(
         InfeasibleProblem, match=r"swings once in 4\.9\d s: look at the unit of the log's times"
     ):

@@ -6,7 +6,7 @@ from generator.free_swings import inside, swing
 
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.estimation import estimate
-from gen_profile.identification.fit import Machine
+from gen_profile.identification.fit import SwingingMachine
 from gen_profile.identification.measurements import Period, SwingLog
 from gen_profile.identification.misfit import spectrum
 from gen_profile.plants.registry import find_plant
@@ -21,7 +21,7 @@ def log_of(values, quantity="angle", load="payload"):
 
 
 def hoist(**changed):
-    return Machine(plant=HOIST, parameters=HOIST.nominal() | changed, q_a=(0.0, 4.0))
+    return SwingingMachine(plant=HOIST, parameters=HOIST.nominal() | changed, q_a=(0.0, 4.0))
 
 
 @pytest.mark.slow
@@ -30,7 +30,7 @@ def test_another_rope_that_is_wrong_is_named():
     times = 0.5 * TIMES
     exact = swing(true, times, [0.1, -0.05, 0.2, 0.3], (0.0,), "double-pendulum-crane")
     log = SwingLog(times=times, values=exact + NOISE, quantity="angle", load="hook")
-    machine = Machine(plant=CRANE, parameters=true | {"L1": 0.47, "L2": 0.36}, q_a=(0.0,))
+    machine = SwingingMachine(plant=CRANE, parameters=true | {"L1": 0.47, "L2": 0.36}, q_a=(0.0,))
     with pytest.raises(
         InfeasibleProblem, match=r"rad RMS, .* is left of it, strongest at .*another .*L2"
     ) as told:
@@ -84,10 +84,10 @@ def test_what_a_stopwatch_rests_on_is_told():
     """T² of a simple pendulum goes with L0 + the hoist over g; its mass and drives do not matter."""
     found = estimate(hoist(), ["L0"], [Period(mode=1, seconds=4.914, uncertainty=0.01)])
     assert found.rests_on["L0"].get("m", 0.0) == pytest.approx(0.0, abs=1e-9)
-    crane = Machine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
+    crane = SwingingMachine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
     watched = [Period(mode=1, seconds=1.73, uncertainty=0.01)]
     found = estimate(crane, ["L1"], watched).rests_on["L1"]["L2"]
-    longer = Machine(
+    longer = SwingingMachine(
         plant=CRANE, parameters=CRANE.nominal() | {"L2": 1.01 * CRANE.nominal()["L2"]}, q_a=(0.0,)
     )
     moved = estimate(longer, ["L1"], watched).values["L1"] - estimate(crane, ["L1"], watched).values["L1"]

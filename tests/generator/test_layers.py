@@ -1,9 +1,11 @@
 """Import layers: every module stands in one, and what must start fast does."""
 
+import ast
 import os
 import subprocess
 import sys
 import tomllib
+from collections import defaultdict
 from functools import cache
 from pathlib import Path
 
@@ -15,6 +17,8 @@ PACKAGES = {
     "gen_profile_fmu": ROOT / "fmu",
     "gen_profile_exporters": ROOT / "exporters",
 }
+
+MOST_FILES = 16  # the package's own included
 
 
 def layers():
@@ -122,3 +126,19 @@ def test_the_picture_in_the_documentation_is_drawn_from_the_layers():
     page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
     assert f"```mermaid\n{drawn}```" in page
     assert all(f"<b>{layer.removeprefix('gen_profile.')}</b>" in drawn for layer in layers())
+
+
+def test_no_name_of_a_class_has_two_meanings():
+    homes = defaultdict(set)
+    for package, root in PACKAGES.items():
+        for file in (root / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+                if isinstance(node, ast.ClassDef):
+                    homes[node.name].add(str(file.relative_to(root)))
+    assert {name: files for name, files in homes.items() if len(files) > 1} == {}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_folder_has_so_few_files_that_they_are_seen_at_once(package):
+    folders = {file.parent for file in (PACKAGES[package] / package).rglob("*.py")}
+    assert max(len(list(folder.glob("*.py"))) for folder in folders) <= MOST_FILES

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gen_profile.errors import SpecError
 from gen_profile.spec.reading import preset_spec
-from gen_profile.sweep.grid import CHAIN, Axis, overrides, parse_grid
+from gen_profile.sweep.grid import CHAIN, GridAxis, overrides, parse_grid
 
 
 def test_the_last_axis_changes_fastest():
@@ -95,8 +95,8 @@ def test_tells_what_makes_no_sense(axes, sentence):
 
 
 def test_steps_count_from_value_to_value_however_far_apart_they_are():
-    axis = Axis(key="move.distance", values=(10, 1, 2.0))
+    axis = GridAxis(key="move.distance", values=(10, 1, 2.0))
     assert axis.steps(np.array([1.0, 2.0, 10.0, 1.5, 6.0, -7.0, 40.0])) == pytest.approx(
         [0, 1, 2, 0.5, 1.5, 0, 2]
     )
-    assert Axis(key="plant.L1", values=(0.5,)).steps(0.5) == 0.0
+    assert GridAxis(key="plant.L1", values=(0.5,)).steps(0.5) == 0.0

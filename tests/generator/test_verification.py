@@ -15,7 +15,7 @@ SPEC = preset_spec("paper", ["robustness={}", "cost.sway_weight=0"])
 
 @pytest.fixture(scope="module")
 def setpoints():
-    return sample(plan(SPEC).trial.command, 0.01)
+    return sample(plan(SPEC).evaluation.command, 0.01)
 
 
 def swaying(times, amplitude, phase):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import attrs
 
-from gen_profile_exporters.block_source import BlockSource, Variable
+from gen_profile_exporters.block_source import BlockSource, BlockVariable
 
 HEADER = """\
 (*
@@ -221,7 +221,10 @@ def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> Block
         header=HEADER.format(name=name, block=block.name, guide=library.guide),
         name=name,
         variables=(
-            *(Variable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type) for n, _ in numbers),
+            *(
+                BlockVariable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type)
+                for n, _ in numbers
+            ),
             *inputs,
             *outputs,
             *_own(block.name, [v.name for v in inputs], numbers, library),
@@ -232,7 +235,7 @@ def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> Block
 
 def _own(
     block: str, inputs: list[str], numbers: list[tuple[str, str]], library: MotionLibrary
-) -> list[Variable]:
+) -> list[BlockVariable]:
     """Declare what is the wrapper's own."""
     own = {"fbMotion": block, "nStage": "DINT", "nTrigger": "DINT", "nDue": "DINT"}
     own |= {f"{trigger}{end}": "BOOL" for trigger in _triggers(inputs) for end in ("Before", "Now")}
@@ -246,9 +249,9 @@ def _own(
         for key, type_ in {"bTaken": "BOOL", **library.instances}.items()
     }
     return [
-        *(Variable(section="VAR", name=key, type=type_) for key, type_ in own.items()),
+        *(BlockVariable(section="VAR", name=key, type=type_) for key, type_ in own.items()),
         *(
-            Variable(section="VAR CONSTANT", name=stage, type="DINT", initial=str(number))
+            BlockVariable(section="VAR CONSTANT", name=stage, type="DINT", initial=str(number))
             for number, stage in enumerate(STAGES)
         ),
     ]

@@ -16,7 +16,7 @@ import attrs
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
-from gen_profile_exporters.block_source import BlockSource, Variable
+from gen_profile_exporters.block_source import BlockSource, BlockVariable
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.playback.structured_text import (
     axis_lines,
@@ -172,7 +172,7 @@ def _rows(source: BlockSource) -> int:
     return next(int(variable.initial) for variable in source.variables if variable.name == ROWS)
 
 
-def _merged(same: Sequence[Variable]) -> Variable:
+def _merged(same: Sequence[BlockVariable]) -> BlockVariable:
     """Make one variable of those of the same name in all blocks."""
     first = same[0]
     if first.name not in OWN or first.name in OUTPUTS:
@@ -183,8 +183,8 @@ def _merged(same: Sequence[Variable]) -> Variable:
     return _array(first.name, first.array[2] if first.array else first.type, values, first.comment)
 
 
-def _array(name: str, type_: str, values: Sequence[str], comment: str = "") -> Variable:
-    return Variable(
+def _array(name: str, type_: str, values: Sequence[str], comment: str = "") -> BlockVariable:
+    return BlockVariable(
         section="VAR CONSTANT",
         name=name,
         type=f"ARRAY [0..{len(values) - 1}] OF {type_}",
@@ -193,13 +193,15 @@ def _array(name: str, type_: str, values: Sequence[str], comment: str = "") -> V
     )
 
 
-def _selector(sources: Sequence[BlockSource]) -> list[Variable]:
+def _selector(sources: Sequence[BlockSource]) -> list[BlockVariable]:
     """Declare what selects a motion, and where its tables begin and end."""
     last, rows = len(sources) - 1, [_rows(source) for source in sources]
     added = [
-        Variable(section="VAR_INPUT", name="nProfile", type="DINT", comment=f"which motion, 0 to {last}"),
-        Variable(section="VAR", name="nSelected", type="DINT", comment="nProfile, once nothing moved"),
-        Variable(section="VAR CONSTANT", name="cProfiles", type="DINT", initial=str(len(sources))),
+        BlockVariable(
+            section="VAR_INPUT", name="nProfile", type="DINT", comment=f"which motion, 0 to {last}"
+        ),
+        BlockVariable(section="VAR", name="nSelected", type="DINT", comment="nProfile, once nothing moved"),
+        BlockVariable(section="VAR CONSTANT", name="cProfiles", type="DINT", initial=str(len(sources))),
         _array(FIRST_ROW, "DINT", _starts(rows)),
     ]
     segments = [len(v.elements) for source in sources for v in source.variables if v.name == SEGMENTS]
@@ -239,8 +241,8 @@ def _single(library: BlockSource, arrays: Mapping[str, list[str]], number: int) 
 
 
 def _part(
-    variable: Variable, arrays: Mapping[str, list[str]], parts: Mapping[str, slice], axes: int
-) -> Variable:
+    variable: BlockVariable, arrays: Mapping[str, list[str]], parts: Mapping[str, slice], axes: int
+) -> BlockVariable:
     """Declare a variable as the block of a single motion does."""
     source = "cStart" if variable.name in OUTPUTS else variable.name
     if source not in parts:

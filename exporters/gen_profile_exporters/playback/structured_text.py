@@ -24,7 +24,7 @@ import numpy as np
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile
 from gen_profile.units import AxisScale
-from gen_profile_exporters.block_source import BlockSource, take_apart
+from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.machine_variants import AxisVariants
 from gen_profile_exporters.playback import block as playback_block
@@ -81,7 +81,7 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
     ExportError
         The text is none.
     """
-    return take_apart(content.decode("latin-1"))
+    return parse_function_block(content.decode("latin-1"))
 
 
 def block_text(profile: Profile, target: Target) -> str:

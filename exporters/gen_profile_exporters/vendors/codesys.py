@@ -12,7 +12,7 @@ from __future__ import annotations
 from lxml import etree
 
 from gen_profile.motion.profile import Profile
-from gen_profile_exporters.block_source import BlockSource, Variable, take_apart
+from gen_profile_exporters.block_source import BlockSource, BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.axis_wrapper import CODESYS, axis_wrapper
 from gen_profile_exporters.playback.structured_text import block_text, literal
@@ -31,7 +31,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     ExportError
         As for Structured Text.
     """
-    source = take_apart(block_text(profile, target))
+    source = parse_function_block(block_text(profile, target))
     points = quintic_points(profile, target)
     return _project(source, target, [_cam(source.name, points, axis) for axis in range(len(target.axes))])
 
@@ -64,8 +64,8 @@ def _cam(block: str, points: QuinticPoints, axis: int) -> etree._Element:
         "MC_CamTableSelect. *)\n",
         name=name,
         variables=(
-            Variable(section="VAR_OUTPUT", name="Cam", type="MC_CAM_REF"),
-            Variable(section="VAR", name="aPoints", type=f"ARRAY [0..{last}] OF SMC_CAMXYVA"),
+            BlockVariable(section="VAR_OUTPUT", name="Cam", type="MC_CAM_REF"),
+            BlockVariable(section="VAR", name="aPoints", type=f"ARRAY [0..{last}] OF SMC_CAMXYVA"),
         ),
         body=f"Cam.byType := 3;\nCam.byVarType := 6;\nCam.nElements := {last + 1};\nCam.xStart := 0.0;\n"
         f"Cam.xEnd := {literal(points.time[-1])};\nCam.pce := ADR(aPoints);\n",

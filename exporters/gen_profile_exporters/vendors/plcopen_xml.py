@@ -13,7 +13,7 @@ from lxml import etree
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile
-from gen_profile_exporters.block_source import BlockSource, Variable, take_apart
+from gen_profile_exporters.block_source import BlockSource, BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.structured_text import block_text, read_block
 from gen_profile_exporters.vendors.xml_documents import attribute, child, parse_xml, write_xml
@@ -31,7 +31,7 @@ SECTIONS = {
 
 
 @attrs.frozen(kw_only=True)
-class Dialect:
+class XmlDialect:
     """What readers of the format do not agree on.
 
     Attributes
@@ -92,7 +92,7 @@ class Dialect:
                 value = self._append(structure, "value", {"member": member})
                 self._append(value, "simpleValue", {"value": text})
 
-    def _variable(self, group: etree._Element, variable: Variable) -> None:
+    def _variable(self, group: etree._Element, variable: BlockVariable) -> None:
         element = self._append(group, "variable", {"name": variable.name})
         type_ = self._append(element, "type")
         if variable.array:
@@ -113,7 +113,7 @@ class Dialect:
         else:
             self._append(parent, "derived", {"name": name})
 
-    def _initial(self, parent: etree._Element, variable: Variable) -> None:
+    def _initial(self, parent: etree._Element, variable: BlockVariable) -> None:
         if not variable.array:
             self._append(parent, "simpleValue", {"value": variable.initial})
             return
@@ -133,8 +133,8 @@ class Dialect:
         return f"{{{self.namespace}}}{name}"
 
 
-TC6 = Dialect(namespace="http://www.plcopen.org/xml/tc6_0201", text="p")
-CODESYS = Dialect(namespace="http://www.plcopen.org/xml/tc6_0200", text="xhtml")
+TC6 = XmlDialect(namespace="http://www.plcopen.org/xml/tc6_0201", text="p")
+CODESYS = XmlDialect(namespace="http://www.plcopen.org/xml/tc6_0200", text="xhtml")
 
 
 def encode(profile: Profile, target: Target) -> tuple[File, ...]:
@@ -145,7 +145,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     ExportError
         As for Structured Text.
     """
-    return wrap(take_apart(block_text(profile, target)), target)
+    return wrap(parse_function_block(block_text(profile, target)), target)
 
 
 def replay(content: bytes, target: Target) -> SampledProfile:
@@ -187,7 +187,7 @@ def _default(namespace: str) -> dict[str, str]:
 
 def _source(element: etree._Element) -> BlockSource:
     """Read a function block back."""
-    variables: list[Variable] = []
+    variables: list[BlockVariable] = []
     for section, group_name in SECTIONS.items():
         for group in element.findall(f"{{*}}interface/{{*}}{group_name}"):
             constant = group.get("constant") == "true"
@@ -202,7 +202,7 @@ def _source(element: etree._Element) -> BlockSource:
     )
 
 
-def _read_variable(section: str, element: etree._Element) -> Variable:
+def _read_variable(section: str, element: etree._Element) -> BlockVariable:
     array = element.find("{*}type/{*}array")
     if array is None:
         type_ = _read_type(child(element, "{*}type"))
@@ -214,7 +214,7 @@ def _read_variable(section: str, element: etree._Element) -> Variable:
     initial = ", ".join(values)
     if array is not None and values:
         initial = f"[{initial}]"
-    return Variable(
+    return BlockVariable(
         section=section,
         name=attribute(element, "name"),
         type=type_,

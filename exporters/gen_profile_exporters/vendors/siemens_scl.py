@@ -16,7 +16,7 @@ import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile, sample
-from gen_profile_exporters.block_source import BlockSource, Variable, ordered, take_apart
+from gen_profile_exporters.block_source import BlockSource, BlockVariable, ordered, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.axis_wrapper import SIEMENS, axis_wrapper
 from gen_profile_exporters.playback.block import layout_of, variable_names
@@ -44,7 +44,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     ExportError
         As for Structured Text; the table is larger than a data block, or the cam needs too many points.
     """
-    source = take_apart(block_text(profile, target))
+    source = parse_function_block(block_text(profile, target))
     blocks = wrap(source, target)
     cams = _cams(source.name, profile, target)
     return (*blocks, File(filename=f"{target.name}_cam.scl", content=cams.encode("ascii")))
@@ -95,7 +95,7 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
         raise ExportError("There is no SCL block of this export; export it again.")
     header, name, declarations, body = found.groups()
     portable = _unmarked(body)
-    source = take_apart(
+    source = parse_function_block(
         f"{header}FUNCTION_BLOCK {name}\n{declarations.lstrip()}\n{portable.lstrip()}END_FUNCTION_BLOCK\n"
     )
     arrays_back = [
@@ -144,11 +144,11 @@ def _unmarked(body: str) -> str:
     return body.replace("#", "")
 
 
-def _is_table(variable: Variable) -> bool:
+def _is_table(variable: BlockVariable) -> bool:
     return variable.array is not None and variable.name.startswith("c")
 
 
-def _bytes(variable: Variable) -> int:
+def _bytes(variable: BlockVariable) -> int:
     if variable.array is None:
         return BYTES.get(variable.type, 2)
     lower, upper, type_ = variable.array

@@ -13,7 +13,7 @@ from lxml import etree
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile
-from gen_profile_exporters.block_source import BlockSource, take_apart
+from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.playback.axis_wrapper import TWINCAT, axis_wrapper
 from gen_profile_exporters.playback.structured_text import block_name, block_text, literal, read_block
@@ -29,7 +29,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     ExportError
         As for Structured Text.
     """
-    source = take_apart(block_text(profile, target))
+    source = parse_function_block(block_text(profile, target))
     points = quintic_points(profile, target)
     name = f"GVL_{block_name(target.name).removeprefix('FB_')}"
     return (*wrap(source, target), _variable_list(name, points))
@@ -64,7 +64,7 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
         raise ExportError("The document is no TcPlcObject; export it again.")
     pou = child(root, "POU")
     declaration, body = child(pou, "Declaration").text, child(pou, "Implementation/ST").text
-    return take_apart(f"{declaration or ''}\n{body or ''}END_FUNCTION_BLOCK\n")
+    return parse_function_block(f"{declaration or ''}\n{body or ''}END_FUNCTION_BLOCK\n")
 
 
 def _pou(source: BlockSource) -> File:

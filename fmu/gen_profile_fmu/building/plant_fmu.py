@@ -14,7 +14,7 @@ from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.description.fmu_files import SOURCE_FILE, Version, archive, fmu_files, sources
 from gen_profile_fmu.model.contents import Model, plant_model
-from gen_profile_fmu.model.plant_variables import InputKind, Machine
+from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 from gen_profile_fmu.model.variables import VariableTable
 
 
@@ -54,7 +54,7 @@ def plant_fmu(plant: Plant, on_build: Callable[[], None] | None = None) -> Plant
     CosimulationError
         When there is no compiler, it fails, or no cache folder can be written.
     """
-    machine = Machine(plant=plant, parameters=plant.nominal())
+    machine = PlantInstance(plant=plant, parameters=plant.nominal())
     return cached_fmu(plant_model(machine, InputKind.SETPOINT), Version.FMI2, on_build)
 
 

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 from gen_profile_fmu.description.base_units import BASE_UNITS
 from gen_profile_fmu.model.contents import Model
-from gen_profile_fmu.model.variables import Kind, Type, Variable, VariableTable
+from gen_profile_fmu.model.variables import FmuVariable, Kind, Type, VariableTable
 
 _PER_UNIT = {"deg": math.degrees(1.0), "mm": 1e3}  # of an SI unit, whatever it is divided by
 LOG_CATEGORIES = {
@@ -72,7 +72,7 @@ def add_experiment(root: ElementTree.Element, model: Model) -> None:
     )
 
 
-def variable_attributes(reference: int, variable: Variable) -> dict[str, str]:
+def variable_attributes(reference: int, variable: FmuVariable) -> dict[str, str]:
     """Say which variable it is, and what an importer may do with it."""
     kind = variable.kind
     return {
@@ -85,7 +85,7 @@ def variable_attributes(reference: int, variable: Variable) -> dict[str, str]:
     }
 
 
-def value_attributes(variable: Variable) -> dict[str, str]:
+def value_attributes(variable: FmuVariable) -> dict[str, str]:
     """Give unit, bounds and start value."""
     bounds = {"min": variable.lower, "max": variable.upper}
     unit = {"unit": variable.unit} if variable.unit else {}

@@ -15,7 +15,7 @@ from gen_profile_fmu.description.base_units import BASE_UNITS
 from gen_profile_fmu.description.common import to_bytes
 from gen_profile_fmu.description.fmu_files import archive
 from gen_profile_fmu.model.contents import Model
-from gen_profile_fmu.model.variables import Type, Variable
+from gen_profile_fmu.model.variables import FmuVariable, Type
 
 STRUCTURE = "SystemStructure.ssd"
 PARAMETER_SET = "initialValues"  # as others call it, and as Ecos is told to take
@@ -53,7 +53,7 @@ class Component:
         """Path of the FMU's parameters in the archive."""
         return f"resources/{self.model.identifier}.ssv"
 
-    def variables(self, *causalities: str) -> list[Variable]:
+    def variables(self, *causalities: str) -> list[FmuVariable]:
         """List the variables of some causalities."""
         return [v for v in self.model.variables.variables if v.kind.causality in causalities]
 
@@ -118,7 +118,7 @@ def _structure(name: str, profile: Component, plant: Component, step: float) -> 
     return to_bytes(root)
 
 
-def _connectors(component: Component) -> list[Variable]:
+def _connectors(component: Component) -> list[FmuVariable]:
     """List what can be connected, but for the trigger: an input that nothing feeds stops some importers."""
     return [v for v in component.variables("input", "output") if v.name != "trigger"]
 
@@ -170,16 +170,16 @@ def _parameters(component: Component) -> bytes:
     return to_bytes(root)
 
 
-def _type_name(variable: Variable) -> str:
+def _type_name(variable: FmuVariable) -> str:
     return "Real" if variable.type is Type.REAL else "Boolean"
 
 
-def _unit(variable: Variable) -> dict[str, str]:
+def _unit(variable: FmuVariable) -> dict[str, str]:
     """Name a variable's unit, where its base units are known: without them, SSP takes none."""
     return {"unit": variable.unit} if variable.unit in BASE_UNITS else {}
 
 
-def _add_units(units: ElementTree.Element, variables: Iterable[Variable]) -> None:
+def _add_units(units: ElementTree.Element, variables: Iterable[FmuVariable]) -> None:
     for name in sorted({unit for variable in variables for unit in _unit(variable).values()}):
         unit = ElementTree.SubElement(units, "ssc:Unit", name=name)
         exponents = {base: str(exponent) for base, exponent in BASE_UNITS[name].items()}

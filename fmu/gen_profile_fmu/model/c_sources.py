@@ -12,7 +12,7 @@ from gen_profile.motion.profile import Profile
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import Dynamics
 from gen_profile.problem.symbolic import Function
-from gen_profile_fmu.model.variables import DERIVATIVES, STATES, Kind, Type, Variable, VariableTable
+from gen_profile_fmu.model.variables import DERIVATIVES, STATES, FmuVariable, Kind, Type, VariableTable
 
 FOLDER = Path(__file__).parents[1] / "c"
 FEWEST_POWERS = 4  # so that there is a jerk
@@ -104,9 +104,9 @@ typedef struct {{
     Type type;
     Kind kind;
     double start, lower, upper, nominal;
-}} Variable;
+}} FmuVariable;
 
-static const Variable VARIABLES[N_VALUES] = {{
+static const FmuVariable VARIABLES[N_VALUES] = {{
 {_lines(map(_variable_row, table.variables))}
 }};
 
@@ -149,7 +149,7 @@ def _lines(items: Iterable[str]) -> str:
     return ",\n".join(items)
 
 
-def _variable_row(variable: Variable) -> str:
+def _variable_row(variable: FmuVariable) -> str:
     lower = "-DBL_MAX" if variable.lower is None else repr(float(variable.lower))
     upper = "DBL_MAX" if variable.upper is None else repr(float(variable.upper))
     return (

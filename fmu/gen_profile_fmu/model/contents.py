@@ -21,7 +21,7 @@ from gen_profile_fmu.model.dependencies import Structure, plant_structure, profi
 from gen_profile_fmu.model.documentation import motion_page, plant_page, system_page
 from gen_profile_fmu.model.plant_variables import (
     InputKind,
-    Machine,
+    PlantInstance,
     plant_variables,
     profile_variables,
     system_variables,
@@ -82,12 +82,12 @@ def identifier_of(name: str) -> str:
     return re.sub(r"\W|^(?=\d)", "_", name, flags=re.ASCII)
 
 
-def plant_model(machine: Machine, kind: InputKind, name: str | None = None) -> Model:
+def plant_model(machine: PlantInstance, kind: InputKind, name: str | None = None) -> Model:
     """Make the FMU's content of a plant with inputs.
 
     Parameters
     ----------
-    machine : Machine
+    machine : PlantInstance
     kind : InputKind
         What its drives are asked for.
     name : str, optional
@@ -172,13 +172,13 @@ def profile_model(name: str, axes: Sequence[Coordinate], profile: Profile) -> Mo
     )
 
 
-def system_model(name: str, machine: Machine, command: Profile) -> Model:
+def system_model(name: str, machine: PlantInstance, command: Profile) -> Model:
     """Make the FMU's content of a plant whose drives follow a motion.
 
     Parameters
     ----------
     name : str
-    machine : Machine
+    machine : PlantInstance
     command : Profile
         What the drives are asked for.
 

@@ -9,11 +9,11 @@ from html import escape
 
 import numpy as np
 
-from gen_profile.evaluation.simulation import Swing
+from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile_fmu.model.nominals import smooth_move
-from gen_profile_fmu.model.plant_variables import InputKind, Machine
+from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 from gen_profile_fmu.model.variables import VariableTable
 
 _WIDTH, _HEIGHT, _SAMPLES = 640.0, 220.0, 321
@@ -42,7 +42,7 @@ _BEGINNING = (
 )
 
 
-def plant_page(name: str, machine: Machine, table: VariableTable, kind: InputKind) -> str:
+def plant_page(name: str, machine: PlantInstance, table: VariableTable, kind: InputKind) -> str:
     """Describe a plant with inputs, in HTML; its picture is the swing after a quick push."""
     parts = (
         f"<p>{_capital(machine.plant.summary)}.</p>",
@@ -67,7 +67,7 @@ def motion_page(name: str, axes: Sequence[Coordinate], profile: Profile, table: 
     return _page(name, parts)
 
 
-def system_page(name: str, machine: Machine, command: Profile, table: VariableTable) -> str:
+def system_page(name: str, machine: PlantInstance, command: Profile, table: VariableTable) -> str:
     """Describe a plant that follows a motion, in HTML."""
     parts = (
         f"<p>{_capital(machine.plant.summary)}, whose drives follow a motion, behind a first-order lag where "
@@ -121,15 +121,17 @@ def _variables(table: VariableTable) -> str:
     return f"<h2>Variables</h2>\n<table>\n<tr>{head}</tr>\n{rows}\n</table>"
 
 
-def _push(machine: Machine) -> Profile:
+def _push(machine: PlantInstance) -> Profile:
     """Move each axis by a tenth of its unit in 1 s, from rest to rest, from where it starts."""
     start = np.array(machine.position)
     return smooth_move(start.tolist(), (start + 0.1).tolist(), 1.0)
 
 
-def _sway_plot(machine: Machine, profile: Profile, until: float) -> str:
+def _sway_plot(machine: PlantInstance, profile: Profile, until: float) -> str:
     times = np.linspace(0.0, until, _SAMPLES)
-    (response,) = Swing(machine.plant, profile, [machine.parameters], until, machine.initial).at(times)
+    (response,) = PlantSimulation(machine.plant, profile, [machine.parameters], until, machine.initial).at(
+        times
+    )
     return _plot(times, response.sway, machine.plant.loads, "sway in m")
 
 

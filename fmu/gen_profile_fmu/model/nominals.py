@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gen_profile.evaluation.simulation import AT_REST, Swing
+from gen_profile.evaluation.simulation import AT_REST, PlantSimulation
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Plant
 from gen_profile_fmu.model.variables import variable_name
@@ -63,7 +63,7 @@ def state_nominals(
         Its integration would take too many steps.
     """
     times = np.linspace(0.0, motion.duration, _SAMPLES)
-    (seen,) = Swing(plant, motion, [parameters], motion.duration, initial).at(times)
+    (seen,) = PlantSimulation(plant, motion, [parameters], motion.duration, initial).at(times)
     free, driven = [q.name for q in plant.unactuated], [axis.name for axis in plant.actuated]
     sizes = {
         **_sizes(free, seen.q_u),

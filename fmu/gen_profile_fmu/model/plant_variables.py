@@ -13,9 +13,9 @@ from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile_fmu.model.variables import (
     DERIVATIVES,
     STATES,
+    FmuVariable,
     Kind,
     Type,
-    Variable,
     VariableTable,
     require_good_names,
     variable_name,
@@ -25,7 +25,7 @@ TAU = "tau"
 MAX_STEP = "max_step"
 PERIOD = "interpolation_period"
 _STANDING = 1e-9  # m or rad, less than which a motion leads nowhere
-Blocks = dict[str, tuple[Variable, ...]]
+Blocks = dict[str, tuple[FmuVariable, ...]]
 
 
 class InputKind(Enum):
@@ -37,7 +37,7 @@ class InputKind(Enum):
 
 
 @attrs.frozen(kw_only=True)
-class Machine:
+class PlantInstance:
     """A plant with the values it starts from.
 
     Attributes
@@ -70,7 +70,7 @@ class Machine:
         return [0.0] * len(self.plant.actuated)
 
 
-def plant_variables(machine: Machine, kind: InputKind) -> VariableTable:
+def plant_variables(machine: PlantInstance, kind: InputKind) -> VariableTable:
     """List the variables of a plant with inputs.
 
     Raises
@@ -100,7 +100,7 @@ def profile_variables(axes: Sequence[Coordinate], motion: Profile) -> VariableTa
     return table
 
 
-def system_variables(machine: Machine, motion: Profile) -> VariableTable:
+def system_variables(machine: PlantInstance, motion: Profile) -> VariableTable:
     """List the variables of a plant that follows a motion; raises as `plant_variables` does."""
     table = VariableTable(
         blocks={
@@ -116,9 +116,9 @@ def system_variables(machine: Machine, motion: Profile) -> VariableTable:
     return table
 
 
-def _parameters(machine: Machine, kind: InputKind) -> Blocks:
+def _parameters(machine: PlantInstance, kind: InputKind) -> Blocks:
     parameters = tuple(
-        Variable(
+        FmuVariable(
             name=parameter.name,
             description=parameter.description,
             unit=parameter.unit,
@@ -133,9 +133,9 @@ def _parameters(machine: Machine, kind: InputKind) -> Blocks:
     return {"P": parameters, "TAU": lag, "MAX_STEP": (_longest_step(),)}
 
 
-def _lag(tau: float) -> Variable:
+def _lag(tau: float) -> FmuVariable:
     # fixed: position + tau * velocity is the interpolated setpoint only while tau stays as it is
-    return Variable(
+    return FmuVariable(
         name=TAU,
         description="time constant of the drives' first-order lag; 0: ideal drives",
         unit="s",
@@ -145,8 +145,8 @@ def _lag(tau: float) -> Variable:
     )
 
 
-def _longest_step() -> Variable:
-    return Variable(
+def _longest_step() -> FmuVariable:
+    return FmuVariable(
         name=MAX_STEP,
         description="longest integration step in co-simulation (Runge-Kutta, fourth order)",
         unit="s",
@@ -157,14 +157,14 @@ def _longest_step() -> Variable:
     )
 
 
-def _period(period: float, kind: InputKind) -> tuple[Variable, ...]:
+def _period(period: float, kind: InputKind) -> tuple[FmuVariable, ...]:
     words = {
         InputKind.SETPOINT: "in which drives go on to a setpoint",
         InputKind.VELOCITY: "for which ideal drives hold a velocity",
     }
     if kind not in words:
         return ()
-    period_variable = Variable(
+    period_variable = FmuVariable(
         name=PERIOD,
         description=f"time {words[kind]}, in model exchange; in co-simulation, the step",
         unit="s",
@@ -192,10 +192,10 @@ def _way(axes: Sequence[Coordinate], motion: Profile) -> Blocks:
 
 def _per_axis(
     axes: Sequence[Coordinate], suffix: str, description: str, order: int, kind: Kind
-) -> tuple[Variable, ...]:
+) -> tuple[FmuVariable, ...]:
     """List a quantity of every axis; `order` is that of the time derivative."""
     return tuple(
-        Variable(
+        FmuVariable(
             name=f"{axis.name}.{suffix}", description=description, unit=_unit(axis.unit, order), kind=kind
         )
         for axis in axes
@@ -206,14 +206,14 @@ def _unit(unit: str, order: int) -> str:
     return (unit, f"{unit}/s", f"{unit}/s^2", f"{unit}/s^3")[order]
 
 
-def _at(position: Iterable[float], variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+def _at(position: Iterable[float], variables: tuple[FmuVariable, ...]) -> tuple[FmuVariable, ...]:
     return tuple(
         attrs.evolve(variable, start=float(start))
         for variable, start in zip(variables, position, strict=True)
     )
 
 
-def _inputs(machine: Machine, kind: InputKind) -> tuple[Variable, ...]:
+def _inputs(machine: PlantInstance, kind: InputKind) -> tuple[FmuVariable, ...]:
     axes = machine.plant.actuated
     match kind:
         case InputKind.ACCELERATION:
@@ -225,7 +225,7 @@ def _inputs(machine: Machine, kind: InputKind) -> tuple[Variable, ...]:
             return _at(machine.position, _per_axis(axes, "setpoint", words, 0, Kind.INPUT))
 
 
-def _states_and_outputs(machine: Machine) -> Blocks:
+def _states_and_outputs(machine: PlantInstance) -> Blocks:
     blocks = _of_plant(machine)
     sized = {
         block: tuple(
@@ -236,7 +236,7 @@ def _states_and_outputs(machine: Machine) -> Blocks:
     return {**blocks, **sized}
 
 
-def _of_plant(machine: Machine) -> Blocks:
+def _of_plant(machine: PlantInstance) -> Blocks:
     plant, axes = machine.plant, machine.plant.actuated
     accelerations = _per_axis(axes, "velocity", "acceleration of the axis", 2, Kind.DERIVATIVE)
     velocities = _per_axis(axes, "position", "velocity of the axis", 1, Kind.DERIVATIVE)
@@ -261,14 +261,16 @@ def _of_plant(machine: Machine) -> Blocks:
     }
 
 
-def _swinging(initial: Mapping[str, float], states: tuple[Variable, ...]) -> tuple[Variable, ...]:
+def _swinging(initial: Mapping[str, float], states: tuple[FmuVariable, ...]) -> tuple[FmuVariable, ...]:
     started = {variable_name(name): value for name, value in initial.items()}
     return tuple(attrs.evolve(state, start=started.get(state.name, 0.0)) for state in states)
 
 
-def _unactuated(plant: Plant, pattern: str, description: str, order: int, kind: Kind) -> tuple[Variable, ...]:
+def _unactuated(
+    plant: Plant, pattern: str, description: str, order: int, kind: Kind
+) -> tuple[FmuVariable, ...]:
     return tuple(
-        Variable(
+        FmuVariable(
             name=pattern.format(coordinate.name),
             description=description,
             unit=_unit(coordinate.unit, order),
@@ -280,9 +282,9 @@ def _unactuated(plant: Plant, pattern: str, description: str, order: int, kind: 
 
 def _of_loads(
     plant: Plant, quantity: str, unit: str, description: str, display_unit: str
-) -> tuple[Variable, ...]:
+) -> tuple[FmuVariable, ...]:
     return tuple(
-        Variable(
+        FmuVariable(
             name=f"{quantity}.{load}",
             description=description,
             unit=unit,
@@ -295,7 +297,7 @@ def _of_loads(
 
 def _of_bodies(plant: Plant) -> Blocks:
     places = tuple(
-        Variable(name=f"position.{body}.{direction}", description=words, unit="m", kind=Kind.OUTPUT)
+        FmuVariable(name=f"position.{body}.{direction}", description=words, unit="m", kind=Kind.OUTPUT)
         for body in plant.bodies
         for direction, words in (
             ("x", "where the load is, horizontally"),
@@ -304,15 +306,15 @@ def _of_bodies(plant: Plant) -> Blocks:
         )
     )
     words = "mechanical energy of all loads: kinetic, of springs, and of weight, from the suspension point on"
-    energy = Variable(name="energy", description=words, unit="J", kind=Kind.OUTPUT)
+    energy = FmuVariable(name="energy", description=words, unit="J", kind=Kind.OUTPUT)
     return {"PLACE": places, "ENERGY": (energy,) if plant.bodies else ()}
 
 
 def _trigger() -> Blocks:
-    def boolean(name: str, description: str, kind: Kind) -> tuple[Variable, ...]:
-        return (Variable(name=name, description=description, unit="", kind=kind, type=Type.BOOLEAN),)
+    def boolean(name: str, description: str, kind: Kind) -> tuple[FmuVariable, ...]:
+        return (FmuVariable(name=name, description=description, unit="", kind=kind, type=Type.BOOLEAN),)
 
-    start = Variable(
+    start = FmuVariable(
         name="start_time",
         description="time before which the motion does not begin",
         unit="s",
@@ -338,8 +340,8 @@ def _command(axes: Sequence[Coordinate]) -> Blocks:
     }
 
 
-def _time() -> Variable:
-    return Variable(name="time", description="simulation time", unit="s", kind=Kind.INDEPENDENT)
+def _time() -> FmuVariable:
+    return FmuVariable(name="time", description="simulation time", unit="s", kind=Kind.INDEPENDENT)
 
 
 def _check_names(plant: Plant, table: VariableTable) -> None:

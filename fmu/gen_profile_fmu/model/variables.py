@@ -62,7 +62,7 @@ def variable_name(name: str) -> str:
 
 
 @attrs.frozen(kw_only=True)
-class Variable:
+class FmuVariable:
     """A scalar variable.
 
     Attributes
@@ -103,14 +103,14 @@ class VariableTable:
 
     Attributes
     ----------
-    blocks : dict of str to tuple of Variable
+    blocks : dict of str to tuple of FmuVariable
         By the block's name in the C code (``P``, ``Q_U`` …); a block may be empty.
     """
 
-    blocks: dict[str, tuple[Variable, ...]]
+    blocks: dict[str, tuple[FmuVariable, ...]]
 
     @property
-    def variables(self) -> tuple[Variable, ...]:
+    def variables(self) -> tuple[FmuVariable, ...]:
         """All variables, a variable's index being its value reference."""
         return tuple(variable for block in self.blocks.values() for variable in block)
 

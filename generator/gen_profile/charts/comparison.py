@@ -12,7 +12,7 @@ from gen_profile.charts.curves import end_load_sway
 from gen_profile.charts.figure import HEADROOM, Style
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.charts.picture import in_ink, picture
-from gen_profile.comparison.compare import Comparison, Row
+from gen_profile.comparison.compare import ComparedMethod, Comparison
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.phrases import machine, number
 from gen_profile.evaluation.scenarios import extremes
@@ -61,9 +61,9 @@ def _places(figure: Any, machines: int) -> list[Any]:
     return [axes[name] for name in (*left, *dict.fromkeys(right), "residuals")]
 
 
-def _times(row: Row) -> Array:
-    duration = row.trial.motion.duration
-    return np.linspace(0.0, duration + min(AFTERMATH * duration, row.trial.watch), SAMPLES)
+def _times(row: ComparedMethod) -> Array:
+    duration = row.evaluation.motion.duration
+    return np.linspace(0.0, duration + min(AFTERMATH * duration, row.evaluation.watch), SAMPLES)
 
 
 def _reference(axes: Sequence[Any], comparison: Comparison, styles: Styles) -> None:
@@ -71,8 +71,8 @@ def _reference(axes: Sequence[Any], comparison: Comparison, styles: Styles) -> N
     first = comparison.spec.machine().actuated[0]
     for order, (axis, label) in enumerate(zip(axes, ORDERS, strict=True)):
         for row in comparison.rows:
-            times = np.linspace(0.0, row.trial.motion.duration, SAMPLES)
-            values = row.trial.motion.derivative(times, order)[:, 0]
+            times = np.linspace(0.0, row.evaluation.motion.duration, SAMPLES)
+            values = row.evaluation.motion.derivative(times, order)[:, 0]
             axis.plot(times, values, label=row.method, **in_ink(styles[row.method]))
         axis.set(ylabel=f"{first.name} " + label.format(first.unit), xlabel="time (s)")
         _dress(axis)
@@ -80,11 +80,11 @@ def _reference(axes: Sequence[Any], comparison: Comparison, styles: Styles) -> N
 
 def _spectrum(axis: Any, comparison: Comparison, styles: Styles) -> None:
     """Draw the spectrum of the acceleration, and where the machines' natural frequencies lie (figure 3)."""
-    natural = natural_frequencies(comparison.spec, comparison.rows[0].trial.machines)
+    natural = natural_frequencies(comparison.spec, comparison.rows[0].evaluation.machines)
     frequencies = natural.span(FREQUENCIES)
     highest = 0.0
     for row in comparison.rows:
-        magnitude = spectrum(row.trial.motion, frequencies)
+        magnitude = spectrum(row.evaluation.motion, frequencies)
         highest = max(highest, float(magnitude.max()))
         axis.semilogy(frequencies, magnitude, **in_ink(styles[row.method]))
     for low, high in zip(natural.lowest, natural.highest, strict=True):
@@ -107,13 +107,13 @@ def _sway(axes: Sequence[Any], comparison: Comparison, styles: Styles) -> None:
     spec = comparison.spec
     for row in comparison.rows:
         times = _times(row)
-        responses = row.trial.swing.at(times)
+        responses = row.evaluation.swing.at(times)
         for axis, index in zip(axes, extremes(spec), strict=True):
             sway = 1e3 * end_load_sway(spec, responses[index])
             axis.plot(times, sway, label=row.method, **in_ink(styles[row.method]))
-    machines = comparison.rows[0].trial.machines
+    machines = comparison.rows[0].evaluation.machines
     for axis, index in zip(axes, extremes(spec), strict=True):
-        for duration in {row.trial.motion.duration for row in comparison.rows}:
+        for duration in {row.evaluation.motion.duration for row in comparison.rows}:
             axis.axvline(duration, color="0.7", linewidth=0.8, zorder=0)
         who = machine(machines[index].name) if index else "nominal machine"
         axis.set(ylabel=f"{spec.machine().end_load_name} sway (mm)", xlabel="time (s)")

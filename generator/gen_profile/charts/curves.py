@@ -10,8 +10,8 @@ import numpy as np
 from gen_profile.charts.figure import PALETTE, PLAIN, Band, Figure, Level, Line, Panel, Style
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.comparison.candidates import own_method
-from gen_profile.comparison.compare import Comparison, Row
-from gen_profile.evaluation.motion_evaluation import Trial
+from gen_profile.comparison.compare import ComparedMethod, Comparison
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import machine, place_unit
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES
 from gen_profile.evaluation.scenarios import extremes
@@ -35,7 +35,7 @@ FOLLOWED = Style(colour=PALETTE[1], dash="dash")
 
 @attrs.frozen(kw_only=True)
 class Shown:
-    """One of the trial's machines, as it is drawn; the nominal one has rank 0, the worst one rank 1."""
+    """One of the evaluation's machines, as it is drawn; the nominal one has rank 0, the worst one rank 1."""
 
     index: int
     rank: int
@@ -43,34 +43,34 @@ class Shown:
     style: Style
 
 
-def cast(trial: Trial) -> list[Shown]:
+def select_machines(evaluation: MotionEvaluation) -> list[Shown]:
     """Choose the nominal machine and those that leave the most sway, in the check's order."""
-    duration = trial.motion.duration
-    after = trial.swing.at(np.linspace(duration, duration + trial.watch, RESIDUAL_SAMPLES))
-    end_load = trial.swing.plant.end_load
+    duration = evaluation.motion.duration
+    after = evaluation.swing.at(np.linspace(duration, duration + evaluation.watch, RESIDUAL_SAMPLES))
+    end_load = evaluation.swing.plant.end_load
     residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in after]
     by_rank = [0, *sorted(range(1, len(residuals)), key=lambda index: -residuals[index])][: TWINS + 1]
     return [
         Shown(
             index=index,
             rank=by_rank.index(index),
-            name=machine(trial.machines[index].name),
+            name=machine(evaluation.machines[index].name),
             style=Style(colour=colour, width=1.3 if index else 2.2),
         )
         for index, colour in zip(sorted(by_rank), PALETTE, strict=False)
     ]
 
 
-def motion_figure(spec: Spec, trial: Trial) -> Figure:
+def motion_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
     """Draw what the drives are asked for, and its derivatives, with limits that are near."""
-    lagging = trial.command is not trial.motion
+    lagging = evaluation.command is not evaluation.motion
     panels = []
     for column, axis in enumerate(spec.machine().actuated):
         place, factor = place_unit(spec, column)
         for order, (quantity, unit) in enumerate(ORDERS):
-            lines = [_derivative("command", trial.command, order, column)]
+            lines = [_derivative("command", evaluation.command, order, column)]
             if lagging:
-                lines.append(_derivative("motion of the axis", trial.motion, order, column, FOLLOWED))
+                lines.append(_derivative("motion of the axis", evaluation.motion, order, column, FOLLOWED))
             greatest = max(float(np.abs(line.y).max()) for line in lines)
             levels = tuple(_limits(spec, column, order, NEAR * greatest))
             if order == 0:
@@ -92,9 +92,9 @@ def motion_figure(spec: Spec, trial: Trial) -> Figure:
     )
 
 
-def spectrum_figure(spec: Spec, trial: Trial) -> Figure:
+def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
     """Draw the spectrum of the acceleration over the natural frequencies of all machines."""
-    natural = natural_frequencies(spec, trial.machines)
+    natural = natural_frequencies(spec, evaluation.machines)
     if natural.varying:
         meaning = "They are those at the target, and others on the way: this does not tell what is left."
     elif any(spec.move.initial.values()):
@@ -103,15 +103,15 @@ def spectrum_figure(spec: Spec, trial: Trial) -> Figure:
         meaning = "The less the motion holds there, the less the loads swing on."
     return Figure(
         caption=f"Dotted: natural frequencies of the nominal machine; shaded: those of the others. {meaning}",
-        panels=[_spectrum(spec, trial, {"motion": trial.motion}, {"motion": PLAIN})],
+        panels=[_spectrum(spec, evaluation, {"motion": evaluation.motion}, {"motion": PLAIN})],
     )
 
 
-def sway_figure(spec: Spec, trial: Trial, shown: Sequence[Shown], arrival: float) -> Figure:
+def sway_figure(spec: Spec, evaluation: MotionEvaluation, shown: Sequence[Shown], arrival: float) -> Figure:
     """Draw the sway of every load on the nominal machine and on perturbed ones."""
-    times = np.linspace(0.0, trial.motion.duration + trial.watch, SAMPLES)
-    responses = trial.swing.at(times)
-    left_out = len(trial.machines) - len(shown)
+    times = np.linspace(0.0, evaluation.motion.duration + evaluation.watch, SAMPLES)
+    responses = evaluation.swing.at(times)
+    left_out = len(evaluation.machines) - len(shown)
     more = f" {left_out} machines that sway less after the move are not drawn." if left_out else ""
     return Figure(
         caption=f"Dotted: the arrival. Dashed in red: what is allowed from then on.{more}",
@@ -145,14 +145,14 @@ def other_methods(comparison: Comparison) -> Figure:
             x_label=TIME,
             y_label=f"{quantity.lower()} ({unit.format(first.unit)})",
             lines=[
-                _derivative(row.method, row.trial.motion, order, 0, styles[row.method], COMPARED)
+                _derivative(row.method, row.evaluation.motion, order, 0, styles[row.method], COMPARED)
                 for row in rows
             ],
         )
         for order, (quantity, unit) in enumerate(ORDERS)
     ]
-    motions = {row.method: row.trial.motion for row in rows}
-    panels.append(_spectrum(spec, rows[0].trial, motions, styles))
+    motions = {row.method: row.evaluation.motion for row in rows}
+    panels.append(_spectrum(spec, rows[0].evaluation, motions, styles))
     return Figure(
         caption=(
             "Optimal motions solid, shapers dashed, extra-insensitive ones dotted. "
@@ -165,8 +165,8 @@ def other_methods(comparison: Comparison) -> Figure:
 def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Panel]:
     """Draw the end load under every method, on the nominal machine and on those with all parameters off."""
     spec, rows = comparison.spec, comparison.rows
-    plant, last = spec.machine(), max(row.trial.motion.duration for row in rows)
-    seen = {row.method: row.trial.swing.at(_until(row)) for row in rows}
+    plant, last = spec.machine(), max(row.evaluation.motion.duration for row in rows)
+    seen = {row.method: row.evaluation.swing.at(_until(row)) for row in rows}
     allowed = 1e3 * spec.check.residual_sway[plant.loads[-1]]
     signs = (1.0, -1.0) if plant.directions == 1 else (1.0,)  # the sway in two directions is a length
     for index in extremes(spec):
@@ -181,7 +181,7 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
         ]
         end = max(float(line.x[-1]) for line in lines)
         yield Panel(
-            title=f"Sway of the {plant.end_load_name}, {machine(rows[0].trial.machines[index].name)}",
+            title=f"Sway of the {plant.end_load_name}, {machine(rows[0].evaluation.machines[index].name)}",
             x_label=TIME,
             y_label="sway (mm)",
             lines=lines,
@@ -243,8 +243,10 @@ def _limits(spec: Spec, column: int, order: int, near: float) -> Iterator[Level]
             yield Level(value=value)
 
 
-def _spectrum(spec: Spec, trial: Trial, motions: Mapping[str, Profile], styles: Mapping[str, Style]) -> Panel:
-    first, natural = spec.machine().actuated[0], natural_frequencies(spec, trial.machines)
+def _spectrum(
+    spec: Spec, evaluation: MotionEvaluation, motions: Mapping[str, Profile], styles: Mapping[str, Style]
+) -> Panel:
+    first, natural = spec.machine().actuated[0], natural_frequencies(spec, evaluation.machines)
     frequencies = natural.span(FREQUENCIES)
     ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
     return Panel(
@@ -277,6 +279,6 @@ def compared_styles(comparison: Comparison) -> dict[str, Style]:
     return {method: attrs.evolve(style, shown=method in shown) for method, style in styles.items()}
 
 
-def _until(row: Row) -> Array:
-    duration = row.trial.motion.duration
-    return np.linspace(0.0, duration + row.trial.watch, COMPARED)
+def _until(row: ComparedMethod) -> Array:
+    duration = row.evaluation.motion.duration
+    return np.linspace(0.0, duration + row.evaluation.watch, COMPARED)

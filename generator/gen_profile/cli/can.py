@@ -15,7 +15,7 @@ from gen_profile.errors import SpecError
 if TYPE_CHECKING:
     from gen_profile_exporters.can.host.detection import Channel
     from gen_profile_exporters.can.host.port import Port
-    from gen_profile_exporters.can.streaming.discovery import Node
+    from gen_profile_exporters.can.streaming.discovery import IdentifiedNode
 
 
 @cli.group(epilog="Example: gen-profile can list")
@@ -72,7 +72,7 @@ def list_(interface: str | None, channel: str | None, bitrate: int, as_json: boo
     print_outcome(document, "\n".join(lines), as_json)
 
 
-def _nodes(port: Port, bitrate: int) -> tuple[Node, ...]:
+def _nodes(port: Port, bitrate: int) -> tuple[IdentifiedNode, ...]:
     from gen_profile.streaming.stream import require_extra
 
     require_extra()
@@ -84,7 +84,7 @@ def _nodes(port: Port, bitrate: int) -> tuple[Node, ...]:
         return discover(Link(bus, SystemClock()))
 
 
-def _told(node: Node) -> dict[str, Any]:
+def _told(node: IdentifiedNode) -> dict[str, Any]:
     return {
         "node": node.number,
         "name": node.name,
@@ -111,7 +111,7 @@ def _interface_words(found: dict[str, tuple[Channel, ...]]) -> Iterator[str]:
         yield f"  {name}: {detection.needs(name)}"
 
 
-def _node_words(nodes: tuple[Node, ...], where: str) -> Iterator[str]:
+def _node_words(nodes: tuple[IdentifiedNode, ...], where: str) -> Iterator[str]:
     if not nodes:
         yield f"No node answers on {where}: check power, cabling, termination, bit rate and node ids."
         return

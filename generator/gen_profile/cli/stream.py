@@ -24,7 +24,7 @@ from gen_profile.errors import OutputError, SpecError, StreamAborted
 
 if TYPE_CHECKING:
     from gen_profile.progress import Progress
-    from gen_profile.streaming.outcome import Outcome, Source
+    from gen_profile.streaming.outcome import Source, StreamOutcome
     from gen_profile_exporters.can.host.lateness import Lateness
     from gen_profile_exporters.can.host.port import Port
 
@@ -181,7 +181,7 @@ def drive_sim(
     from gen_profile_exporters.can.simulation import drive_dictionary
 
     spec = chosen_spec(spec_path, preset, overrides)
-    make = drive_dictionary.Make(miss=miss, own_mapping=own_mapping)
+    make = drive_dictionary.DriveVariant(miss=miss, own_mapping=own_mapping)
     if eds is not None:
         deliver(eds, drive_dictionary.eds(spec.can.node, make, eds.name).encode("utf-8"))
         return
@@ -212,7 +212,7 @@ for parameter in stream.params:
         parameter.metavar = "[ARTEFACT|SPEC.toml]"
 
 
-def _conclude(outcome: Outcome, table: Path | None, as_json: bool) -> None:
+def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None:
     """Report what became of a stream, by every way that still takes it, and end in the exit code of that."""
     import attrs
 
@@ -236,7 +236,7 @@ def _conclude(outcome: Outcome, table: Path | None, as_json: bool) -> None:
         sys.exit(code)
 
 
-def _aborted(outcome: Outcome) -> str:
+def _aborted(outcome: StreamOutcome) -> str:
     return f"Stream aborted: {outcome.record.reason}"
 
 
@@ -359,7 +359,7 @@ def _lateness_words(late: Lateness) -> str:
     return f"half below {half}, 99 % below {most}, all below {all_}"
 
 
-def _outcome_words(outcome: Outcome) -> str:
+def _outcome_words(outcome: StreamOutcome) -> str:
     from gen_profile.evaluation.phrases import mm, number
 
     told, late = outcome.to_dict(), outcome.record.lateness

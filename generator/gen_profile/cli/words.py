@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from gen_profile.report.build import Report
     from gen_profile.spec.model import Spec
     from gen_profile.sweep.library import Library
-    from gen_profile.sweep.lookup import Found
+    from gen_profile.sweep.lookup import LookupResult
     from gen_profile.sweep.run import Sweep
     from gen_profile.verification.check import Judgement
     from gen_profile.verification.verdict import Check
@@ -246,7 +246,7 @@ def sweep(done: Sweep) -> str:
     return _block(done.store.name, [*rows, ("wrote", str(done.table))])
 
 
-def found_profile(found: Found) -> str:
+def found_profile(found: LookupResult) -> str:
     """Tell which profile is nearest, and what it costs to use it."""
     expected, designed = found.sway
     costs = [f"{key} {value:+g}" for key, value in found.costs.items() if value]
@@ -316,7 +316,7 @@ def _peaks(outcome: Design) -> list[tuple[str, str]]:
     from gen_profile.motion.metrics import greatest
 
     kind = "peak motion" if outcome.spec.actuator.tau is None else "peak command"
-    axes, command = outcome.spec.machine().actuated, outcome.plan.trial.command
+    axes, command = outcome.spec.machine().actuated, outcome.plan.evaluation.command
     rows = []
     for index, axis in enumerate(axes):
         powers = zip((1, 2, 3), ("s", "s²", "s³"), strict=True)

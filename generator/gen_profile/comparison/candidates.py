@@ -32,7 +32,7 @@ ROBUST: dict[str, Mapping[str, Any]] = {
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Contender:
+class Candidate:
     """A method that takes part.
 
     Attributes
@@ -57,7 +57,7 @@ def own_method(spec: Spec) -> str:
     return "optimal" if spec.cost.sway_scale is None else f"optimal-beta{spec.cost.sway_weight:g}"
 
 
-def contenders(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Contender]:
+def candidates(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Candidate]:
     """List shapers, then optimal motions, then motions that were made elsewhere.
 
     Parameters
@@ -69,25 +69,25 @@ def contenders(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Contender]:
         Each of a ``method`` of its own.
     """
     for name in SHAPERS:
-        yield Contender(method=name, design=partial(shaped_motion, spec, name))
+        yield Candidate(method=name, design=partial(shaped_motion, spec, name))
     if spec.solver.shaper is not None:
         spec = attrs.evolve(spec, solver=attrs.evolve(spec.solver, method="auto"))
     yield from _optimal_contenders(spec)
     for motion in own:
-        yield Contender(method=motion.method, design=partial(_given, motion))
+        yield Candidate(method=motion.method, design=partial(_given, motion))
 
 
-def _optimal_contenders(spec: Spec) -> Iterator[Contender]:
+def _optimal_contenders(spec: Spec) -> Iterator[Candidate]:
     once = cache(partial(timed, spec))  # the shortest duration does not depend on β
     of_spec = cache(partial(_attempt, once))
     weight = spec.cost.sway_weight
     for other in sorted({*SWAY_WEIGHTS, weight}):
         name = own_method(spec) if other == weight else f"optimal-beta{other:g}"
         design = partial(_result, of_spec) if other == weight else partial(_weighed, once, other)
-        yield Contender(method=name, design=design, requirements="the spec's own")
+        yield Candidate(method=name, design=design, requirements="the spec's own")
     for kind, keys in _other_robustness(spec).items():
         robust = attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, **keys))
-        yield Contender(method=f"optimal-{kind}", design=partial(_optimal_within, robust, of_spec))
+        yield Candidate(method=f"optimal-{kind}", design=partial(_optimal_within, robust, of_spec))
 
 
 def _given(motion: Profile) -> Profile:

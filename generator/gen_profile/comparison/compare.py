@@ -7,10 +7,10 @@ from typing import Any
 
 import attrs
 
-from gen_profile.comparison.candidates import Contender, contenders
+from gen_profile.comparison.candidates import Candidate, candidates
 from gen_profile.comparison.recommendation import Recommendation, efficient, recommend
 from gen_profile.errors import GenProfileError, InfeasibleProblem
-from gen_profile.evaluation.motion_evaluation import Trial, evaluate, keeps_residual_sway
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, keeps_residual_sway
 from gen_profile.evaluation.phrases import mm
 from gen_profile.motion.profile import Profile
 from gen_profile.progress import Progress, untold
@@ -18,20 +18,20 @@ from gen_profile.spec.model import Spec
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Row:
+class ComparedMethod:
     """A method that has a motion for the move.
 
     Attributes
     ----------
     method : str
-    trial : Trial
+    evaluation : MotionEvaluation
     figures : dict of str to float
     safe : bool
         Whether every load keeps its limit of residual sway on all machines.
     """
 
     method: str
-    trial: Trial
+    evaluation: MotionEvaluation
     figures: dict[str, float]
     safe: bool
 
@@ -43,7 +43,7 @@ class Comparison:
     Attributes
     ----------
     spec : Spec
-    rows : tuple of Row
+    rows : tuple of ComparedMethod
     left_out : dict of str to str
         Methods without a motion for the move, and why.
     efficient : frozenset of str
@@ -53,7 +53,7 @@ class Comparison:
     """
 
     spec: Spec
-    rows: tuple[Row, ...]
+    rows: tuple[ComparedMethod, ...]
     left_out: dict[str, str]
     efficient: frozenset[str]
     recommended: dict[str, Recommendation]
@@ -90,10 +90,10 @@ def compare(spec: Spec, progress: Progress = untold, *, own: Sequence[Profile] =
     own : sequence of Profile
         Further motions of the axes, each of a ``method`` of its own.
     """
-    rows: list[Row] = []
+    rows: list[ComparedMethod] = []
     left_out: dict[str, str] = {}
     impossible: dict[str, str] = {}
-    listed = tuple(contenders(spec, own))
+    listed = tuple(candidates(spec, own))
     for done, contender in enumerate(listed):
         progress("comparing", done, len(listed), contender.method)
         try:
@@ -120,13 +120,13 @@ def compare(spec: Spec, progress: Progress = untold, *, own: Sequence[Profile] =
     )
 
 
-def _row(spec: Spec, contender: Contender) -> Row:
-    trial = evaluate(spec, contender.design())
-    return Row(
+def _row(spec: Spec, contender: Candidate) -> ComparedMethod:
+    evaluation = evaluate(spec, contender.design())
+    return ComparedMethod(
         method=contender.method,
-        trial=trial,
-        figures=trial.figures,
-        safe=keeps_residual_sway(spec, trial),
+        evaluation=evaluation,
+        figures=evaluation.figures,
+        safe=keeps_residual_sway(spec, evaluation),
     )
 
 

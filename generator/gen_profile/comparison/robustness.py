@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.comparison.candidates import contenders
+from gen_profile.comparison.candidates import candidates
 from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.motion.profile import Array, Profile, grid_length, grid_times, read_only
@@ -157,7 +157,7 @@ def robustness(
     errors = error_grid(spec, parameters, points, half_range)
     motions: dict[str, Profile] = {}
     left_out: dict[str, str] = {}
-    listed = {contender.method: contender for contender in contenders(spec, own)}
+    listed = {contender.method: contender for contender in candidates(spec, own)}
     for method in methods:
         if method not in listed:
             raise SpecError(f"--method {method[:60]}: unknown method{suggestion(method, list(listed))}")

@@ -15,14 +15,14 @@ from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_m
 from gen_profile.artefacts.writing import Staging, staged
 from gen_profile.designs.plan import Plan, plan
 from gen_profile.errors import OutputError
-from gen_profile.evaluation.motion_evaluation import Trial
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec.model import Spec
 from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
-from gen_profile.verification.external_fmu import judge_foreign
+from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import with_further
 from gen_profile.verification.verdict import Check
 from gen_profile.verification.worst_machines import worst_machines
@@ -156,7 +156,7 @@ def design(
     spec = planned.spec
     with staged(folder) as staging:
         progress("exporting")
-        artefacts, replayed = _export(spec, planned.trial.command, exporters, staging)
+        artefacts, replayed = _export(spec, planned.evaluation.command, exporters, staging)
         worst = _check(spec, planned, replayed, progress) if check else None
         _accompany(spec, staging)
         manifest = _manifest(spec, planned, artefacts, worst)
@@ -205,28 +205,32 @@ def _export(
 def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progress: Progress) -> Check:
     """Judge all artefacts against the continuous motion, and keep the verdict on the worst."""
     progress("checking by co-simulation")
-    machines = planned.trial.machines
+    machines = planned.evaluation.machines
     further = further_scenarios(spec, machines)
     checks = []
     for setpoints in replayed:
         worst = worst_machines(spec, setpoints, [*machines, *further], _compiling(progress))
         rows = [*machines, *further, *worst.machines]
         if spec.check.foreign is not None:
-            check = judge_foreign(spec, spec.check.foreign, setpoints, rows)
+            check = judge_external(spec, spec.check.foreign, setpoints, rows)
         else:
-            check = _judged(spec, planned.trial, setpoints, rows, progress)
+            check = _judged(spec, planned.evaluation, setpoints, rows, progress)
         checks.append(attrs.evolve(check, searched=worst.tried))
     return max(checks, key=lambda check: check.demand)
 
 
 def _judged(
-    spec: Spec, trial: Trial, setpoints: SampledProfile, rows: Sequence[Scenario], progress: Progress
+    spec: Spec,
+    evaluation: MotionEvaluation,
+    setpoints: SampledProfile,
+    rows: Sequence[Scenario],
+    progress: Progress,
 ) -> Check:
-    """Judge one artefact in all its scenarios, of which the trial's machines are the first."""
+    """Judge one artefact in all its scenarios, of which the evaluation's machines are the first."""
     machines = [row for row in rows if row.followed]
     spacing = sample_spacing(spec, setpoints)
     found = cosimulate(spec, setpoints, machines, output_step=spacing, on_build=_compiling(progress))
-    expected = trial.followed(found[0].times, machines[len(trial.machines) :])
+    expected = evaluation.followed(found[0].times, machines[len(evaluation.machines) :])
     return with_further(
         spec,
         setpoints,
@@ -245,7 +249,7 @@ def _manifest(spec: Spec, planned: Plan, artefacts: tuple[Artefact, ...], check:
         name=spec.name,
         spec=spec.to_dict(),
         spec_sha256=spec.sha256(),
-        profile_sha256=planned.trial.command.payload_hash(),
+        profile_sha256=planned.evaluation.command.payload_hash(),
         versions={library: version(library) for library in LIBRARIES},
         artefacts=artefacts,
         check=None if check is None else check.to_dict(),

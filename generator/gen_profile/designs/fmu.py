@@ -30,7 +30,7 @@ from gen_profile_fmu.model.contents import (
     system_model,
 )
 from gen_profile_fmu.model.nominals import smooth_move, state_nominals
-from gen_profile_fmu.model.plant_variables import InputKind, Machine
+from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
 KINDS = ("plant", "profile", "system", "ssp")
@@ -137,15 +137,15 @@ def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Progress) -> 
     name = identifier_of(f"{spec.name} {kind}")
     if kind == "plant":
         return plant_model(_machine(spec, _rough_nominals(spec)), input_kind, name)
-    trial = plan(spec, progress=progress).trial
+    evaluation = plan(spec, progress=progress).evaluation
     if kind == "profile":
-        return profile_model(name, spec.machine().actuated, trial.command)
-    return system_model(name, _machine(spec, _nominals(spec, trial.motion)), trial.command)
+        return profile_model(name, spec.machine().actuated, evaluation.command)
+    return system_model(name, _machine(spec, _nominals(spec, evaluation.motion)), evaluation.command)
 
 
-def _machine(spec: Spec, nominal: Mapping[str, float]) -> Machine:
+def _machine(spec: Spec, nominal: Mapping[str, float]) -> PlantInstance:
     move = spec.move
-    return Machine(
+    return PlantInstance(
         plant=spec.machine(),
         parameters=spec.plant.parameters,
         tau=spec.actuator.tau or 0.0,

@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import InfeasibleProblem, LimitViolation, SolverDiverged
-from gen_profile.evaluation.motion_evaluation import Trial, evaluate, keeps_residual_sway
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, keeps_residual_sway
 from gen_profile.motion.profile import Profile, grid_length, grid_times
 from gen_profile.problem.limits import breaches, rounded_up
 from gen_profile.problem.linearization import linearize
@@ -43,7 +43,7 @@ class Plan:
         What the solver found; None where a shaper made the motion.
     solver_time : float
         s.
-    trial : Trial
+    evaluation : MotionEvaluation
         Of the motion.
     figures : dict of str to float
     """
@@ -51,18 +51,18 @@ class Plan:
     spec: Spec
     solution: Solution | None
     solver_time: float
-    trial: Trial
+    evaluation: MotionEvaluation
     figures: dict[str, float]
 
     @property
     def motion(self) -> Profile:
         """Of the axes."""
-        return self.trial.motion
+        return self.evaluation.motion
 
     @property
     def command(self) -> Profile:
         """Setpoints of the drives, which is the motion itself where they are ideal."""
-        return self.trial.command
+        return self.evaluation.command
 
 
 def timed(spec: Spec, progress: Progress = untold) -> Spec:
@@ -161,15 +161,15 @@ def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold
     except OutOfWork:
         choice.given_up(problem_of(spec)).raise_for_status()
         raise
-    trial = evaluate(spec, motion)
-    found = trial.figures
-    broken = breaches(spec.limits, trial.command, found["sway_transient_peak_m"])
+    evaluation = evaluate(spec, motion)
+    found = evaluation.figures
+    broken = breaches(spec.limits, evaluation.command, found["sway_transient_peak_m"])
     if broken:
         sentences = [breach.sentence() for breach in broken]
         progress(EXPLAINING)
         cure = choice.remedy(problem_of(spec), spec.solver.solver, partial(_is_calm, spec))
         raise LimitViolation("\n".join([*sentences, cure]).strip())
-    return Plan(spec=spec, solution=solution, solver_time=solver_time, trial=trial, figures=found)
+    return Plan(spec=spec, solution=solution, solver_time=solver_time, evaluation=evaluation, figures=found)
 
 
 def _designed(spec: Spec, near: Trajectory | None, progress: Progress) -> tuple[Solution | None, Profile]:
@@ -179,5 +179,5 @@ def _designed(spec: Spec, near: Trajectory | None, progress: Progress) -> tuple[
     attempt = choice.attempt(problem_of(spec), spec.solver.solver, near)
     if attempt.optimum is None:
         progress(EXPLAINING)
-    solution = choice.explained(attempt, spec.solver.solver, partial(_is_calm, spec))
+    solution = choice.diagnosed(attempt, spec.solver.solver, partial(_is_calm, spec))
     return solution, optimal_profile(solution)

@@ -9,9 +9,9 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import InfeasibleProblem
-from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, watch_time
+from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import Scenario, scenarios
-from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, Response, Swing
+from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, PlantSimulation, Response
 from gen_profile.motion.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.problem.actuator import lag_compensated
@@ -25,7 +25,7 @@ ACCURACY = 1e-6  # of their integration, relative
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Trial:
+class MotionEvaluation:
     """A motion and what it does to the machines of its spec.
 
     Attributes
@@ -36,9 +36,9 @@ class Trial:
         Setpoints of the drives, which is the motion itself where they are ideal.
     machines : tuple of Scenario
         Nominal first.
-    swing : Swing
+    swing : PlantSimulation
         Of these machines.
-    everywhere : Swing
+    everywhere : PlantSimulation
         Of machines all over the ranges, less accurately; of the same where nothing has a range.
     watch : float
         How long a residual is watched, in s.
@@ -47,8 +47,8 @@ class Trial:
     motion: Profile
     command: Profile
     machines: tuple[Scenario, ...]
-    swing: Swing
-    everywhere: Swing
+    swing: PlantSimulation
+    everywhere: PlantSimulation
     watch: float
 
     @cached_property
@@ -62,11 +62,11 @@ class Trial:
         if not others:
             return found
         parameters, initial = [machine.parameters for machine in others], self.swing.initial
-        more = Swing(self.swing.plant, self.motion, parameters, float(times[-1]), initial)
+        more = PlantSimulation(self.swing.plant, self.motion, parameters, float(times[-1]), initial)
         return (*found, *more.at(times))
 
 
-def evaluate(spec: Spec, motion: Profile) -> Trial:
+def evaluate(spec: Spec, motion: Profile) -> MotionEvaluation:
     """Integrate every machine of a spec under a motion of its axes.
 
     Parameters
@@ -76,11 +76,11 @@ def evaluate(spec: Spec, motion: Profile) -> Trial:
     """
     plant, machines = spec.machine(), scenarios(spec)
     tau = spec.actuator.tau
-    watch = watch_time(spec)
+    watch = observation_time(spec)
     settle = 2.0 * max(spec.export.cycle_time, spec.can.sync_period) + STANDSTILL * (tau or 0.0)
     until = motion.duration + settle + watch
     _require_room(spec, until)
-    swing = Swing(plant, motion, [m.parameters for m in machines], until, spec.move.initial)
+    swing = PlantSimulation(plant, motion, [m.parameters for m in machines], until, spec.move.initial)
     known = np.array([list(machine.parameters.values()) for machine in machines])
     inside = [
         values
@@ -89,8 +89,8 @@ def evaluate(spec: Spec, motion: Profile) -> Trial:
     ]
     everywhere = swing
     if inside:
-        everywhere = Swing(plant, motion, inside, until, spec.move.initial, accuracy=ACCURACY)
-    return Trial(
+        everywhere = PlantSimulation(plant, motion, inside, until, spec.move.initial, accuracy=ACCURACY)
+    return MotionEvaluation(
         motion=motion,
         command=lag_compensated(motion, tau),
         machines=machines,
@@ -115,32 +115,32 @@ def _require_room(spec: Spec, until: float) -> None:
             )
 
 
-def keeps_residual_sway(spec: Spec, trial: Trial, share: float = 1.0) -> bool:
+def keeps_residual_sway(spec: Spec, evaluation: MotionEvaluation, share: float = 1.0) -> bool:
     """Whether every load keeps a share of its limit of residual sway on all machines."""
     limits = share * np.array(list(spec.check.residual_sway.values()))
-    return all(bool((peak(response.sway) <= limits).all()) for response in _afterwards(trial))
+    return all(bool((peak(response.sway) <= limits).all()) for response in _afterwards(evaluation))
 
 
-def _afterwards(trial: Trial) -> tuple[Response, ...]:
-    """Response after the motion of the trial's machines, and of others all over the ranges."""
-    begin, watch = trial.motion.duration, trial.watch
-    named = trial.swing.at(np.linspace(begin, begin + watch, RESIDUAL_SAMPLES))
-    others = trial.everywhere.at(np.linspace(begin, begin + watch, COARSE_SAMPLES))
+def _afterwards(evaluation: MotionEvaluation) -> tuple[Response, ...]:
+    """Response after the motion of the evaluation's machines, and of others all over the ranges."""
+    begin, watch = evaluation.motion.duration, evaluation.watch
+    named = evaluation.swing.at(np.linspace(begin, begin + watch, RESIDUAL_SAMPLES))
+    others = evaluation.everywhere.at(np.linspace(begin, begin + watch, COARSE_SAMPLES))
     return (*named, *others)
 
 
-def _figures(trial: Trial) -> dict[str, float]:
-    motion, command, duration = trial.motion, trial.command, trial.motion.duration
-    end_load = trial.swing.plant.end_load
+def _figures(evaluation: MotionEvaluation) -> dict[str, float]:
+    motion, command, duration = evaluation.motion, evaluation.command, evaluation.motion.duration
+    end_load = evaluation.swing.plant.end_load
     on_the_way = [
         length(response.sway[:, end_load])
         for response in (
-            *trial.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES)),
-            *trial.everywhere.at(np.linspace(0.0, duration, COARSE_SAMPLES)),
+            *evaluation.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES)),
+            *evaluation.everywhere.at(np.linspace(0.0, duration, COARSE_SAMPLES)),
         )
     ]
     during = on_the_way[0]
-    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in _afterwards(trial)]
+    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in _afterwards(evaluation)]
     names = ("velocity", "acceleration", "jerk")
     units = ("m_per_s", "m_per_s2", "m_per_s3")
     table = {"duration_s": duration}
@@ -153,7 +153,7 @@ def _figures(trial: Trial) -> dict[str, float]:
         "sway_transient_worst_m": max(float(peak(sway)[0]) for sway in on_the_way),
         "sway_transient_rms_m": float(mean_square_root(during)[0]),
         "sway_residual_peak_m": residuals[0],
-        "sway_residual_peak_perturbed_m": residuals[min(1, len(trial.machines) - 1)],
+        "sway_residual_peak_perturbed_m": residuals[min(1, len(evaluation.machines) - 1)],
         "sway_residual_worst_m": max(residuals),
     }
     if command is not motion:

@@ -16,7 +16,7 @@ STANDSTILL = 10.0  # time constants after which a lagging drive counts as standi
 RESIDUAL_SAMPLES = 4001
 
 
-def watch_time(spec: Spec) -> float:
+def observation_time(spec: Spec) -> float:
     """Time in s in which every mode of every machine of a spec shows its greatest sway at the target."""
     plant, target = spec.machine(), spec.move.target
     slowest = min(linearize(plant, row.parameters, target).frequencies[0] for row in scenarios(spec))

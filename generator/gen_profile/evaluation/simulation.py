@@ -55,7 +55,7 @@ class Response:
     angle: Array
 
 
-class Swing:
+class PlantSimulation:
     """Machines whose axes follow one profile exactly, integrated all at once.
 
     Parameters
@@ -148,7 +148,7 @@ def greatest_sway(
     plant: Plant, motion: Profile, parameters: Mapping[str, float], initial: Mapping[str, float] = AT_REST
 ) -> float:
     """Find the greatest sway of the end load during a motion, in m."""
-    swing = Swing(plant, motion, [parameters], motion.duration, initial)
+    swing = PlantSimulation(plant, motion, [parameters], motion.duration, initial)
     (response,) = swing.at(np.linspace(0.0, motion.duration, TRANSIENT_SAMPLES))
     return float(peak(length(response.sway[:, plant.end_load]))[0])
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import norm
 
 from gen_profile.errors import InfeasibleProblem
-from gen_profile.identification.fit import Fit, Machine, fit_of
+from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
 from gen_profile.identification.measurements import DirectReading, Period, SwingLog
 from gen_profile.identification.misfit import Misfit, explanation, misfits
 from gen_profile.identification.swing_model import swing_model
@@ -69,7 +69,7 @@ class Estimate:
 
 
 def estimate(
-    machine: Machine,
+    machine: SwingingMachine,
     names: Sequence[str],
     readings: Sequence[DirectReading | Period],
     logs: Sequence[SwingLog] = (),
@@ -78,7 +78,7 @@ def estimate(
 
     Parameters
     ----------
-    machine : Machine
+    machine : SwingingMachine
         Its parameters are where the search starts.
     names : sequence of str
         Parameters to identify.

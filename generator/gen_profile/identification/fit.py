@@ -30,7 +30,7 @@ STEPS = 60  # of a search; near a solution five are enough
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Machine:
+class SwingingMachine:
     """What is known beforehand: the machine, all its parameters, and where its axes stood."""
 
     plant: Plant
@@ -44,7 +44,7 @@ class Fit:
 
     Attributes
     ----------
-    machine : Machine
+    machine : SwingingMachine
     names : (p,) tuple of str
         Parameters to identify.
     scale : (p,) array
@@ -56,7 +56,7 @@ class Fit:
         One per log.
     """
 
-    machine: Machine
+    machine: SwingingMachine
     names: tuple[str, ...]
     scale: Array
     bounds: Array
@@ -231,7 +231,7 @@ class Fit:
 
 
 def fit_of(
-    machine: Machine,
+    machine: SwingingMachine,
     names: Sequence[str],
     readings: Sequence[DirectReading | Period],
     models: Sequence[SwingModel],

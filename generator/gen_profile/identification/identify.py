@@ -14,7 +14,7 @@ import tomli_w
 from gen_profile.artefacts.writing import staged
 from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.identification.estimation import CONFIDENCE, Estimate, estimate
-from gen_profile.identification.fit import Machine
+from gen_profile.identification.fit import SwingingMachine
 from gen_profile.identification.log_table import read_text
 from gen_profile.identification.measurements import (
     GREATEST,
@@ -217,7 +217,7 @@ def identify(
     if not all(abs(place) <= GREATEST for place in stood):
         raise SpecError(f"--at: must be places in m or rad, found {', '.join(f'{x:g}' for x in stood)}.")
     found = estimate(
-        Machine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
+        SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
         [q.name for q in plant.parameters if q.name in asked],
         readings,
         logs,

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from gen_profile.plants.plant import Plant
-from gen_profile.plants.virtual_work import contradictions
+from gen_profile.plants.virtual_work import equation_inconsistencies
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 TYPE = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]*")
@@ -97,6 +97,6 @@ def _values(plant: Plant) -> Iterator[str]:
     elif plant.bodies:
         try:
             with np.errstate(all="ignore"):
-                yield from contradictions(plant)
+                yield from equation_inconsistencies(plant)
         except Exception as error:
             yield f"its equations fail where it swings: {type(error).__name__}: {error}"

@@ -27,7 +27,7 @@ STATES = 8
 SWING, RATE, PUSH = 0.2, 0.5, 1.0  # greatest coordinates, rates and accelerations of these states
 
 
-def contradictions(plant: Plant) -> Iterator[str]:
+def equation_inconsistencies(plant: Plant) -> Iterator[str]:
     """Say, a clause each, where a machine's equations contradict its bodies; it must have bodies."""
     p = SimpleNamespace(**plant.nominal())
     n_u, m = len(plant.unactuated), len(plant.actuated)

@@ -118,7 +118,7 @@ class OptimalitySystem:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Data:
+class RuntimeParameters:
     """Run-time data of an `OptimalitySystem`; see the module docstring for the scales.
 
     Attributes

@@ -113,7 +113,7 @@ def report(
     arrival = _checked(outcome).arrival
     measured = None
     if read is not None:
-        measured = compare_measured(outcome.spec, outcome.plan.trial, read, arrival, log_start)
+        measured = compare_measured(outcome.spec, outcome.plan.evaluation, read, arrival, log_start)
     comparison = compare(spec, progress) if compared else None
     progress("writing the report")
     page = attrs.evolve(
@@ -131,7 +131,7 @@ def _page(outcome: Design, comparison: Comparison | None, measured: Measured | N
         title=spec.name,
         subtitle=f"{spec.machine().summary}: {move(spec)}; uncertain: {uncertain(spec)}",
         verdicts=[verdict(check), *([] if measured is None else [measured_verdict(measured)])],
-        facts=facts(spec, outcome.plan.trial, outcome.figures, check),
+        facts=facts(spec, outcome.plan.evaluation, outcome.figures, check),
         sections=list(sections(outcome, check, comparison, measured)),
         colophon=f"Made by {libraries}.",
     )

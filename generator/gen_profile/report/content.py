@@ -65,7 +65,7 @@ class Share:
 
 
 @attrs.frozen(kw_only=True)
-class Row:
+class TableRow:
     """A line of a table; `mark` is ``"passed"``, ``"failed"``, ``"own"`` or nothing."""
 
     cells: Sequence[str | Share]
@@ -79,7 +79,7 @@ class Table:
     Attributes
     ----------
     head : sequence of str
-    rows : sequence of Row
+    rows : sequence of TableRow
     words : int
         So many columns at the left hold words, the others numbers.
     code : bool
@@ -87,7 +87,7 @@ class Table:
     """
 
     head: Sequence[str]
-    rows: Sequence[Row]
+    rows: Sequence[TableRow]
     words: int = 1
     code: bool = False
     kind = "table"

@@ -13,7 +13,7 @@ from scipy.linalg import null_space
 from scipy.optimize import minimize_scalar
 
 from gen_profile.errors import OutputError
-from gen_profile.evaluation.motion_evaluation import Trial
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.simulation import Response
 from gen_profile.motion.profile import Array
 from gen_profile.problem.linearization import linearize
@@ -95,7 +95,7 @@ class MeasuredSway:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Measured:
-    """A log held against a trial.
+    """A log held against a evaluation.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Measured:
     angles : mapping of str to Signal
         By load, of the nominal machine.
     nearest : int or None
-        Which of the trial's machines swings most like it; None where no swing was logged.
+        Which of the evaluation's machines swings most like it; None where no swing was logged.
     loads : tuple of str
         Of the machine, whether they were logged or not.
     """
@@ -153,14 +153,14 @@ class Measured:
 
 
 def compare_measured(
-    spec: Spec, trial: Trial, log: MeasuredLog, arrival: float, start: float | None = None
+    spec: Spec, evaluation: MotionEvaluation, log: MeasuredLog, arrival: float, start: float | None = None
 ) -> Measured:
     """Hold a log against the plan.
 
     Parameters
     ----------
     spec : Spec
-    trial : Trial
+    evaluation : MotionEvaluation
     log : MeasuredLog
     arrival : float
         When the axes stand still, in s since the start of the move.
@@ -172,9 +172,9 @@ def compare_measured(
     OutputError
         The log does not hold the move.
     """
-    start = _best_start(trial, log) if start is None else start
-    move = _the_move(trial, log, start)
-    q_a, responses = trial.motion(move.times).position, trial.swing.at(move.times)
+    start = _best_start(evaluation, log) if start is None else start
+    move = _the_move(evaluation, log, start)
+    q_a, responses = evaluation.motion(move.times).position, evaluation.swing.at(move.times)
     plant, loads = spec.machine(), spec.machine().loads
     sways = {**_sways_of_angles(spec, move, q_a), **move.sways}
 
@@ -206,11 +206,11 @@ def _signals(
     }
 
 
-def _the_move(trial: Trial, log: MeasuredLog, start: float) -> MeasuredLog:
+def _the_move(evaluation: MotionEvaluation, log: MeasuredLog, start: float) -> MeasuredLog:
     """Cut out of a log what was planned, the swing afterwards included; its times begin with the move."""
-    until = trial.motion.duration + trial.watch
+    until = evaluation.motion.duration + evaluation.watch
     kept = (log.times >= start) & (log.times <= start + until)
-    if kept.sum() < 2 or log.times[kept][-1] < start + trial.motion.duration:
+    if kept.sum() < 2 or log.times[kept][-1] < start + evaluation.motion.duration:
         raise OutputError(
             f"--measured {log.source}: the log ends before the move that begins at {start:.4g} s in it does; "
             "log on until the load is at rest, or state the start with --measured-start."
@@ -269,22 +269,22 @@ def _zero(times: Array, values: Array, frequencies: Array) -> float:
     return float(np.linalg.lstsq(basis * weights[:, None], y * weights)[0][0])
 
 
-def _best_start(trial: Trial, log: MeasuredLog) -> float:
+def _best_start(evaluation: MotionEvaluation, log: MeasuredLog) -> float:
     """Find when the move begins in a log: where a measured signal is nearest to the planned one.
 
     An axis' position tells it best; the sway of a load where no axis that moves was logged.
     """
-    plant, duration = trial.swing.plant, trial.motion.duration
-    ways = np.abs(trial.motion.target - trial.motion.start)
+    plant, duration = evaluation.swing.plant, evaluation.motion.duration
+    ways = np.abs(evaluation.motion.target - evaluation.motion.start)
     axes = [axis.name for axis in plant.actuated]
     moving = [name for name in log.positions if ways[axes.index(name)] > 0.0]
     grid = np.linspace(0.0, duration, 2001)
     if moving:
         signal = log.positions[moving[0]]
-        planned = trial.motion(grid).position[:, axes.index(moving[0])]
+        planned = evaluation.motion(grid).position[:, axes.index(moving[0])]
     else:
         name, signal = next(iter({**log.sways, **log.angles}.items()))
-        (nominal, *_) = trial.swing.at(grid)
+        (nominal, *_) = evaluation.swing.at(grid)
         seen = nominal.sway if name in log.sways else nominal.angle
         planned = seen[:, plant.loads.index(name)]
     times = log.times

@@ -8,10 +8,10 @@ import numpy as np
 
 from gen_profile.charts.curves import TIME, sway_levels
 from gen_profile.charts.figure import PALETTE, Band, Figure, Level, Line, Panel, Style
-from gen_profile.evaluation.motion_evaluation import Trial
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import machine, mm, number, place_unit
 from gen_profile.motion.profile import Array
-from gen_profile.report.content import Row, Section, Share, Table, Verdict
+from gen_profile.report.content import Section, Share, Table, TableRow, Verdict
 from gen_profile.report.measured import Measured, MeasuredSway, Signal
 from gen_profile.spec.model import Spec
 
@@ -48,25 +48,26 @@ def measured_verdict(measured: Measured) -> Verdict:
     )
 
 
-def measured_section(spec: Spec, trial: Trial, measured: Measured) -> Section:
+def measured_section(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Section:
     """Draw what was measured over what was planned, with the deviations."""
     words = [
         f"The move begins at {number(measured.start)} s in {measured.log.source}.",
-        *_likeness(trial, measured),
+        *_likeness(evaluation, measured),
     ]
     if measured.log.ignored:
         words.append(f"Columns that were left alone: {', '.join(measured.log.ignored)}.")
     figure = Figure(
         caption="Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on.",
-        panels=[*_panels(spec, trial, measured)],
+        panels=[*_panels(spec, evaluation, measured)],
     )
     return Section(title="What the machine did", words=[" ".join(words)], blocks=[_table(measured), figure])
 
 
-def _likeness(trial: Trial, measured: Measured) -> Iterator[str]:
+def _likeness(evaluation: MotionEvaluation, measured: Measured) -> Iterator[str]:
     """Say which of the machines that were tried the real one is most like."""
-    if measured.nearest is not None and len(trial.machines) > 1:
-        yield f"Of the machines tried, {machine(trial.machines[measured.nearest].name)} swings most like it."
+    if measured.nearest is not None and len(evaluation.machines) > 1:
+        nearest = machine(evaluation.machines[measured.nearest].name)
+        yield f"Of the machines tried, {nearest} swings most like it."
     computed = [load for load, sway in measured.sways.items() if sway.from_angles]
     if computed:
         yield f"Sway computed from the ropes' angles and nominal lengths: {', '.join(computed)}."
@@ -81,19 +82,21 @@ def _table(measured: Measured) -> Table:
     return Table(head=("", "off the plan, RMS", "at most", "residual", "allowed", "share"), rows=rows)
 
 
-def _row(name: str, signal: Signal, sway: MeasuredSway | None = None) -> Row:
+def _row(name: str, signal: Signal, sway: MeasuredSway | None = None) -> TableRow:
     cells = [name, *(f"{number(1e3 * value)} m{signal.unit}" for value in (signal.rms, signal.peak))]
     if sway is None or sway.residual is None:
-        return Row(cells=[*cells, "", "", ""])
+        return TableRow(cells=[*cells, "", "", ""])
     share = Share(_share(sway))
-    return Row(cells=[*cells, mm(sway.residual), mm(sway.limit), share], mark="" if sway.passed else "failed")
+    return TableRow(
+        cells=[*cells, mm(sway.residual), mm(sway.limit), share], mark="" if sway.passed else "failed"
+    )
 
 
 def _share(sway: MeasuredSway) -> float:
     return (sway.residual or 0.0) / sway.limit
 
 
-def _panels(spec: Spec, trial: Trial, measured: Measured) -> Iterator[Panel]:
+def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Iterator[Panel]:
     arrival = Band(low=measured.arrival, high=measured.arrival)
     names = [axis.name for axis in spec.machine().actuated]
     for axis, signal in measured.positions.items():
@@ -118,8 +121,8 @@ def _panels(spec: Spec, trial: Trial, measured: Measured) -> Iterator[Panel]:
         times, found, planned, _ = _thinned(sway.signal)
         lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * found)]
         if measured.nearest:
-            like = trial.swing.at(times)[measured.nearest].sway[:, loads.index(load)]
-            name = machine(trial.machines[measured.nearest].name)
+            like = evaluation.swing.at(times)[measured.nearest].sway[:, loads.index(load)]
+            name = machine(evaluation.machines[measured.nearest].name)
             lines.append(Line(name=f"planned, {name}", x=times, y=1e3 * like, style=NEAREST))
         levels = sway_levels(spec, load, measured.arrival, float(times[-1]))
         yield _swinging(f"Sway of the {load}", "sway (mm)", lines, levels, arrival)

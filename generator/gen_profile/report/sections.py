@@ -8,11 +8,11 @@ from typing import Any
 import tomli_w
 
 from gen_profile.charts.curves import (
-    cast,
     compared_styles,
     hamiltonian_figure,
     motion_figure,
     other_methods,
+    select_machines,
     spectrum_figure,
     sway_figure,
 )
@@ -20,11 +20,11 @@ from gen_profile.charts.figure import PLAIN
 from gen_profile.comparison.candidates import own_method
 from gen_profile.comparison.compare import Comparison
 from gen_profile.designs.design import Design
-from gen_profile.evaluation.motion_evaluation import Trial
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import bound, machine, mm, number, place_unit
 from gen_profile.motion.metrics import extremes, greatest
 from gen_profile.report.actors import animation
-from gen_profile.report.content import Block, Listing, Row, Section, Share, Table, Terms, Verdict
+from gen_profile.report.content import Block, Listing, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.measured import Measured
 from gen_profile.report.measured_section import measured_section
 from gen_profile.report.robustness import robustness_section
@@ -68,16 +68,18 @@ def verdict(check: Check) -> Verdict:
     )
 
 
-def facts(spec: Spec, trial: Trial, figures: Mapping[str, float], check: Check) -> list[tuple[str, str]]:
+def facts(
+    spec: Spec, evaluation: MotionEvaluation, figures: Mapping[str, float], check: Check
+) -> list[tuple[str, str]]:
     """Name the few numbers that say what the motion is."""
     load, finding = check.worst
     margin = check.limit[load] - finding.residual[load] - check.error_bound
     return [
-        ("Duration", f"{number(trial.motion.duration)} s"),
+        ("Duration", f"{number(evaluation.motion.duration)} s"),
         *(
             (
                 f"Peak {quantity}{_of(spec, axis.name)}",
-                f"{number(greatest(trial.command, order, column))} {axis.unit}/{per}",
+                f"{number(greatest(evaluation.command, order, column))} {axis.unit}/{per}",
             )
             for column, axis in enumerate(spec.machine().actuated)
             for order, (quantity, per) in enumerate(zip(QUANTITIES, UNITS_OF_TIME, strict=True), start=1)
@@ -93,24 +95,26 @@ def sections(
     outcome: Design, check: Check, comparison: Comparison | None, measured: Measured | None
 ) -> Iterator[Section]:
     """Put the report in the order in which an engineer asks."""
-    spec, trial, shown = outcome.spec, outcome.plan.trial, cast(outcome.plan.trial)
+    spec, evaluation, shown = outcome.spec, outcome.plan.evaluation, select_machines(outcome.plan.evaluation)
     if measured is not None:
-        yield measured_section(spec, trial, measured)
+        yield measured_section(spec, evaluation, measured)
     yield Section(
         title="The machine plays the move",
         words=("All machines follow the same setpoints. Dashed: where the loads would be if nothing swung.",),
-        blocks=[animation(spec, trial, shown, check.arrival)],
+        blocks=[animation(spec, evaluation, shown, check.arrival)],
     )
     yield Section(
         title="Limits and margins",
-        blocks=[_limits(spec, trial, outcome.figures, check)],
+        blocks=[_limits(spec, evaluation, outcome.figures, check)],
     )
-    yield Section(title="The motion", blocks=[motion_figure(spec, trial), spectrum_figure(spec, trial)])
+    yield Section(
+        title="The motion", blocks=[motion_figure(spec, evaluation), spectrum_figure(spec, evaluation)]
+    )
     yield Section(
         title="The loads",
-        blocks=[sway_figure(spec, trial, shown, check.arrival), *_scenarios(check)],
+        blocks=[sway_figure(spec, evaluation, shown, check.arrival), *_scenarios(check)],
     )
-    robust = _robustness(spec, trial, comparison)
+    robust = _robustness(spec, evaluation, comparison)
     if robust is not None:
         yield robust
     if comparison is not None:
@@ -123,9 +127,9 @@ def _of(spec: Spec, axis: str) -> str:
     return f", {axis}" if len(spec.axis) > 1 else ""
 
 
-def _limits(spec: Spec, trial: Trial, figures: Mapping[str, float], check: Check) -> Table:
+def _limits(spec: Spec, evaluation: MotionEvaluation, figures: Mapping[str, float], check: Check) -> Table:
     """Hold every limit of the spec against what the motion takes of it."""
-    rows = [*_axis_limits(spec, trial)]
+    rows = [*_axis_limits(spec, evaluation)]
     if spec.limits.sway is not None:
         rows.append(_limit("sway on the way", figures["sway_transient_peak_m"], spec.limits.sway, "mm", 1e3))
     for load, limit in check.limit.items():
@@ -134,23 +138,23 @@ def _limits(spec: Spec, trial: Trial, figures: Mapping[str, float], check: Check
     return Table(head=("", "takes", "allowed", "margin", "share"), rows=rows)
 
 
-def _axis_limits(spec: Spec, trial: Trial) -> Iterator[Row]:
+def _axis_limits(spec: Spec, evaluation: MotionEvaluation) -> Iterator[TableRow]:
     for column, axis in enumerate(spec.machine().actuated):
         limits = spec.limits.of(column)
         for order, (quantity, per) in enumerate(zip(QUANTITIES, UNITS_OF_TIME, strict=True), start=1):
             allowed = getattr(limits, quantity)
-            taken = greatest(trial.command, order, column)
+            taken = greatest(evaluation.command, order, column)
             name, unit = f"{quantity} of {axis.name}", f"{axis.unit}/{per}"
             if allowed is None:
-                yield Row(cells=(name, f"{number(taken)} {unit}", "no limit stated", "", ""))
+                yield TableRow(cells=(name, f"{number(taken)} {unit}", "no limit stated", "", ""))
             else:
                 yield _limit(name, taken, allowed, unit)
         if limits.travel is not None:
             unit, factor = place_unit(spec, column)
             low, high = (factor * end for end in limits.travel)
-            least, most = (factor * end for end in extremes(trial.command, 0, column))
+            least, most = (factor * end for end in extremes(evaluation.command, 0, column))
             margin = min(least - low, high - most)
-            yield Row(
+            yield TableRow(
                 cells=(
                     f"travel of {axis.name}",
                     f"{number(least)} to {number(most)} {unit}",
@@ -161,9 +165,9 @@ def _axis_limits(spec: Spec, trial: Trial) -> Iterator[Row]:
             )
 
 
-def _limit(name: str, taken: float, allowed: float, unit: str, factor: float = 1.0) -> Row:
+def _limit(name: str, taken: float, allowed: float, unit: str, factor: float = 1.0) -> TableRow:
     texts = (f"{number(factor * value)} {unit}" for value in (taken, allowed, allowed - taken))
-    return Row(cells=(name, *texts, Share(taken / allowed)), mark="failed" if taken > allowed else "")
+    return TableRow(cells=(name, *texts, Share(taken / allowed)), mark="failed" if taken > allowed else "")
 
 
 def _scenarios(check: Check) -> Iterator[Table]:
@@ -178,7 +182,7 @@ def _scenarios(check: Check) -> Iterator[Table]:
     yield Table(
         head=(what, *(f"{load} (mm)" for load in loads), "share of the limit", "verdict"),
         rows=[
-            Row(
+            TableRow(
                 cells=(
                     machine(finding.scenario.name),
                     *(number(1e3 * finding.residual[load]) for load in loads),
@@ -192,10 +196,10 @@ def _scenarios(check: Check) -> Iterator[Table]:
     )
 
 
-def _group(group: Mapping[str, Any]) -> Row:
+def _group(group: Mapping[str, Any]) -> TableRow:
     sways = (group["quantiles_m"]["0.5"], group["quantiles_m"]["0.99"], group["worst"]["residual_peak_m"])
     verdict = "passed" if group["passed"] else "failed"
-    return Row(
+    return TableRow(
         cells=(
             group["group"],
             group["what"],
@@ -211,13 +215,13 @@ def _demand(check: Check, residual: Mapping[str, float]) -> float:
     return max((residual[load] + check.error_bound) / limit for load, limit in check.limit.items())
 
 
-def _robustness(spec: Spec, trial: Trial, comparison: Comparison | None) -> Section | None:
+def _robustness(spec: Spec, evaluation: MotionEvaluation, comparison: Comparison | None) -> Section | None:
     own = own_method(spec)
     if comparison is None:
-        return robustness_section(spec, own, {own: trial.motion}, {own: PLAIN})
-    motions = {row.method: row.trial.motion for row in comparison.rows}
+        return robustness_section(spec, own, {own: evaluation.motion}, {own: PLAIN})
+    motions = {row.method: row.evaluation.motion for row in comparison.rows}
     return robustness_section(
-        spec, own, {**motions, own: trial.motion}, {own: PLAIN, **compared_styles(comparison)}
+        spec, own, {**motions, own: evaluation.motion}, {own: PLAIN, **compared_styles(comparison)}
     )
 
 
@@ -228,7 +232,7 @@ def _methods(comparison: Comparison) -> Section:
     table = Table(
         head=("method", *(head.format(unit) for head in COMPARED), "keeps the limit", "Pareto front"),
         rows=[
-            Row(
+            TableRow(
                 cells=(
                     row.method,
                     *(number(factor * row.figures[key]) for key, factor in COMPARED.values()),
@@ -298,13 +302,13 @@ def _files(outcome: Design) -> Section:
     table = Table(
         head=("format", "file", "bytes", "SHA-256"),
         rows=[
-            Row(cells=(artefact.format, artefact.path, str(artefact.bytes), artefact.sha256))
+            TableRow(cells=(artefact.format, artefact.path, str(artefact.bytes), artefact.sha256))
             for artefact in outcome.artefacts
         ],
         words=2,
         code=True,
     )
-    hashes = {"Spec": spec.sha256(), "Motion": outcome.plan.trial.command.payload_hash()}
+    hashes = {"Spec": spec.sha256(), "Motion": outcome.plan.evaluation.command.payload_hash()}
     if spec.plant.file is not None:
         hashes[f"Machine {spec.plant.file.name}"] = spec.plant.file.sha256
     if spec.check.foreign is not None:

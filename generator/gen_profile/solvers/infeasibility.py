@@ -26,7 +26,7 @@ FARTHER = 1.7  # times the least value with a solution, up to which one that is 
 
 
 @attrs.frozen(kw_only=True)
-class Trial:
+class CandidateTest:
     """How values are tried.
 
     Attributes
@@ -78,14 +78,14 @@ class Trial:
         return enough
 
 
-def cures(problem: Problem, trial: Trial, *, in_time: bool = False) -> str:
+def cures(problem: Problem, trial: CandidateTest, *, in_time: bool = False) -> str:
     """Name what to change, each thing by itself, in one or two sentences; nothing where nothing was found.
 
     Parameters
     ----------
     problem : Problem
         Without a solution.
-    trial : Trial
+    trial : CandidateTest
     in_time : bool
         Look for what would do in the duration asked for only.
     """
@@ -106,7 +106,7 @@ def cures(problem: Problem, trial: Trial, *, in_time: bool = False) -> str:
     return " ".join(sentences)
 
 
-def _longer(problem: Problem, trial: Trial) -> str:
+def _longer(problem: Problem, trial: CandidateTest) -> str:
     """Find the least duration that will do, in s, rounded up to three digits; empty where there is none."""
     enough = least_duration(problem)
     if enough is None:
@@ -119,7 +119,7 @@ def _longer(problem: Problem, trial: Trial) -> str:
     return "" if factor is None else rounded_up(factor * enough)
 
 
-def _wider(problem: Problem, trial: Trial) -> list[str]:
+def _wider(problem: Problem, trial: CandidateTest) -> list[str]:
     """Widen one limit by itself as little as will do; all of them alike where one is not enough."""
     stated = problem.limits.stated()
 
@@ -132,7 +132,7 @@ def _wider(problem: Problem, trial: Trial) -> list[str]:
     return alone
 
 
-def _widened(problem: Problem, limits: Mapping[str, Any], trial: Trial) -> str:
+def _widened(problem: Problem, limits: Mapping[str, Any], trial: CandidateTest) -> str:
     """Write the values of some limits that will do, the others as they are; nothing where there are none."""
     easiest = relaxed(problem, tuple(limits))
     if easiest is None:
@@ -148,7 +148,7 @@ def _widened(problem: Problem, limits: Mapping[str, Any], trial: Trial) -> str:
     return " and ".join(f"{place} = {_written(value)}" for place, value in wider(factor).items())
 
 
-def _less_robust(problem: Problem, trial: Trial) -> str:
+def _less_robust(problem: Problem, trial: CandidateTest) -> str:
     """Ask for less robustness."""
     if problem.order > 1 and trial.pleases(attrs.evolve(problem, order=1)):
         return "robustness.order = 1"

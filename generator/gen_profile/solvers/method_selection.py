@@ -18,7 +18,7 @@ from gen_profile.solvers.direct import worst_case
 from gen_profile.solvers.direct.relaxation import relaxed
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way
 from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.infeasibility import WORK, Trial, cures
+from gen_profile.solvers.infeasibility import WORK, CandidateTest, cures
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
@@ -45,12 +45,12 @@ def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None
     """
     try:
         with budget(ANSWER):
-            return explained(attempt(problem, method, near), method)
+            return diagnosed(attempt(problem, method, near), method)
     except OutOfWork:
         return given_up(problem)
 
 
-def explained(solution: Solution, method: SolverName = "auto", welcome: Judge = lambda _: True) -> Solution:
+def diagnosed(solution: Solution, method: SolverName = "auto", welcome: Judge = lambda _: True) -> Solution:
     """Find out what would help where a solve failed.
 
     Parameters
@@ -73,7 +73,7 @@ def explained(solution: Solution, method: SolverName = "auto", welcome: Judge = 
 
 def remedy(problem: Problem, method: SolverName = "auto", welcome: Judge = lambda _: True) -> str:
     """Say which other values would let a method find a motion within the limits; nothing where none will."""
-    trial = Trial(
+    trial = CandidateTest(
         solve=lambda other: attempt(other, method),
         keeps=keeps_limits,
         welcome=welcome,
@@ -141,7 +141,9 @@ def _direct(problem: Problem) -> Solution:
 
 def requirements(problem: Problem) -> str:
     """Say which limits would have to be wider for a motion in the duration of a problem that has none."""
-    trial = Trial(solve=lambda other: attempt(other, "direct"), keeps=keeps_limits, welcome=lambda _: True)
+    trial = CandidateTest(
+        solve=lambda other: attempt(other, "direct"), keeps=keeps_limits, welcome=lambda _: True
+    )
     return cures(problem, trial, in_time=True)
 
 

@@ -10,7 +10,7 @@ import attrs
 
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.external_fmu import KEYS as FOREIGN
-from gen_profile.spec.external_fmu import foreign_fmu
+from gen_profile.spec.external_fmu import external_fmu
 from gen_profile.spec.model import RESIDUAL_SHARE, CheckSpec
 from gen_profile.spec.structure import Faults, Table, finite, found, place
 from gen_profile.suggestion import suggestion
@@ -51,7 +51,7 @@ def check_table(tables: Table, plant: Plant | None, folder: Path, faults: Faults
             "check.uncertain, widen theirs, and let check.samples draw",
         )
     given = {key: table[key] for key in ("samples", "seed") if key in table}
-    foreign = foreign_fmu(table, plant, [name for name in parameters if name in changed], folder, faults)
+    foreign = external_fmu(table, plant, [name for name in parameters if name in changed], folder, faults)
     if foreign is not None and (tables["move"]["initial"] or any(tables["move"]["final_velocity"])):
         faults.add("check.fmu", "judges moves from rest to rest only; remove move.initial and final_velocity")
     return {

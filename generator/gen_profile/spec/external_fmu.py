@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gen_profile.plants.plant import Plant
-from gen_profile.spec.model import ForeignFmu
+from gen_profile.spec.model import ExternalFmu
 from gen_profile.spec.structure import Faults, Table, finite, found, place
 from gen_profile.suggestion import suggestion
 
@@ -18,9 +18,9 @@ SUFFIX = ".fmu"
 TIME_LIMIT = 60.0  # s
 
 
-def foreign_fmu(
+def external_fmu(
     check: Table, plant: Plant | None, uncertain: Sequence[str], folder: Path, faults: Faults
-) -> ForeignFmu | None:
+) -> ExternalFmu | None:
     """Take the keys of a foreign FMU out of the table ``[check]``.
 
     Parameters
@@ -45,7 +45,7 @@ def foreign_fmu(
     limit = finite(given.get("time_limit", TIME_LIMIT))
     if limit is None or limit <= 0.0:
         faults.add("check.time_limit", f"must be a positive time in s, found {found(given['time_limit'])}")
-    return ForeignFmu(
+    return ExternalFmu(
         name=Path(name).name,
         path=folder / name,
         sha256=_sha256(folder / name, given.get("fmu_sha256"), faults),

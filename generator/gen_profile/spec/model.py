@@ -231,7 +231,7 @@ class LimitsSpec:
 
 
 @attrs.frozen(kw_only=True)
-class ForeignFmu:
+class ExternalFmu:
     """Somebody else's FMU that judges in place of ours.
 
     Attributes
@@ -329,7 +329,7 @@ class CheckSpec:
     seed : int
         Of what is random.
     path : PathSpec
-    foreign : ForeignFmu or None
+    foreign : ExternalFmu or None
         Somebody else's FMU that judges in place of ours.
     """
 
@@ -341,7 +341,7 @@ class CheckSpec:
     samples: Annotated[int, Bounds(least=0, most=1_000_000)] = 0
     seed: Annotated[int, Bounds(least=0, most=0xFFFF_FFFF)] = 0
     path: PathSpec = attrs.field(factory=PathSpec)
-    foreign: ForeignFmu | None = None
+    foreign: ExternalFmu | None = None
     default: bool = attrs.field(default=False, eq=False)  # the limit was not stated
 
 

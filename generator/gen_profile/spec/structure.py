@@ -18,7 +18,7 @@ from cattrs.errors import (
 
 from gen_profile.errors import SpecError
 from gen_profile.plants.machine_file import MachineFile
-from gen_profile.spec.model import Bounds, ForeignFmu, Pattern, Spec
+from gen_profile.spec.model import Bounds, ExternalFmu, Pattern, Spec
 from gen_profile.suggestion import number_meant, suggestion
 
 Table = dict[str, Any]
@@ -216,7 +216,7 @@ def _converter() -> Converter:
     converter.register_structure_hook(int, _structure_int)
     converter.register_structure_hook(str, _structure_str)
     converter.register_structure_hook(MachineFile, lambda value, _: value)
-    converter.register_structure_hook(ForeignFmu, lambda value, _: value)
+    converter.register_structure_hook(ExternalFmu, lambda value, _: value)
     converter.register_structure_hook(bool, _structure_bool)
     converter.register_structure_hook_func(_is(Literal), _structure_choice)
     converter.register_structure_hook_factory(_is(Annotated), _constrained)

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from gen_profile.errors import CosimulationError
-from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, watch_time
+from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.motion.metrics import length, peak
 from gen_profile.spec.model import Spec
@@ -39,7 +39,7 @@ class CraneLoad:
             )
         machines = scenarios(spec)
         tau = spec.actuator.tau or 0.0
-        self._settle, self._watch = STANDSTILL * tau, watch_time(spec)
+        self._settle, self._watch = STANDSTILL * tau, observation_time(spec)
         self._end_load = spec.machine().end_load
         self._position: Sequence[float] = spec.move.start
         self._fmu = SteppedPlant(

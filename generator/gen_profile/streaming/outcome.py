@@ -23,7 +23,7 @@ class Source:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Outcome:
+class StreamOutcome:
     """What became of a stream; see the command-line contract.
 
     Attributes

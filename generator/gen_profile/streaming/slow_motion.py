@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import attrs
 
 from gen_profile.errors import SpecError
-from gen_profile.evaluation.residual_sway import watch_time
+from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.progress import Progress
 from gen_profile.spec.model import Spec
 from gen_profile.streaming.outcome import Source
@@ -78,7 +78,7 @@ def slow(source: Source, start: Sequence[float], target: Sequence[float]) -> Spe
         With limits on every axis, and a duration that leaves room below them.
     """
     spec, motion = source.spec, source.plan.motion
-    durations, limits = [SETTLE * watch_time(spec)], {}
+    durations, limits = [SETTLE * observation_time(spec)], {}
     for column, (name, axis) in enumerate(spec.axis.items()):
         position, scale = motion.position[:, column], abs(axis.counts_per_metre)
         velocity = SHARE * greatest_velocity(position, motion.period) / scale or CREEP

@@ -19,7 +19,7 @@ from gen_profile.errors import CheckFailed, OutputError, SpecError, StreamAborte
 from gen_profile.progress import Progress
 from gen_profile.spec.model import CanSpec, Spec
 from gen_profile.spec.reading import spec_from_dict
-from gen_profile.streaming.outcome import Outcome, Source
+from gen_profile.streaming.outcome import Source, StreamOutcome
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock, SharedClock, SystemClock
 from gen_profile_exporters.can.host.console import stopped_by_signals, told_aside
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from gen_profile.streaming.load import CraneLoad
     from gen_profile_exporters.can.simulation.drive_bank import DriveBank
-    from gen_profile_exporters.can.simulation.drive_dictionary import Make
+    from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
     from gen_profile_exporters.can.streaming.record import Record
 
 Tell = Callable[[str], None]
@@ -190,7 +190,7 @@ def stream(
     reset_fault: bool = False,
     notes: tuple[str, ...] = (),
     tell: Tell = lambda _: None,
-) -> Outcome:
+) -> StreamOutcome:
     """Stream a motion, and stop the axes whatever happens.
 
     Parameters
@@ -231,7 +231,7 @@ def stream(
     else:
         sway, remarks = simulation.sway, _stalls(simulation.clock.stalled - before)
     said = (*notes, *refused, *remarks, *_afterwards(record))
-    return Outcome(source=source, record=record, notes=said, sway=sway)
+    return StreamOutcome(source=source, record=record, notes=said, sway=sway)
 
 
 def _shut_down(bus: can.BusABC) -> None:
@@ -247,7 +247,7 @@ def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
 
 
 def drive_bank(
-    source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: Make, clock: Clock | None = None
+    source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: DriveVariant, clock: Clock | None = None
 ) -> DriveBank:
     """Put a simulated drive on the bus for every axis, at rest at the start of the move.
 
@@ -266,7 +266,7 @@ def drive_bank(
     return DriveBank(bus, clock or SystemClock(), drives, scales, load)
 
 
-def _of_identity(make: Make, can: CanSpec, axis: str) -> Make:
+def _of_identity(make: DriveVariant, can: CanSpec, axis: str) -> DriveVariant:
     """Give a make the identity that a spec asks for."""
     return attrs.evolve(
         make,
@@ -301,7 +301,7 @@ def _stalls(stalled: int) -> tuple[str, ...]:
 def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
     """Have simulated drives work on the bus whenever the streamer sleeps."""
     from gen_profile.streaming.load import CraneLoad  # noqa: PLC0415  # FMPy and CasADi, 0.5 s
-    from gen_profile_exporters.can.simulation.drive_dictionary import Make  # noqa: PLC0415  # canopen is an extra
+    from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant  # noqa: PLC0415  # canopen is an extra
 
     period = frames.period_microseconds(source.spec.can) * 1000
     with (
@@ -309,7 +309,7 @@ def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
         port.open(source.spec.can.bitrate) as bus,
     ):
         clock = SharedClock(longest=period // 4)
-        clock.work = drive_bank(source.spec, bus, load, Make(), clock).poll
+        clock.work = drive_bank(source.spec, bus, load, DriveVariant(), clock).poll
         found = _Simulation(clock)
         yield found
         found.sway = load.residual_sway()

@@ -88,7 +88,7 @@ class Recipe:
 
 
 @attrs.frozen(kw_only=True)
-class Outcome:
+class CaseOutcome:
     """What came of a case.
 
     Attributes
@@ -117,7 +117,7 @@ def versions() -> tuple[tuple[str, str], ...]:
     return tuple((library, version(library)) for library in LIBRARIES)
 
 
-def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes | None = None) -> Outcome:
+def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes | None = None) -> CaseOutcome:
     """Design, export and check one case; whatever is wrong with it becomes its record.
 
     Parameters
@@ -151,7 +151,7 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes 
             near = None if start is None else _unpacked(start)
             outcome = design(recipe.spec(values), recipe.formats, Path(folder), near=near)
             files = {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
-        return Outcome(record=_record(case, values, outcome), files=files, start=_packed(outcome))
+        return CaseOutcome(record=_record(case, values, outcome), files=files, start=_packed(outcome))
     except OutputError:
         raise
     except GenProfileError as error:
@@ -160,9 +160,9 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes 
         return failed(case, values, CRASHED, f"Internal error ({type(error).__name__}: {error}).")
 
 
-def failed(case: int, values: Mapping[str, Any], status: str, reason: str) -> Outcome:
+def failed(case: int, values: Mapping[str, Any], status: str, reason: str) -> CaseOutcome:
     """Record a case of which nothing came."""
-    return Outcome(
+    return CaseOutcome(
         record={"case": case, "values": dict(values), "status": status, "reason": reason}, files={}
     )
 
@@ -181,7 +181,7 @@ def _record(case: int, values: Mapping[str, Any], outcome: Design) -> dict[str, 
         "status": PASSED if check.passed else CHECK_FAILED,
         "reason": " ".join(check.reasons()),
         "spec_sha256": document["spec_sha256"],
-        "profile_sha256": outcome.plan.trial.command.payload_hash(),
+        "profile_sha256": outcome.plan.evaluation.command.payload_hash(),
         "solver": solver,
         "figures": document["figures"],
         "check": {

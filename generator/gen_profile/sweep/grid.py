@@ -22,7 +22,7 @@ DIGITS = 12  # of a value between the ends of an axis: 0.3, not 0.30000000000000
 
 
 @attrs.frozen(kw_only=True)
-class Axis:
+class GridAxis:
     """A key of the spec and the values that it takes.
 
     Attributes
@@ -54,7 +54,7 @@ class Axis:
 class Grid:
     """All combinations of the axes' values, numbered; the last axis changes fastest."""
 
-    axes: tuple[Axis, ...]
+    axes: tuple[GridAxis, ...]
 
     def __len__(self) -> int:
         return math.prod(self._shape)
@@ -108,7 +108,7 @@ def overrides(values: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in values.items())
 
 
-def _axis(text: str) -> Axis:
+def _axis(text: str) -> GridAxis:
     key, equals, stated = (part.strip() for part in text.partition("="))
     if not equals or not stated or not all(step.strip() for step in key.split(".")):
         raise SpecError(f"--vary {text!r}: write KEY=LO:HI:N or KEY=VALUE,VALUE,…")
@@ -121,7 +121,7 @@ def _axis(text: str) -> Axis:
         raise SpecError(f"--vary {text!r}: values are finite numbers, texts or arrays of these.") from error
     if len(different) < len(values):
         raise SpecError(f"--vary {text!r}: a value comes twice.")
-    return Axis(key=key, values=tuple(values))
+    return GridAxis(key=key, values=tuple(values))
 
 
 def _range(text: str, parts: Sequence[str]) -> list[float]:

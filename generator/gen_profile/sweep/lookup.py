@@ -18,7 +18,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import overridden, spec_from_dict
 from gen_profile.suggestion import number_meant, suggestion
 from gen_profile.sweep.case import PASSED
-from gen_profile.sweep.grid import Axis, Grid, overrides
+from gen_profile.sweep.grid import Grid, GridAxis, overrides
 from gen_profile.sweep.store import grid_of, read_swept
 from gen_profile.sweep.table import Table, cell, read_table
 from gen_profile.verification.check import Judgement, check_artefact
@@ -30,7 +30,7 @@ MACHINE = ("plant.", "actuator.", "check.", "robustness.uncertain.")  # what one
 
 
 @attrs.frozen(kw_only=True)
-class Found:
+class LookupResult:
     """A profile of a library, and what it costs to use it.
 
     Attributes
@@ -93,7 +93,9 @@ class Found:
         }
 
 
-def lookup(folder: Path, asked: Mapping[str, str], progress: Callable[[str], None] = lambda _: None) -> Found:
+def lookup(
+    folder: Path, asked: Mapping[str, str], progress: Callable[[str], None] = lambda _: None
+) -> LookupResult:
     """Find the nearest profile that keeps the limits on the machine asked for, by co-simulation of the file.
 
     Distances are counted in steps of the grid, and what is more than one step away is another profile, not an
@@ -135,7 +137,9 @@ def lookup(folder: Path, asked: Mapping[str, str], progress: Callable[[str], Non
         judgement = _judge(folder, row, wanted, lambda: progress("compiling the plant's FMU, once"))
         if judgement.check.passed:
             used = {key: row[key] for key in wanted}
-            return Found(asked=wanted, used=used, row=row, judgement=judgement, passed_over=passed_over)
+            return LookupResult(
+                asked=wanted, used=used, row=row, judgement=judgement, passed_over=passed_over
+            )
         passed_over[row["case"]] = " ".join(judgement.check.reasons())
     raise CheckFailed(
         f"None of the {len(rows)} nearest profiles is safe there. {_named(rows[0], wanted)} "
@@ -160,7 +164,7 @@ def _wanted(grid: Grid, asked: Mapping[str, str]) -> dict[str, Any]:
     return wanted
 
 
-def _value(axis: Axis, text: str | None) -> float | str:
+def _value(axis: GridAxis, text: str | None) -> float | str:
     if text is None:
         raise SpecError(f"--{axis.key}: state it, {_range(axis)} were swept.")
     if not axis.numeric:
@@ -177,7 +181,7 @@ def _value(axis: Axis, text: str | None) -> float | str:
     return value
 
 
-def _range(axis: Axis) -> str:
+def _range(axis: GridAxis) -> str:
     if axis.numeric:
         return f"{min(axis.values):g} to {max(axis.values):g}"
     return ", ".join(str(cell(axis, value)) for value in axis.values)

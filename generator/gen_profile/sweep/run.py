@@ -23,7 +23,7 @@ from dask.system import CPU_COUNT
 from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 
 from gen_profile.errors import GenProfileError, SpecError
-from gen_profile.sweep.case import CRASHED, PASSED, Outcome, failed, run_case
+from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, failed, run_case
 from gen_profile.sweep.store import Store, opened
 from gen_profile.sweep.table import write_table
 
@@ -32,7 +32,7 @@ ANSWER_TIME = "30s"  # that a scheduler and its first worker have to answer
 
 
 @attrs.frozen(kw_only=True)
-class Progress:
+class CasesDone:
     """How far a sweep is.
 
     Attributes
@@ -87,7 +87,7 @@ def sweep(
     *,
     scheduler: str | None = None,
     workers: int | None = None,
-    progress: Callable[[Progress], None] = lambda _: None,
+    progress: Callable[[CasesDone], None] = lambda _: None,
 ) -> Sweep:
     """Work out all cases that are not finished, and write the table.
 
@@ -142,12 +142,12 @@ def _work(
     chains: Sequence[Sequence[int]],
     scheduler: str | None,
     workers: int | None,
-    progress: Callable[[Progress], None],
+    progress: Callable[[CasesDone], None],
 ) -> None:
     """Hand the chains to workers, a few ahead, and keep what comes back."""
     total, failures = len(store.grid), 0
     done = total - sum(map(len, chains))
-    progress(Progress(done=done, failed=failures, total=total))
+    progress(CasesDone(done=done, failed=failures, total=total))
     waiting: Iterator[Sequence[int]] = iter(chains)
     with _client(scheduler, workers) as client:
         running: dict[Future, tuple[int, Sequence[int]]] = {}
@@ -167,16 +167,16 @@ def _work(
             outcome = _outcome(future, case, store.grid[case])
             store.keep(case, outcome, followed=bool(rest))
             done, failures = done + 1, failures + (not outcome.passed)
-            progress(Progress(done=done, failed=failures, total=total))
+            progress(CasesDone(done=done, failed=failures, total=total))
             following = rest or next(waiting, ())
             if following:
                 begin(following)
 
 
-def _outcome(future: Future, case: int, values: Mapping[str, Any]) -> Outcome:
+def _outcome(future: Future, case: int, values: Mapping[str, Any]) -> CaseOutcome:
     """Take a case's outcome in, whatever became of its process."""
     try:
-        return cast("Outcome", future.result())
+        return cast("CaseOutcome", future.result())
     except GenProfileError:
         raise
     except KilledWorker:

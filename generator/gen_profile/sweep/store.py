@@ -26,8 +26,8 @@ from filelock import FileLock, Timeout
 from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.writing import deliver, staged
 from gen_profile.errors import OutputError
-from gen_profile.sweep.case import Outcome, Recipe
-from gen_profile.sweep.grid import Axis, Grid
+from gen_profile.sweep.case import CaseOutcome, Recipe
+from gen_profile.sweep.grid import Grid, GridAxis
 
 FORMAT, FORMAT_VERSION = "gen-profile sweep", 1
 DESCRIPTION, RECORD, TABLE, CASES = "sweep.json", "case.json", "sweep.parquet", "cases"
@@ -77,7 +77,7 @@ class Store:
         path = self._start_path(case - 1)
         return path.read_bytes() if path.is_file() else None
 
-    def keep(self, case: int, outcome: Outcome, *, followed: bool) -> None:
+    def keep(self, case: int, outcome: CaseOutcome, *, followed: bool) -> None:
         """Write a finished case, and what the next one begins at if one follows.
 
         That comes first and goes last: whenever this is interrupted, the case that is to come finds it.
@@ -202,7 +202,7 @@ def grid_of(folder: Path) -> Grid:
         There is no sweep in it.
     """
     vary = _description(folder)["vary"]
-    return Grid(axes=tuple(Axis(key=key, values=tuple(values)) for key, values in vary.items()))
+    return Grid(axes=tuple(GridAxis(key=key, values=tuple(values)) for key, values in vary.items()))
 
 
 def read_swept(path: Path, digest: str | None = None) -> bytes:

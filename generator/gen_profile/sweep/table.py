@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from gen_profile.errors import OutputError
-from gen_profile.sweep.grid import Axis, Grid
+from gen_profile.sweep.grid import Grid, GridAxis
 from gen_profile.sweep.store import TABLE, case_path
 
 Table = Any  # pyarrow.Table, which has no types
@@ -93,7 +93,7 @@ def read_table(folder: Path, grid: Grid) -> Table:
     return table
 
 
-def cell(axis: Axis, value: Any) -> float | str:
+def cell(axis: GridAxis, value: Any) -> float | str:
     """Write a value as its column holds it: a number, or a text."""
     if axis.numeric:
         return float(value)

@@ -17,7 +17,7 @@ from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
-from gen_profile.verification.external_fmu import judge_foreign
+from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import Progress, with_further
 from gen_profile.verification.motion_variant import parse_variant, varied
 from gen_profile.verification.verdict import Check
@@ -160,7 +160,7 @@ def _verdict(
     """
     resolution = float(setpoints.resolution.max())
     if spec.check.foreign is not None:
-        check = judge_foreign(spec, spec.check.foreign, setpoints, rows)
+        check = judge_external(spec, spec.check.foreign, setpoints, rows)
         return attrs.evolve(check, error_bound=check.error_bound + resolution)
     further = [row for row in rows if not row.followed]
     # where a single scenario is asked for, the nominal machine tells what cycles err by

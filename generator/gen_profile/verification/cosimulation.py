@@ -6,7 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, modal_amplitudes, watch_time
+from gen_profile.evaluation.residual_sway import (
+    RESIDUAL_SAMPLES,
+    STANDSTILL,
+    modal_amplitudes,
+    observation_time,
+)
 from gen_profile.evaluation.scenarios import Scenario
 from gen_profile.evaluation.simulation import Response
 from gen_profile.motion.metrics import length, peak
@@ -62,7 +67,7 @@ def cosimulate(
                 machine.parameters,
                 tau=tau,
                 max_step=max_step(spec, machine),
-                settle=STANDSTILL * tau + watch_time(spec),
+                settle=STANDSTILL * tau + observation_time(spec),
                 output_step=output_step,
                 initial=spec.move.initial,
                 final_velocity=spec.move.final_velocity,
@@ -123,7 +128,7 @@ def _distance(found: Response, expected: Response) -> float:
 
 def sample_spacing(spec: Spec, setpoints: SampledProfile) -> float:
     """Choose the spacing in s at which residuals are sampled."""
-    return min(setpoints.cycle_time, watch_time(spec) / (RESIDUAL_SAMPLES - 1))
+    return min(setpoints.cycle_time, observation_time(spec) / (RESIDUAL_SAMPLES - 1))
 
 
 def above_samples(values: Array) -> float:

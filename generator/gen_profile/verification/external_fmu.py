@@ -7,11 +7,11 @@ from itertools import groupby
 
 import numpy as np
 
-from gen_profile.evaluation.residual_sway import STANDSTILL, watch_time
+from gen_profile.evaluation.residual_sway import STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import TIMING, Scenario
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
-from gen_profile.spec.model import ForeignFmu, Spec
+from gen_profile.spec.model import ExternalFmu, Spec
 from gen_profile.spec.plausibility import doubts
 from gen_profile.verification.batch import Feed
 from gen_profile.verification.cosimulation import ERROR_FLOOR, above_samples, arrival
@@ -25,9 +25,9 @@ STEPS_PER_LAG = 4  # at least, of drives that lag
 SPACING = 0.01  # s, at most, of samples while the axes stand
 
 
-def judge_foreign(
+def judge_external(
     spec: Spec,
-    foreign: ForeignFmu,
+    foreign: ExternalFmu,
     setpoints: SampledProfile,
     machines: Sequence[Scenario],
 ) -> Check:
@@ -39,7 +39,7 @@ def judge_foreign(
     Parameters
     ----------
     spec : Spec
-    foreign : ForeignFmu
+    foreign : ExternalFmu
     setpoints : SampledProfile
     machines : sequence of Scenario
         Parameters that the FMU has no variable for stay what they are in it. Those that share setpoints and
@@ -75,7 +75,7 @@ def _driven_alike(scenario: Scenario) -> tuple[object, ...]:
 
 
 def _judged(
-    spec: Spec, foreign: ForeignFmu, setpoints: SampledProfile, rows: Sequence[Scenario]
+    spec: Spec, foreign: ExternalFmu, setpoints: SampledProfile, rows: Sequence[Scenario]
 ) -> tuple[list[Finding], float]:
     """Run scenarios that share setpoints and drives; their findings, and what these err by at most in m."""
     first = rows[0]
@@ -86,7 +86,7 @@ def _judged(
         feed = Feed(times=feed.times[0], position=feed.position[0])
     velocity = setpoints.velocity if exact else None
     times, inputs = _axis_inputs(foreign.input, feed, velocity, lag_of(spec, first))
-    settle = max(since - times[-1], 0.0) + watch_time(spec)
+    settle = max(since - times[-1], 0.0) + observation_time(spec)
     held = grid_times(grid_length(settle, SPACING), SPACING)[1:]
     rest = inputs[-1:] if foreign.input == "setpoint" else np.zeros_like(inputs[-1:])
     times = np.concatenate([times, times[-1] + held])
@@ -99,13 +99,13 @@ def _judged(
     return [_finding(foreign, row, sways) for row, sways in zip(rows, found, strict=True)], error
 
 
-def _finding(foreign: ForeignFmu, machine: Scenario, sways: Array) -> Finding:
+def _finding(foreign: ExternalFmu, machine: Scenario, sways: Array) -> Finding:
     """Take the peaks; nothing is known of a foreign machine's modes that would bound them."""
     residual = dict(zip(foreign.sway, map(float, peak(sways)), strict=True))
     return Finding(scenario=machine, residual=residual, modal=residual)
 
 
-def _sways(foreign: ForeignFmu, times: Array, inputs: Array, machines: Sequence[Scenario]) -> Array:
+def _sways(foreign: ExternalFmu, times: Array, inputs: Array, machines: Sequence[Scenario]) -> Array:
     """Sway of the loads that the FMU has, shape (machines, samples, loads)."""
     names = foreign.parameters
     return run_foreign(
@@ -121,7 +121,7 @@ def _sways(foreign: ForeignFmu, times: Array, inputs: Array, machines: Sequence[
     )
 
 
-def _halved(foreign: ForeignFmu, times: Array, inputs: Array) -> tuple[Array, Array]:
+def _halved(foreign: ExternalFmu, times: Array, inputs: Array) -> tuple[Array, Array]:
     """Split every communication step; setpoints are reached half-way in the first half of their step."""
     middles = 0.5 * (times[:-1] + times[1:])
     twice = np.repeat(inputs, 2, axis=0)

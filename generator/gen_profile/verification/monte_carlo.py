@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import attrs
 import numpy as np
 
-from gen_profile.evaluation.residual_sway import STANDSTILL, watch_time
+from gen_profile.evaluation.residual_sway import STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import Scenario, scenarios
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.spec.model import Spec
@@ -128,7 +128,7 @@ def watched(spec: Spec, setpoints: SampledProfile, phase: float = SAMPLE_PHASE) 
     machines = scenarios(spec)
     begin = float(setpoints.times[-1]) + setpoints.cycle_time + delay(spec.check.path)
     spacing = phase / STEP_PHASE * min(longest_step(spec, machine) for machine in machines)
-    until = standstill(spec, setpoints) + watch_time(spec)
+    until = standstill(spec, setpoints) + observation_time(spec)
     return begin + grid_times(grid_length(until - begin, spacing), spacing)
 
 

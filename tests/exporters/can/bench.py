@@ -14,7 +14,7 @@ from exporters.motions import quintic, target
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.export import exporter
 from gen_profile_exporters.can.simulation.drive_bank import DriveBank
-from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
 from gen_profile_exporters.can.streaming.plan import plan_of
 from gen_profile_exporters.can.streaming.streamer import Streamer
@@ -22,7 +22,7 @@ from gen_profile_exporters.can.streaming.streamer import Streamer
 MS = 1_000_000
 BEGINNING = 1_000 * MS
 QUICK_STOP = b"\x02\x00"
-OTHER_MAKE = Make(own_mapping=True, fixed_period=(40, -4), miss="hold")  # 4 ms, said in another way
+OTHER_MAKE = DriveVariant(own_mapping=True, fixed_period=(40, -4), miss="hold")  # 4 ms, said in another way
 _channels = itertools.count()
 
 
@@ -158,7 +158,7 @@ class Bench:
         self.streamer_end = Launching(self._buses[2], self.clock) if launching else Tampered(self._buses[2])
         self.heard = []
         self.clock.actors.append(self._listen)
-        self.drives = self._drives(kind, make or Make(), load, stand)
+        self.drives = self._drives(kind, make or DriveVariant(), load, stand)
         self.drives_alive = True
         self.clock.actors.append(lambda: self.drives.poll() if self.drives_alive else None)
         self._streamer_clock = Sluggish(self.clock) if sluggish else self.clock

@@ -11,7 +11,7 @@ from exporters.motions import quintic, target
 from gen_profile.errors import ExportError
 from gen_profile.spec.model import CobIdsSpec
 from gen_profile_exporters.can.export.exporter import encode
-from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.streaming.record import Phase
 
 PROFILE = quintic((0.1, 0.4), (1.2, -0.7))
@@ -80,7 +80,7 @@ def test_addresses_that_cannot_be(stated, reason):
 
 @pytest.mark.parametrize(("serial", "fits"), [(77, True), (78, False)])
 def test_a_profile_names_its_machine(serial, fits):
-    with Bench(make=attrs.evolve(Make(), serial=77), serial={"cart": serial}) as bench:
+    with Bench(make=attrs.evolve(DriveVariant(), serial=77), serial={"cart": serial}) as bench:
         record = bench.run()
     if fits:
         assert record.phase is Phase.DONE

@@ -11,7 +11,7 @@ from motions import quintic, target
 from gen_profile.errors import ExportError
 from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.export.exporter import encode
-from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.streaming.plan import plan_of
 from gen_profile_exporters.can.streaming.record import Phase
 
@@ -33,18 +33,18 @@ def refused(bench, reason):
             r"stands at 0\.11, and the motion starts at 0\.1 \(10000 counts apart, 1000 allowed",
         ),
         (
-            {"make": Make(following_error=0xFFFF_FFFF)},
+            {"make": DriveVariant(following_error=0xFFFF_FFFF)},
             r"does not watch its following error \(6065h is FFFFFFFFh",
         ),
-        ({"make": Make(following_error=0)}, r"does not watch its following error"),
+        ({"make": DriveVariant(following_error=0)}, r"does not watch its following error"),
         (
             {"vendor": 1},
             r"node 1 is another drive: its vendor is 000002E5h, and can\.vendor asks for 00000001h",
         ),
         ({"product": 1}, r"another drive: its product"),
-        ({"make": Make(modes=1)}, r"does not know the mode csp \(6502h\)"),
+        ({"make": DriveVariant(modes=1)}, r"does not know the mode csp \(6502h\)"),
         (
-            {"make": Make(fixed_period=(2, -3))},
+            {"make": DriveVariant(fixed_period=(2, -3))},
             r"60C2h:01 \(interpolation period: digits\) must hold 4h, .* keeps 2h",
         ),
     ],
@@ -52,7 +52,7 @@ def refused(bench, reason):
 )
 @pytest.mark.parametrize("other", [False, True], ids=["usual", "other"])
 def test_unfit_drives(options, reason, other):
-    make = options.get("make", Make())
+    make = options.get("make", DriveVariant())
     if other:
         period = make.fixed_period or OTHER_MAKE.fixed_period
         make = attrs.evolve(make, own_mapping=True, miss="hold", fixed_period=period)
@@ -61,7 +61,7 @@ def test_unfit_drives(options, reason, other):
 
 
 def test_a_window_that_is_off_can_be_stated():
-    with Bench(make=Make(following_error=0xFFFF_FFFF), following_error=0.01) as bench:
+    with Bench(make=DriveVariant(following_error=0xFFFF_FFFF), following_error=0.01) as bench:
         held = []
         bench.at_cycle(100, lambda: held.append(bench.drive.value(0x6065)))
         assert bench.run().phase is Phase.DONE

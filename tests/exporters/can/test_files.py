@@ -21,7 +21,7 @@ from gen_profile.spec.reading import preset_spec
 from gen_profile_exporters.can import frames, scaling, startup
 from gen_profile_exporters.can.export.candump import read
 from gen_profile_exporters.can.export.exporter import encode, replay
-from gen_profile_exporters.can.simulation.drive_dictionary import Make, dictionary, eds
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant, dictionary, eds
 from gen_profile_exporters.exporter import target_of
 
 MOVE = quintic((0.1, 0.4))
@@ -191,7 +191,7 @@ class TestOthersDecode:
 
 def set_up(number, concise_dcf):
     """Set a node of canopen up as a manager does with our list."""
-    node = canopen.LocalNode(number, dictionary(number, Make()))
+    node = canopen.LocalNode(number, dictionary(number, DriveVariant()))
     for index, sub, data in concise(concise_dcf):
         if index != 0x1017:  # would start a heartbeat
             node.set_data(index, sub, data)
@@ -251,10 +251,10 @@ class TestStartup:
             files(timeout=0.005)
 
     def test_eds_is_read_by_canopen(self):
-        written = eds(7, Make(), "axis.eds")
+        written = eds(7, DriveVariant(), "axis.eds")
         file = io.StringIO(written)
         file.name = "axis.eds"
-        found, own = canopen.import_od(file, 7), dictionary(7, Make())
+        found, own = canopen.import_od(file, 7), dictionary(7, DriveVariant())
         for index, entry in own.items():
             for sub in getattr(entry, "subindices", [0]):
                 ours, theirs = own.get_variable(index, sub), found.get_variable(index, sub)

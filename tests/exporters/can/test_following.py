@@ -8,8 +8,8 @@ import pytest
 from exporters.can.bench import Bench, RigidLoad
 from motions import quintic
 
-from gen_profile.streaming.outcome import Outcome
-from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile.streaming.outcome import StreamOutcome
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.streaming.following import standstills
 
 PERIOD = 0.004
@@ -31,7 +31,7 @@ def test_setpoints_that_a_drive_leaves_out(many, goal):
         return message
 
     left = [None] * many
-    with Bench(make=Make(miss="hold"), profile=quintic((0.1, goal)), following_error=0.01) as bench:
+    with Bench(make=DriveVariant(miss="hold"), profile=quintic((0.1, goal)), following_error=0.01) as bench:
         bench.at_cycle(120, lambda: None)
         bench.drive_end.receiving = drop
         record = bench.run()
@@ -44,7 +44,7 @@ def test_setpoints_that_a_drive_leaves_out(many, goal):
     assert stood.apart == pytest.approx(many * step, rel=0.02)
     machine = SimpleNamespace(actuated=[SimpleNamespace(unit="m")])
     source = SimpleNamespace(plan=bench.plan, spec=SimpleNamespace(machine=lambda: machine))
-    told = Outcome(source=source, record=record, notes=("first",)).to_dict()
+    told = StreamOutcome(source=source, record=record, notes=("first",)).to_dict()
     assert (told["drive"]["cycles_standing"], told["drive"]["cycles_unanswered"]) == (many, 0)
     cycles = "1 cycle" if many == 1 else f"{many} cycles"
     pattern = (

@@ -6,7 +6,7 @@ from exporters.can.bench import OTHER_MAKE, Bench
 from exporters.motions import quintic
 
 from gen_profile_exporters.can.cia402 import State
-from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.streaming.record import Phase
 
 OPTIONS = {
@@ -43,7 +43,7 @@ def own_settings(bench, watched=OTHER_MASTER):
     return held(bench.drive)
 
 
-@pytest.mark.parametrize("make", [Make(), OTHER_MAKE, attrs.evolve(Make(), own_mapping=True)])
+@pytest.mark.parametrize("make", [DriveVariant(), OTHER_MAKE, attrs.evolve(DriveVariant(), own_mapping=True)])
 @pytest.mark.parametrize("stop", [False, True])
 def test_a_drive_is_left_as_it_was_found(make, stop):
     with Bench(make=make, profile=quintic((0.1, 0.4)), **OPTIONS) as bench:

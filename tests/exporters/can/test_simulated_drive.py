@@ -13,7 +13,7 @@ from exporters.can.bench import Bench
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can.cia402 import Controlword, State, state_of
 from gen_profile_exporters.can.host.realtime import real_time
-from gen_profile_exporters.can.simulation.drive_dictionary import Make, dictionary
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant, dictionary
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
 
 
@@ -95,7 +95,7 @@ class TestConnection:
         ],
     )
     def test_a_lost_heartbeat(self, option, state, code):
-        with Bench(make=Make(miss="hold")) as bench:
+        with Bench(make=DriveVariant(miss="hold")) as bench:
             drive = enabled(bench, x6007=option, x6085=10_000_000)
             bench.wait(19)
             assert drive.state is State.ENABLED
@@ -104,7 +104,7 @@ class TestConnection:
             assert bench.of(0x081)[0].data[:2] == code
 
     def test_no_reaction_where_none_is_asked_for(self):
-        with Bench(make=Make(miss="hold")) as bench:
+        with Bench(make=DriveVariant(miss="hold")) as bench:
             drive = enabled(bench, x6007=0)
             bench.wait(50)
             assert drive.state is State.ENABLED
@@ -131,7 +131,7 @@ class TestMotion:
         assert drive.state is State.ENABLED
 
     def test_positions_beyond_32_bits_are_clipped(self):
-        drive = SimulatedDrive(1, Make(), 0)
+        drive = SimulatedDrive(1, DriveVariant(), 0)
         drive.arrive(1e12)
         assert drive.value(0x6064) == 2**31 - 1
 
@@ -166,7 +166,7 @@ class TestBus:
 class TestEvents:
     def test_canopens_own_master_sees_the_state(self, bench):
         """Without a SYNC, and with the PDOs as they come."""
-        network, node = canopen.Network(), canopen.BaseNode402(1, dictionary(1, Make()))
+        network, node = canopen.Network(), canopen.BaseNode402(1, dictionary(1, DriveVariant()))
         network.add_node(node)
         node.pdo.read(from_od=True)
         node.setup_402_state_machine(read_pdos=False)

@@ -11,13 +11,13 @@ from motions import quintic
 
 from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.host import console
-from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.streaming.record import Phase
 
 PERIOD = 4  # ms
 STOP_BY_SDO = bytes.fromhex("2b40600002000000")
 VELOCITY = {"profile": quintic((0.0, 0.3)), "mode": "csv", "following_error": 0.005}
-HOLDING = Make(miss="hold")
+HOLDING = DriveVariant(miss="hold")
 
 
 def leave_operational(bench):

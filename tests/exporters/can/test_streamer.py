@@ -13,7 +13,7 @@ from motions import quintic
 from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.export.candump import read
 from gen_profile_exporters.can.export.exporter import encode
-from gen_profile_exporters.can.simulation.drive_dictionary import Make
+from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.streaming.record import Phase
 
 PHASES = ["configure", "align", "enable", "stream", "hold", "disable"]
@@ -34,7 +34,7 @@ def find(haystack, needle):
 
 
 class TestWholeStream:
-    @pytest.mark.parametrize("make", [Make(), OTHER_MAKE])
+    @pytest.mark.parametrize("make", [DriveVariant(), OTHER_MAKE])
     def test_every_setpoint_once_in_order_byte_for_byte(self, make):
         with Bench(make=make) as bench:
             record = bench.run()
@@ -136,7 +136,7 @@ VELOCITY = {"mode": "csv", "following_error": 0.005}
 class TestVelocities:
     """Drives that take speed only (60FFh)."""
 
-    @pytest.mark.parametrize("make", [Make(), OTHER_MAKE])
+    @pytest.mark.parametrize("make", [DriveVariant(), OTHER_MAKE])
     def test_they_lead_the_axes_to_the_target(self, make):
         profile = quintic((0.0, 0.3), (0.0, -0.7))
         with Bench("bridge", "trolley", profile=profile, make=make, **VELOCITY) as bench:
@@ -163,7 +163,7 @@ class TestVelocities:
 
     def test_a_drive_that_is_fed_no_more_stops_by_itself(self):
         """It would go on at its last velocity for ever."""
-        with Bench(profile=quintic((0.0, 0.3)), make=Make(miss="hold"), **VELOCITY) as bench:
+        with Bench(profile=quintic((0.0, 0.3)), make=DriveVariant(miss="hold"), **VELOCITY) as bench:
             bench.at_cycle(120, lambda: setattr(bench.streamer_end, "sending", lambda _: False))
             bench.streamer.run()
             bench.wait(300)
@@ -290,7 +290,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("make", [Make(), OTHER_MAKE], ids=["usual", "other"])
+@pytest.mark.parametrize("make", [DriveVariant(), OTHER_MAKE], ids=["usual", "other"])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_every_fault_stops_the_axis(fault, make):
     act, cycles, reason = FAULTS[fault]
@@ -374,7 +374,9 @@ def test_a_drive_that_does_not_switch_on():
 
 
 @pytest.mark.parametrize(
-    "make", [Make(), Make(miss="hold"), Make(miss="stop")], ids=["extrapolate", "hold", "stop"]
+    "make",
+    [DriveVariant(), DriveVariant(miss="hold"), DriveVariant(miss="stop")],
+    ids=["extrapolate", "hold", "stop"],
 )
 def test_a_killed_streamers_drive_stops_by_itself(make):
     """The streamer is gone between two frames; whatever the drive's make, it stops within the time-out."""

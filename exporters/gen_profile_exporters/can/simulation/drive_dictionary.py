@@ -30,7 +30,7 @@ WINDOW = 1 << 31  # counts; a drive's own following error window, wide open but 
 
 
 @attrs.frozen(kw_only=True)
-class Make:
+class DriveVariant:
     """How one maker's drive differs from another's.
 
     Attributes
@@ -63,7 +63,7 @@ class Make:
     modes: int = 1 << 8 | 1 << 7 | 1 << 6  # csv, csp and ip
 
 
-def dictionary(node: int, make: Make) -> canopen.ObjectDictionary:
+def dictionary(node: int, make: DriveVariant) -> canopen.ObjectDictionary:
     """Build the object dictionary of one node."""
     found = canopen.ObjectDictionary()
     found.node_id = node
@@ -82,7 +82,7 @@ def dictionary(node: int, make: Make) -> canopen.ObjectDictionary:
     return found
 
 
-def eds(node: int, make: Make, file_name: str = "drive.eds") -> str:
+def eds(node: int, make: DriveVariant, file_name: str = "drive.eds") -> str:
     """Render the electronic data sheet (CiA 306), the same at any time."""
     about = {
         "FileName": file_name,
@@ -163,7 +163,7 @@ def _variables_of(found: canopen.ObjectDictionary) -> Iterator[Any]:
         yield from [entry] if isinstance(entry, ODVariable) else entry.values()
 
 
-def _identify(information: Any, make: Make) -> None:
+def _identify(information: Any, make: DriveVariant) -> None:
     information.vendor_name, information.vendor_number = "gen-profile", make.vendor
     information.product_name, information.product_number = "simulated CiA 402 drive", make.product
     information.revision_number, information.order_code = REVISION, "drive-sim"
@@ -174,7 +174,7 @@ def _identify(information: Any, make: Make) -> None:
     information.dynamic_channels_supported = False
 
 
-def _variables(make: Make) -> Iterator[tuple[int, str, int, str, int]]:
+def _variables(make: DriveVariant) -> Iterator[tuple[int, str, int, str, int]]:
     yield 0x1000, "Device type", U32, "ro", 0x0002_0192
     yield 0x1001, "Error register", U8, "ro", 0
     yield 0x1006, "Communication cycle period", U32, "rw", 0
@@ -196,7 +196,9 @@ def _variables(make: Make) -> Iterator[tuple[int, str, int, str, int]]:
     yield 0x6502, "Supported drive modes", U32, "ro", make.modes
 
 
-def _records(node: int, make: Make) -> Iterator[tuple[int, str, int | dict[int, int], str, tuple[int, ...]]]:
+def _records(
+    node: int, make: DriveVariant
+) -> Iterator[tuple[int, str, int | dict[int, int], str, tuple[int, ...]]]:
     yield 0x1016, "Consumer heartbeat time", U32, "rw", (0,)
     yield 0x1018, "Identity object", U32, "ro", (make.vendor, make.product, REVISION, make.serial)
     yield 0x607D, "Software position limit", I32, "rw", (0, 0)
@@ -223,7 +225,7 @@ def _records(node: int, make: Make) -> Iterator[tuple[int, str, int | dict[int, 
             yield base + 0x200 + pdo, f"{word} {pdo + 1} mapping", U32, "rw", entries
 
 
-def _default_mapping(make: Make, pdo: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _default_mapping(make: DriveVariant, pdo: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Entries of an RPDO and a TPDO as they come: CiA 402's proposal, or the maker's own."""
     proposed = {
         0: ((0x6040_0010,), (0x6041_0010,)),
@@ -234,7 +236,7 @@ def _default_mapping(make: Make, pdo: int) -> tuple[tuple[int, ...], tuple[int, 
 
 
 def _count(index: int, values: tuple[int, ...]) -> ODVariable:
-    """Make subindex 0; in a mapping it counts the objects that are in use."""
+    """DriveVariant subindex 0; in a mapping it counts the objects that are in use."""
     if index & 0x0200 and index < 0x1C00:
         used = len(values) - values.count(0)
         return _variable(index, 0, "Number of mapped objects", U8, access="rw", value=used)

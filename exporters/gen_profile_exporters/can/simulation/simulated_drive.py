@@ -27,7 +27,7 @@ from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.simulation.drive_dictionary import (
     MAPPED,
     PDOS,
-    Make,
+    DriveVariant,
     dictionary,
     refusal,
     supports,
@@ -48,12 +48,12 @@ class SimulatedDrive:
     Parameters
     ----------
     node : int
-    make : Make
+    make : DriveVariant
     position : int
         Where the axis stands, in counts.
     """
 
-    def __init__(self, node: int, make: Make, position: int) -> None:
+    def __init__(self, node: int, make: DriveVariant, position: int) -> None:
         self.node, self.make = node, make
         self.state = State.SWITCH_ON_DISABLED
         self.command = self.actual = float(position)

@@ -25,7 +25,7 @@ CIA_402 = 402
 
 
 @attrs.frozen(kw_only=True)
-class Node:
+class IdentifiedNode:
     """What a node tells of itself; None for what it does not.
 
     Attributes
@@ -61,7 +61,7 @@ class Node:
         return tuple(name for name, mode in MODES.items() if (self.modes or 0) >> (mode - 1) & 1)
 
 
-def discover(link: Link) -> tuple[Node, ...]:
+def discover(link: Link) -> tuple[IdentifiedNode, ...]:
     """Ask every node id who is there.
 
     Raises
@@ -140,16 +140,18 @@ class _Answers:
             self.nodes.add(number)
 
 
-def _identified(link: Link, number: int) -> Node:
+def _identified(link: Link, number: int) -> IdentifiedNode:
     device = _number(link, number, 0x1000)
     name = _read(link, number, 0x1008)
-    return Node(
+    return IdentifiedNode(
         number=number,
         device=device,
         vendor=_number(link, number, 0x1018, 1),
         product=_number(link, number, 0x1018, 2),
         serial=_number(link, number, 0x1018, 4),
-        modes=_number(link, number, 0x6502) if Node(number=number, device=device).is_drive else None,
+        modes=_number(link, number, 0x6502)
+        if IdentifiedNode(number=number, device=device).is_drive
+        else None,
         name=None if name is None else name.rstrip(b"\0").decode("latin-1"),
     )
 

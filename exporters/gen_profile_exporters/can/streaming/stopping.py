@@ -22,7 +22,7 @@ from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import Controlword
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.streaming.pacer import Pacer
-from gen_profile_exporters.can.streaming.watch import Axis, Watch
+from gen_profile_exporters.can.streaming.watch import Watch, WatchedAxis
 
 AGAIN = NANOSECONDS // 20  # after which an SDO counts as lost
 _SDO = struct.Struct("<BHBHxx")  # an expedited transfer of 16 bits: command, index, subindex, data (CiA 301)
@@ -93,7 +93,7 @@ def quick_stop(pacer: Pacer, watch: Watch, patience: int) -> Stop:
 class _Service:
     """Quick stop by SDO and what the statusword then is, in turn, for a drive that takes no PDOs."""
 
-    def __init__(self, pacer: Pacer, axis: Axis) -> None:
+    def __init__(self, pacer: Pacer, axis: WatchedAxis) -> None:
         self.axis = axis
         self._pacer, self._clock = pacer, pacer.link.clock
         self.begun = False

@@ -30,7 +30,7 @@ from gen_profile_exporters.can.streaming.plan import StreamPlan, cycles_of
 from gen_profile_exporters.can.streaming.record import Phase, Record, Recorder
 from gen_profile_exporters.can.streaming.restoration import Restoration
 from gen_profile_exporters.can.streaming.stopping import quick_stop
-from gen_profile_exporters.can.streaming.watch import Alert, Axis, Watch
+from gen_profile_exporters.can.streaming.watch import SupervisionLevel, Watch, WatchedAxis
 
 ALIGN_CYCLES = 10  # of preloads before power goes on
 SETTLED_CYCLES = 10  # within the tolerance, before power goes off
@@ -69,7 +69,7 @@ class Streamer:
         self._pacer = Pacer(self._link, plan.target)
         self._watch = Watch(
             [
-                Axis(axis.name, node, own[frames.TPDO1])
+                WatchedAxis(axis.name, node, own[frames.TPDO1])
                 for axis, node, own in zip(
                     plan.target.axes, frames.nodes(plan.target), frames.cob_ids(plan.target), strict=True
                 )
@@ -132,7 +132,7 @@ class Streamer:
 
     def _configure(self) -> tuple[int, ...]:
         """Set the drives up; find out where they stand, in counts."""
-        self._watch.raise_alert(Alert.CONFIGURING)
+        self._watch.raise_alert(SupervisionLevel.CONFIGURING)
         plan = self._plan
         standing = configuration.configure(
             self._link, plan.target, plan.motion, self._found, self._attend, reset_fault=self._reset_fault
@@ -155,7 +155,7 @@ class Streamer:
         self._pacer.begin()
         for _ in range(ALIGN_CYCLES):
             self._cycle(self._preload)
-        self._watch.raise_alert(Alert.CYCLIC)
+        self._watch.raise_alert(SupervisionLevel.CYCLIC)
 
     def _enable(self) -> None:
         self._begin(Phase.ENABLE)
@@ -163,7 +163,7 @@ class Streamer:
         self._command(Controlword.SHUTDOWN, State.READY, self._preload)
         self._command(Controlword.SWITCH_ON, State.SWITCHED_ON, self._preload)
         self._command(enable, State.ENABLED, self._preload, bits=FOLLOWS)
-        self._watch.raise_alert(Alert.FOLLOWING)
+        self._watch.raise_alert(SupervisionLevel.FOLLOWING)
 
     def _approach(self, standing: Sequence[int]) -> None:
         """Lead axes that stand off the first setpoint to it, slowly."""
@@ -209,7 +209,7 @@ class Streamer:
 
     def _disable(self) -> None:
         self._begin(Phase.DISABLE)
-        self._watch.raise_alert(Alert.CYCLIC)
+        self._watch.raise_alert(SupervisionLevel.CYCLIC)
         last = self._plan.cycles[-1]
         self._command(Controlword.SWITCH_ON, State.SWITCHED_ON, last)
         self._command(Controlword.SHUTDOWN, State.READY, last)
@@ -271,7 +271,11 @@ class Streamer:
         told = all(axis.heard >= self._sent_at for axis in self._watch.axes)
         if told and self._answers_for >= 0:
             self._recorder.take_answer(self._answers_for, [axis.position for axis in self._watch.axes])
-        if told and self._watch.alert is Alert.FOLLOWING and self._plan.motion.velocity is not None:
+        if (
+            told
+            and self._watch.alert is SupervisionLevel.FOLLOWING
+            and self._plan.motion.velocity is not None
+        ):
             self._require_following()
         self._answers_for = -1
 

@@ -20,7 +20,7 @@ HEARTBEATS_MISSED = 3
 BUS_OFF, CONTROLLER_STATE, PASSIVE = 0x40, 0x04, 0x30  # of SocketCAN's error frames (linux/can/error.h)
 
 
-class Alert(IntEnum):
+class SupervisionLevel(IntEnum):
     """How much is demanded of the drives; each level includes those before."""
 
     LISTENING = 0  # no one else in command
@@ -30,7 +30,7 @@ class Alert(IntEnum):
 
 
 @attrs.define
-class Axis:
+class WatchedAxis:
     """Last words of one drive.
 
     Attributes
@@ -72,7 +72,7 @@ class Watch:
 
     Parameters
     ----------
-    axes : sequence of Axis
+    axes : sequence of WatchedAxis
     clock : Clock
     period, heartbeat : int
         SYNC period, and period of the drives' heartbeats, in ns.
@@ -84,7 +84,7 @@ class Watch:
 
     def __init__(
         self,
-        axes: Sequence[Axis],
+        axes: Sequence[WatchedAxis],
         clock: Clock,
         *,
         period: int,
@@ -93,7 +93,7 @@ class Watch:
         ours: Iterable[int],
     ) -> None:
         self.axes = tuple(axes)
-        self.alert = Alert.LISTENING
+        self.alert = SupervisionLevel.LISTENING
         self.fault: str | None = None
         self._clock, self._period, self._heartbeat, self._timeout = clock, period, heartbeat, timeout
         self._feedback = frames.packing(frames.FEEDBACK)
@@ -120,9 +120,9 @@ class Watch:
                 take, axis = self._takers[message.arbitration_id]
                 take(axis, bytes(message.data))
 
-    def raise_alert(self, alert: Alert) -> None:
+    def raise_alert(self, alert: SupervisionLevel) -> None:
         """Demand more from now on."""
-        if self.alert < Alert.CYCLIC <= alert:
+        if self.alert < SupervisionLevel.CYCLIC <= alert:
             for axis in self.axes:
                 axis.heard = axis.beat = self._clock.now()
         self.alert = alert
@@ -134,7 +134,7 @@ class Watch:
         ------
         StreamAborted
         """
-        if self.alert >= Alert.CYCLIC:
+        if self.alert >= SupervisionLevel.CYCLIC:
             self._look_for_silence()
         if self.fault is not None:
             raise StreamAborted(self.fault)
@@ -148,33 +148,33 @@ class Watch:
             "or choose other nodes."
         )
 
-    def _take_request(self, axis: Axis, data: bytes) -> None:
+    def _take_request(self, axis: WatchedAxis, data: bytes) -> None:
         """Let others read by SDO while we do not; a drive serves one at a time."""
-        if self.alert < Alert.CYCLIC or not data or data[0] >> 5 not in READING:
+        if self.alert < SupervisionLevel.CYCLIC or not data or data[0] >> 5 not in READING:
             self._find_second_controller(frames.SDO_REQUEST + axis.node)
 
-    def _take_feedback(self, axis: Axis, data: bytes) -> None:
+    def _take_feedback(self, axis: WatchedAxis, data: bytes) -> None:
         if len(data) == self._feedback.size:
             axis.statusword, axis.position = self._feedback.unpack(data)
             axis.heard = self._clock.now()
             self._look_at(axis)
-        elif self.alert >= Alert.CYCLIC:
+        elif self.alert >= SupervisionLevel.CYCLIC:
             self._find(
                 f"axis {axis.name}: feedback of {len(data)} bytes instead of {self._feedback.size}; "
                 "the drive's mapping was changed."
             )
 
-    def _take_emergency(self, axis: Axis, data: bytes) -> None:
+    def _take_emergency(self, axis: WatchedAxis, data: bytes) -> None:
         code = int.from_bytes(data[:2], "little")
         if code:
             self._find(f"axis {axis.name}: the drive reports emergency {code:04X}h; see its manual.")
 
-    def _take_heartbeat(self, axis: Axis, data: bytes) -> None:
+    def _take_heartbeat(self, axis: WatchedAxis, data: bytes) -> None:
         axis.beat = self._clock.now()
         state = data[0] & 0x7F if data else None
-        if state == 0 and self.alert >= Alert.CONFIGURING:
+        if state == 0 and self.alert >= SupervisionLevel.CONFIGURING:
             self._find(f"axis {axis.name}: the drive was reset; find out why before moving it again.")
-        elif state != OPERATIONAL and self.alert >= Alert.FOLLOWING:
+        elif state != OPERATIONAL and self.alert >= SupervisionLevel.FOLLOWING:
             self._find(f"axis {axis.name}: the drive left the NMT state operational.")
 
     def _take_error(self, message: can.Message) -> None:
@@ -195,10 +195,10 @@ class Watch:
             if now - axis.beat > HEARTBEATS_MISSED * self._heartbeat + self._period:
                 self._find(f"axis {axis.name}: no heartbeat; the drive or the cable failed.")
 
-    def _look_at(self, axis: Axis) -> None:
+    def _look_at(self, axis: WatchedAxis) -> None:
         if axis.state in FAULTS:
             self._find(f"axis {axis.name}: the drive is in the state {axis.state.words!r}.")
-        if self.alert < Alert.FOLLOWING:
+        if self.alert < SupervisionLevel.FOLLOWING:
             return
         if axis.statusword & FOLLOWING_ERROR:
             self._find(f"axis {axis.name}: following error; the axis is blocked, or too slow for the motion.")

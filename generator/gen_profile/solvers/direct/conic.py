@@ -23,7 +23,7 @@ STEEP = 100.0  # slope of a cost from which on our units alone may scale it bett
 POSING, ITERATION = 5e-7, 1e-7  # s of work for each entry of the constraints, and for each of an iteration's
 
 
-class Verdict(Enum):
+class ConicStatus(Enum):
     """How a program ended."""
 
     SOLVED = "solved"
@@ -32,10 +32,10 @@ class Verdict(Enum):
 
 
 _VERDICTS = {
-    "Solved": Verdict.SOLVED,
-    "AlmostSolved": Verdict.SOLVED,  # to about 1e-5 of the tolerance asked for, which is far beyond need
-    "PrimalInfeasible": Verdict.INFEASIBLE,
-    "AlmostPrimalInfeasible": Verdict.INFEASIBLE,
+    "Solved": ConicStatus.SOLVED,
+    "AlmostSolved": ConicStatus.SOLVED,  # to about 1e-5 of the tolerance asked for, which is far beyond need
+    "PrimalInfeasible": ConicStatus.INFEASIBLE,
+    "AlmostPrimalInfeasible": ConicStatus.INFEASIBLE,
 }
 
 
@@ -45,7 +45,7 @@ class ConicSolution:
 
     Attributes
     ----------
-    verdict : Verdict
+    verdict : ConicStatus
     exact : bool
         Whether it was solved as exactly as asked for.
     x : (variables,) array
@@ -53,7 +53,7 @@ class ConicSolution:
         One per constraint, in the order in which they were added.
     """
 
-    verdict: Verdict
+    verdict: ConicStatus
     exact: bool
     x: Array
     multipliers: list[Array]
@@ -112,7 +112,7 @@ class ConicProgram:
             solution = self._run(scaled, slope, matrix, settings)
         ends = np.cumsum([len(side) for side in self._sides])[:-1]
         return ConicSolution(
-            verdict=_VERDICTS.get(str(solution.status), Verdict.FAILED),
+            verdict=_VERDICTS.get(str(solution.status), ConicStatus.FAILED),
             exact=str(solution.status) == "Solved",
             x=self._units * np.array(solution.x),
             multipliers=np.split(np.array(solution.z), ends),

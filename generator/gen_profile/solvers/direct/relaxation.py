@@ -20,11 +20,11 @@ from gen_profile.problem.problem import Problem
 from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.condensing import IntervalMaps
-from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, Matrix, Verdict
+from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
 from gen_profile.solvers.direct.solver import (
     MAX_ITERATIONS,
     STEP_TOLERANCE,
-    LeastCost,
+    CostProgram,
     Setup,
     sequence,
     set_up,
@@ -127,22 +127,22 @@ def relaxed(problem: Problem, loosened: Sequence[str]) -> Relaxed | None:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
         return relaxed(attrs.evolve(problem, desensitized=kept), loosened)
     setup = attrs.evolve(setup, tried=())
-    free = LeastCost(
+    free = CostProgram(
         setup=attrs.evolve(setup, problem=attrs.evolve(problem, limits=LimitsSpec())),
         sway_cost=SwayCost(beta=0.0, gamma=1.0),
         sway_limit=None,
     )
     unlimited = sequence(setup, setup.transcription.rest(), free)
-    if unlimited.verdict is not Verdict.SOLVED:
+    if unlimited.verdict is not ConicStatus.SOLVED:
         return None
     x = unlimited.solutions[-1].x
     effort = 0.5 * float(x @ (setup.transcription.effort(setup.forms, len(x)) @ x))
     for price in PRICES:
         goal = LeastShare(setup=setup, loosened=tuple(loosened), price=price / effort)
         found = sequence(setup, unlimited.iterate, goal)
-        if found.verdict is Verdict.SOLVED:
+        if found.verdict is ConicStatus.SOLVED:
             return Relaxed(share=float(found.solutions[-1].x[-1]), iterate=found.iterate)
-        if found.verdict is Verdict.INFEASIBLE or found.iterations == MAX_ITERATIONS:
+        if found.verdict is ConicStatus.INFEASIBLE or found.iterations == MAX_ITERATIONS:
             break
     return None
 

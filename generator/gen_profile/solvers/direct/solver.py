@@ -30,11 +30,15 @@ from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.bezier import Piece, power_basis
 from gen_profile.solvers.direct.condensing import IntervalMaps, axes_map
-from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, Matrix, Verdict
-from gen_profile.solvers.direct.transcription import Iterate, Machine, Transcription
+from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
+from gen_profile.solvers.direct.transcription import Iterate, TranscribedMachine, Transcription
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
 from gen_profile.solvers.indirect.acceleration import accelerate
-from gen_profile.solvers.indirect.boundary_value_problem import Canonical, canonical_problem, independence
+from gen_profile.solvers.indirect.boundary_value_problem import (
+    BoundaryValueProblem,
+    canonical_problem,
+    independence,
+)
 from gen_profile.solvers.solution import Optimum, Solution, Status
 from gen_profile.spec.model import LimitsSpec
 
@@ -82,10 +86,10 @@ class Setup:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Found:
+class ProgramSequence:
     """Where a sequence of programs ended."""
 
-    verdict: Verdict
+    verdict: ConicStatus
     iterate: Iterate
     solutions: tuple[ConicSolution, ...]
     step: float
@@ -143,7 +147,7 @@ def solve(problem: Problem, near: Iterate | None = None) -> Solution:
 
     def attempt(sway_limit: float | None) -> Solution:
         nonlocal iterations, start
-        goal = LeastCost(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
+        goal = CostProgram(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
         found = sequence(setup, start, goal)
         iterations, start = iterations + found.iterations, found.iterate
         return conclude(setup, found, sway_cost, iterations)
@@ -208,14 +212,16 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     return setup, redundant
 
 
-def _nominal(problem: Problem, canonical: Canonical, asked: NDArray[np.bool_]) -> Machine:
+def _nominal(
+    problem: Problem, canonical: BoundaryValueProblem, asked: NDArray[np.bool_]
+) -> TranscribedMachine:
     """State the machine that is to rest at the end, and what it is to be insensitive to."""
     layout, scale = canonical.system.layout, canonical.data.scale
     states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
     exact = problem.worst_case is None or problem.worst_case.nominal_zero
     modal = np.asarray(np.linalg.inv(canonical.coordinates.basis), dtype=np.float64)
     swung = initial_state(problem.plant, problem.initial)
-    return Machine(
+    return TranscribedMachine(
         equations=motion_equations(problem.plant, problem.desensitized, problem.order),
         parameters=parameter_column(problem.plant, dict(problem.parameters)),
         scale=scale[states],
@@ -224,10 +230,12 @@ def _nominal(problem: Problem, canonical: Canonical, asked: NDArray[np.bool_]) -
     )
 
 
-def _other(problem: Problem, canonical: Canonical, parameters: Mapping[str, float]) -> Machine:
+def _other(
+    problem: Problem, canonical: BoundaryValueProblem, parameters: Mapping[str, float]
+) -> TranscribedMachine:
     """State a machine of other parameters that follows the same motion."""
     scale = canonical.data.scale[: 2 * canonical.system.layout.n_u]
-    return Machine(
+    return TranscribedMachine(
         equations=motion_equations(problem.plant, (), problem.order),
         parameters=parameter_column(problem.plant, dict(parameters)),
         scale=scale,
@@ -237,7 +245,7 @@ def _other(problem: Problem, canonical: Canonical, parameters: Mapping[str, floa
 
 
 def _amplitudes(
-    problem: Problem, machines: Sequence[Machine], others: Sequence[Mapping[str, float]]
+    problem: Problem, machines: Sequence[TranscribedMachine], others: Sequence[Mapping[str, float]]
 ) -> tuple[goals.Amplitudes, ...]:
     """Say how what every machine swings with at the end shows, where the worst of them counts."""
     if problem.worst_case is None:
@@ -263,18 +271,18 @@ def _mesh(problem: Problem) -> Array:
     return np.concatenate([graded, np.full(int(middle), rest / middle), graded[::-1]])
 
 
-def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
+def sequence(setup: Setup, start: Iterate, goal: Goal) -> ProgramSequence:
     """Solve programs linearised about one another's motion until what counts stays."""
     transcription, iterate = setup.transcription, start
     solutions: list[ConicSolution] = []
     points: list[Array] = []
     images: list[Array] = []
-    step, verdict = float("inf"), Verdict.FAILED
-    while verdict is Verdict.FAILED and len(solutions) < MAX_ITERATIONS:
+    step, verdict = float("inf"), ConicStatus.FAILED
+    while verdict is ConicStatus.FAILED and len(solutions) < MAX_ITERATIONS:
         maps = transcription.maps(iterate)
         program = transcription.program(maps, goal.extra)
         solutions.append(program.solve(*goal.pose(program, iterate, maps)))
-        if solutions[-1].verdict is not Verdict.SOLVED:
+        if solutions[-1].verdict is not ConicStatus.SOLVED:
             verdict = solutions[-1].verdict
             break
         before, step = step, goal.step(solutions)
@@ -283,16 +291,16 @@ def sequence(setup: Setup, start: Iterate, goal: Goal) -> Found:
         images.append(iterate.flat())
         stalled = step < STALLED and step > 0.5 * before
         if step < STEP_TOLERANCE or stalled or (step < ROUGH and not solutions[-1].exact):
-            verdict = Verdict.SOLVED
+            verdict = ConicStatus.SOLVED
         else:
             if step > SLOW * before:
                 iterate = iterate.of_flat(accelerate(points, images, transcription.importance))
             iterate = goal.approach(iterate.of_flat(points[-1]), iterate)
-    return Found(verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)
+    return ProgramSequence(verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class LeastCost:
+class CostProgram:
     """Minimise eq. (26), with the end load's sway and the worst case within bounds.
 
     Attributes
@@ -385,13 +393,13 @@ def _widen(matrix: Matrix, width: int) -> Matrix:
     return widened
 
 
-def conclude(setup: Setup, found: Found, sway_cost: SwayCost, iterations: int) -> Solution:
+def conclude(setup: Setup, found: ProgramSequence, sway_cost: SwayCost, iterations: int) -> Solution:
     """Turn the outcome of programs into a solution."""
     problem = setup.problem
     status, cure = Status.CONVERGED, ""
-    if found.verdict is Verdict.INFEASIBLE:
+    if found.verdict is ConicStatus.INFEASIBLE:
         status, cure = Status.INFEASIBLE, "Allow more time (move.duration), or wider limits."
-    elif found.verdict is not Verdict.SOLVED:
+    elif found.verdict is not ConicStatus.SOLVED:
         status, cure = Status.DIVERGED, "Allow more time (move.duration)."
     elif greatest_angle(setup, found.iterate) > HORIZONTAL:
         status, cure = Status.SWINGS_TOO_FAR, "Allow more time (move.duration), or shorten the move."
@@ -406,7 +414,7 @@ def conclude(setup: Setup, found: Found, sway_cost: SwayCost, iterations: int) -
     )
 
 
-def _optimum(setup: Setup, found: Found, sway_cost: SwayCost) -> Optimum:
+def _optimum(setup: Setup, found: ProgramSequence, sway_cost: SwayCost) -> Optimum:
     """Return to SI units."""
     problem, transcription = setup.problem, setup.transcription
     piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
@@ -439,7 +447,7 @@ def _optimum(setup: Setup, found: Found, sway_cost: SwayCost) -> Optimum:
     )
 
 
-def _nodes(setup: Setup, found: Found) -> tuple[Array, Array]:
+def _nodes(setup: Setup, found: ProgramSequence) -> tuple[Array, Array]:
     """Read the nominal machine's states and costates at the nodes off a program, in SI units.
 
     A costate is what the cost would lose if its state were displaced there, which is the multiplier of the

@@ -26,7 +26,7 @@ QUINTIC_PEAKS = np.array([1.0, 1.9, 5.8, 60.0])  # of position, velocity, accele
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Machine:
+class TranscribedMachine:
     """A machine that follows the motion.
 
     Attributes
@@ -88,7 +88,7 @@ class Transcription:
         s.
     target, final_velocity : (m,) arrays
         Dimensionless positions and velocities at the end.
-    machines : tuple of Machine
+    machines : tuple of TranscribedMachine
         The nominal one first.
     """
 
@@ -97,7 +97,7 @@ class Transcription:
     duration: float
     target: Array
     final_velocity: Array
-    machines: tuple[Machine, ...]
+    machines: tuple[TranscribedMachine, ...]
 
     @property
     def intervals(self) -> int:

@@ -14,17 +14,17 @@ from itertools import product
 import attrs
 import numpy as np
 
-from gen_profile.evaluation.simulation import Swing
+from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.motion.metrics import greatest, peak
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem, WorstCase
 from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.direct.conic import Verdict
+from gen_profile.solvers.direct.conic import ConicStatus
 from gen_profile.solvers.direct.solver import (
-    Found,
-    LeastCost,
+    CostProgram,
     LeastWorst,
+    ProgramSequence,
     Setup,
     conclude,
     resolve_sway_cost,
@@ -111,7 +111,9 @@ def solve_within_limits(problem: Problem) -> Solution:
     tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
-        goal = LeastCost(setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=1.0 - MARGIN)
+        goal = CostProgram(
+            setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=1.0 - MARGIN
+        )
         found = sequence(setup, setup.transcription.rest(), goal)
         iterations += found.iterations
         solution = conclude(setup, found, sway_cost, iterations)
@@ -130,13 +132,15 @@ def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
     tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
-        goal = LeastCost(setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=GOOD_ENOUGH)
+        goal = CostProgram(
+            setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=GOOD_ENOUGH
+        )
         bound, found = 0.0, sequence(setup, setup.transcription.rest(), goal)
-        if found.verdict is not Verdict.SOLVED:
+        if found.verdict is not ConicStatus.SOLVED:
             best = _least_worst(setup, traces)
             iterations += best.iterations
             bound = float(best.solutions[0].x[-1])
-            if best.verdict is not Verdict.SOLVED:
+            if best.verdict is not ConicStatus.SOLVED:
                 return conclude(setup, best, sway_cost, iterations)
             goal = attrs.evolve(goal, worst=SLACK * float(best.solutions[-1].x[-1]) + MARGIN)
             found = sequence(setup, best.iterate, goal)
@@ -151,11 +155,11 @@ def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
     return attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
 
 
-def _least_worst(setup: Setup, traces: Sequence[float]) -> Found:
+def _least_worst(setup: Setup, traces: Sequence[float]) -> ProgramSequence:
     """Minimise the worst share, for as little effort besides as the programs can tell from none."""
     for trace in traces:
         best = sequence(setup, setup.transcription.rest(), LeastWorst(setup=setup, trace=trace))
-        if best.verdict is not Verdict.FAILED:
+        if best.verdict is not ConicStatus.FAILED:
             break
     return best
 
@@ -191,7 +195,7 @@ def residual_shares(
     """Find the greatest share of a load's limit that every machine sways by, shape (machines,)."""
     slowest = min(linearize(problem.plant, p, problem.target).frequencies[0] for p in machines)
     watch = 2.0 * 2.0 * np.pi / slowest
-    swing = Swing(problem.plant, motion, machines, motion.duration + watch, problem.initial)
+    swing = PlantSimulation(problem.plant, motion, machines, motion.duration + watch, problem.initial)
     after = swing.at(motion.duration + np.linspace(0.0, watch, WATCH_SAMPLES))
     limits = np.array(worst_case.load_limits)
     return np.array([(peak(response.sway) / limits).max() for response in after])

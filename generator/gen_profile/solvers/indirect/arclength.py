@@ -12,7 +12,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.solvers.collocation import Trajectory, linearize
-from gen_profile.solvers.indirect.boundary_value_problem import Canonical
+from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.solvers.indirect.continuation import Advance
 from gen_profile.solvers.indirect.newton import solve_newton
 
@@ -38,12 +38,12 @@ class _Point:
         )
 
 
-def follow(problem: Canonical, guess: Trajectory, widest: float) -> Advance:
+def follow(problem: BoundaryValueProblem, guess: Trajectory, widest: float) -> Advance:
     """Solve a problem by following the solutions of shares of its move from rest.
 
     Parameters
     ----------
-    problem : Canonical
+    problem : BoundaryValueProblem
     guess : Trajectory
         Solution of the linearised problem, the direction in which the curve begins.
     widest : float
@@ -85,7 +85,7 @@ def follow(problem: Canonical, guess: Trajectory, widest: float) -> Advance:
 class _Curve:
     """Points (share, solution), and distances between them."""
 
-    problem: Canonical
+    problem: BoundaryValueProblem
     weights: Array
 
     def point(self, latest: _Point, ahead: _Point, length: float) -> tuple[_Point | None, int]:

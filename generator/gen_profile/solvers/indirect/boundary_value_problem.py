@@ -15,7 +15,7 @@ from gen_profile.problem.axis_reach import axis_reach, effort_weights
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import Linearization
 from gen_profile.problem.linearization import linearize as linearized_machine
-from gen_profile.problem.pontryagin import Data, OptimalitySystem, StateLayout
+from gen_profile.problem.pontryagin import OptimalitySystem, RuntimeParameters, StateLayout
 from gen_profile.problem.problem import AUTO_EFFORT, AUTO_SWAY, Problem
 from gen_profile.problem.reachability import independent_states
 from gen_profile.problem.sway_cost import SwayCost
@@ -56,7 +56,7 @@ class Coordinates:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Canonical:
+class BoundaryValueProblem:
     """A boundary value problem whose unknowns ζ are modal coordinates ξ and their costates.
 
     Angles, rates and sensitivities of coupled pendulums are nearly dependent on one another; the amplitudes
@@ -65,7 +65,7 @@ class Canonical:
     Attributes
     ----------
     system : OptimalitySystem
-    data : Data
+    data : RuntimeParameters
     coordinates : Coordinates
     initial, final : (n,) arrays
         ξ at the start and at the end; NaN where no end condition is asked for.
@@ -77,7 +77,7 @@ class Canonical:
     """
 
     system: OptimalitySystem
-    data: Data
+    data: RuntimeParameters
     coordinates: Coordinates
     initial: Array
     final: Array
@@ -149,7 +149,7 @@ class Canonical:
         """H, g, highest derivatives, sways and angles; see `OptimalitySystem`."""
         return self.system.quantities(self.unknowns(points), self.data.row())[:, :, 0]
 
-    def rescaled(self, solution: Trajectory) -> tuple[Canonical, Trajectory]:
+    def rescaled(self, solution: Trajectory) -> tuple[BoundaryValueProblem, Trajectory]:
         """Measure every coordinate by its own greatest value, which conditions the linear equations best."""
         largest = self._greatest(solution)
         return (
@@ -163,7 +163,7 @@ class Canonical:
             solution.scaled(np.concatenate([1.0 / largest, largest])),
         )
 
-    def towards(self, share: float) -> Canonical:
+    def towards(self, share: float) -> BoundaryValueProblem:
         """Pose the problem for a share of the move and of the initial swing."""
         return attrs.evolve(self, initial=share * self.initial, final=share * self.final)
 
@@ -172,7 +172,7 @@ class Canonical:
         """Whether every mode is asked to rest: none is so fast that no mesh could follow it."""
         return not np.isnan(self.final[: 2 * self.system.layout.n_u]).any()
 
-    def slower(self, factor: float) -> Canonical:
+    def slower(self, factor: float) -> BoundaryValueProblem:
         """Pose the problem for a longer duration."""
         return attrs.evolve(self, data=attrs.evolve(self.data, duration=factor * self.data.duration))
 
@@ -220,7 +220,7 @@ class Canonical:
         return np.where(largest > 0.0, largest, 1.0)
 
 
-def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
+def canonical_problem(problem: Problem, system: OptimalitySystem) -> BoundaryValueProblem:
     """State the problem with β = 0.
 
     Lengths are measured by the move, angles by what its mean acceleration holds statically.
@@ -243,7 +243,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     final[layout.axis(1)] = np.array(problem.final_velocity) * duration / reach
     swung = np.zeros(layout.size)
     swung[: 2 * layout.n_u] = initial_state(problem.plant, problem.initial)
-    data = Data(
+    data = RuntimeParameters(
         parameters=np.array([problem.parameters[q.name] for q in problem.plant.parameters]),
         beta=0.0,
         gamma=0.0,  # where β is zero, too, an overflowing exponential would make NaN
@@ -258,7 +258,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     basis, shown = _modal(layout, linear, _shown(linear, excited, reach))
     final[[state for states, _ in layout.kinds for state in states if shown[state] == 0.0]] = np.nan
     initial = np.asarray(np.linalg.solve(basis, swung / scale), dtype=np.float64)
-    return Canonical(
+    return BoundaryValueProblem(
         system=system,
         data=data,
         coordinates=Coordinates(basis=basis),
@@ -269,7 +269,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> Canonical:
     )
 
 
-def independence(canonical: Canonical) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+def independence(canonical: BoundaryValueProblem) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Find the end conditions to ask for, and the parameters whose sensitivities vanish with those."""
     layout = canonical.system.layout
     n, first = layout.size, layout.sensitivities.start
@@ -289,7 +289,7 @@ def independence(canonical: Canonical) -> tuple[NDArray[np.bool_], tuple[str, ..
     return asked, tuple(name for name in every if name not in useful)
 
 
-def quintic(canonical: Canonical, mesh: Array, scheme: Scheme) -> Trajectory:
+def quintic(canonical: BoundaryValueProblem, mesh: Array, scheme: Scheme) -> Trajectory:
     """Guess that the axes move by a quintic, and that everything else rests."""
     layout = canonical.system.layout
 
@@ -303,7 +303,9 @@ def quintic(canonical: Canonical, mesh: Array, scheme: Scheme) -> Trajectory:
     return sampled(states, scheme, mesh)
 
 
-def with_sway_cost(problem: Problem, quiet: Canonical, solution: Trajectory) -> Canonical:
+def with_sway_cost(
+    problem: Problem, quiet: BoundaryValueProblem, solution: Trajectory
+) -> BoundaryValueProblem:
     """Pose the same problem with the β asked for; an automatic γ is scaled by a solution without."""
     beta, gamma = problem.sway_weight, problem.sway_scale
     if beta == 0.0:

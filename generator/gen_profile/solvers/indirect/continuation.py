@@ -12,7 +12,7 @@ from collections.abc import Callable
 import attrs
 
 from gen_profile.solvers.collocation import Trajectory
-from gen_profile.solvers.indirect.boundary_value_problem import Canonical
+from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.solvers.indirect.newton import solve_newton
 
 SMALLEST_ADVANCE = 1.0 / 32.0
@@ -41,13 +41,13 @@ class Advance:
 
 
 def advance(
-    problem_at: Callable[[float], Canonical], guess: Trajectory, start: Trajectory | None = None
+    problem_at: Callable[[float], BoundaryValueProblem], guess: Trajectory, start: Trajectory | None = None
 ) -> Advance:
     """Solve the problem at share 1, through problems nearer to 0 where Newton needs them.
 
     Parameters
     ----------
-    problem_at : share → Canonical
+    problem_at : share → BoundaryValueProblem
     guess : Trajectory
         For share 1.
     start : Trajectory, optional

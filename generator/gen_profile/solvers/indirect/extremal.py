@@ -6,7 +6,7 @@ import numpy as np
 
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.collocation import Trajectory
-from gen_profile.solvers.indirect.boundary_value_problem import Canonical
+from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.solvers.indirect.refinement import defect
 from gen_profile.solvers.solution import Optimum, Solution, Status
 
@@ -16,7 +16,7 @@ TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the line
 
 
 def judged(
-    problem: Problem, weighted: Canonical, found: Trajectory, iterations: int, residual: float
+    problem: Problem, weighted: BoundaryValueProblem, found: Trajectory, iterations: int, residual: float
 ) -> Solution:
     """Accept a solution where it stands up to a look between the mesh's points."""
     if weighted.missed(found) > TOLERATED_MISS:
@@ -36,7 +36,7 @@ def judged(
     )
 
 
-def _optimum(canonical: Canonical, solution: Trajectory) -> Optimum:
+def _optimum(canonical: BoundaryValueProblem, solution: Trajectory) -> Optimum:
     """Return to SI units."""
     system, data = canonical.system, canonical.data
     layout, n, m = system.layout, system.layout.size, system.layout.m

@@ -19,7 +19,7 @@ from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.collocation import GAUSS, RADAU, Scheme, Trajectory, sampled
 from gen_profile.solvers.indirect.arclength import follow
-from gen_profile.solvers.indirect.boundary_value_problem import Canonical, quintic, with_sway_cost
+from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem, quintic, with_sway_cost
 from gen_profile.solvers.indirect.continuation import Advance, advance
 from gen_profile.solvers.indirect.extremal import failure, judged, too_steep
 from gen_profile.solvers.indirect.newton import NewtonOutcome, solve_newton
@@ -39,7 +39,7 @@ MODERATE_ANGLE = np.pi / 4.0  # up to which Newton's method hardly fails
 SMALL_ANGLE = np.radians(50.0)  # of the linear model; from there on nonlinearity is blamed where Newton fails
 
 
-def solve_by_homotopy(problem: Problem, quiet: Canonical, near: Trajectory | None) -> Solution:
+def solve_by_homotopy(problem: Problem, quiet: BoundaryValueProblem, near: Trajectory | None) -> Solution:
     """Begin on a coarse mesh, which smooths the way; where it misleads, on finer ones."""
     fine = float(np.clip(quiet.phase / RADIANS_PER_INTERVAL, INTERVALS, MAX_INTERVALS))
     iterations = 0
@@ -56,7 +56,9 @@ def solve_by_homotopy(problem: Problem, quiet: Canonical, near: Trajectory | Non
     return attrs.evolve(solution, iterations=iterations)
 
 
-def _on_mesh(problem: Problem, quiet: Canonical, near: Trajectory | None, coarse: int, fine: int) -> Solution:
+def _on_mesh(
+    problem: Problem, quiet: BoundaryValueProblem, near: Trajectory | None, coarse: int, fine: int
+) -> Solution:
     """Follow the solution from the linear model's to that with the β asked for."""
     guess = quintic(quiet, np.linspace(0.0, 1.0, coarse + 1), _scheme(quiet))
     quiet, linear = quiet.rescaled(quiet.solve_linear(quiet.flow(guess.points), guess))
@@ -87,7 +89,7 @@ def _on_mesh(problem: Problem, quiet: Canonical, near: Trajectory | None, coarse
     return judged(problem, weighted, refined.solution, iterations, refined.residual or climb.residual)
 
 
-def _approach(quiet: Canonical, linear: Trajectory) -> Advance:
+def _approach(quiet: BoundaryValueProblem, linear: Trajectory) -> Advance:
     """Solve the problem with β = 0: at once, else through shorter moves, slower ones, or around folds."""
     ways: tuple[Callable[[], Advance], ...] = (
         lambda: advance(quiet.towards, linear, linear.scaled(0.0)),
@@ -103,7 +105,7 @@ def _approach(quiet: Canonical, linear: Trajectory) -> Advance:
     return attrs.evolve(found, iterations=iterations)
 
 
-def _from_slower(quiet: Canonical, linear: Trajectory) -> Advance:
+def _from_slower(quiet: BoundaryValueProblem, linear: Trajectory) -> Advance:
     """Begin at a longer duration, at which the load swings less."""
     slowly = _slower(quiet, linear, SLOWER)
     if slowly.solution is None:
@@ -112,13 +114,13 @@ def _from_slower(quiet: Canonical, linear: Trajectory) -> Advance:
     return attrs.evolve(found, iterations=slowly.iterations + found.iterations)
 
 
-def _slower(quiet: Canonical, linear: Trajectory, factor: float) -> NewtonOutcome:
+def _slower(quiet: BoundaryValueProblem, linear: Trajectory, factor: float) -> NewtonOutcome:
     """Solve for a longer duration, from the linear model's solution for that."""
     slower, rest = quiet.slower(factor), linear.scaled(0.0)
     return solve_newton(slower, slower.solve_linear(slower.flow(rest.points), rest))
 
 
-def _beside(weighted: Canonical, near: Trajectory | None, intervals: int) -> Advance | None:
+def _beside(weighted: BoundaryValueProblem, near: Trajectory | None, intervals: int) -> Advance | None:
     """Find the solution from that of a similar problem, if that lies near enough."""
     if near is None or near.size != 2 * len(weighted.final) or weighted.data.beta == 0.0:
         return None
@@ -131,12 +133,14 @@ def _beside(weighted: Canonical, near: Trajectory | None, intervals: int) -> Adv
     )
 
 
-def _scheme(canonical: Canonical) -> Scheme:
+def _scheme(canonical: BoundaryValueProblem) -> Scheme:
     """Let modes fade that are too fast for any mesh."""
     return GAUSS if canonical.resolved else RADAU
 
 
-def _measured(problem: Problem, quiet: Canonical, coarse: Trajectory, fine: int) -> tuple[Trajectory, int]:
+def _measured(
+    problem: Problem, quiet: BoundaryValueProblem, coarse: Trajectory, fine: int
+) -> tuple[Trajectory, int]:
     """Find the motion with β = 0 as exactly as what is measured by it needs; also count the iterations."""
     if problem.sway_weight == 0.0 or problem.sway_scale is not None:
         return coarse, 0
@@ -144,13 +148,13 @@ def _measured(problem: Problem, quiet: Canonical, coarse: Trajectory, fine: int)
     return refined.solution or coarse, refined.iterations
 
 
-def _lighter(weighted: Canonical, share: float) -> Canonical:
+def _lighter(weighted: BoundaryValueProblem, share: float) -> BoundaryValueProblem:
     """Pose the same problem with a β that is smaller by decades."""
     beta = weighted.data.beta * 10.0 ** (BETA_DECADES * (share - 1.0))
     return attrs.evolve(weighted, data=attrs.evolve(weighted.data, beta=beta))
 
 
-def _too_hard(problem: Problem, quiet: Canonical, linear: Trajectory, iterations: int) -> Solution:
+def _too_hard(problem: Problem, quiet: BoundaryValueProblem, linear: Trajectory, iterations: int) -> Solution:
     """Blame the swing where the linear model leaves the small angles, else the solver; name a duration."""
     small = quiet.greatest_angle(linear) < SMALL_ANGLE
     status = Status.DIVERGED if small else Status.SWINGS_TOO_FAR

@@ -36,7 +36,7 @@ class LinearMachine:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class LeastCost:
+class CostMinimum:
     """Outcome.
 
     Attributes
@@ -56,7 +56,7 @@ class LeastCost:
 
 def least_cost(
     machine: LinearMachine, cost: SwayCost, sway: Array, *, moved: Array, slope: Array, missing: Array
-) -> LeastCost:
+) -> CostMinimum:
     """Minimise the cost under end conditions.
 
     Parameters
@@ -102,7 +102,7 @@ def least_cost(
         pull += (stiffness @ step[..., None])[..., 0]
         if np.abs(growth).max() <= CLOSE or cost.beta == 0.0:
             break
-    return LeastCost(controls=controls, multipliers=multipliers, pull=weights * pull)
+    return CostMinimum(controls=controls, multipliers=multipliers, pull=weights * pull)
 
 
 def _newton_step(hessian: Array, slope: Array, conditions: Array, missing: Array) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.solvers.collocation import Trajectory
-from gen_profile.solvers.indirect.boundary_value_problem import Canonical
+from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 
 TOLERANCE = 1e-7  # step after which the next iterate's error is of the order of its square
 STALLED = 1e-5  # step that is taken for rounding noise when it ceases to shrink
@@ -41,12 +41,12 @@ class _Iterate:
     step: float
 
 
-def solve_newton(problem: Canonical, guess: Trajectory) -> NewtonOutcome:
-    """Iterate from a guess until the step is small, as `Canonical.distance` measures it.
+def solve_newton(problem: BoundaryValueProblem, guess: Trajectory) -> NewtonOutcome:
+    """Iterate from a guess until the step is small, as `BoundaryValueProblem.distance` measures it.
 
     Parameters
     ----------
-    problem : Canonical
+    problem : BoundaryValueProblem
     guess : Trajectory
     """
     current, damping = _iterate(problem, guess), 1.0
@@ -70,7 +70,7 @@ def solve_newton(problem: Canonical, guess: Trajectory) -> NewtonOutcome:
     return NewtonOutcome(solution=None, iterations=iteration, residual=current.step)
 
 
-def _iterate(problem: Canonical, trajectory: Trajectory) -> _Iterate | None:
+def _iterate(problem: BoundaryValueProblem, trajectory: Trajectory) -> _Iterate | None:
     """Take a full Newton step, if there is one."""
     try:
         flow = problem.flow(trajectory.points)
@@ -82,7 +82,7 @@ def _iterate(problem: Canonical, trajectory: Trajectory) -> _Iterate | None:
     )
 
 
-def _shortens(problem: Canonical, current: _Iterate, trial: _Iterate, damping: float) -> bool:
+def _shortens(problem: BoundaryValueProblem, current: _Iterate, trial: _Iterate, damping: float) -> bool:
     """Apply the monotonicity tests to the damped step that led to `trial`."""
     enough = (1.0 - damping / 4.0) * current.step
     if trial.step <= enough:

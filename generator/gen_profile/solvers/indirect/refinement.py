@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile.solvers.collocation import Trajectory
-from gen_profile.solvers.indirect.boundary_value_problem import Canonical
+from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.solvers.indirect.newton import NewtonOutcome, solve_newton
 
 MAX_INTERVALS = 480
@@ -22,10 +22,10 @@ DEFECT_TOLERANCE = 3e-3  # see `defect`; what it costs in sway is of its square
 
 
 def refine(
-    canonical: Canonical,
+    canonical: BoundaryValueProblem,
     coarse: Trajectory,
     least: int = 0,
-    solve: Callable[[Canonical, Trajectory], NewtonOutcome] = solve_newton,
+    solve: Callable[[BoundaryValueProblem, Trajectory], NewtonOutcome] = solve_newton,
 ) -> NewtonOutcome:
     """Split intervals until the equations are met and the Hamiltonian is constant.
 
@@ -34,7 +34,7 @@ def refine(
 
     Parameters
     ----------
-    canonical : Canonical
+    canonical : BoundaryValueProblem
     coarse : Trajectory
         Its solution on a mesh that may be too coarse to judge it by.
     least : int
@@ -59,10 +59,10 @@ def refine(
 
 
 def _first_solved(
-    canonical: Canonical,
+    canonical: BoundaryValueProblem,
     solution: Trajectory,
     meshes: Sequence[Array],
-    solve: Callable[[Canonical, Trajectory], NewtonOutcome],
+    solve: Callable[[BoundaryValueProblem, Trajectory], NewtonOutcome],
 ) -> tuple[NewtonOutcome, int]:
     """Try one mesh after the other; also count the iterations of all."""
     spent = 0
@@ -74,7 +74,7 @@ def _first_solved(
     return outcome, spent
 
 
-def _parts(canonical: Canonical, solution: Trajectory) -> NDArray[np.intp]:
+def _parts(canonical: BoundaryValueProblem, solution: Trajectory) -> NDArray[np.intp]:
     """Tell into how many parts to divide every interval."""
     stages = solution.scheme.stages
     wanted = (defect(canonical, solution) / DEFECT_TOLERANCE) ** (1.0 / stages)
@@ -87,7 +87,7 @@ def _parts(canonical: Canonical, solution: Trajectory) -> NDArray[np.intp]:
     return parts
 
 
-def _drift(canonical: Canonical, solution: Trajectory) -> Array:
+def _drift(canonical: BoundaryValueProblem, solution: Trajectory) -> Array:
     """Change of H over each interval, relative to its size; none for the exact solution."""
     hamiltonian = canonical.quantities(solution.nodes)[:, 0]
     return np.asarray(np.abs(np.diff(hamiltonian)) / np.abs(hamiltonian).max())
@@ -102,7 +102,7 @@ def _split(mesh: Array, parts: NDArray[np.intp]) -> Array:
 
 
 @lru_cache(maxsize=1)  # who refined is asked again for what was reached
-def defect(canonical: Canonical, solution: Trajectory) -> Array:
+def defect(canonical: BoundaryValueProblem, solution: Trajectory) -> Array:
     """Greatest miss of the state equations between collocation points, on each interval.
 
     Per interval, as a share of each state's size. (What is missed of the costates' shows in the Hamiltonian.)

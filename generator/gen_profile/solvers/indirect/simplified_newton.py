@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile.solvers.collocation import IntArray, Trajectory
-from gen_profile.solvers.indirect.boundary_value_problem import Canonical
+from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
 from gen_profile.solvers.indirect.least_cost import LinearMachine, least_cost
 from gen_profile.solvers.indirect.linear_response import LinearResponse, linear_response
 from gen_profile.solvers.indirect.newton import NewtonOutcome
@@ -30,7 +30,7 @@ MOST_CONTROLS = 800  # up to which to solve for all of them at once
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class _Iterate:
+class _SimplifiedIterate:
     """A trajectory, and its slopes at the collocation points."""
 
     trajectory: Trajectory
@@ -70,14 +70,14 @@ class _Model:
     is_uniform: bool
 
 
-def solve_simplified(problem: Canonical, start: Trajectory) -> NewtonOutcome:
-    """Iterate from a start until the solution is near, as `Canonical.distance` measures it.
+def solve_simplified(problem: BoundaryValueProblem, start: Trajectory) -> NewtonOutcome:
+    """Iterate from a start until the solution is near, as `BoundaryValueProblem.distance` measures it.
 
     There is no solution where the iteration does not converge well, or has too many controls.
 
     Parameters
     ----------
-    problem : Canonical
+    problem : BoundaryValueProblem
     start : Trajectory
         Of a scheme of Gauss's.
 
@@ -104,7 +104,7 @@ def solve_simplified(problem: Canonical, start: Trajectory) -> NewtonOutcome:
     return NewtonOutcome(solution=None, iterations=iteration, residual=step)
 
 
-def _hanging(problem: Canonical, trajectory: Trajectory) -> Array:
+def _hanging(problem: BoundaryValueProblem, trajectory: Trajectory) -> Array:
     """Take the axes' motion of a trajectory; everything else rests."""
     layout = problem.system.layout
     points = np.zeros_like(trajectory.points)
@@ -113,7 +113,7 @@ def _hanging(problem: Canonical, trajectory: Trajectory) -> Array:
     return points
 
 
-def _model(problem: Canonical, like: Trajectory, points: Array) -> _Model:
+def _model(problem: BoundaryValueProblem, like: Trajectory, points: Array) -> _Model:
     """Linearise at given states and costates, at a trajectory's points in time."""
     layout, times = problem.system.layout, like.stages.shape[:2]
     n = layout.size
@@ -146,7 +146,9 @@ def _model(problem: Canonical, like: Trajectory, points: Array) -> _Model:
     )
 
 
-def _corrected(problem: Canonical, model: _Model, current: _Iterate) -> _Iterate:
+def _corrected(
+    problem: BoundaryValueProblem, model: _Model, current: _SimplifiedIterate
+) -> _SimplifiedIterate:
     """Solve the linear machine's problem for what the conditions miss."""
     n, response, weights = len(problem.final), model.response, model.response.weights
     slopes, sway = problem.slopes(current.trajectory.points)
@@ -172,7 +174,7 @@ def _corrected(problem: Canonical, model: _Model, current: _Iterate) -> _Iterate
     return _integrated(current.trajectory, slopes, problem.initial, current.final_costates + final_costates)
 
 
-def _consistent(problem: Canonical, start: Trajectory) -> _Iterate:
+def _consistent(problem: BoundaryValueProblem, start: Trajectory) -> _SimplifiedIterate:
     """Begin at the initial state; costates of free final states end at zero."""
     lengths = np.diff(start.mesh)[:, None, None]
     slopes = start.scheme.slopes @ (start.stages - start.nodes[:-1, None]) / lengths
@@ -181,7 +183,7 @@ def _consistent(problem: Canonical, start: Trajectory) -> _Iterate:
     return _integrated(start, slopes, problem.initial, final_costates)
 
 
-def _integrated(like: Trajectory, slopes: Array, initial: Array, final_costates: Array) -> _Iterate:
+def _integrated(like: Trajectory, slopes: Array, initial: Array, final_costates: Array) -> _SimplifiedIterate:
     """Integrate slopes from the initial state, and backward from the final costates, on the same mesh."""
     n, scheme, lengths = len(initial), like.scheme, np.diff(like.mesh)[:, None, None]
     nodes = np.zeros_like(like.nodes)
@@ -189,4 +191,4 @@ def _integrated(like: Trajectory, slopes: Array, initial: Array, final_costates:
     nodes[:, :n] += initial
     nodes[:, n:] += final_costates - nodes[-1, n:]
     stages = nodes[:-1, None] + lengths * (scheme.A @ slopes)
-    return _Iterate(trajectory=attrs.evolve(like, nodes=nodes, stages=stages), slopes=slopes)
+    return _SimplifiedIterate(trajectory=attrs.evolve(like, nodes=nodes, stages=stages), slopes=slopes)

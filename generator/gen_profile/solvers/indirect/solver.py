@@ -17,7 +17,7 @@ from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.collocation import LONG_GAUSS, Trajectory
 from gen_profile.solvers.indirect.boundary_value_problem import (
-    Canonical,
+    BoundaryValueProblem,
     canonical_problem,
     independence,
     quintic,
@@ -75,7 +75,7 @@ def _solve(problem: Problem, near: Trajectory | None) -> Solution:
     return found or solve_by_homotopy(problem, quiet, near)
 
 
-def _solve_simply(problem: Problem, quiet: Canonical) -> Solution | None:
+def _solve_simply(problem: Problem, quiet: BoundaryValueProblem) -> Solution | None:
     """Solve with few long intervals and one linear model; there is none where the machine swings too far.
 
     Raises
@@ -103,7 +103,7 @@ def _solve_simply(problem: Problem, quiet: Canonical) -> Solution | None:
     return solution if solution.optimum is None or solution.optimum.angle < MODERATE_ANGLE else None
 
 
-def _refined(problem: Canonical, start: Trajectory) -> NewtonOutcome:
+def _refined(problem: BoundaryValueProblem, start: Trajectory) -> NewtonOutcome:
     """Solve on the start's mesh, then on finer ones as needed."""
     found = solve_simplified(problem, start)
     if found.solution is None:
