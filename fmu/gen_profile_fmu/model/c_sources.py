@@ -104,9 +104,9 @@ typedef struct {{
     Type type;
     Kind kind;
     double start, lower, upper, nominal;
-}} FmuVariable;
+}} Variable;
 
-static const FmuVariable VARIABLES[N_VALUES] = {{
+static const Variable VARIABLES[N_VALUES] = {{
 {_lines(map(_variable_row, table.variables))}
 }};
 

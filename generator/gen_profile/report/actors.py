@@ -1,4 +1,4 @@
-"""The machines of a evaluation as actors of an animation."""
+"""The machines of an evaluation as actors of an animation."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ class MeasuredSway:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Measured:
-    """A log held against a evaluation.
+    """A log held against an evaluation.
 
     Attributes
     ----------

@@ -236,7 +236,7 @@ def _default_mapping(make: DriveVariant, pdo: int) -> tuple[tuple[int, ...], tup
 
 
 def _count(index: int, values: tuple[int, ...]) -> ODVariable:
-    """DriveVariant subindex 0; in a mapping it counts the objects that are in use."""
+    """Make subindex 0; in a mapping it counts the objects that are in use."""
     if index & 0x0200 and index < 0x1C00:
         used = len(values) - values.count(0)
         return _variable(index, 0, "Number of mapped objects", U8, access="rw", value=used)
