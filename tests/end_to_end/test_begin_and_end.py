@@ -10,6 +10,7 @@ ONWARD = ("--set", "move.final_velocity=0.1")
 LAG = ("--set", "actuator={type='first-order', tau=0.05}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changes", [SWUNG, ONWARD, (*SWUNG, *ONWARD), (*ONWARD, *LAG)], ids=len)
 @pytest.mark.parametrize("duration", [3.0, 3.0005], ids=["even", "off the grid"])
 def test_the_check_begins_and_ends_as_the_spec_says(tmp_path, changes, duration):

@@ -15,6 +15,7 @@ def offered(*words):
     return {line.partition(",")[2] for line in outcome.out.splitlines()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

@@ -34,6 +34,7 @@ def exports(formats):
     return [word for format_ in formats for word in ("--export", format_)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formats", [c for n in (1, 2, 3) for c in combinations(SUFFIXES, n)], ids="+".join)
 def test_every_choice_of_formats_is_written_and_recorded(tmp_path, monkeypatch, formats):
     monkeypatch.chdir(tmp_path)

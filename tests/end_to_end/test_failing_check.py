@@ -122,9 +122,14 @@ def interrupted(folder, word, delay, number, **environment):
         return process.returncode, "".join(seen) + rest
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(
-    ("word", "delay"), [("solving", 0.02), ("solving", 0.15), ("exporting", 0.0), ("checking", 0.03)]
+    ("word", "delay", "number"),
+    [
+        ("solving", 0.02, signal.SIGINT),
+        ("solving", 0.15, signal.SIGTERM),
+        ("exporting", 0.0, signal.SIGINT),
+        ("checking", 0.03, signal.SIGTERM),
+    ],
 )
 def test_an_interrupted_run_leaves_all_or_nothing(tmp_path, word, delay, number):
     code, stderr = interrupted(tmp_path, word, delay, number)

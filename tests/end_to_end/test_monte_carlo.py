@@ -114,6 +114,7 @@ PATHS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", PATHS.values(), ids=PATHS.keys())
 def test_whatever_happens_to_setpoints_on_the_way_agrees_with_a_separate_simulation(tmp_path, path):
     artefact = design(tmp_path, path, cycle="0.01")
@@ -283,6 +284,7 @@ def test_one_altered_count_fails_on_its_hash(right, tmp_path):
     assert "altered after its export" in outcome.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "overrides",
     [

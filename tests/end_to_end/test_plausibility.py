@@ -97,6 +97,7 @@ def played(spec, command, form):
     return exporter.replay(exporter.encode(command, target)[0].content, target)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("move", MOVES.values(), ids=MOVES)
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(

@@ -48,6 +48,7 @@ def test_a_vector_picture_is_well_formed_and_names_what_it_shows(tmp_path):
     assert sum(len(path.get("d", "")) > 2000 for path in paths) >= 15  # three curves per method
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("preset", "load"), [("paper-beta0", "payload"), ("gantry-crane", "load")])
 def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path, preset, load):
     picture = tmp_path / "picture.svg"

@@ -110,6 +110,7 @@ def test_a_spectrum_is_said_to_tell_no_more_than_it_does(tmp_path, words, senten
     assert sentence in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("preset", "signs"), [("paper-beta0", {1, -1}), ("gantry-crane", {1})])
 def test_the_length_of_a_sway_has_no_negative_limit(preset, signs):
     spec = preset_spec(preset, ["robustness={}", "solver.method=zv"])
@@ -190,6 +191,7 @@ def test_limits_stand_beside_what_the_motion_takes(tmp_path):
     assert levels == [[-0.1, 0.5], [0.3, -0.3], [0.8, -0.8], []]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words, expected",
     [

@@ -80,6 +80,7 @@ def report(tmp_path, *words):
     return outcome, measured, out.read_text("utf-8") if out.exists() else ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("until", [5.1, 6.1])
 def test_swings_that_a_log_cuts_short_have_no_other_zero(tmp_path, spec, motion, until):
     p = {**spec.plant.parameters, "L1": 0.470 * 0.95, "m2": 0.203 * 0.9}
@@ -88,6 +89,7 @@ def test_swings_that_a_log_cuts_short_have_no_other_zero(tmp_path, spec, motion,
     assert 1e3 * measured["sways"]["payload"]["residual_m"] == pytest.approx(truth["payload"], rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "columns", [("position", "payload"), ("payload",), ("angles",), ("position", "angles")]
 )
@@ -156,6 +158,7 @@ def test_a_log_without_the_move_is_refused(tmp_path, spec, motion):
     assert "log on until the load is at rest" in outcome.errors[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", ["hook", "payload"])
 def test_one_rope_s_angle_tells_of_what_hangs_on_it_alone(tmp_path, spec, motion, kept):
     """The upper one's gives the hook's sway; the lower one's, without the upper one's, none."""

@@ -24,6 +24,7 @@ def test_the_spec_knows_the_same_names_as_the_tables():
     assert set(get_args(attrs.fields_dict(attrs.resolve_types(SolverSpec))["base"].type)) == set(BASES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPERS)
 def test_every_shaper_is_designed_written_and_checked(tmp_path, name):
     outcome = run_here("--method", name, *SIX_SECONDS, *LOOSE, "--export", "plc", "--out", tmp_path, "--json")

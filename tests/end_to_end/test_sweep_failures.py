@@ -34,6 +34,7 @@ def prepared(folder, *axes, overrides=(), formats=("csv",)):
 # Cases
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("values", "status", "reason"),
     [

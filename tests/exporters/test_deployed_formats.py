@@ -25,6 +25,7 @@ def artefacts(folder):
     return {artefact["format"]: artefact["path"] for artefact in reversed(listed)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_each_first_artefact_passes_its_check(folder, artefacts, name):
     outcome = run_here("check", folder / artefacts[name], "--json")

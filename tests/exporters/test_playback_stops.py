@@ -301,6 +301,7 @@ class TestStartWithinTheTolerance:
         assert {row["fposition"][1] for row in rows} == {0.5004}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("profile", THERE_AND_BACK.values(), ids=THERE_AND_BACK.keys())
 def test_the_laws_hold_for_random_inputs(profile, layout):

@@ -97,6 +97,7 @@ def mutated(content, draw):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("axes", [1, 2])
@@ -140,6 +141,7 @@ def test_file_name_has_the_formats_suffix(contract):
     assert file.filename == f"{contract.stem}{BUILT_IN[contract.format].suffix}"
 
 
+@pytest.mark.slow
 @bounded
 @given(
     start=st.floats(-30, 30),
@@ -171,6 +173,7 @@ def test_any_bytes_are_refused_or_read_never_a_crash(contract, content):
         assert np.isfinite(found.position).all()
 
 
+@pytest.mark.slow
 @bounded
 @given(data=st.data())
 def test_a_mutated_file_is_refused_or_read_never_a_crash(contract, data):

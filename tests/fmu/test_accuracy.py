@@ -31,6 +31,7 @@ def test_positions_alone_carry_the_motion(cosimulation, crane, quintic, cycle, b
     np.testing.assert_allclose(response.angle, angles, rtol=0.0, atol=100.0 * bound)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tau", [0.0, 0.1, 0.005, 1e-3])
 @pytest.mark.parametrize("parameters", [None, OTHER_CRANE], ids=["nominal", "other"])
 def test_drives_interpolate_their_setpoints(cosimulation, crane, quintic, tau, parameters):

@@ -75,6 +75,7 @@ class TestPlantFmu:
         assert first.guid != second.guid
         assert first.folder != second.folder
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", ["*.xml", "*.fmu", "binaries/*/*", "checksums.json"])
     @pytest.mark.parametrize("damage", ["truncated", "missing", "altered"])
     def test_is_mended(self, new_cache, builds, crane, kind, damage):
@@ -95,6 +96,7 @@ class TestPlantFmu:
         assert path.read_bytes() == content
         assert works(crane)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("listing", ["[]", "{}", '"text"', "3", '{"gone": "00"}', "\udcff"])
     def test_is_mended_when_its_listing_is_something_else(self, new_cache, builds, listing):
         path = builds.get().folder / "checksums.json"

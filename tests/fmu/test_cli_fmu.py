@@ -16,6 +16,7 @@ from gen_profile_fmu.model.plant_variables import InputKind
 FAST = ("--set", "plant.L1=0.5")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "ssp"])
 @pytest.mark.parametrize("version", ["2", "3"])
 def test_writes_an_fmu_that_others_run(tmp_path, kind, version):

@@ -55,6 +55,7 @@ def zig_cc(tmp_path, cache):
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plant", "kind", "version"),
     [

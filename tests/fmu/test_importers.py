@@ -59,6 +59,7 @@ def _own_jacobian(kind, x, u):
 
 if tuple(map(int, casadi.__version__.split(".")[:2])) >= (3, 8):  # older ones read neither FMI 3 nor states
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", [*INPUTS, "system"])
     def test_casadi_imports_model_exchange_with_our_jacobian(kind, version):
         fmu = cached_fmu(model_of(kind, CRANE), version)
@@ -169,6 +170,7 @@ def test_events_may_lie_next_to_communication_points(kind, start, version):
     np.testing.assert_allclose(found[position], exact, rtol=0.0, atol=1e-15 if kind == "profile" else 1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_source_fmus_compile_with_a_plain_compiler_and_run(kind, version, tmp_path):
     """By C99 alone and with the standard's headers, as an importer does, who finds nothing to warn of."""

@@ -23,6 +23,7 @@ def plant(request):
     return request.param
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", Version)
 def test_a_system_moves_as_its_equations_say(plant, version):
     axes = len(plant.actuated)

@@ -55,12 +55,14 @@ def kind(request):
     return request.param
 
 
+@pytest.mark.slow
 def test_fmpy_finds_no_fault(plant, kind, version, tmp_path):
     path = tmp_path / "model.fmu"
     path.write_bytes(archive(fmu_files(sources(model_of(kind, plant), version), {}, with_extras=False)))
     assert validate_fmu(str(path)) == []
 
 
+@pytest.mark.slow
 def test_fmutool_finds_no_fault(kind, version):
     tool = Path(sys.executable).with_name("fmutool")
     built = cached_fmu(model_of(kind, CRANE), version).archive

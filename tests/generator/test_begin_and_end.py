@@ -29,6 +29,7 @@ def sways(motion, p, initial, watch=4.0, step=5e-4):
     return np.stack([hook, hook + p["L2"] * np.sin(angles[:, 1])], axis=1)
 
 
+@pytest.mark.slow
 @SOLVERS
 @pytest.mark.parametrize(("effort", "tau"), EFFORTS)
 def test_a_swinging_load_arrives_at_rest(solver, effort, tau):
@@ -57,6 +58,7 @@ def test_what_was_measured_is_the_same_on_all_machines(solver):
     assert apart[("L1",)] < 1e-3 * apart[()]
 
 
+@pytest.mark.slow
 @SOLVERS
 @pytest.mark.parametrize("tau", [None, 0.1])
 def test_a_load_hangs_still_while_its_crane_goes_on(solver, tau):
@@ -132,6 +134,7 @@ def test_limits_bind_a_motion_that_ends_at_speed():
     assert np.abs(sways(motion, problem.parameters, problem.initial)).max() < 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("initial", [{}, SWUNG], ids=["rest", "swing"])
 def test_what_is_left_out_is_told_truly(initial):
     """From rest, zero sensitivity to L1 is zero sensitivity to gravity, too; not so with a swing."""

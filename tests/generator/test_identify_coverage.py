@@ -82,6 +82,7 @@ TOLD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("type_", MACHINES)
 def test_every_machine_is_told_by_its_swing(type_):
     """Logged in the direction of the last load; a gantry's payload shows nothing of the other there."""

@@ -22,6 +22,7 @@ def duration_named(message):
     return float(message.split("Allow about ")[1].split(" s")[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [25.0, 40.0])
 def test_the_cure_for_too_short_a_move_works(distance):
     problem = crane_problem(target=(distance,), sway_weight=0.0)

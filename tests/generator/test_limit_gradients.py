@@ -105,6 +105,7 @@ def lagranges(problem, type_, paths, times):
     return np.reshape(sway, (len(times), -1)), swing.y[:, -1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("type_", MACHINES)
 def test_slopes_of_sway_and_residual(type_):
     problem = task(type_)

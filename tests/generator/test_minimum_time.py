@@ -28,6 +28,7 @@ def shortest(frequencies, distances, guess, desensitized, **limits):
     return high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("desensitized", [(), ("L1",)])
 @pytest.mark.parametrize(
     "limits",
@@ -84,6 +85,7 @@ MACHINES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["none", "sensitivity"])
 @pytest.mark.parametrize("preset", MACHINES)
 def test_of_other_machines(preset, method):

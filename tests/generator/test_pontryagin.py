@@ -63,6 +63,7 @@ def test_canonical_equations_lead_from_node_to_node(case):
         np.testing.assert_allclose(arrived / sizes, nodes[k + 1] / sizes, rtol=0.0, atol=tolerance)
 
 
+@pytest.mark.slow
 def test_cost_is_that_of_a_direct_method(case):
     oracle, optimum = case
     constant = optimum.sway_weight * optimum.knots[-1]  # the oracle counts exp(…) − 1

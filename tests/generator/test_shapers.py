@@ -162,6 +162,7 @@ def test_convolution_leaves_every_mode_at_rest(name, frequencies):
     assert vibration(impulses, frequencies).max() < size * (1e-12 if name in AT_REST else 0.05 + 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPERS)
 @given(
     frequencies=LISTS, spare=st.floats(0.05, 5.0), ends=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))

@@ -149,6 +149,7 @@ class TestVelocities:
         assert bench.of(0x301)[0].data == bench.of(0x301)[-1].data == bytes(4)
         np.testing.assert_allclose(record.actual, bench.plan.motion.at_sync, atol=1)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("fault", ["EMCY", "bit 12 lost", "TPDO late", "drive killed", "axis blocked"])
     def test_every_fault_stops_the_axis(self, fault):
         act, cycles, reason = FAULTS[fault]
