@@ -168,7 +168,7 @@ def main(folder):
     for name, (queue, disturb) in SCENARIOS.items():
         for attempt in range(ATTEMPTS):
             place = folder / f"{name}-{attempt}"
-            log = folder / ("4ms" if disturb is None else "10ms") / "paper.log"
+            log = folder / ("calm" if disturb is None else "disturbed") / "paper.log"
             if run(place, log, queue, disturb):
                 break
         place.rename(folder / name)
