@@ -37,7 +37,7 @@ def test_motion_is_continuous_at_knots(solution, profile):
     for order in range(solution.optimum.top_order):
         _, values = profile.within_segments(2, order)
         ends, starts = values[1:-1:2, 0], values[2::2, 0]
-        np.testing.assert_allclose(ends, starts, rtol=0.0, atol=1e-13 * np.abs(values).max())
+        np.testing.assert_allclose(ends, starts, rtol=0.0, atol=3e-13 * np.abs(values).max())
 
 
 def test_ends_are_exact(solution, profile):
@@ -46,7 +46,7 @@ def test_ends_are_exact(solution, profile):
     assert values[-1, 0] == pytest.approx(TARGET, rel=2e-15)  # the polynomial itself, not the held target
     for order in range(1, solution.optimum.top_order):
         _, values = profile.within_segments(2, order)
-        assert np.abs(values[[0, -1]]).max() < 1e-13 * np.abs(values).max()
+        assert np.abs(values[[0, -1]]).max() < 3e-13 * np.abs(values).max()
     assert times[-1] == profile.duration == 3.0
 
 
