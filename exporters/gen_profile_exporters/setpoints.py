@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, Profile, SampledProfile, grid_length, sample
-from gen_profile.spec.model import Bounds, CycleTime
+from gen_profile.spec.values import Bounds, CycleTime
 from gen_profile.units import COUNTS, AxisScale
 from gen_profile_exporters.exporter import Target
 

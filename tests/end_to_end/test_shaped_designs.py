@@ -12,8 +12,9 @@ from gen_profile.designs.plan import plan, timed
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.spec.model import ShaperName, SolverSpec
+from gen_profile.spec.model import SolverSpec
 from gen_profile.spec.reading import preset_spec
+from gen_profile.spec.values import ShaperName
 
 SIX_SECONDS = ("--set", "move.duration=6.0")  # longer than any delay
 LOOSE = ("--set", "check.residual_sway=0.1")  # what matters is that the sway found is the shaper's own

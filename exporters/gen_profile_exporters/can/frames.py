@@ -28,7 +28,7 @@ from can import Message
 from numpy.typing import NDArray
 
 from gen_profile.errors import ExportError
-from gen_profile.spec.model import CanSpec, CobIdsSpec
+from gen_profile.spec.can import CanSpec, CobIdsSpec
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.setpoints import two_digits_up
 

@@ -17,7 +17,7 @@ from math import ceil
 import attrs
 
 from gen_profile.errors import ExportError
-from gen_profile.spec.model import CanSpec
+from gen_profile.spec.can import CanSpec
 from gen_profile.units import AxisScale
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.frames import Field

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from textwrap import indent
 
 import attrs
@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from gen_profile_exporters.planner.interface_text import HEADER, INTERFACE
 from gen_profile_exporters.planner.motion_text import INPUTS, OUTPUTS, SLOTS
-from gen_profile_exporters.planner.planning_text import PLANNING, ROW, STEP
+from gen_profile_exporters.planner.planning_text import PLANNING
+from gen_profile_exporters.planner.programme_text import PROGRAMME, ROW, STEP
+from gen_profile_exporters.playback.structured_text import block_name, initialiser, literal
 
 Array = NDArray[np.float64]
 
@@ -80,17 +82,12 @@ class PlannerConstants:
 
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
-    body = PLANNING
+    body = PLANNING.replace("@programme\n", PROGRAMME)
     for hole, part in (("@row\n", ROW), ("@step\n", STEP)):
         body = body.replace(hole, indent(part, 20 * " "))
     text = HEADER + INTERFACE + INPUTS + SLOTS + body + OUTPUTS
     values = _values(constants)
     return re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
-
-
-def block_name(name: str) -> str:
-    """Name of the function block type: letters, digits and single underscores."""
-    return "FB_" + re.sub(r"_+", "_", re.sub(r"[^A-Za-z0-9]", "_", name)).strip("_").upper() + "_PLANNER"
 
 
 def _values(c: PlannerConstants) -> dict[str, str]:
@@ -99,7 +96,7 @@ def _values(c: PlannerConstants) -> dict[str, str]:
     lives = list(c.live)
     ranges = [f"f{name}: live parameter {name}, {low:g} to {high:g}" for name, (low, high) in c.live.items()]
     inputs = [
-        f"    f{name} : LREAL := {real_literal(value)}; (* {low:g} to {high:g} *)"
+        f"    f{name} : LREAL := {literal(value)}; (* {low:g} to {high:g} *)"
         for (name, (low, high)), value in zip(c.live.items(), c.nominal, strict=True)
     ]
     lasts = {
@@ -117,11 +114,11 @@ def _values(c: PlannerConstants) -> dict[str, str]:
     }
     return {
         "name": c.name,
-        "block": block_name(c.name),
+        "block": f"{block_name(c.name)}_planner",
         "machine": c.machine,
         "axis": c.axis,
-        "start": real_literal(c.start),
-        "cycle_time": real_literal(c.cycle),
+        "start": literal(c.start),
+        "cycle_time": literal(c.cycle),
         "cycle": f"{c.cycle:g}",
         "velocity": f"{c.velocity:g}",
         "acceleration": f"{c.acceleration:g}",
@@ -182,26 +179,11 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cReach": c.reaches.ravel(),
     }
     lines = [f"    {name} : DINT := {value};" for name, value in whole.items()]
-    lines += [f"    {name} : LREAL := {real_literal(value)};" for name, value in real.items()]
-    lines += [_array(name, "LREAL", [real_literal(v) for v in values]) for name, values in arrays.items()]
+    lines += [f"    {name} : LREAL := {literal(value)};" for name, value in real.items()]
+    lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in arrays.items()]
     lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))
     return "\n".join(lines)
 
 
-def _array(name: str, type_: str, values: list[str]) -> str:
-    lines, line = [], ""
-    for value in values:
-        if len(line) + len(value) > 96:
-            lines.append(line)
-            line = ""
-        line += f"{value}, "
-    text = "\n        ".join([*lines, line]).removesuffix(", ")
-    return f"    {name} : ARRAY [0..{len(values) - 1}] OF {type_} := [{text}];"
-
-
-def real_literal(value: float) -> str:
-    """Write a number so that every compiler reads the same double."""
-    text = repr(float(value)).upper()
-    mantissa, _, exponent = text.partition("E")
-    mantissa += "" if "." in mantissa else ".0"
-    return mantissa + (f"E{exponent}" if exponent else "")
+def _array(name: str, type_: str, values: Sequence[str]) -> str:
+    return f"    {name} : ARRAY [0..{len(values) - 1}] OF {type_} := {initialiser(values)};"

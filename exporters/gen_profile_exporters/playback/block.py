@@ -9,7 +9,8 @@ from functools import cache
 import attrs
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters.playback.template import BODY, HEADER, INTERFACE, LAYOUTS
+from gen_profile_exporters.playback.layouts import LAYOUTS
+from gen_profile_exporters.playback.template import BODY, HEADER, INTERFACE
 
 _CHECKED = {  # how the value of a constant enters the checksum
     "DINT": "fValue := DINT_TO_LREAL({});",

@@ -1,4 +1,4 @@
-"""A command group whose first command runs when no command is named."""
+"""Command groups of which one command runs when none is named."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from click.shell_completion import CompletionItem
 from gen_profile.errors import SpecError
 from gen_profile.suggestion import suggestion
 
-DEFAULT = "design"
-
 
 class DefaultGroup(click.Group):
-    """Put `DEFAULT` before arguments that begin with neither a command nor an option of the group."""
+    """Put `default` before arguments that begin with neither a command nor an option of the group."""
+
+    default = "design"
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments, the default command put in."""
@@ -24,7 +24,7 @@ class DefaultGroup(click.Group):
         completing_first_word = ctx.resilient_parsing and not args
         if not completing_first_word and (not args or (args[0] not in self.commands and args[0] not in own)):
             self._refuse_mistyped(ctx, args)
-            args = [DEFAULT, *args]
+            args = [self.default, *args]
         return super().parse_args(ctx, args)
 
     def _refuse_mistyped(self, ctx: click.Context, args: list[str]) -> None:
@@ -41,7 +41,7 @@ class DefaultGroup(click.Group):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Show the default command's options with the group's own."""
-        default = self.commands[DEFAULT]
+        default = self.commands[self.default]
         records = (parameter.get_help_record(ctx) for parameter in (*default.params, *self.get_params(ctx)))
         with formatter.section("Options"):
             formatter.write_dl([record for record in records if record is not None])
@@ -49,6 +49,6 @@ class DefaultGroup(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete commands and what the default command takes."""
-        default = self.commands[DEFAULT]
-        inner = default.make_context(DEFAULT, [], parent=ctx, resilient_parsing=True)
+        default = self.commands[self.default]
+        inner = default.make_context(self.default, [], parent=ctx, resilient_parsing=True)
         return [*super().shell_complete(ctx, incomplete), *default.shell_complete(inner, incomplete)]

@@ -7,19 +7,16 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import cli
+from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import OutputFile, chosen_spec, debug_option, json_option, spec_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import OutputError
 
 
-class PlannerGroup(click.Group):
-    """Put ``write`` before arguments that begin with no command of the group."""
+class PlannerGroup(DefaultGroup):
+    """Write where no command is named."""
 
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments, the default command put in."""
-        if args and args[0] not in self.commands and args[0] != "--help":
-            args = ["write", *args]
-        return super().parse_args(ctx, args)
+    default = "write"
 
 
 @cli.group(cls=PlannerGroup, epilog="Example: gen-profile planner crane.toml --out deploy")

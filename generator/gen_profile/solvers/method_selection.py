@@ -22,7 +22,8 @@ from gen_profile.solvers.infeasibility import WORK, CandidateTest, cures
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
-from gen_profile.spec.model import LimitsSpec, SolverName
+from gen_profile.spec.model import LimitsSpec
+from gen_profile.spec.values import SolverName
 from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]

@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 import attrs
@@ -18,56 +17,25 @@ import attrs
 from gen_profile.plants.machine_file import MachineFile, plant_of_file
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
+from gen_profile.spec.can import CanSpec
+from gen_profile.spec.values import (
+    Bounds,
+    Column,
+    CycleTime,
+    Distance,
+    Duration,
+    Name,
+    NotNegative,
+    Positive,
+    RelativeRange,
+    ShaperName,
+    SolverName,
+    frozen_mapping,
+)
 from gen_profile.units import AxisScale, axis_factor
-
-
-@attrs.frozen
-class Bounds:
-    """Allowed values of a number, `above` itself excluded, and what they are: a unit, or words."""
-
-    above: float = -float("inf")
-    least: float = -float("inf")
-    most: float = float("inf")
-    meaning: str = ""
-
-
-@attrs.frozen
-class Pattern:
-    """Allowed texts: a regular expression and what it means in words."""
-
-    expression: str
-    meaning: str
-
-
-Name = Annotated[
-    str,
-    Pattern(
-        r"(?!(?i:con|prn|aux|nul|com[0-9]|lpt[0-9])(?:\.|$))"
-        r"[A-Za-z0-9](?:[A-Za-z0-9._ -]{0,62}[A-Za-z0-9_-])?",
-        "1 to 64 letters, digits, dots, underscores, hyphens and spaces, beginning with a letter or digit, "
-        "not ending with a dot or space, and no device's name in Windows, as CON",
-    ),
-]
-Positive = Annotated[float, Bounds(above=0.0)]
-NotNegative = Annotated[float, Bounds(least=0.0)]
-RelativeRange = Annotated[float, Bounds(above=0.0, most=0.9, meaning="(0.1 is 10 %)")]
-CycleTime = Annotated[float, Bounds(least=1e-5, most=1.0, meaning="s (4 ms are 0.004)")]
-Duration = Annotated[float, Bounds(least=1e-3, most=1e5, meaning="s")]
-Column = Literal["position", "velocity", "acceleration", "jerk"]
-Distance = Annotated[float, Bounds(least=-1e5, most=1e5, meaning="m (or rad)")]
-SolverName = Literal["auto", "indirect", "direct"]
-ShaperName = Literal["nzv", "zv", "zvd", "zvdd", "umzvd", "ei", "2hump-ei", "3hump-ei", "mzv"]
-Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]
-NodeId = Annotated[int, Bounds(least=1, most=127)]
-# what CiA 301 leaves to PDOs: EMCY lies below, SDOs above
-PdoCobId = Annotated[int, Bounds(least=0x181, most=0x57F, meaning="(181h to 57Fh)")]
 
 DEFAULT_COUNTS_PER_SI = 1e6
 RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longest axis move
-
-
-def _frozen_mapping(values: Mapping[str, Any]) -> Mapping[str, Any]:
-    return MappingProxyType(dict(values))
 
 
 @attrs.frozen(kw_only=True)
@@ -76,7 +44,7 @@ class PlantSpec:
 
     type: str
     file: MachineFile | None = None
-    parameters: Mapping[str, float] = attrs.field(factory=dict, converter=_frozen_mapping)
+    parameters: Mapping[str, float] = attrs.field(factory=dict, converter=frozen_mapping)
     defaults: tuple[str, ...] = attrs.field(default=(), eq=False)  # parameters the spec left to the type
 
 
@@ -98,7 +66,7 @@ class MoveSpec:
     target: tuple[Distance, ...]
     duration: Duration
     shortest: bool = False
-    initial: Mapping[str, float] = attrs.field(factory=dict, converter=_frozen_mapping)
+    initial: Mapping[str, float] = attrs.field(factory=dict, converter=frozen_mapping)
     final_velocity: tuple[Distance, ...] = attrs.field()
 
     @final_velocity.default
@@ -131,7 +99,7 @@ class RobustnessSpec:
     method: Literal["none", "sensitivity", "range"] = "none"
     order: Literal[1, 2] = 1
     nominal_zero: bool = False  # with method "range": the nominal machine comes to rest exactly all the same
-    uncertain: Mapping[str, RelativeRange] = attrs.field(factory=dict, converter=_frozen_mapping)
+    uncertain: Mapping[str, RelativeRange] = attrs.field(factory=dict, converter=frozen_mapping)
 
 
 @attrs.frozen(kw_only=True)
@@ -186,7 +154,7 @@ class LimitsSpec:
     jerk: Positive | None = None
     sway: Positive | None = None
     travel: tuple[Distance, Distance] | None = None
-    axis: Mapping[str, AxisLimitsSpec] = attrs.field(factory=dict, converter=_frozen_mapping)
+    axis: Mapping[str, AxisLimitsSpec] = attrs.field(factory=dict, converter=frozen_mapping)
 
     def own(self, column: int) -> tuple[str, AxisLimitsSpec]:
         """Name of an axis that has limits of its own, and those."""
@@ -258,8 +226,8 @@ class ExternalFmu:
     sha256: str
     input: str
     inputs: tuple[str, ...]
-    sway: Mapping[str, str] = attrs.field(converter=_frozen_mapping)
-    parameters: Mapping[str, str] = attrs.field(converter=_frozen_mapping)
+    sway: Mapping[str, str] = attrs.field(converter=frozen_mapping)
+    parameters: Mapping[str, str] = attrs.field(converter=frozen_mapping)
     time_limit: float
 
     def to_dict(self) -> dict[str, Any]:
@@ -333,11 +301,11 @@ class CheckSpec:
         Somebody else's FMU that judges in place of ours.
     """
 
-    residual_sway: Mapping[str, Positive] = attrs.field(converter=_frozen_mapping)
+    residual_sway: Mapping[str, Positive] = attrs.field(converter=frozen_mapping)
     uncertain: Mapping[str, RelativeRange] | None = attrs.field(
-        default=None, converter=attrs.converters.optional(_frozen_mapping)
+        default=None, converter=attrs.converters.optional(frozen_mapping)
     )
-    spans: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=_frozen_mapping)
+    spans: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=frozen_mapping)
     samples: Annotated[int, Bounds(least=0, most=1_000_000)] = 0
     seed: Annotated[int, Bounds(least=0, most=0xFFFF_FFFF)] = 0
     path: PathSpec = attrs.field(factory=PathSpec)
@@ -365,96 +333,6 @@ class ExportSpec:
 
 
 @attrs.frozen(kw_only=True)
-class CobIdsSpec:
-    """COB-IDs of one drive's PDOs; None for those of the predefined connection set of CiA 301.
-
-    Attributes
-    ----------
-    command : int or None
-        Controlword, 200h + node id.
-    setpoint : int or None
-        300h + node id.
-    feed_forward : int or None
-        The torque beside a velocity, 400h + node id.
-    feedback : int or None
-        Statusword and actual position, 180h + node id.
-    """
-
-    command: PdoCobId | None = None
-    setpoint: PdoCobId | None = None
-    feed_forward: PdoCobId | None = None
-    feedback: PdoCobId | None = None
-
-
-@attrs.frozen(kw_only=True)
-class CanSpec:
-    """The drives on the CAN bus, and how they are to be fed, watched and stopped.
-
-    Attributes
-    ----------
-    node : int
-        CANopen node of the first axis; the second axis takes the next one, and so on.
-    nodes : mapping of str to int
-        Nodes of all axes by name, where they do not count up from `node`; empty where they do.
-    cob_ids : mapping of str to CobIdsSpec
-        By axis, where they are not those of the predefined connection set.
-    bitrate : int
-        bit/s.
-    mode : str
-        ``"csp"`` (cyclic synchronous position, 607Ah), ``"ip"`` (interpolated position, 60C1h) or ``"csv"``
-        (cyclic synchronous velocity, 60FFh).
-    sync_period : float
-        s; also the drives' interpolation period 60C2h.
-    feed_forward : str
-        What goes along with each position in csp: nothing, the velocity 60B1h, the torque 60B2h, or both.
-    torque_per_acceleration : float or None
-        For the torque: ‰ of the rated torque per m/s² (or rad/s²) of the axis.
-    timeout : float or None
-        How long a drive waits for the next setpoint before it stops by itself, and the streamer for an
-        answer, in s; None takes 20 ms or three cycles, whichever is longer.
-    start_tolerance : float
-        How far the axis may stand from the first setpoint, in m (or rad).
-    following_error : float or None
-        Window 6065h in m (or rad); None leaves the drive's own. In csv, where no drive watches it, the
-        streamer does, and it must be stated.
-    quick_stop : float or None
-        Deceleration 6085h in m/s² (or rad/s²); None takes twice the motion's greatest acceleration.
-    travel : mapping of str to (float, float)
-        Software position limits 607Dh by axis, in m (or rad).
-    encoder, gear, feed : (int, int) or None
-        Numerator and denominator of 608Fh (increments per motor revolutions), 6091h (motor per shaft
-        revolutions) and 6092h (counts per shaft revolutions), for drives that scale positions themselves.
-    vendor, product : int or None
-        Identity 1018h:01 and :02 that a drive must have.
-    serial : mapping of str to int
-        Serial number 1018h:04 that the drive of an axis must have.
-    homed : (int, int, int) or None
-        Index, subindex and bits of the drive's object that are set once it knows where its axis is.
-    """
-
-    node: NodeId = 1
-    nodes: Mapping[str, NodeId] = attrs.field(factory=dict, converter=_frozen_mapping)
-    cob_ids: Mapping[str, CobIdsSpec] = attrs.field(factory=dict, converter=_frozen_mapping)
-    bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
-    mode: Literal["csp", "ip", "csv"] = "csp"
-    sync_period: CycleTime = 0.004
-    feed_forward: Literal["none", "velocity", "torque", "both"] = "none"
-    torque_per_acceleration: Positive | None = None
-    timeout: Annotated[float, Bounds(least=0.001, most=30.0)] | None = None
-    start_tolerance: Positive = 0.001
-    following_error: Positive | None = None
-    quick_stop: Positive | None = None
-    travel: Mapping[str, tuple[Distance, Distance]] = attrs.field(factory=dict, converter=_frozen_mapping)
-    encoder: tuple[Unsigned32, Unsigned32] | None = None
-    gear: tuple[Unsigned32, Unsigned32] | None = None
-    feed: tuple[Unsigned32, Unsigned32] | None = None
-    vendor: Unsigned32 | None = None
-    product: Unsigned32 | None = None
-    serial: Mapping[str, Unsigned32] = attrs.field(factory=dict, converter=_frozen_mapping)
-    homed: tuple[Unsigned32, Annotated[int, Bounds(least=0, most=255)], Unsigned32] | None = None
-
-
-@attrs.frozen(kw_only=True)
 class PlannerSpec:
     """What a planner block is told at run time, and how it brakes at once.
 
@@ -468,7 +346,7 @@ class PlannerSpec:
         m/s³; None takes four times the limit.
     """
 
-    live: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=_frozen_mapping)
+    live: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=frozen_mapping)
     quick_stop: Positive | None = None
     quick_stop_jerk: Positive | None = None
 
@@ -486,7 +364,7 @@ class Spec:
     solver: SolverSpec
     limits: LimitsSpec
     check: CheckSpec
-    axis: Mapping[str, AxisSpec] = attrs.field(converter=_frozen_mapping)
+    axis: Mapping[str, AxisSpec] = attrs.field(converter=frozen_mapping)
     export: ExportSpec
     can: CanSpec
     planner: PlannerSpec = attrs.field(factory=PlannerSpec)

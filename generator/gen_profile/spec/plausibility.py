@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.errors import SpecError
-from gen_profile.spec.model import RESIDUAL_SHARE, CanSpec, Spec
+from gen_profile.spec.can import CanSpec
+from gen_profile.spec.model import RESIDUAL_SHARE, Spec
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,8 @@ from cattrs.errors import (
 
 from gen_profile.errors import SpecError
 from gen_profile.plants.machine_file import MachineFile
-from gen_profile.spec.model import Bounds, ExternalFmu, Pattern, Spec
+from gen_profile.spec.model import ExternalFmu, Spec
+from gen_profile.spec.values import Bounds, Pattern
 from gen_profile.suggestion import number_meant, suggestion
 
 Table = dict[str, Any]

@@ -17,12 +17,12 @@ from gen_profile.errors import SpecError
 from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_machine_file
 from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile.plants.registry import find_plant, plant_types
+from gen_profile.spec.can import CanSpec
 from gen_profile.spec.check_table import KEYS as CHECK_KEYS
 from gen_profile.spec.check_table import check_table
 from gen_profile.spec.external_fmu import KEYS as FOREIGN_KEYS
 from gen_profile.spec.model import (
     ActuatorSpec,
-    CanSpec,
     CostSpec,
     ExportSpec,
     LimitsSpec,

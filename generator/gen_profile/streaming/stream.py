@@ -17,7 +17,8 @@ from gen_profile.artefacts.manifest import FILENAME, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import CheckFailed, OutputError, SpecError, StreamAborted
 from gen_profile.progress import Progress
-from gen_profile.spec.model import CanSpec, Spec
+from gen_profile.spec.can import CanSpec
+from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.streaming.outcome import Source, StreamOutcome
 from gen_profile_exporters.can import frames

@@ -1,0 +1,105 @@
+"""What a spec says of drives on a CAN bus."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import attrs
+
+from gen_profile.spec.values import Bounds, CycleTime, Distance, Positive, frozen_mapping
+
+Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]
+NodeId = Annotated[int, Bounds(least=1, most=127)]
+# what CiA 301 leaves to PDOs: EMCY lies below, SDOs above
+PdoCobId = Annotated[int, Bounds(least=0x181, most=0x57F, meaning="(181h to 57Fh)")]
+
+
+@attrs.frozen(kw_only=True)
+class CobIdsSpec:
+    """COB-IDs of one drive's PDOs; None for those of the predefined connection set of CiA 301.
+
+    Attributes
+    ----------
+    command : int or None
+        Controlword, 200h + node id.
+    setpoint : int or None
+        300h + node id.
+    feed_forward : int or None
+        The torque beside a velocity, 400h + node id.
+    feedback : int or None
+        Statusword and actual position, 180h + node id.
+    """
+
+    command: PdoCobId | None = None
+    setpoint: PdoCobId | None = None
+    feed_forward: PdoCobId | None = None
+    feedback: PdoCobId | None = None
+
+
+@attrs.frozen(kw_only=True)
+class CanSpec:
+    """The drives on the CAN bus, and how they are to be fed, watched and stopped.
+
+    Attributes
+    ----------
+    node : int
+        CANopen node of the first axis; the second axis takes the next one, and so on.
+    nodes : mapping of str to int
+        Nodes of all axes by name, where they do not count up from `node`; empty where they do.
+    cob_ids : mapping of str to CobIdsSpec
+        By axis, where they are not those of the predefined connection set.
+    bitrate : int
+        bit/s.
+    mode : str
+        ``"csp"`` (cyclic synchronous position, 607Ah), ``"ip"`` (interpolated position, 60C1h) or ``"csv"``
+        (cyclic synchronous velocity, 60FFh).
+    sync_period : float
+        s; also the drives' interpolation period 60C2h.
+    feed_forward : str
+        What goes along with each position in csp: nothing, the velocity 60B1h, the torque 60B2h, or both.
+    torque_per_acceleration : float or None
+        For the torque: ‰ of the rated torque per m/s² (or rad/s²) of the axis.
+    timeout : float or None
+        How long a drive waits for the next setpoint before it stops by itself, and the streamer for an
+        answer, in s; None takes 20 ms or three cycles, whichever is longer.
+    start_tolerance : float
+        How far the axis may stand from the first setpoint, in m (or rad).
+    following_error : float or None
+        Window 6065h in m (or rad); None leaves the drive's own. In csv, where no drive watches it, the
+        streamer does, and it must be stated.
+    quick_stop : float or None
+        Deceleration 6085h in m/s² (or rad/s²); None takes twice the motion's greatest acceleration.
+    travel : mapping of str to (float, float)
+        Software position limits 607Dh by axis, in m (or rad).
+    encoder, gear, feed : (int, int) or None
+        Numerator and denominator of 608Fh (increments per motor revolutions), 6091h (motor per shaft
+        revolutions) and 6092h (counts per shaft revolutions), for drives that scale positions themselves.
+    vendor, product : int or None
+        Identity 1018h:01 and :02 that a drive must have.
+    serial : mapping of str to int
+        Serial number 1018h:04 that the drive of an axis must have.
+    homed : (int, int, int) or None
+        Index, subindex and bits of the drive's object that are set once it knows where its axis is.
+    """
+
+    node: NodeId = 1
+    nodes: Mapping[str, NodeId] = attrs.field(factory=dict, converter=frozen_mapping)
+    cob_ids: Mapping[str, CobIdsSpec] = attrs.field(factory=dict, converter=frozen_mapping)
+    bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
+    mode: Literal["csp", "ip", "csv"] = "csp"
+    sync_period: CycleTime = 0.004
+    feed_forward: Literal["none", "velocity", "torque", "both"] = "none"
+    torque_per_acceleration: Positive | None = None
+    timeout: Annotated[float, Bounds(least=0.001, most=30.0)] | None = None
+    start_tolerance: Positive = 0.001
+    following_error: Positive | None = None
+    quick_stop: Positive | None = None
+    travel: Mapping[str, tuple[Distance, Distance]] = attrs.field(factory=dict, converter=frozen_mapping)
+    encoder: tuple[Unsigned32, Unsigned32] | None = None
+    gear: tuple[Unsigned32, Unsigned32] | None = None
+    feed: tuple[Unsigned32, Unsigned32] | None = None
+    vendor: Unsigned32 | None = None
+    product: Unsigned32 | None = None
+    serial: Mapping[str, Unsigned32] = attrs.field(factory=dict, converter=frozen_mapping)
+    homed: tuple[Unsigned32, Annotated[int, Bounds(least=0, most=255)], Unsigned32] | None = None
