@@ -13,7 +13,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer
-from lark.exceptions import LarkError
+from lark.exceptions import LarkError, UnexpectedInput
 
 from gen_profile.errors import ExportError
 
@@ -64,6 +64,7 @@ _GRAMMAR = r"""
     %ignore /\s+/
 """
 
+_NO_BLOCK = "The text is no function block that can be executed here"
 _TYPES = {"BOOL": "bool", "DINT": "int32_t", "LREAL": "double"}
 _OPERATORS = {"=": "==", "<>": "!=", "AND": "&&", "OR": "||"}
 _FUNCTIONS = {
@@ -95,7 +96,8 @@ class Translation(NamedTuple):
         All scalars.
     header, source : str
         `source` includes ``NAME.h``. Compiled with ``COUNT_OPERATIONS``, it adds up floating-point operations
-        in ``NAME_operations``.
+        in ``NAME_operations``; with ``CHECK_INDICES``, an index beyond its array sets ``NAME_beyond``, and
+        takes element 0.
     """
 
     name: str
@@ -126,11 +128,12 @@ def translate(text: str) -> Translation:
         variables = [v for section in tree.find_data("section") for v in _declared(section)]
         translated: Any = _Translator(variables).transform(tree)
         name, *_, body = translated.children
+    except UnexpectedInput as error:
+        place = f"line {error.line}, column {error.column}"
+        raise ExportError(f"{_NO_BLOCK}: {place} is not understood.") from error
     except (LarkError, KeyError) as error:
         reason = getattr(error, "orig_exc", error)
-        raise ExportError(
-            f"The text is no function block that can be executed here: {str(reason).splitlines()[0]}."
-        ) from error
+        raise ExportError(f"{_NO_BLOCK}: {reason.args[0]}.") from error
     inputs, outputs = (
         tuple(v for v in variables if v.section == section) for section in ("VAR_INPUT", "VAR_OUTPUT")
     )
@@ -185,7 +188,9 @@ class _Translator(Transformer[Token, object]):
         if declared is None:
             raise KeyError(f"{name} is not declared")
         owner = "" if declared.section == "VAR CONSTANT" else "fb->"
-        element = "" if index is None else f"[{index.text}]"
+        if (index is None) != (declared.length == 0):
+            raise KeyError(f"{name} is {'an array' if declared.length else 'no array'}")
+        element = "" if index is None else f"[AT({index.text}, {declared.length})]"
         return _Code(f"{owner}{declared.name}{element}", declared.type)
 
     def prefixed(self, parts):  # type: ignore[no-untyped-def]
@@ -307,6 +312,19 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             f"#define OPERATIONS(number) ({name}_operations += (number))",
             "#else",
             "#define OPERATIONS(number) ((void)0)",
+            "#endif",
+            "#ifdef CHECK_INDICES",
+            f"static bool {name}_beyond;",
+            "#define AT(index, length) within(index, length)",
+            "static int32_t within(int32_t index, int32_t length)",
+            "{",
+            "    if (index >= 0 && index < length)",
+            "        return index;",
+            f"    {name}_beyond = true;",
+            "    return 0;",
+            "}",
+            "#else",
+            "#define AT(index, length) (index)",
             "#endif",
             "",
             *constants,

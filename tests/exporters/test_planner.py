@@ -277,9 +277,38 @@ def test_a_fault_in_the_commands_is_told_with_its_line(text, commands, words):
         play(text, commands)
 
 
-def test_what_is_no_block_is_refused():
-    with pytest.raises(ExportError, match="no function block"):
-        play("FUNCTION_BLOCK x VAR END_VAR y := 1; END_FUNCTION_BLOCK", "")
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("FUNCTION_BLOCK x VAR END_VAR y := 1; END_FUNCTION_BLOCK", "y is not declared"),
+        (
+            "FUNCTION_BLOCK x VAR\n  y : INT; END_VAR END_FUNCTION_BLOCK",
+            r"line 2, column 7 is not understood",
+        ),
+        ("FUNCTION_BLOCK x VAR", "line 1, column [0-9]+ is not understood"),
+        ("FUNCTION_BLOCK x VAR y : DINT; END_VAR y[1] := 1; END_FUNCTION_BLOCK", "y is no array"),
+    ],
+)
+def test_what_is_no_block_is_refused(text, words):
+    with pytest.raises(ExportError, match=words):
+        play(text, "")
+
+
+def test_a_block_that_leaves_its_arrays_ends_in_a_sentence():
+    """An index of 2³⁰ would end the process otherwise."""
+    block = BlockInstance(
+        "FUNCTION_BLOCK x VAR_INPUT n : DINT; END_VAR VAR_OUTPUT y : LREAL; END_VAR "
+        "VAR a : ARRAY [0..2] OF LREAL; END_VAR a[n] := 1.0; y := a[n]; END_FUNCTION_BLOCK"
+    )
+    assert block.call(np.array([[0.0], [2.0]])).tolist() == [[1.0], [1.0]]
+    for index in (-1.0, 3.0, 2.0**30):
+        with pytest.raises(ExportError, match="beyond the end of an array"):
+            block.call(np.array([[index]]))
+
+
+def test_an_error_of_the_block_is_told(text):
+    """The target lies beyond the travel."""
+    assert play(text, "time_s,command,value\n0,position,1e6\n").errors == (3,)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from gen_profile.motion.metrics import greatest
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
@@ -119,7 +120,7 @@ def test_snap_within_a_limit_of_the_sway_takes_few_programs_and_intervals(monkey
     task = ["cost.effort=snap", "move.duration=6.0", "limits.sway=0.003"]
     few = direct.solve(problem_of(preset_spec("slosh-tank", task)))
     assert few.iterations <= 20
-    monkeypatch.setattr(direct, "INTERVALS", 60)  # of which there are twice as many, with limits
+    monkeypatch.setattr(set_up, "INTERVALS", 60)  # of which there are twice as many, with limits
     many = direct.solve(problem_of(preset_spec("slosh-tank", task)))
     assert many.raise_for_status().cost == pytest.approx(few.raise_for_status().cost, rel=0.01)
 

@@ -10,6 +10,7 @@ import pytest
 from scipy.interpolate import BPoly, CubicSpline, PPoly
 
 import gen_profile as gp
+from gen_profile.charts.method_styles import method_styles
 from gen_profile.motion.profile import Profile
 
 
@@ -98,3 +99,38 @@ def test_a_verdict_that_failed_raises():
     assert not Path("unused").exists()
     with pytest.raises(gp.CheckFailed, match="sways by"):
         design.check.raise_for_failure()
+
+
+def straight(axes, method):
+    """A motion that stands still for 3 s."""
+    return Profile(
+        knots=[0.0, 3.0], coefficients=np.zeros((1, 1, axes)), target=np.zeros(axes), method=method
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (
+            lambda spec: gp.evaluate(spec, straight(2, "mine")),
+            r"moves 2 axes, .* machine has 1 \(cart\)",
+        ),
+        (lambda spec: gp.compare(spec, own=[straight(1, "zvd")]), "Two motions are called 'zvd'"),
+        (lambda spec: gp.export_fmu(spec, "plnt"), "no FMU of the kind 'plnt'; did you mean 'plant'"),
+        (lambda spec: gp.design(spec, "plcc", "unused"), "unknown format 'plcc'; did you mean 'plc'"),
+    ],
+)
+def test_slips_are_told_in_a_sentence(call, sentence):
+    with pytest.raises(gp.SpecError, match=sentence):
+        call(gp.preset_spec("paper"))
+    assert not Path("unused").exists()
+
+
+def test_what_is_said_of_all_axes_replaces_what_was_said_of_one():
+    spec = gp.preset_spec("paper")
+    assert {axis.unit for axis in gp.evolve_spec(spec, axis={"unit": "um"}).axis.values()} == {"um"}
+
+
+def test_curves_of_motions_that_users_bring_differ():
+    styles = method_styles(["optimal", "mine", "yours", "theirs"])
+    assert len({(style.colour, style.dash) for style in styles.values()}) == 4

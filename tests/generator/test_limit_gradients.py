@@ -14,7 +14,7 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.collocation import GAUSS
 from gen_profile.solvers.direct.bezier import bernstein
-from gen_profile.solvers.direct.solver import set_up
+from gen_profile.solvers.direct.set_up import set_up
 from gen_profile.solvers.direct.transcription import Iterate
 
 STEP = 1e-2

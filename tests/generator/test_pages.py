@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from command_line import COMMANDS
 
-from gen_profile.cli.group import DEFAULT
+from gen_profile.cli.group import DefaultGroup
 from gen_profile.plants.registry import find_plant, plant_types
 
 ROOT = Path(__file__).parents[2]
@@ -31,7 +31,7 @@ def commands_on(page):
 def test_options_are_those_of_the_command(page):
     wrong = []
     for words in commands_on(page):
-        names = (words[0], " ".join(words[:2]), DEFAULT)
+        names = (words[0], " ".join(words[:2]), DefaultGroup.default)
         command = next(COMMANDS[name] for name in names if name in COMMANDS)
         known = {option for parameter in command.params for option in parameter.opts} | OF_THE_GROUP
         asked = {word.partition("=")[0] for word in words if re.match(r"--[a-z-]+(=|$)", word)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from itertools import cycle
 
 from gen_profile.charts.figure import PALETTE, Dash, Style
 from gen_profile.shapers.impulses import SHAPERS
@@ -36,9 +37,9 @@ def method_styles(methods: Iterable[str], thick: Collection[str | None] = ()) ->
         for dash, first, group in GROUPS
         for place, method in enumerate(group)
     }
-    other: tuple[str, Dash] = (PALETTE[len(OPTIMAL)], "solid")  # the spec's own β
+    others = cycle(reversed(PALETTE))  # the spec's own β first, then what users bring
     styles = {}
     for method in methods:
-        colour, dash = looks.get(method, other)
+        colour, dash = looks.get(method) or (next(others), "solid")
         styles[method] = Style(colour=colour, dash=dash, width=THICK if method in thick else THIN)
     return styles

@@ -32,5 +32,7 @@ def plot(result: Comparison | Robustness | Identification, path: Path | str) -> 
             comparison.draw(result, path)
         case Robustness():
             robustness.draw(result, path)
-        case _:
+        case Identification():
             identification.draw(result, path)
+        case _:
+            raise TypeError(f"There is no picture of a {type(result).__name__}.")

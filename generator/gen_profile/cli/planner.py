@@ -90,17 +90,21 @@ def write(
 @debug_option
 def play(block: Path, commands_path: Path, path: Path, as_json: bool) -> None:
     """Execute a written planner block under a table of commands."""
-    text, commands = _read(block, "the block"), _read(commands_path, "the commands")
+    content, commands = _read(block, "the block"), _read(commands_path, "the commands")
     from gen_profile.artefacts.writing import deliver
     from gen_profile.cli.progress import progress
     from gen_profile.planner.commands import play as run
 
     with progress() as tell:
         tell("executing the block")
-        setpoints = run(text, commands)
-    deliver(path, setpoints.encode("ascii"))
-    cycles = setpoints.count("\n") - 1
-    print_outcome({"path": str(path), "cycles": cycles}, f"{path}: {cycles} cycles", as_json)
+        setpoints = run(content, commands)
+    deliver(path, setpoints.table.encode("ascii"))
+    text = f"{path}: {setpoints.cycles} cycles"
+    if setpoints.errors:
+        ids = ", ".join(map(str, setpoints.errors))
+        text += f"; the block showed error {ids}, which its header explains"
+    document = {"path": str(path), "cycles": setpoints.cycles, "error_ids": list(setpoints.errors)}
+    print_outcome(document, text, as_json)
 
 
 def _read(path: Path, what: str) -> str:

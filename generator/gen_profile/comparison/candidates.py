@@ -10,7 +10,7 @@ import attrs
 
 from gen_profile.designs.plan import timed
 from gen_profile.designs.shape import shaped_motion
-from gen_profile.errors import GenProfileError, InfeasibleProblem
+from gen_profile.errors import GenProfileError, InfeasibleProblem, SpecError
 from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Profile
 from gen_profile.problem.actuator import lag_compensated
@@ -41,7 +41,7 @@ class Candidate:
     design : () → Profile
         Raises a `GenProfileError` where the method has no motion for the move.
     requirements : str
-        Contenders of the same requirements have a motion all or none; empty where that says nothing.
+        Candidates of the same requirements have a motion all or none; empty where that says nothing.
     """
 
     method: str
@@ -67,17 +67,27 @@ def candidates(spec: Spec, own: Sequence[Profile] = ()) -> Iterator[Candidate]:
         shaper is fed with the spec's base move.
     own : sequence of Profile
         Each of a ``method`` of its own.
+
+    Raises
+    ------
+    SpecError
+        Two have the same name.
     """
+    known = [*SHAPERS, *(candidate.method for candidate in _optimal_candidates(spec))]
+    for motion in own:
+        if motion.method in known:
+            raise SpecError(f"Two motions are called {motion.method!r}; give yours another method.")
+        known.append(motion.method)
     for name in SHAPERS:
         yield Candidate(method=name, design=partial(shaped_motion, spec, name))
     if spec.solver.shaper is not None:
         spec = attrs.evolve(spec, solver=attrs.evolve(spec.solver, method="auto"))
-    yield from _optimal_contenders(spec)
+    yield from _optimal_candidates(spec)
     for motion in own:
         yield Candidate(method=motion.method, design=partial(_given, motion))
 
 
-def _optimal_contenders(spec: Spec) -> Iterator[Candidate]:
+def _optimal_candidates(spec: Spec) -> Iterator[Candidate]:
     once = cache(partial(timed, spec))  # the shortest duration does not depend on β
     of_spec = cache(partial(_attempt, once))
     weight = spec.cost.sway_weight

@@ -94,17 +94,17 @@ def compare(spec: Spec, progress: Progress = untold, *, own: Sequence[Profile] =
     left_out: dict[str, str] = {}
     impossible: dict[str, str] = {}
     listed = tuple(candidates(spec, own))
-    for done, contender in enumerate(listed):
-        progress("comparing", done, len(listed), contender.method)
+    for done, candidate in enumerate(listed):
+        progress("comparing", done, len(listed), candidate.method)
         try:
-            if contender.requirements in impossible:
-                left_out[contender.method] = impossible[contender.requirements]
+            if candidate.requirements in impossible:
+                left_out[candidate.method] = impossible[candidate.requirements]
             else:
-                rows.append(_row(spec, contender))
+                rows.append(_row(spec, candidate))
         except GenProfileError as error:
-            left_out[contender.method] = str(error)
-            if contender.requirements and isinstance(error, InfeasibleProblem):
-                impossible[contender.requirements] = str(error)
+            left_out[candidate.method] = str(error)
+            if candidate.requirements and isinstance(error, InfeasibleProblem):
+                impossible[candidate.requirements] = str(error)
     found = {row.method: row.figures for row in rows}
     return Comparison(
         spec=spec,
@@ -120,10 +120,10 @@ def compare(spec: Spec, progress: Progress = untold, *, own: Sequence[Profile] =
     )
 
 
-def _row(spec: Spec, contender: Candidate) -> ComparedMethod:
-    evaluation = evaluate(spec, contender.design())
+def _row(spec: Spec, candidate: Candidate) -> ComparedMethod:
+    evaluation = evaluate(spec, candidate.design())
     return ComparedMethod(
-        method=contender.method,
+        method=candidate.method,
         evaluation=evaluation,
         figures=evaluation.figures,
         safe=keeps_residual_sway(spec, evaluation),

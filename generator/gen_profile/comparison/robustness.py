@@ -157,7 +157,7 @@ def robustness(
     errors = error_grid(spec, parameters, points, half_range)
     motions: dict[str, Profile] = {}
     left_out: dict[str, str] = {}
-    listed = {contender.method: contender for contender in candidates(spec, own)}
+    listed = {candidate.method: candidate for candidate in candidates(spec, own)}
     for method in methods:
         if method not in listed:
             raise SpecError(f"--method {method[:60]}: unknown method{suggestion(method, list(listed))}")

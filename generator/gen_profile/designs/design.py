@@ -118,7 +118,7 @@ class Design:
 
 def design(
     spec: Spec,
-    formats: Sequence[str],
+    formats: Sequence[str] | str,
     folder: Path | str,
     *,
     check: bool = True,
@@ -131,7 +131,7 @@ def design(
     Parameters
     ----------
     spec : Spec
-    formats : sequence of str
+    formats : sequence of str, or str
         Names known to the exporters' registry.
     folder : Path or str
         Made if needed; files of the same names are replaced, others left alone.
@@ -149,7 +149,7 @@ def design(
     GenProfileError
         Nothing was written.
     """
-    folder = Path(folder)
+    folder, formats = Path(folder), [formats] if isinstance(formats, str) else formats
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
     require_end(exporters, stops=spec.move.stops)
     planned = plan(spec, near, progress)

@@ -12,11 +12,12 @@ import numpy as np
 
 from gen_profile.artefacts.writing import deliver
 from gen_profile.designs.plan import plan
-from gen_profile.errors import CosimulationError, InfeasibleProblem
+from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError
 from gen_profile.motion.profile import Profile
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
+from gen_profile.suggestion import suggestion
 from gen_profile_fmu.building.build import build_fmu
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
 from gen_profile_fmu.description.fmu_files import Version
@@ -52,7 +53,7 @@ class Export:
     """
 
     path: Path
-    content: bytes
+    content: bytes = attrs.field(repr=False)
     identifier: str
     version: Version
     platforms: tuple[str, ...]
@@ -105,6 +106,8 @@ def export_fmu(
     GenProfileError
         Nothing was written.
     """
+    if kind not in KINDS:
+        raise SpecError(f"There is no FMU of the kind {kind!r}{suggestion(kind, KINDS)}")
     is_system = kind == "ssp"
     identifier = identifier_of(spec.name if is_system else f"{spec.name} {kind}")
     path = Path(path or f"{identifier}.{'ssp' if is_system else 'fmu'}")

@@ -8,7 +8,7 @@ from functools import cached_property
 import attrs
 import numpy as np
 
-from gen_profile.errors import InfeasibleProblem
+from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import Scenario, scenarios
 from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, PlantSimulation, Response
@@ -73,8 +73,20 @@ def evaluate(spec: Spec, motion: Profile) -> MotionEvaluation:
     ----------
     spec : Spec
     motion : Profile
+
+    Raises
+    ------
+    SpecError
+        The motion has not the machine's axes.
+    InfeasibleProblem
+        It goes on to where the machine cannot be.
     """
     plant, machines = spec.machine(), scenarios(spec)
+    if motion.axes != len(plant.actuated):
+        names = ", ".join(axis.name for axis in plant.actuated)
+        raise SpecError(
+            f"The motion moves {motion.axes} axes, and the machine has {len(plant.actuated)} ({names})."
+        )
     tau = spec.actuator.tau
     watch = observation_time(spec)
     settle = 2.0 * max(spec.export.cycle_time, spec.can.sync_period) + STANDSTILL * (tau or 0.0)

@@ -101,7 +101,25 @@ def _number(text: str | None, name: str, line: int) -> float:
         raise SpecError(f"commands, line {line}: {name} must be a number, found {text!r}.") from None
 
 
-def play(text: str, commands_text: str) -> str:
+@attrs.frozen(kw_only=True)
+class IssuedSetpoints:
+    """What a block issued.
+
+    Attributes
+    ----------
+    table : str
+        CSV, one row per cycle.
+    cycles : int
+    errors : tuple of int
+        Error ids that it showed, in their order.
+    """
+
+    table: str
+    cycles: int
+    errors: tuple[int, ...]
+
+
+def play(text: str, commands_text: str) -> IssuedSetpoints:
     """Execute a written block under a table of commands.
 
     Parameters
@@ -110,11 +128,6 @@ def play(text: str, commands_text: str) -> str:
         The block.
     commands_text : str
         Table of commands; each row holds until the next, and the last one until the axis stands still.
-
-    Returns
-    -------
-    str
-        CSV of the setpoints, one row per cycle.
 
     Raises
     ------
@@ -133,7 +146,9 @@ def play(text: str, commands_text: str) -> str:
     for number, row in enumerate(issued):
         cells = (str(int(row[at])) if name in WHOLE else repr(float(row[at])) for name, at in places.items())
         lines.append(f"{number * cycle:.9g}," + ",".join(cells))
-    return "\n".join(lines) + "\n"
+    shown = issued[:, places["error_id"]].astype(int).tolist()
+    errors = tuple(error for error in dict.fromkeys(shown) if error)
+    return IssuedSetpoints(table="\n".join(lines) + "\n", cycles=len(issued), errors=errors)
 
 
 STANDARD = (

@@ -49,8 +49,8 @@ def planner_block(spec: Spec) -> PlannerBlock:
     SpecError
         A limit is not stated, or the block does not take this machine.
     """
-    velocity, acceleration, jerk, travel = _limits(spec)
     found = live_modes(spec)
+    velocity, acceleration, jerk, travel = _limits(spec)
     fastest = max(_rates(found, point)[0][0] for point in _corners(found))
     if 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * spec.export.cycle_time) < FEWEST_CYCLES:
         most = 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * FEWEST_CYCLES)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_char_p, c_double, c_long, c_void_p
+from ctypes import POINTER, c_bool, c_char_p, c_double, c_long, c_void_p
 from functools import lru_cache
 from pathlib import Path
 
 import fmpy
 import numpy as np
 
+from gen_profile.errors import ExportError
 from gen_profile.planner.chebyshev import Array
 from gen_profile_exporters.st_to_c import StVariable, Translation, translate
 from gen_profile_fmu.building.build import compile_texts
@@ -29,7 +30,7 @@ class BlockInstance:
     Raises
     ------
     ExportError
-        It is no such text.
+        It is no such text, or leaves its arrays when it is called.
     CosimulationError
         There is no C compiler, or no folder to keep the library in.
     """
@@ -63,7 +64,8 @@ class BlockInstance:
         """
         given = np.ascontiguousarray(inputs, dtype=np.float64)
         issued = np.empty((len(given), len(self._translation.outputs)))
-        self._library.instance_play(self._memory, _doubles(given), len(given), _doubles(issued))
+        if not self._library.instance_play(self._memory, _doubles(given), len(given), _doubles(issued)):
+            raise ExportError("The function block goes beyond the end of an array; its text was altered.")
         return issued
 
 
@@ -88,6 +90,7 @@ def _compiled(translation: Translation) -> ctypes.CDLL:
     taken = "".join(f"        fb->{v.name} = *inputs++;\n" for v in translation.inputs)
     given = "".join(f"        *outputs++ = fb->{v.name};\n" for v in translation.outputs)
     loop = f"""\
+#define CHECK_INDICES
 #include "{block}.c"
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
@@ -95,11 +98,12 @@ def _compiled(translation: Translation) -> ctypes.CDLL:
 #define EXPORT __attribute__((visibility("default")))
 #endif
 EXPORT long instance_size(void) {{ return sizeof({block}); }}
-EXPORT void instance_init({block} *fb) {{ {block}_init(fb); }}
-EXPORT void instance_play({block} *fb, const double *inputs, long cycles, double *outputs) {{
-    for (long cycle = 0; cycle < cycles; ++cycle) {{
+EXPORT void instance_init({block} *fb) {{ {block}_beyond = false; {block}_init(fb); }}
+EXPORT bool instance_play({block} *fb, const double *inputs, long cycles, double *outputs) {{
+    for (long cycle = 0; cycle < cycles && !{block}_beyond; ++cycle) {{
 {taken}        {block}_step(fb);
 {given}    }}
+    return !{block}_beyond;
 }}
 """
     texts = {f"{block}.h": translation.header, f"{block}.c": translation.source, "loop.c": loop}
@@ -113,6 +117,6 @@ EXPORT void instance_play({block} *fb, const double *inputs, long cycles, double
     loaded.instance_size.restype = c_long
     loaded.instance_init.argtypes = [c_char_p]
     loaded.instance_play.argtypes = [c_void_p, POINTER(c_double), c_long, POINTER(c_double)]
-    for function in (loaded.instance_init, loaded.instance_play):
-        function.restype = None
+    loaded.instance_init.restype = None
+    loaded.instance_play.restype = c_bool
     return loaded

@@ -274,6 +274,9 @@ def _fill(document: Table, tables: Mapping[str, Any]) -> None:
                 table.pop(key, None)
             else:
                 _set(table, (name, key), value)
+                for inner in table.values():  # said of all axes, it replaces what was said of one
+                    if isinstance(inner, dict):
+                        inner.pop(key, None)
 
 
 def _override_value(text: str) -> Any:

@@ -21,14 +21,8 @@ from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
-from gen_profile.solvers.direct.solver import (
-    MAX_ITERATIONS,
-    STEP_TOLERANCE,
-    CostProgram,
-    Setup,
-    sequence,
-    set_up,
-)
+from gen_profile.solvers.direct.set_up import Setup, set_up
+from gen_profile.solvers.direct.solver import MAX_ITERATIONS, STEP_TOLERANCE, CostProgram, sequence
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.spec.model import LimitsSpec
 

@@ -21,15 +21,14 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem, WorstCase
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.conic import ConicStatus
+from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.solver import (
     CostProgram,
     LeastWorst,
     ProgramSequence,
-    Setup,
     conclude,
     resolve_sway_cost,
     sequence,
-    set_up,
 )
 from gen_profile.solvers.direct.transient_sway import within_sway
 from gen_profile.solvers.motion import optimal_profile

@@ -1,0 +1,160 @@
+"""A problem transcribed for the direct method: mesh, machines, forms of the effort."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_profile.motion.profile import Array
+from gen_profile.problem.axis_reach import axis_reach
+from gen_profile.problem.dynamics import parameter_column
+from gen_profile.problem.initial_state import initial_state
+from gen_profile.problem.linearization import linearize
+from gen_profile.problem.motion_equations import motion_equations
+from gen_profile.problem.pontryagin import SNAP_TIME, optimality_system
+from gen_profile.problem.problem import Problem
+from gen_profile.solvers.direct import goals
+from gen_profile.solvers.direct.bezier import Piece
+from gen_profile.solvers.direct.condensing import axes_map
+from gen_profile.solvers.direct.transcription import TranscribedMachine, Transcription
+from gen_profile.solvers.indirect.boundary_value_problem import (
+    BoundaryValueProblem,
+    canonical_problem,
+    independence,
+)
+
+INTERVALS = 40
+MAX_INTERVALS = 480
+GROWTH, MAX_GRADED = 1.4, 30  # of intervals from the ends on, and how many there are at most
+RADIANS_PER_INTERVAL = 1.5  # of the fastest mode, which Gauss collocation then follows to 1e-7 of the cost
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Setup:
+    """A problem, transcribed.
+
+    Attributes
+    ----------
+    problem : Problem
+    transcription : Transcription
+    forms : tuple of (intervals, size, size) arrays
+        Twice the effort of every axis, in units of `cost_scale`.
+    cost_scale : float
+        Of the running cost.
+    tried : tuple of Amplitudes
+        Of every machine whose residual sway is to be bounded; empty where end states are zero instead.
+    """
+
+    problem: Problem
+    transcription: Transcription
+    forms: tuple[Array, ...]
+    cost_scale: float
+    tried: tuple[goals.Amplitudes, ...] = ()
+
+    @property
+    def extra(self) -> int:
+        """Number of variables that bounding the worst machine takes."""
+        return goals.worst_case_variables(self.tried) if self.tried else 0
+
+
+def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tuple[Setup, tuple[str, ...]]:
+    """Transcribe a problem; also name the parameters whose sensitivities need not be asked for.
+
+    Parameters
+    ----------
+    problem : Problem
+    others : sequence of mapping of str to float
+        Parameters of further machines whose residual sway shall be bounded, with the nominal one's.
+    """
+    system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
+    canonical = canonical_problem(problem, system)
+    asked, redundant = independence(canonical)
+    machines = (
+        _nominal(problem, canonical, asked),
+        *(_other(problem, canonical, parameters) for parameters in others),
+    )
+    jerks = [problem.limits.of(axis).jerk for axis in range(system.layout.m)]
+    commands_jerk = problem.tau is not None and any(jerk is not None for jerk in jerks)
+    piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=_mesh(problem))
+    reach = axis_reach(problem)
+    transcription = Transcription(
+        piece=piece,
+        axes=axes_map(piece, np.array(problem.start), reach, problem.duration),
+        duration=problem.duration,
+        target=np.array(problem.distance) / reach,
+        final_velocity=np.array(problem.final_velocity) * problem.duration / reach,
+        machines=machines,
+    )
+    form, usual = goals.effort_form(problem, piece), goals.usual_effort(problem)
+    cost_scale = canonical.data.cost_scale * usual
+    unit = canonical.data.effort_weights * reach**2 / problem.duration**6 / cost_scale
+    setup = Setup(
+        problem=problem,
+        transcription=transcription,
+        forms=tuple(share * form for share in unit),
+        cost_scale=cost_scale,
+        tried=_amplitudes(problem, machines, others),
+    )
+    return setup, redundant
+
+
+def _nominal(
+    problem: Problem, canonical: BoundaryValueProblem, asked: NDArray[np.bool_]
+) -> TranscribedMachine:
+    """State the machine that is to rest at the end, and what it is to be insensitive to."""
+    layout, scale = canonical.system.layout, canonical.data.scale
+    states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
+    exact = problem.worst_case is None or problem.worst_case.nominal_zero
+    modal = np.asarray(np.linalg.inv(canonical.coordinates.basis), dtype=np.float64)
+    swung = initial_state(problem.plant, problem.initial)
+    return TranscribedMachine(
+        equations=motion_equations(problem.plant, problem.desensitized, problem.order),
+        parameters=parameter_column(problem.plant, dict(problem.parameters)),
+        scale=scale[states],
+        start=np.pad(swung, (0, len(states) - len(swung))) / scale[states],
+        end=modal[np.ix_(states[asked[states] & exact], states)],
+    )
+
+
+def _other(
+    problem: Problem, canonical: BoundaryValueProblem, parameters: Mapping[str, float]
+) -> TranscribedMachine:
+    """State a machine of other parameters that follows the same motion."""
+    scale = canonical.data.scale[: 2 * canonical.system.layout.n_u]
+    return TranscribedMachine(
+        equations=motion_equations(problem.plant, (), problem.order),
+        parameters=parameter_column(problem.plant, dict(parameters)),
+        scale=scale,
+        start=initial_state(problem.plant, problem.initial) / scale,
+        end=np.zeros((0, len(scale))),
+    )
+
+
+def _amplitudes(
+    problem: Problem, machines: Sequence[TranscribedMachine], others: Sequence[Mapping[str, float]]
+) -> tuple[goals.Amplitudes, ...]:
+    """Say how what every machine swings with at the end shows, where the worst of them counts."""
+    if problem.worst_case is None:
+        return ()
+    limits = problem.worst_case.load_limits
+    return tuple(
+        goals.amplitudes(problem, values, limits, machine.scale)
+        for values, machine in zip([problem.parameters, *others], machines, strict=True)
+    )
+
+
+def _mesh(problem: Problem) -> Array:
+    """Choose relative lengths of intervals: resolve the fastest mode and, for snap, layers at the ends."""
+    fastest = linearize(problem.plant, problem.parameters, problem.target).frequencies[-1]
+    enough = fastest * problem.duration / RADIANS_PER_INTERVAL
+    bends = problem.effort == "snap" and bool(problem.limits.stated())  # where limits begin to bind, too
+    longest = 1.0 / float(np.clip(np.ceil(enough), (1 + bends) * INTERVALS, MAX_INTERVALS))
+    shortest = SNAP_TIME / problem.duration if problem.effort == "snap" else longest
+    graded = longest * GROWTH ** -np.arange(1.0, MAX_GRADED)
+    graded = graded[graded > shortest / GROWTH][::-1]
+    rest = 1.0 - 2.0 * graded.sum()
+    middle = np.ceil(rest / longest * (1.0 - 1e-9))
+    return np.concatenate([graded, np.full(int(middle), rest / middle), graded[::-1]])
