@@ -16,6 +16,7 @@ from scipy.integrate import solve_bvp
 from gen_profile.plants.registry import find_plant
 from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import Problem
+from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.indirect import homotopy
 from gen_profile.solvers.indirect import solver as indirect
@@ -131,7 +132,7 @@ def test_beside_general_tools():
 @pytest.mark.parametrize("intervals", [20, 60, 200, 600, 2000])
 def test_growth_with_intervals(intervals, monkeypatch):
     problem = crane_problem()
-    for module, meshes in ((indirect, homotopy), (direct, direct)):
+    for module, meshes in ((indirect, homotopy), (direct, set_up)):
         monkeypatch.setattr(meshes, "INTERVALS", intervals)
         monkeypatch.setattr(meshes, "MAX_INTERVALS", max(480, intervals))
         monkeypatch.setattr(indirect, "LONG_INTERVALS", intervals)  # so many that short ones are taken
