@@ -47,7 +47,8 @@ UNDER_WAY = 0.8  # s after the beginning of the stream
 def run(place, log, queue, disturb):
     """Let a stream run, disturb it once it moves, and keep what everybody saw; tell whether it was fair.
 
-    A busy machine may be late, which ends a stream before, or instead of, what was to end it.
+    A busy machine stalls, which ends a stream before, or instead of, what was to end it, or lets the simulated
+    drive miss a setpoint.
     """
     place.mkdir()
     running = True
@@ -76,8 +77,9 @@ def run(place, log, queue, disturb):
     )
     told = (place / "stream.json").read_text()
     if disturb is None:
-        running = '"state": "done"' in told
-    return running and (disturb is _freeze or "late at cycle" not in told)
+        running = '"state": "done"' in told and '"cycles_unanswered": 0' in told
+    stalls = ("no heartbeat",) if disturb is _freeze else ("no heartbeat", "late at cycle")
+    return running and not any(words in told for words in stalls)
 
 
 def _begun(arguments, out, err):
