@@ -27,7 +27,7 @@ SAME = 1e-3  # of its range, by which two machines must differ in some parameter
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Found:
+class RangeSearch:
     """What a search came to.
 
     Attributes
@@ -79,7 +79,7 @@ def worst_machines(
     setpoints: SampledProfile,
     rows: Sequence[Scenario],
     on_build: Callable[[], None] | None = None,
-) -> Found:
+) -> RangeSearch:
     """Search the ranges of a check, and of the drives' lag, for the machines that setpoints suit least.
 
     Parameters
@@ -100,7 +100,7 @@ def worst_machines(
     """
     ways = list(_ways(spec, float(setpoints.times[-1])))
     if not ways:
-        return Found()
+        return RangeSearch()
     machines: list[Scenario] = []
     tried = 0
     with many_machines(spec.machine(), on_build) as runs:
@@ -111,7 +111,7 @@ def worst_machines(
             alike = [row for row in rows if (follows_exactly(row) if exact else row.group == way.group)]
             machines += [way.scenario(place) for place in _new(places, [way.place(row) for row in alike])]
     numbered = (attrs.evolve(row, row=len(rows) + index) for index, row in enumerate(machines))
-    return Found(machines=tuple(numbered), tried=tried)
+    return RangeSearch(machines=tuple(numbered), tried=tried)
 
 
 def _ways(spec: Spec, duration: float) -> Iterator[_Way]:

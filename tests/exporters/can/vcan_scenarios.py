@@ -47,8 +47,8 @@ UNDER_WAY = 0.8  # s after the beginning of the stream
 def run(place, log, queue, disturb):
     """Let a stream run, disturb it once it moves, and keep what everybody saw; tell whether it was fair.
 
-    A busy machine stalls, which ends a stream before, or instead of, what was to end it, or lets the simulated
-    drive miss a setpoint.
+    A busy machine stalls, which ends a stream before, or instead of, what was to end it, or lets the
+    simulated drive miss a setpoint.
     """
     place.mkdir()
     running = True

@@ -81,7 +81,7 @@ def discover(link: Link) -> tuple[IdentifiedNode, ...]:
     return tuple(_identified(link, number) for number in sorted(answered.nodes))
 
 
-def listen(link: Link) -> _Ear:
+def listen(link: Link) -> _BusMonitor:
     """Hear for a while that nobody is in command.
 
     Raises
@@ -89,15 +89,15 @@ def listen(link: Link) -> _Ear:
     StreamAborted
         Somebody is, or the bus is disturbed.
     """
-    heard = _Ear()
+    heard = _BusMonitor()
     link.subscribe(heard.take)
     _wait(link, LISTEN)
     heard.require_quiet()
     return heard
 
 
-class _Ear:
-    """Hears who else is on the bus."""
+class _BusMonitor:
+    """Notes who else speaks on the bus, and error frames."""
 
     def __init__(self) -> None:
         self._controller: int | None = None
