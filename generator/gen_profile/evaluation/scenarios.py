@@ -7,7 +7,6 @@ from itertools import product
 
 import attrs
 import numpy as np
-from scipy.stats import qmc
 
 from gen_profile.motion.profile import Array
 from gen_profile.spec.model import Spec
@@ -155,6 +154,8 @@ def _draws(spec: Spec) -> list[Scenario]:
 
 
 def _latin_hypercube(spec: Spec, dimensions: int) -> Array:
+    from scipy.stats import qmc  # noqa: PLC0415  (a quarter of what the main job takes to start)
+
     generator = np.random.default_rng(spec.check.seed)
     drawn: Array = qmc.LatinHypercube(dimensions, seed=generator).random(spec.check.samples)
     return drawn

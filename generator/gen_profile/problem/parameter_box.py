@@ -15,7 +15,6 @@ from itertools import product
 import attrs
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.linearization import eigenvalues
@@ -144,6 +143,8 @@ def start(turned: Phases, ranges: int, most: int = MOST) -> Start:
     if ranges == 1:
         return Start(places=lines[0], steps=steps)
     corners = list(product((0.0, 1.0), repeat=ranges)) if ranges <= CORNERS else []
+    from scipy.stats import qmc  # noqa: PLC0415  (a quarter of what the main job takes to start)
+
     sequence = qmc.Halton(ranges, scramble=False)
     coarse = sequence.random(min(FEWEST_SPREAD * ranges, most))
     span = np.ptp(turned(np.concatenate([coarse, *lines])), axis=0)
