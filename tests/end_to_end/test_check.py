@@ -70,6 +70,7 @@ def test_every_artefact_passes_as_it_was_exported(folder, name):
     assert document["check"]["scenarios"][0]["residual_peak_m"] < 10e-6
 
 
+@pytest.mark.slow
 def test_the_check_of_a_file_sways_as_its_linear_interpolation(folder):
     check = run_here("check", folder / "paper.csv", "--json").document["check"]
     assert_sways_as(check, column((folder / "paper.csv").read_text("utf-8")))
@@ -96,6 +97,7 @@ def sway_after_export(folder):
     return [sway_after(positions, machine.parameters) for machine in scenarios(preset_spec("paper"))]
 
 
+@pytest.mark.slow
 def test_a_stretch_of_altered_positions_fails_by_its_sway(folder):
     text = (folder / "paper.csv").read_text("utf-8")
     for row in range(300, 420):
@@ -108,6 +110,7 @@ def test_a_stretch_of_altered_positions_fails_by_its_sway(folder):
     assert any("are allowed (check.residual_sway" in line for line in outcome.errors)
 
 
+@pytest.mark.slow
 def test_altered_counts_in_a_can_log_give_their_own_sway(folder):
     lines = (folder / "paper.log").read_text("ascii").splitlines()
     positions = []
@@ -295,6 +298,7 @@ def test_the_folder_itself_is_no_artefact(folder):
     assert (outcome.code, outcome.errors) == (2, [f"Error: Cannot read {folder}: Is a directory."])
 
 
+@pytest.mark.slow
 def test_two_specs_may_share_a_folder(tmp_path):
     """Each artefact keeps its own spec and verdict; a second export of one format keeps the first's."""
     short = ("--set", "name=short", "--set", "move.distance=0.1")
@@ -311,6 +315,7 @@ def test_two_specs_may_share_a_folder(tmp_path):
     assert outcome.document["artefact"]["manifest"] == "differs"
 
 
+@pytest.mark.slow
 def test_a_variant_of_a_motion_with_hoist_is_judged_as_the_block_would_play_it(tmp_path):
     done = run_here("--preset", "single-pendulum-crane", "--export", "plc", "--out", tmp_path)
     assert done.code == 0

@@ -120,6 +120,7 @@ def test_recommends_among_those_that_keep_the_limit(comparison, figures):
     assert "3 mm" in comparison["reasons"]["fastest"]
 
 
+@pytest.mark.slow
 def test_recommends_nothing_where_nothing_keeps_the_limit():
     document = run_here("compare", "--json", "--set", "check.residual_sway=1e-6").document
     assert document["recommended"] == {"fastest": None, "gentlest": None}
@@ -136,6 +137,7 @@ def test_says_which_method_has_no_motion_and_why():
     assert f"zvd: {left_out['reason']}" in table.splitlines()
 
 
+@pytest.mark.slow
 def test_the_spec_s_own_weight_is_compared_too():
     methods = [
         row["method"] for row in run_here("compare", "--json", "--set", "cost.sway_weight=7").document["rows"]
@@ -143,6 +145,7 @@ def test_the_spec_s_own_weight_is_compared_too():
     assert "optimal-beta7" in methods
 
 
+@pytest.mark.slow
 def test_people_get_a_table_with_the_recommendation():
     outcome = run_here("compare")
     assert outcome.code == 0
@@ -179,6 +182,7 @@ def test_marks_the_pareto_front(comparison):
     }
 
 
+@pytest.mark.slow
 def test_other_machines_compare_the_spec_s_own_motion_as_optimal():
     document = run_here("compare", "--json", "--preset", "slosh-tank", *FEW).document
     methods = [row["method"] for row in document["rows"]]

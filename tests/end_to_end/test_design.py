@@ -168,6 +168,7 @@ def test_people_get_a_short_table(tmp_path):
     assert list(stages)[:3] == ["solving", "exporting", "checking by co-simulation"]
 
 
+@pytest.mark.slow
 def test_a_sensitivity_that_the_others_imply_is_said_to_be_left_out(tmp_path):
     uncertain = "robustness.uncertain={L1=0.05, g=0.05, L2=0.05}"
     outcome = run_here("--set", uncertain, "--set", "check.residual_sway=0.1", "--out", tmp_path)

@@ -76,6 +76,7 @@ def test_every_load_sways_as_separate_equations_say(tmp_path, overrides):
         np.testing.assert_allclose(found, expected[: len(rows)], rtol=0.0, atol=check["error_bound_m"])
 
 
+@pytest.mark.slow
 def test_at_a_cycle_of_a_millisecond_the_figure_is_right_to_five_micrometres(tmp_path):
     spec = preset_spec("paper")
     command = plan(spec).evaluation.command

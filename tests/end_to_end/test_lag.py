@@ -21,6 +21,7 @@ def both(tmp_path):
     return tmp_path / "ideal" / "paper.csv", tmp_path / "lagging" / "paper.csv"
 
 
+@pytest.mark.slow
 def test_the_command_is_the_motion_and_tau_times_its_rate(both):
     ideal, lagging = map(table, both)
     for order in (1, 2, 3):  # position, velocity, acceleration
@@ -31,6 +32,7 @@ def test_the_command_is_the_motion_and_tau_times_its_rate(both):
     assert np.abs(lagging[1] - ideal[1]).max() > 0.01
 
 
+@pytest.mark.slow
 def test_a_drive_with_that_lag_arrives_without_sway(both):
     lagging = both[1]
     for artefact in (lagging, lagging.with_suffix(".log")):
@@ -41,6 +43,7 @@ def test_a_drive_with_that_lag_arrives_without_sway(both):
         assert check["scenarios"][0]["residual_peak_m"] < 5e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("actuator", "arrival"), [("{type='ideal'}", 3.0), ("{type='first-order', tau=0.2}", 5.0)]
 )
@@ -52,6 +55,7 @@ def test_another_lag_is_judged_as_that_drive_moves(both, actuator, arrival):
     assert check["scenarios"][0]["residual_peak_m"] < 10e-6
 
 
+@pytest.mark.slow
 def test_an_ideal_command_does_not_arrive_in_time_with_a_lagging_drive(both):
     outcome = run_here("check", both[0], "--preset", "paper", *LAGGING, "--json")
     assert outcome.document["artefact"]["manifest"] == "none"

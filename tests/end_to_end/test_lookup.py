@@ -20,7 +20,19 @@ AXES = ("--vary", "solver.method=auto,zv", "--vary", "move.distance=0.3,0.4", "-
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
     folder = tmp_path_factory.mktemp("library")
-    arguments = ("--preset", "paper", "--set", CYCLE, *AXES, "--export", "csv", "--out", folder)
+    arguments = (
+        "--preset",
+        "paper",
+        "--set",
+        CYCLE,
+        *AXES,
+        "--export",
+        "csv",
+        "--workers",
+        "1",
+        "--out",
+        folder,
+    )
     assert run_here("sweep", *arguments).code == 0
     return folder
 
@@ -61,6 +73,7 @@ def test_between_the_values_the_nearest_is_judged_on_the_machine_asked_for(libra
     assert sway != pytest.approx(found["sway_residual_worst_designed_m"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_nearer_profile_that_is_not_safe_there_is_passed_over(library):
     words = ("--move.distance", "0.39", "--plant.L1", "0.33", "--solver.method", "auto")
     found = looked_up(library, *words)

@@ -79,6 +79,7 @@ def table(path):
     return np.array(rows, dtype=float)
 
 
+@pytest.mark.slow
 def test_draws_agree_with_a_separate_monte_carlo_within_the_bound(tmp_path):
     artefact = design(tmp_path, RANGES, DAMPING, "check.samples=100", "check.seed=3")
     check = check_artefact(artefact).check
@@ -181,6 +182,7 @@ def test_groups_are_judged_apart_and_timing_only_when_strict(tmp_path):
     assert "timing" in strict.err
 
 
+@pytest.mark.slow
 def test_a_thousand_rows_leave_a_small_manifest_and_stay_replayable(tmp_path):
     artefact = design(tmp_path, RANGES, "check.samples=300", cycle="0.01")
     check = json.loads((tmp_path / "manifest.json").read_text("utf-8"))["check"]

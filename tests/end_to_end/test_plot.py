@@ -25,9 +25,20 @@ from gen_profile.spec.reading import preset_spec
 FEW = ("--set", "cost.sway_weight=0", "--set", "robustness={}")
 
 
+@pytest.fixture(scope="module", params=["paper", "flexible-joint"])
+def comparison(request):
+    return compare(preset_spec(request.param))
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """A comparison of few methods that are solved at once."""
+    return compare(preset_spec("paper", FEW[1::2]))
+
+
 @pytest.mark.slow
-def test_a_bitmap_shows_lines_of_many_colours(tmp_path):
-    assert run_here("compare", "--plot", tmp_path / "picture.png").code == 0
+def test_a_bitmap_shows_lines_of_many_colours(comparison, tmp_path):
+    draw(comparison, tmp_path / "picture.png")
     pixels = image.imread(tmp_path / "picture.png")
     height, width, _ = pixels.shape
     assert height > 800 and width > 800
@@ -40,8 +51,8 @@ def test_a_bitmap_shows_lines_of_many_colours(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_vector_picture_is_well_formed_and_names_what_it_shows(tmp_path):
-    assert run_here("compare", "--plot", tmp_path / "picture.svg").code == 0
+def test_a_vector_picture_is_well_formed_and_names_what_it_shows(comparison, tmp_path):
+    draw(comparison, tmp_path / "picture.svg")
     root = ElementTree.parse(tmp_path / "picture.svg").getroot()
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
     paths = root.findall(".//{http://www.w3.org/2000/svg}path")
@@ -61,11 +72,11 @@ def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path, preset, load):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_pictures_of_one_comparison_are_alike_to_the_byte(tmp_path, suffix, monkeypatch):
+def test_pictures_of_one_comparison_are_alike_to_the_byte(plain, tmp_path, suffix, monkeypatch):
     pictures = []
     for clock in (1e9, 1.1e9):
         monkeypatch.setattr("time.time", lambda clock=clock: clock)
-        assert run_here("compare", *FEW, "--plot", tmp_path / f"picture{suffix}").code == 0
+        draw(plain, tmp_path / f"picture{suffix}")
         pictures.append((tmp_path / f"picture{suffix}").read_bytes())
     assert pictures[0] == pictures[1]
 
@@ -121,10 +132,10 @@ def kept(figures, path, salt, size):
     yield figures[-1]
 
 
-@pytest.fixture(scope="module", params=["paper", "flexible-joint"])
-def drawn(request):
+@pytest.fixture(scope="module")
+def drawn(comparison):
     """The figure of a comparison, laid out as it would be in a file."""
-    comparison, figures = compare(preset_spec(request.param)), []
+    figures = []
     with patch("gen_profile.charts.comparison.picture", partial(kept, figures)):
         draw(comparison, Path("picture.png"))
     (figure,) = figures
@@ -155,8 +166,9 @@ def test_every_bar_is_told_beside_it_and_not_on_it(drawn):
         assert text.get_window_extent().x0 >= ends - 1.0
 
 
-def test_numerical_error_is_no_figure_of_a_bar(tmp_path):
-    assert run_here("compare", *FEW, "--plot", tmp_path / "picture.svg").code == 0
+@pytest.mark.slow
+def test_numerical_error_is_no_figure_of_a_bar(plain, tmp_path):
+    draw(plain, tmp_path / "picture.svg")
     assert not re.search(r"<!-- +[\d.]+e-", (tmp_path / "picture.svg").read_text("utf-8"))
 
 

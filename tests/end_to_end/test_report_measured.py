@@ -127,6 +127,7 @@ def test_deviations_are_those_between_log_and_plan(tmp_path, spec, motion):
     assert measured["passed"] is None and "Measured, not judged." in page
 
 
+@pytest.mark.slow
 def test_a_machine_that_swings_too_much_fails(tmp_path, spec, motion):
     p = {**spec.plant.parameters, "L1": 0.470 * 0.6}
     truth = log(tmp_path / "log.csv", motion, p)

@@ -9,6 +9,7 @@ RANGE = ("--set", "robustness.method=range", "--set", "cost.sway_weight=0")
 BOUND = ("--set", "limits.acceleration=0.7067")
 
 
+@pytest.mark.slow
 def test_the_shortest_duration_ends_on_a_cycle_and_stands_in_the_manifest(tmp_path):
     limits = ("--set", "limits.acceleration=0.4", "--set", 'move.duration="minimum"')
     outcome = run_here(*limits, "--cycle-time", "0.004", "--out", tmp_path, "--json")
@@ -74,6 +75,7 @@ def test_the_shortest_motion_leaves_no_more_sway_than_the_check_allows(tmp_path)
     assert 0.0029 < figures["sway_residual_worst_m"] < 0.003
 
 
+@pytest.mark.slow
 def test_where_no_duration_is_calm_enough_the_check_is_blamed(tmp_path):
     changes = ('move.duration="minimum"', "limits.acceleration=0.7", "cost.sway_weight=0")
     words = (word for change in (*changes, "check.residual_sway=1e-12") for word in ("--set", change))

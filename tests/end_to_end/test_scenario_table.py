@@ -29,6 +29,7 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_every_row_is_the_scenario_of_the_json_document(checked, tmp_path):
     path = tmp_path / "rows.csv"
     document = run_here("check", checked / "paper.csv", "--csv", path, "--json").document["check"]
@@ -68,6 +69,7 @@ def test_a_single_scenario_is_a_table_of_one_row(checked, tmp_path):
     assert (row["row"], float(row["payload_m"])) == ("12", scenario["residual_peaks_m"]["payload"])
 
 
+@pytest.mark.slow
 def test_of_a_large_group_all_rows_are_there_and_the_same_every_time(checked, tmp_path):
     words = ("check", checked / "paper.csv", "--samples", "120", "--csv")
     document = json.loads(run_here(*words, tmp_path / "one.csv", "--json").out)["check"]

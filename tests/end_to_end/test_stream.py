@@ -83,6 +83,7 @@ def streamed(*arguments):
     return patiently(*arguments, "--json")
 
 
+@pytest.mark.slow
 def test_simulated_drives_end_without_sway(deployed, tmp_path):
     table = tmp_path / "driven.csv"
     outcome = streamed(deployed / "paper.log", "--simulate-drive", "--self-test", "--log", table)
@@ -124,6 +125,7 @@ def full_disk(monkeypatch):
 FULL = r"Cannot write to the folder .*: No space left on device; choose another one\."
 
 
+@pytest.mark.slow
 def test_in_words_even_where_the_log_cannot_be_written(deployed, tmp_path, full_disk, hasty):
     table = ("--log", tmp_path / "driven.csv")
     outcome = patiently(deployed / "paper.log", "--simulate-drive", "--self-test", *table)
@@ -135,6 +137,7 @@ def test_in_words_even_where_the_log_cannot_be_written(deployed, tmp_path, full_
     assert re.search(rf"^Self-test: {lateness}\.$", outcome.out, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_a_busy_machine_delays_a_simulation_as_a_whole(deployed, monkeypatch):
     send, sent = Pacer.send, []
 
@@ -324,6 +327,7 @@ def test_sigterm_stops_the_axis(deployed, monkeypatch, hasty):
     assert outcome.document["drive"]["sway_residual_peak_m"] > 0.003
 
 
+@pytest.mark.slow
 def test_a_machine_that_cannot_hold_the_cycle(deployed, monkeypatch):
     class Slow(SystemClock):
         def now(self):
@@ -392,6 +396,7 @@ class TestSlowMotions:
     def streamed(self, deployed, *options):
         return run_here("stream", deployed / "paper.log", *AWAY, *options, "--json")
 
+    @pytest.mark.slow
     def test_to_the_start_and_then_the_motion(self, deployed, drive_away):
         refused = self.streamed(deployed)
         assert (refused.code, "stands at 0.07" in refused.document["reason"]) == (6, True)

@@ -58,6 +58,7 @@ def test_a_case_ends_in_a_record(tmp_path, values, status, reason):
     assert json.loads(json.dumps(outcome.record, allow_nan=False)) == outcome.record
 
 
+@pytest.mark.slow
 def test_a_case_begins_where_its_neighbour_ended(tmp_path):
     far = ["cost.sway_weight=50", 'cost.sway_scale="auto"', "move.distance=3.2"]  # swings by 20°
     recipe = prepared(tmp_path, "plant.L1=0.45,0.46", overrides=far).recipe

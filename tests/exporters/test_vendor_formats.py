@@ -221,6 +221,7 @@ def test_a_wrapper_takes_and_tells_all_but_positions(library, move):
 
 
 class TestTwincat:
+    @pytest.mark.slow
     def test_blark_parses_block_and_wrapper(self, tmp_path):
         goal = goal_of(quintic((0.1, 0.4)), cycle_time=0.5)
         for file in twincat.encode(MOVE, goal)[:2]:

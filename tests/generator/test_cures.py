@@ -139,6 +139,7 @@ def test_the_share_falls_with_the_duration():
     assert all(later.share < earlier.share for earlier, later in pairwise(shares))
 
 
+@pytest.mark.slow
 def test_the_indirect_method_which_knows_no_limits_is_told_how_to_keep_them():
     overrides = ["solver.method=indirect", "limits.acceleration=0.5"]
     with pytest.raises(LimitViolation) as violation:

@@ -96,6 +96,7 @@ def test_an_infeasible_problem_says_what_would_do():
     assert "limits.velocity" not in solution.cure
 
 
+@pytest.mark.slow
 def test_no_duration_does_where_the_target_is_out_of_reach():
     assert choice.minimum_time(limited(acceleration=1.0, travel=(0.0, 0.2))) is None
 

@@ -139,6 +139,7 @@ def test_ranges_that_are_not_straight_reach_as_far_as_the_measurement_allows():
     assert found.half_range["c"] == pytest.approx(damping(T) - damping(T - reach), rel=0.06)
 
 
+@pytest.mark.slow
 def test_what_part_of_a_log_does_not_tell_stays_near_the_spec_meanwhile():
     """One period hardly tells a tank's fill height, and beyond a half of its length nothing does."""
     plant = find_plant("slosh-tank")

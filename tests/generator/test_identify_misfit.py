@@ -45,6 +45,7 @@ def test_a_damping_that_is_wrong_is_named():
         estimate(hoist(c=0.0), ["L0"], [], [log_of(exact + NOISE)])
 
 
+@pytest.mark.slow
 def test_what_no_parameter_explains_widens_the_range():
     """As a wind that comes and goes, or a trolley that rocks."""
     exact = swing(HOIST.nominal() | {"c": 300.0}, TIMES, [0.15, 0.0])

@@ -39,6 +39,7 @@ def test_the_cure_for_too_short_a_move_works(distance):
     assert problem.duration > 3.0  # it was refused at first
 
 
+@pytest.mark.slow
 def test_a_scale_that_no_weight_needs_does_no_harm():
     """Without weight the sway's exponential, which overflows here, must not enter."""
     with_scale, without = (

@@ -50,6 +50,7 @@ def test_the_worst_crane_of_the_paper(nominal_zero, most):
     assert max(found) <= 1.05 * bound
 
 
+@pytest.mark.slow
 def test_what_lies_between_the_ends_counts():
     # a wide range of a long rope: the worst machine is inside, and the solver must have looked there
     problem = ranged(uncertain={"L1": 0.4}, duration=6.0)

@@ -67,7 +67,7 @@ def structure(tables: Table, faults: Faults) -> Spec:
         spec = _CONVERTER.structure(tables, Spec)
     except ClassValidationError as error:
         _gather(error, "", faults)
-        raise SpecError(*faults) from error
+        raise SpecError(*faults) from None  # whose sentences say more than the structuring does
     if faults:
         raise SpecError(*faults)
     return spec

@@ -149,7 +149,7 @@ def _work(
     done = total - sum(map(len, chains))
     progress(CasesDone(done=done, failed=failures, total=total))
     waiting: Iterator[Sequence[int]] = iter(chains)
-    with _client(scheduler, workers) as client:
+    with _client(scheduler, min(workers or CPU_COUNT, len(chains))) as client:
         running: dict[Future, tuple[int, Sequence[int]]] = {}
         completed = as_completed(loop=client.loop)
 
@@ -190,7 +190,7 @@ def _outcome(future: Future, case: int, values: Mapping[str, Any]) -> CaseOutcom
 
 
 @contextmanager
-def _client(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
     """Reach the workers: those of a scheduler, or processes of this computer.
 
     The latter speak TLS with a key of their own, as whoever reaches a scheduler can run what he likes.
@@ -200,7 +200,7 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         cluster: LocalCluster | str
         if scheduler is None:
             with _undisturbed():
-                cluster = stack.enter_context(_local_cluster(workers or CPU_COUNT))
+                cluster = stack.enter_context(_local_cluster(workers))
         else:
             cluster = scheduler
         try:
