@@ -4,15 +4,19 @@ Most containers' kernels have no vcan. User-mode-linux is a kernel that runs as 
 seconds, sees this machine's files read-only, and has a CAN bus of its own. It needs no privileges.
 """
 
+import ctypes
 import os
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
 
 UML = "linux.uml"
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+libc = ctypes.CDLL(None)
 TOOLS = ("candump", "cansend", "ip", "tc")
 MODULES = (
     "net/can/can.ko",
@@ -99,7 +103,8 @@ def _run_in_uml(script, folder):
 
 
 def _punctual():
-    """Have the kernel not wait for whatever else this machine does, where that is permitted."""
+    """Have the kernel not wait for whatever else this machine does, where that is permitted, and end with us."""
+    libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
 
