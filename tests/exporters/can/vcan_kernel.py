@@ -103,7 +103,7 @@ def _run_in_uml(script, folder):
 
 
 def _punctual():
-    """Have the kernel not wait for whatever else this machine does, where that is permitted, and end with us."""
+    """End the kernel with us, and where it may, let it not wait for what else this machine does."""
     libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
