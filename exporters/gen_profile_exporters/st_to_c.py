@@ -64,6 +64,13 @@ _GRAMMAR = r"""
     %ignore /\s+/
 """
 
+FAULTS = (
+    "",
+    "goes beyond the end of an array",
+    "repeats a loop without end",
+    "divides by zero",
+)
+MOST_TURNS = 200_000  # of all loops in one cycle
 _NO_BLOCK = "The text is no function block that can be executed here"
 _TYPES = {"BOOL": "bool", "DINT": "int32_t", "LREAL": "double"}
 _OPERATORS = {"=": "==", "<>": "!=", "AND": "&&", "OR": "||"}
@@ -96,8 +103,8 @@ class Translation(NamedTuple):
         All scalars.
     header, source : str
         `source` includes ``NAME.h``. Compiled with ``COUNT_OPERATIONS``, it adds up floating-point operations
-        in ``NAME_operations``; with ``CHECK_INDICES``, an index beyond its array sets ``NAME_beyond``, and
-        takes element 0.
+        in ``NAME_operations``. Compiled with ``CHECKED``, it ends whatever an altered text may do, and the
+        instance's ``fault_`` tells what that was, by its place in `FAULTS`.
     """
 
     name: str
@@ -205,6 +212,8 @@ class _Translator(Transformer[Token, object]):
         type_ = left.type if operator in "+-*/" else "BOOL"
         work = left.work + right.work + (left.type == "LREAL")
         left_text, right_text = left.text, right.text
+        if operator == "/" and type_ == "DINT":
+            return _Code(f"QUOTIENT({left_text}, {right_text})", type_, work)
         if operator == "OR":
             left_text, right_text = f"({left_text})", f"({right_text})"
         return _Code(f"{left_text} {_OPERATORS.get(operator, operator)} {right_text}", type_, work)
@@ -250,12 +259,12 @@ class _Translator(Transformer[Token, object]):
     def count(self, parts):  # type: ignore[no-untyped-def]
         name, first, last, body = parts
         variable = f"fb->{self._variables[name.lower()].name}"
-        loop = f"for ({variable} = {first.text}; {variable} <= last; ++{variable}) {{"
+        loop = f"for ({variable} = {first.text}; {variable} <= last && TURN(); ++{variable}) {{"
         return ["{", f"    const int32_t last = {last.text};", *_indented([loop, *_indented(body), "}"]), "}"]
 
     def repeat(self, parts):  # type: ignore[no-untyped-def]
         condition, body = parts
-        return [f"while ({condition.text}) {{", *_indented(body), "}"]
+        return [f"while (({condition.text}) && TURN()) {{", *_indented(body), "}"]
 
 
 def _counted(work: int) -> list[str]:
@@ -281,6 +290,9 @@ def _header(name: str, variables: list[StVariable]) -> str:
 
 typedef struct {{
 {members}
+#ifdef CHECKED
+    int32_t turns_, fault_;
+#endif
 }} {name};
 
 /* Once, before all else. */
@@ -313,19 +325,7 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             "#else",
             "#define OPERATIONS(number) ((void)0)",
             "#endif",
-            "#ifdef CHECK_INDICES",
-            f"static bool {name}_beyond;",
-            "#define AT(index, length) within(index, length)",
-            "static int32_t within(int32_t index, int32_t length)",
-            "{",
-            "    if (index >= 0 && index < length)",
-            "        return index;",
-            f"    {name}_beyond = true;",
-            "    return 0;",
-            "}",
-            "#else",
-            "#define AT(index, length) (index)",
-            "#endif",
+            *_checks(name).splitlines(),
             "",
             *constants,
             "",
@@ -335,11 +335,46 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             "}",
             "",
             f"void {name}_step({name} *fb) {{",
+            "    BEGIN();",
             *_indented(body),
             "}",
             "",
         ]
     )
+
+
+def _checks(name: str) -> str:
+    return f"""\
+#ifdef CHECKED
+#define BEGIN() (fb->turns_ = 0)
+#define AT(index, length) within(fb, index, length)
+#define TURN() turn(fb)
+#define QUOTIENT(dividend, divisor) quotient(fb, dividend, divisor)
+static inline int32_t within({name} *fb, int32_t index, int32_t length)
+{{
+    if (index >= 0 && index < length)
+        return index;
+    fb->fault_ = 1;
+    return 0;
+}}
+static inline bool turn({name} *fb)
+{{
+    if (++fb->turns_ > {MOST_TURNS})
+        fb->fault_ = 2;
+    return fb->fault_ == 0;
+}}
+static inline int32_t quotient({name} *fb, int32_t dividend, int32_t divisor)
+{{
+    if (divisor == 0)
+        fb->fault_ = 3;
+    return divisor == 0 ? 0 : (int32_t)((int64_t)dividend / divisor);
+}}
+#else
+#define BEGIN() ((void)0)
+#define AT(index, length) (index)
+#define TURN() true
+#define QUOTIENT(dividend, divisor) ((dividend) / (divisor))
+#endif"""
 
 
 def _initial(variable: StVariable) -> str:

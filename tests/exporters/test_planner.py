@@ -294,16 +294,24 @@ def test_what_is_no_block_is_refused(text, words):
         play(text, "")
 
 
-def test_a_block_that_leaves_its_arrays_ends_in_a_sentence():
-    """An index of 2³⁰ would end the process otherwise."""
+@pytest.mark.parametrize(
+    ("body", "harmless", "harmful", "words"),
+    [
+        ("a[n] := 1.0; y := a[n];", [0, 2], [-1, 3, 2**30], "beyond the end of an array"),
+        ("WHILE n > 0 DO y := 1.0; END_WHILE;", [0], [1], "a loop without end"),
+        ("FOR k := 0 TO n DO k := 0; END_FOR;", [-1], [1], "a loop without end"),
+        ("k := 4 / n;", [1, -1], [0], "divides by zero"),
+    ],
+)
+def test_what_would_end_or_hang_the_process_ends_in_a_sentence(body, harmless, harmful, words):
     block = BlockInstance(
         "FUNCTION_BLOCK x VAR_INPUT n : DINT; END_VAR VAR_OUTPUT y : LREAL; END_VAR "
-        "VAR a : ARRAY [0..2] OF LREAL; END_VAR a[n] := 1.0; y := a[n]; END_FUNCTION_BLOCK"
+        f"VAR k : DINT; a : ARRAY [0..2] OF LREAL; END_VAR {body} END_FUNCTION_BLOCK"
     )
-    assert block.call(np.array([[0.0], [2.0]])).tolist() == [[1.0], [1.0]]
-    for index in (-1.0, 3.0, 2.0**30):
-        with pytest.raises(ExportError, match="beyond the end of an array"):
-            block.call(np.array([[index]]))
+    block.call(np.array([harmless], dtype=float).T)
+    for number in harmful:
+        with pytest.raises(ExportError, match=words):
+            block.call(np.array([[float(number)]]))
 
 
 def test_an_error_of_the_block_is_told(text):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_bool, c_char_p, c_double, c_long, c_void_p
+from ctypes import POINTER, c_char_p, c_double, c_int, c_long, c_void_p
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile.planner.chebyshev import Array
-from gen_profile_exporters.st_to_c import StVariable, Translation, translate
+from gen_profile_exporters.st_to_c import FAULTS, StVariable, Translation, translate
 from gen_profile_fmu.building.build import compile_texts
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
@@ -30,7 +30,7 @@ class BlockInstance:
     Raises
     ------
     ExportError
-        It is no such text, or leaves its arrays when it is called.
+        It is no such text, or leaves its arrays or its time when it is called.
     CosimulationError
         There is no C compiler, or no folder to keep the library in.
     """
@@ -64,9 +64,24 @@ class BlockInstance:
         """
         given = np.ascontiguousarray(inputs, dtype=np.float64)
         issued = np.empty((len(given), len(self._translation.outputs)))
-        if not self._library.instance_play(self._memory, _doubles(given), len(given), _doubles(issued)):
-            raise ExportError("The function block goes beyond the end of an array; its text was altered.")
+        require_sound(self._library.instance_play(self._memory, _doubles(given), len(given), _doubles(issued)))
         return issued
+
+
+def require_sound(fault: int) -> None:
+    """Refuse what a block did that no block of ours does.
+
+    Parameters
+    ----------
+    fault : int
+        Its place in `FAULTS`.
+
+    Raises
+    ------
+    ExportError
+    """
+    if fault:
+        raise ExportError(f"The function block {FAULTS[fault]}; its text was altered.")
 
 
 def _number(variable: StVariable) -> float:
@@ -90,7 +105,7 @@ def _compiled(translation: Translation) -> ctypes.CDLL:
     taken = "".join(f"        fb->{v.name} = *inputs++;\n" for v in translation.inputs)
     given = "".join(f"        *outputs++ = fb->{v.name};\n" for v in translation.outputs)
     loop = f"""\
-#define CHECK_INDICES
+#define CHECKED
 #include "{block}.c"
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
@@ -98,12 +113,12 @@ def _compiled(translation: Translation) -> ctypes.CDLL:
 #define EXPORT __attribute__((visibility("default")))
 #endif
 EXPORT long instance_size(void) {{ return sizeof({block}); }}
-EXPORT void instance_init({block} *fb) {{ {block}_beyond = false; {block}_init(fb); }}
-EXPORT bool instance_play({block} *fb, const double *inputs, long cycles, double *outputs) {{
-    for (long cycle = 0; cycle < cycles && !{block}_beyond; ++cycle) {{
+EXPORT void instance_init({block} *fb) {{ {block}_init(fb); }}
+EXPORT int instance_play({block} *fb, const double *inputs, long cycles, double *outputs) {{
+    for (long cycle = 0; cycle < cycles && fb->fault_ == 0; ++cycle) {{
 {taken}        {block}_step(fb);
 {given}    }}
-    return !{block}_beyond;
+    return fb->fault_;
 }}
 """
     texts = {f"{block}.h": translation.header, f"{block}.c": translation.source, "loop.c": loop}
@@ -118,5 +133,5 @@ EXPORT bool instance_play({block} *fb, const double *inputs, long cycles, double
     loaded.instance_init.argtypes = [c_char_p]
     loaded.instance_play.argtypes = [c_void_p, POINTER(c_double), c_long, POINTER(c_double)]
     loaded.instance_init.restype = None
-    loaded.instance_play.restype = c_bool
+    loaded.instance_play.restype = c_int
     return loaded
