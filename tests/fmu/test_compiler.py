@@ -69,15 +69,16 @@ def test_no_source_has_a_warning(written, zig_cc, plant, kind, version):
     zig_cc(*STRICT, "-isystem", str(HEADERS), "-c", SOURCE_FILE, "-o", "object.o")
 
 
-def test_the_loop_of_many_runs_has_no_warning(tmp_path, zig_cc):
-    texts = {"many_runs.c": (FOLDER / "many_runs.c").read_text(encoding="utf-8")}
+@pytest.mark.parametrize("loop", ["many_runs.c", "block_run.c"])
+def test_a_compiled_loop_has_no_warning(tmp_path, zig_cc, loop):
+    texts = {name: (FOLDER / name).read_text(encoding="utf-8") for name in (loop, "called_fmu.h")}
     for version in Version:
         texts |= {
             name: f"#pragma GCC system_header\n{text}" for name, text in standard_headers(version).items()
         }
     for name, text in texts.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    zig_cc(*STRICT, "-c", "many_runs.c", "-o", "object.o")
+    zig_cc(*STRICT, "-c", loop, "-o", "object.o")
 
 
 def test_zig_is_the_default():

@@ -3,37 +3,8 @@
  * For each run: reset, set the parameters, initialise, step through the inputs, keep the outputs' peaks.
  */
 #include <math.h>
-#include <stdbool.h>
-#include <stddef.h>
 
-#include "fmi2FunctionTypes.h"
-#include "fmi3FunctionTypes.h"
-
-#if defined _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-
-enum { GOOD = 0 };
-
-/* Functions of one version; those of the other stay null. */
-typedef struct {
-    fmi2ResetTYPE *reset2;
-    fmi2SetupExperimentTYPE *setup2;
-    fmi2EnterInitializationModeTYPE *enter2;
-    fmi2ExitInitializationModeTYPE *exit2;
-    fmi2SetRealTYPE *set2;
-    fmi2GetRealTYPE *get2;
-    fmi2DoStepTYPE *step2;
-    fmi3ResetTYPE *reset3;
-    fmi3EnterInitializationModeTYPE *enter3;
-    fmi3ExitInitializationModeTYPE *exit3;
-    fmi3SetFloat64TYPE *set3;
-    fmi3GetFloat64TYPE *get3;
-    fmi3DoStepTYPE *step3;
-    void *instance;
-} Fmu;
+#include "called_fmu.h"
 
 /* Numbers of every run, one run behind the other; those that all runs share are there once, and `size` is 0. */
 typedef struct {
@@ -53,36 +24,6 @@ typedef struct {
 
 static const double *of_run(const PerRun *numbers, size_t run) { return numbers->values + run * numbers->size; }
 
-static int set(const Fmu *fmu, const unsigned *references, size_t n, const double *values) {
-    if (n == 0) return GOOD;
-    return fmu->set2 ? (int)fmu->set2(fmu->instance, references, n, values)
-                     : (int)fmu->set3(fmu->instance, references, n, values, n);
-}
-
-static int get(const Fmu *fmu, const unsigned *references, size_t n, double *values) {
-    return fmu->get2 ? (int)fmu->get2(fmu->instance, references, n, values)
-                     : (int)fmu->get3(fmu->instance, references, n, values, n);
-}
-
-static int step(const Fmu *fmu, double time, double size) {
-    if (fmu->step2) return (int)fmu->step2(fmu->instance, time, size, fmi2True);
-    bool event, terminate, early;
-    double reached;
-    return (int)fmu->step3(fmu->instance, time, size, true, &event, &terminate, &early, &reached);
-}
-
-static int begin(const Fmu *fmu, const Plan *plan, size_t run) {
-    const double *values = of_run(&plan->parameters, run);
-    const double start = *of_run(&plan->times, run);
-    if (fmu->reset2) {
-        return fmu->reset2(fmu->instance) || fmu->setup2(fmu->instance, fmi2False, 0.0, start, fmi2False, 0.0) ||
-               set(fmu, plan->parameter_references, plan->n_parameters, values) || fmu->enter2(fmu->instance) ||
-               fmu->exit2(fmu->instance);
-    }
-    return fmu->reset3(fmu->instance) || set(fmu, plan->parameter_references, plan->n_parameters, values) ||
-           fmu->enter3(fmu->instance, false, 0.0, start, false, 0.0) || fmu->exit3(fmu->instance);
-}
-
 /* Length of the vector that the last outputs make up. */
 static double length(const Plan *plan, const double *values) {
     double squares = 0.0;
@@ -97,7 +38,7 @@ static size_t columns(const Plan *plan) { return plan->n_outputs + (plan->n_comp
 static int simulate(const Fmu *fmu, const Plan *plan, size_t run, double *values, double *peaks) {
     const double *times = of_run(&plan->times, run), *input = of_run(&plan->inputs, run);
     for (size_t i = 0; i < columns(plan); i++) peaks[i] = 0.0;
-    int status = begin(fmu, plan, run);
+    int status = begin(fmu, times[0], plan->parameter_references, plan->n_parameters, of_run(&plan->parameters, run));
     for (size_t k = 0; k < plan->steps && status == GOOD; k++, input += plan->n_inputs) {
         status = set(fmu, plan->input_references, plan->n_inputs, input);
         if (status == GOOD) status = step(fmu, times[k], times[k + 1] - times[k]);

@@ -2,57 +2,23 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint, c_void_p
+from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
 from functools import cache
-from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import attrs
-import fmpy
 import numpy as np
 
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
-from gen_profile_fmu.building.build import compile_texts
-from gen_profile_fmu.building.cache import cached
-from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.building.plant_fmu import PlantFmu
-from gen_profile_fmu.description.fmu_files import Version, digest, standard_headers
-from gen_profile_fmu.model.c_sources import FOLDER
+from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.variables import variable_name
+from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loop
 from gen_profile_fmu.running.instances import slave
-
-_SOURCE = "many_runs.c"
-_FUNCTIONS = {
-    Version.FMI2: (
-        "fmi2Reset",
-        "fmi2SetupExperiment",
-        "fmi2EnterInitializationMode",
-        "fmi2ExitInitializationMode",
-        "fmi2SetReal",
-        "fmi2GetReal",
-        "fmi2DoStep",
-    ),
-    Version.FMI3: (
-        "fmi3Reset",
-        "fmi3EnterInitializationMode",
-        "fmi3ExitInitializationMode",
-        "fmi3SetFloat64",
-        "fmi3GetFloat64",
-        "fmi3DoStep",
-    ),
-}
-
-
-class _Fmu(Structure):
-    _fields_ = [
-        *((name, c_void_p) for names in _FUNCTIONS.values() for name in names),
-        ("instance", c_void_p),
-    ]
 
 
 class _PerRun(Structure):
@@ -186,9 +152,7 @@ class _Worker:
         self.messages: list[str] = []
         self._loop = _loop()
         self._slave = slave(fmu, version, self.messages)
-        self._fmu = _Fmu(instance=self._slave.component)
-        for name in _FUNCTIONS[version]:
-            setattr(self._fmu, name, ctypes.cast(getattr(self._slave.dll, name), c_void_p).value)
+        self._fmu = called(self._slave, version)
 
     def run(self, plan: _Plan, first: int, end: int, found: Array) -> int:
         """Fill rows of what is to be found; the first bad run, or `end`."""
@@ -246,17 +210,8 @@ def _doubles(array: Array) -> Any:
 @cache
 def _loop() -> Any:
     """Compile the loop, or find it in the cache, and load it."""
-    compiler, name = find_compiler(), f"many_runs{fmpy.sharedLibraryExtension}"
-    texts = {_SOURCE: (FOLDER / _SOURCE).read_text(encoding="utf-8")}
-    for version in Version:
-        texts |= standard_headers(version)
-
-    def make(cache: Path) -> dict[str, bytes]:
-        return {name: compile_texts(texts, _SOURCE, compiler, name, cache)}
-
-    parts = (part.encode("utf-8") for part in (compiler.identity, *texts.values()))
-    function = ctypes.CDLL(str(cached(f"many-runs-{digest(*parts)[:32]}", make) / name)).many_runs
+    function = compiled_loop("many_runs")
     places = (POINTER(c_double), POINTER(c_double))
-    function.argtypes = [POINTER(_Fmu), POINTER(_Plan), c_size_t, c_size_t, *places]
+    function.argtypes = [POINTER(CalledFmu), POINTER(_Plan), c_size_t, c_size_t, *places]
     function.restype = c_size_t
     return function

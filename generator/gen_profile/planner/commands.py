@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import attrs
@@ -157,13 +157,28 @@ STANDARD = (
 )
 
 
-def _issued(block: BlockInstance, commands: tuple[Command, ...], cycle: float) -> Iterator[Array]:
-    """Give the outputs, row of commands by row of commands."""
-    names, values = list(block.inputs), dict(block.inputs) | {"bEnable": 1.0}
-    starts = [math.ceil(command.time / cycle - 1e-9) for command in commands]
-    if starts[0] > 0:
-        yield block.call(np.tile([values[name] for name in names], (starts[0], 1)))
-    for command, start, end in zip(commands, starts, [*starts[1:], None], strict=True):
+def input_rows(
+    commands: Sequence[Command], values: Mapping[str, float], cycle: float
+) -> tuple[list[int], Array]:
+    """Turn commands into inputs that hold from a cycle to the next.
+
+    Parameters
+    ----------
+    commands : sequence of Command
+    values : mapping of str to float
+        All inputs by name, in the block's order, as they are before the first command.
+    cycle : float
+        s.
+
+    Returns
+    -------
+    begins : list of int
+        Rising cycles; the first is 0.
+    inputs : (rows, inputs) array
+    """
+    values = dict(values)
+    rows = {0: list(values.values())}
+    for command in commands:
         values |= {f"f{name}": value for name, value in command.live.items()}
         values |= {
             "bVelocity": float(command.command == "velocity"),
@@ -172,15 +187,19 @@ def _issued(block: BlockInstance, commands: tuple[Command, ...], cycle: float) -
             "bExecute": float(command.command == "position"),
         }
         values["fTarget" if command.command == "position" else "fVelocityCommand"] = command.value
-        row = np.array([values[name] for name in names])
-        after = row.copy()
-        after[names.index("bExecute")] = 0.0  # an edge, so that the next row makes another
-        if end is not None:
-            if end > start:
-                yield block.call(np.vstack([row, np.tile(after, (end - start - 1, 1))]))
-            continue
-        yield block.call(row[None])
-        yield from _until_still(block, after, cycle)
+        begin = math.ceil(command.time / cycle - 1e-9)
+        rows[begin] = list(values.values())
+        values["bExecute"] = 0.0  # an edge, so that the next command makes another
+        rows[begin + 1] = list(values.values())
+    return list(rows), np.array(list(rows.values()), dtype=np.float64)
+
+
+def _issued(block: BlockInstance, commands: tuple[Command, ...], cycle: float) -> Iterator[Array]:
+    """Give the outputs, row of inputs by row of inputs."""
+    begins, rows = input_rows(commands, block.inputs | {"bEnable": 1.0}, cycle)
+    for row, begin, end in zip(rows, begins, begins[1:], strict=False):
+        yield block.call(np.tile(row, (end - begin, 1)))
+    yield from _until_still(block, rows[-1], cycle)
 
 
 def _until_still(block: BlockInstance, row: Array, cycle: float) -> Iterator[Array]:

@@ -67,8 +67,8 @@ def planner_block(spec: Spec) -> PlannerBlock:
         velocity=velocity,
         acceleration=acceleration,
         jerk=jerk,
-        quick_deceleration=spec.planner.quick_stop or QUICK * acceleration,
-        quick_jerk=spec.planner.quick_stop_jerk or QUICK_JERK * jerk,
+        quick_deceleration=quick_limits(spec)[0],
+        quick_jerk=quick_limits(spec)[1],
         travel=travel,
         live=found.live,
         nominal=tuple(_nominal(spec, name) for name in found.live),
@@ -86,6 +86,16 @@ def planner_block(spec: Spec) -> PlannerBlock:
         text=block_text(constants),
         modes=found.modes,
         frequency_error=found.error,
+    )
+
+
+def quick_limits(spec: Spec) -> tuple[float, float]:
+    """Deceleration and jerk of a quick stop, where the limits are stated, in m and s."""
+    own = spec.limits.of(0)
+    assert own.acceleration and own.jerk
+    return (
+        spec.planner.quick_stop or QUICK * own.acceleration,
+        spec.planner.quick_stop_jerk or QUICK_JERK * own.jerk,
     )
 
 

@@ -17,6 +17,10 @@ from gen_profile_fmu.building.build import compile_texts
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.description.fmu_files import digest
+from gen_profile_fmu.running.block_run import CalledBlock
+
+AXIS = ("fPosition", "fVelocity", "fAcceleration")
+STATES = ("bBusy", "bPromise", "nErrorId")
 
 
 class BlockInstance:
@@ -50,6 +54,22 @@ class BlockInstance:
         """Names of the outputs."""
         return [v.name for v in self._translation.outputs]
 
+    def called(self) -> CalledBlock:
+        """Give a fresh instance to a loop that is compiled, too.
+
+        Raises
+        ------
+        ExportError
+            The text is no planner block's.
+        """
+        names = self.outputs
+        if missing := [name for name in (*AXIS, *STATES) if name not in names]:
+            raise ExportError(f"The function block has no output {missing[0]}, so it is no planner block.")
+        memory = ctypes.create_string_buffer(len(self._memory))
+        self._library.instance_init(memory)
+        play = ctypes.cast(self._library.instance_play, c_void_p).value or 0
+        return CalledBlock(play=play, memory=memory, outputs=names, axes=[AXIS], states=STATES)
+
     def call(self, inputs: Array) -> Array:
         """Call the block once for every row of inputs.
 
@@ -64,7 +84,8 @@ class BlockInstance:
         """
         given = np.ascontiguousarray(inputs, dtype=np.float64)
         issued = np.empty((len(given), len(self._translation.outputs)))
-        require_sound(self._library.instance_play(self._memory, _doubles(given), len(given), _doubles(issued)))
+        play = self._library.instance_play
+        require_sound(play(self._memory, _doubles(given), len(given), _doubles(issued)))
         return issued
 
 

@@ -1,0 +1,133 @@
+/*
+ * A co-simulation of a plant that follows what a controller's function block issues, cycle by cycle: no
+ * interpreter within. The block is called with inputs that change at some cycles, until it stands after the
+ * last change; then the loads are watched.
+ */
+#include <math.h>
+
+#include "called_fmu.h"
+
+typedef int Play(void *block, const double *inputs, long cycles, double *outputs);
+
+typedef struct {
+    Play *play;
+    void *instance;
+    size_t n_inputs, n_outputs, n_axes;
+    const size_t *axes;                  /* n_axes x 3: places of position, velocity and acceleration among outputs */
+    size_t busy, promise, error;         /* likewise */
+} Block;
+
+typedef struct {
+    double cycle;
+    size_t n_rows;
+    const long *begins;                  /* cycle from which each row of inputs holds; the first is 0 */
+    const double *inputs;                /* n_rows x n_inputs */
+    long longest;                        /* cycles after the last row within which the axes must stand */
+    long settle, watch;                  /* cycles of standing before the loads' sway counts, and while it does */
+    size_t n_parameters, n_setpoints, n_loads;
+    const unsigned *parameter_references, *setpoint_references, *load_references;
+    const double *parameters;
+    double *setpoints;                   /* where axes stand that the block does not lead */
+    const size_t *led;                   /* n_axes: places among the setpoints */
+} History;
+
+/* Of an axis; gap: by how far the position is not the velocity's integral, nor this the acceleration's. */
+typedef struct {
+    double velocity, acceleration, jerk, lowest, highest, gap, creep;
+} Extremes;
+
+typedef struct {
+    Extremes *axes;                      /* n_axes */
+    double *on_the_way, *residual;       /* n_loads: greatest sway at any time, and of what remains */
+    double *trace;                       /* cycles x (n_outputs + n_loads), or null */
+    long stands, cycles, unpromised;     /* stands: the cycle from which the axes do, or -1 */
+    int status, fault, error;
+    bool promise;                        /* at the end */
+} Found;
+
+static double greater(double peak, double value) { return isnan(value) ? INFINITY : fmax(peak, fabs(value)); }
+
+static void begin_axes(const Block *block, Found *found) {
+    for (size_t i = 0; i < block->n_axes; i++) {
+        found->axes[i] = (Extremes){.lowest = INFINITY, .highest = -INFINITY};
+    }
+}
+
+/* What an axis does in this cycle, `now`, and did in the one before. */
+static void take_axis(const size_t *places, const double *before, const double *now, double cycle, Extremes *axis) {
+    const double position = now[places[0]], velocity = now[places[1]], acceleration = now[places[2]];
+    axis->velocity = greater(axis->velocity, velocity);
+    axis->acceleration = greater(axis->acceleration, acceleration);
+    axis->lowest = isnan(position) ? -INFINITY : fmin(axis->lowest, position);
+    axis->highest = isnan(position) ? INFINITY : fmax(axis->highest, position);
+    if (before == NULL) return;
+    const double change = acceleration - before[places[2]];
+    const double half = 0.5 * cycle;
+    axis->jerk = greater(axis->jerk, change / cycle);
+    const double gain = velocity - before[places[1]] - half * (acceleration + before[places[2]]);
+    const double way = position - before[places[0]] - half * (velocity + before[places[1]]);
+    axis->gap = greater(axis->gap, gain * cycle);
+    axis->gap = greater(axis->gap, way + cycle * cycle * change / 12.0);
+}
+
+static bool standing(const Block *block, const double *outputs) {
+    if (outputs[block->busy] != 0.0) return false;
+    for (size_t i = 0; i < block->n_axes; i++) {
+        if (outputs[block->axes[3 * i + 1]] != 0.0) return false;
+    }
+    return true;
+}
+
+static void take_states(const Block *block, const double *outputs, Found *found) {
+    if (outputs[block->error] != 0.0) found->error = (int)outputs[block->error];
+    found->promise = outputs[block->promise] != 0.0;
+    if (!found->promise && outputs[block->busy] != 0.0) found->unpromised++;
+}
+
+static void take_loads(const History *history, const double *sway, bool counts, Found *found) {
+    for (size_t i = 0; i < history->n_loads; i++) {
+        found->on_the_way[i] = greater(found->on_the_way[i], sway[i]);
+        if (counts) found->residual[i] = greater(found->residual[i], sway[i]);
+    }
+}
+
+/* `room`: 2 x n_outputs + n_loads + n_axes. */
+EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history, double *room, Found *found) {
+    const size_t row_size = block->n_outputs + history->n_loads;
+    double *before = NULL, *now = room, *other = room + block->n_outputs;
+    double *sway = room + 2 * block->n_outputs, *stood = sway + history->n_loads;
+    long last = history->begins[history->n_rows - 1], end = last + history->longest;
+    size_t row = 0;
+    begin_axes(block, found);
+    found->stands = -1;
+    found->status = begin(fmu, 0.0, history->parameter_references, history->n_parameters, history->parameters);
+    for (long k = 0; k < end && found->status == GOOD; k++, found->cycles = k) {
+        while (row + 1 < history->n_rows && history->begins[row + 1] <= k) row++;
+        found->fault = block->play(block->instance, history->inputs + row * block->n_inputs, 1, now);
+        if (found->fault != 0) return;
+        take_states(block, now, found);
+        if (k >= last && found->stands < 0 && standing(block, now)) {
+            found->stands = k;
+            end = k + history->settle + history->watch;
+            for (size_t i = 0; i < block->n_axes; i++) stood[i] = now[block->axes[3 * i]];
+        }
+        for (size_t i = 0; i < block->n_axes; i++) {
+            const double position = now[block->axes[3 * i]];
+            take_axis(block->axes + 3 * i, before, now, history->cycle, found->axes + i);
+            if (found->stands >= 0) found->axes[i].creep = greater(found->axes[i].creep, position - stood[i]);
+            history->setpoints[history->led[i]] = position;
+        }
+        found->status = set(fmu, history->setpoint_references, history->n_setpoints, history->setpoints);
+        if (found->status == GOOD) found->status = step(fmu, (double)k * history->cycle, history->cycle);
+        if (found->status == GOOD) found->status = get(fmu, history->load_references, history->n_loads, sway);
+        take_loads(history, sway, found->stands >= 0 && k >= found->stands + history->settle, found);
+        if (found->trace != NULL) {
+            double *kept = found->trace + (size_t)k * row_size;
+            for (size_t i = 0; i < block->n_outputs; i++) kept[i] = now[i];
+            for (size_t i = 0; i < history->n_loads; i++) kept[block->n_outputs + i] = sway[i];
+        }
+        before = now;
+        now = other;
+        other = before;
+    }
+}

@@ -1,0 +1,319 @@
+"""Co-simulations of a plant that follows a controller's function block, by a compiled loop over both."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from ctypes import POINTER, Structure, byref, c_bool, c_double, c_int, c_long, c_size_t, c_uint, c_void_p
+from functools import cache
+from types import TracebackType
+from typing import Any, Self
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import CosimulationError
+from gen_profile.motion.profile import Array
+from gen_profile_fmu.building.plant_fmu import PlantFmu
+from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.model.variables import variable_name
+from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loop
+from gen_profile_fmu.running.instances import slave
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class CalledBlock:
+    """A function block in memory.
+
+    Attributes
+    ----------
+    play : int
+        Address of a C function ``int (void *block, const double *inputs, long cycles, double *outputs)``
+        that calls the block and returns 0, or what it did that no block may do.
+    memory : buffer
+        The instance, begun.
+    outputs : sequence of str
+        Their names, in the order in which the function writes them.
+    axes : (axes, 3) sequence of str
+        Outputs that are position, velocity and acceleration of an axis.
+    states : (3,) sequence of str
+        Outputs that tell whether it is busy, whether its promise holds, and the number of its error.
+    """
+
+    play: int
+    memory: Any = attrs.field(repr=False)
+    outputs: Sequence[str]
+    axes: Sequence[Sequence[str]]
+    states: Sequence[str]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Script:
+    """What a block is told.
+
+    Attributes
+    ----------
+    cycle : float
+        s.
+    begins : (rows,) array of int
+        Cycle from which each row of inputs holds; the first is 0.
+    inputs : (rows, inputs) array
+    longest : int
+        Cycles after the last row within which the axes must stand.
+    settle, watch : int
+        Cycles of standing before sway counts as residual, and while it does.
+    """
+
+    cycle: float
+    begins: Sequence[int]
+    inputs: Array
+    longest: int
+    settle: int
+    watch: int
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class AxisExtremes:
+    """What an axis came to, in m and s.
+
+    Attributes
+    ----------
+    velocity, acceleration, jerk : float
+        Greatest magnitudes.
+    lowest, highest : float
+        Positions.
+    gap : float
+        By how much, in m, a cycle's position is not the integral of the velocity, nor this that of the
+        acceleration.
+    creep : float
+        How far it moved while it stood.
+    """
+
+    velocity: float
+    acceleration: float
+    jerk: float
+    lowest: float
+    highest: float
+    gap: float
+    creep: float
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class BlockRun:
+    """What became of a run.
+
+    Attributes
+    ----------
+    axes : tuple of AxisExtremes
+    on_the_way, residual : (loads,) arrays
+        Greatest sway in m, at any time, and once the axes stand.
+    cycles : int
+    stands : int
+        Cycle from which the axes stand for good; -1 if they never do.
+    unpromised : int
+        Cycles of motion without the block's promise.
+    promise : bool
+        At the end.
+    error : int
+        The last that the block showed; 0 for none.
+    fault : int
+        What the block did that no block may do; 0 for nothing.
+    trace : (cycles, outputs + loads) array or None
+    """
+
+    axes: tuple[AxisExtremes, ...]
+    on_the_way: Array
+    residual: Array
+    cycles: int
+    stands: int
+    unpromised: int
+    promise: bool
+    error: int
+    fault: int
+    trace: Array | None = None
+
+
+class _Block(Structure):
+    _fields_ = [
+        *((name, c_void_p) for name in ("play", "instance")),
+        *((name, c_size_t) for name in ("n_inputs", "n_outputs", "n_axes")),
+        ("axes", POINTER(c_size_t)),
+        *((name, c_size_t) for name in ("busy", "promise", "error")),
+    ]
+
+
+class _History(Structure):
+    _fields_ = [
+        ("cycle", c_double),
+        ("n_rows", c_size_t),
+        ("begins", POINTER(c_long)),
+        ("inputs", POINTER(c_double)),
+        *((name, c_long) for name in ("longest", "settle", "watch")),
+        *((name, c_size_t) for name in ("n_parameters", "n_setpoints", "n_loads")),
+        *((f"{name}_references", POINTER(c_uint)) for name in ("parameter", "setpoint", "load")),
+        ("parameters", POINTER(c_double)),
+        ("setpoints", POINTER(c_double)),
+        ("led", POINTER(c_size_t)),
+    ]
+
+
+class _Found(Structure):
+    _fields_ = [
+        *((name, POINTER(c_double)) for name in ("axes", "on_the_way", "residual", "trace")),
+        *((name, c_long) for name in ("stands", "cycles", "unpromised")),
+        *((name, c_int) for name in ("status", "fault", "error")),
+        ("promise", c_bool),
+    ]
+
+
+class BlockFollower:
+    """A plant FMU in memory that follows blocks, one run after the other; a context manager.
+
+    Parameters
+    ----------
+    fmu : PlantFmu
+        FMI 2, of this computer.
+
+    Raises
+    ------
+    CosimulationError
+        The FMU cannot be loaded, or the loop cannot be compiled (once).
+    """
+
+    def __init__(self, fmu: PlantFmu) -> None:
+        self._references = {variable.name: i for i, variable in enumerate(fmu.variables.variables)}
+        self._loads = [v.name for v in fmu.variables.blocks["SWAY"]]
+        self._setpoints = [v.name for v in fmu.variables.blocks["INPUTS"]]
+        self._messages: list[str] = []
+        self._loop = _loop()
+        self._slave = slave(fmu, Version.FMI2, self._messages)
+        self._fmu = called(self._slave, Version.FMI2)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._slave.freeInstance()
+
+    def run(
+        self,
+        block: CalledBlock,
+        script: Script,
+        values: Mapping[str, float],
+        led: Sequence[int],
+        *,
+        rows: int = 0,
+    ) -> BlockRun:
+        """Let the plant follow a block.
+
+        Parameters
+        ----------
+        block : CalledBlock
+            Begun, and of no more use afterwards.
+        script : Script
+        values : mapping of str to float
+            Start values of the FMU's variables, its setpoints among them.
+        led : (axes,) sequence of int
+            Which axis of the plant each axis of the block is.
+        rows : int
+            Cycles of which everything is to be kept: as many as an earlier run took, or none.
+
+        Raises
+        ------
+        CosimulationError
+            A name is unknown, or the FMU refuses a value or a step.
+        """
+        self._messages.clear()
+        loads, outputs = len(self._loads), len(block.outputs)
+        kept = {
+            "axes": np.zeros((len(block.axes), 7)),
+            "on_the_way": np.zeros(loads),
+            "residual": np.zeros(loads),
+            "trace": np.zeros((rows, outputs + loads)),
+        }
+        found = _Found(**{name: _doubles(array) for name, array in kept.items() if array.size})
+        room = np.empty(2 * outputs + loads + len(block.axes))
+        self._loop(
+            byref(self._fmu),
+            byref(_called(block, script)),
+            byref(self._history(script, values, led)),
+            _doubles(room),
+            byref(found),
+        )
+        if found.status:
+            reason = " ".join(self._messages)
+            raise CosimulationError(f"The FMU could not go on after cycle {found.cycles}: {reason}")
+        return BlockRun(
+            axes=tuple(
+                AxisExtremes(**dict(zip(_EXTREMES, row, strict=True))) for row in kept["axes"].tolist()
+            ),
+            on_the_way=kept["on_the_way"],
+            residual=kept["residual"],
+            trace=kept["trace"] if rows else None,
+            **{name: getattr(found, name) for name in _SIMPLE},
+        )
+
+    def _history(self, script: Script, values: Mapping[str, float], led: Sequence[int]) -> _History:
+        begins = (c_long * len(script.begins))(*script.begins)
+        setpoints = [values[name] for name in self._setpoints]
+        return _History(
+            cycle=script.cycle,
+            n_rows=len(begins),
+            begins=begins,
+            inputs=_doubles(script.inputs),
+            longest=script.longest,
+            settle=script.settle,
+            watch=script.watch,
+            n_parameters=len(values),
+            n_setpoints=len(setpoints),
+            n_loads=len(self._loads),
+            parameter_references=self._numbers(values),
+            setpoint_references=self._numbers(self._setpoints),
+            load_references=self._numbers(self._loads),
+            parameters=(c_double * len(values))(*values.values()),
+            setpoints=(c_double * len(setpoints))(*setpoints),
+            led=(c_size_t * len(led))(*led),
+        )
+
+    def _numbers(self, names: Mapping[str, float] | Sequence[str]) -> Any:
+        unknown = [name for name in names if variable_name(name) not in self._references]
+        if unknown:
+            raise CosimulationError(f"The FMU has no variable {unknown[0]!r}.")
+        return (c_uint * len(names))(*(self._references[variable_name(name)] for name in names))
+
+
+_EXTREMES = [field.name for field in attrs.fields(AxisExtremes)]
+_SIMPLE = ("stands", "cycles", "unpromised", "promise", "error", "fault")
+
+
+def _called(block: CalledBlock, script: Script) -> _Block:
+    places = [block.outputs.index(name) for axis in block.axes for name in axis]
+    busy, promise, error = (block.outputs.index(name) for name in block.states)
+    return _Block(
+        play=block.play,
+        instance=ctypes.addressof(block.memory),
+        n_inputs=script.inputs.shape[1],
+        n_outputs=len(block.outputs),
+        n_axes=len(block.axes),
+        axes=(c_size_t * len(places))(*places),
+        busy=busy,
+        promise=promise,
+        error=error,
+    )
+
+
+def _doubles(array: Array) -> Any:
+    return array.ctypes.data_as(POINTER(c_double))
+
+
+@cache
+def _loop() -> Any:
+    """Compile the loop, or find it in the cache, and load it."""
+    function = compiled_loop("block_run")
+    function.argtypes = [
+        *(POINTER(kind) for kind in (CalledFmu, _Block, _History, c_double, _Found)),
+    ]
+    function.restype = None
+    return function

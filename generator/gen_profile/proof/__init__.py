@@ -1,0 +1,1 @@
+"""The proof of a planner block: machines that follow the written block under thousands of commands."""

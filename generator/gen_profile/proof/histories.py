@@ -1,0 +1,209 @@
+"""Histories of commands that a planner block is proved on.
+
+A history is made of *choices*, shares from 0 to 1: where it starts, the live parameters that the block is
+told, by how much the machine differs from them, and what is commanded when. So histories are drawn as a Latin
+hypercube, corners are choices of 0 and 1, and a search moves through the same cube.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import islice, product
+from typing import Self
+
+import attrs
+import numpy as np
+from scipy.stats import qmc
+
+from gen_profile.motion.profile import Array
+from gen_profile.planner.commands import Command
+from gen_profile.problem.linearization import linearize
+from gen_profile.spec.model import Spec
+
+COMMANDED = 40.0  # s in which commands come; slow machines take longer, see PERIODS
+PERIODS = 5.0  # of the slowest mode, which they come in at least
+SOONEST = 0.5  # s until the first command, at most
+SHORTEST, LONGEST = 0.02, 3.0  # periods between two commands
+MOST_COMMANDS = 16
+MANNERS = ((0.85, 0.05, 0.1), (0.05, 0.9, 0.05), (0.4, 0.4, 0.2))  # shares of positions, a stick, and stops
+MOST_CORNERS = 10  # ranges up to which all corners are tried where histories are enough
+
+_PER_COMMAND = 3  # choices: which, its value, how long
+
+
+@attrs.frozen(kw_only=True)
+class History:
+    """Commands to a block, and the machine that follows it.
+
+    Attributes
+    ----------
+    live : mapping of str to float
+        What the block is told of the live parameters.
+    parameters : mapping of str to float
+        Of the machine.
+    places : tuple of float
+        Where the machine's axes stand at first, in m (or rad).
+    commands : tuple of Command
+    """
+
+    live: Mapping[str, float]
+    parameters: Mapping[str, float]
+    places: tuple[float, ...]
+    commands: tuple[Command, ...]
+
+    @property
+    def brakes(self) -> bool:
+        """Whether it has a quick stop, after which nothing is promised."""
+        return any(command.command == "quick-stop" for command in self.commands)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Histories:
+    """What histories of a spec are made of.
+
+    Attributes
+    ----------
+    spec : Spec
+    uncertain : mapping of str to (float, float)
+        Ranges of the machine's parameters; of a live one, of its ratio to what the block is told.
+    period : float
+        Of the slowest mode over all ranges, in s.
+    fastest : float
+        Frequency of the fastest mode there, in rad/s.
+    """
+
+    spec: Spec
+    uncertain: Mapping[str, tuple[float, float]]
+    period: float
+    fastest: float
+
+    @classmethod
+    def of(cls, spec: Spec) -> Self:
+        """Look at the ranges of a spec, whose limits are stated."""
+        live, nominal = spec.planner.live, spec.plant.parameters
+        ranges = {
+            name: (low / nominal[name], high / nominal[name]) if name in live else (low, high)
+            for name, (low, high) in spec.checked_ranges().items()
+            # a live one's span says where it may be, and of nothing there is no share
+            if not (name in live and (name in spec.check.spans or nominal[name] == 0.0))
+        }
+        ends = product(*live.values(), *([low, high] for low, high in ranges.values()))
+        found = []
+        for chosen in islice(ends, 2**MOST_CORNERS):
+            told = dict(zip(live, chosen, strict=False))
+            errors = dict(zip(ranges, chosen[len(live) :], strict=True))
+            found.append(linearize(spec.machine(), *_machine(spec, told, errors)).frequencies)
+        slowest, fastest = float(np.min(found)), float(np.max(found))
+        return cls(spec=spec, uncertain=ranges, period=2.0 * np.pi / slowest, fastest=fastest)
+
+    @property
+    def box(self) -> int:
+        """Number of choices that make the machine: live parameters and uncertain ones."""
+        return len(self.spec.planner.live) + len(self.uncertain)
+
+    @property
+    def choices(self) -> int:
+        """Number of choices of a history."""
+        return 5 + self.box + _PER_COMMAND * MOST_COMMANDS
+
+    def drawn(self, count: int, seed: int) -> Array:
+        """Draw choices as a Latin hypercube, the first ones at the corners of the machine's ranges.
+
+        Parameters
+        ----------
+        count : int
+            Of which the corners take up half at most.
+        seed : int
+
+        Returns
+        -------
+        (count, choices) array
+        """
+        random = np.random.default_rng(seed)
+        drawn: Array = qmc.LatinHypercube(self.choices, seed=random).random(count)
+        corners = self.corners(count)
+        every = 2 ** min(self.box, 62)
+        numbers = np.arange(every) if every == corners else random.integers(every, size=corners)
+        drawn[:corners, 1 : 1 + self.box] = (numbers[:, None] >> np.arange(self.box)) & 1
+        return drawn
+
+    def corners(self, count: int) -> int:
+        """How many of so many histories are at corners."""
+        every: int = 2 ** min(self.box, MOST_CORNERS)
+        return min(every, count // 2)
+
+    def history(self, choices: Array) -> History:
+        """Make the history of some choices, shape (choices,)."""
+        start, *box, first, manner, amount, ending = choices[: 5 + self.box].tolist()
+        live, uncertain = self.spec.planner.live, self.uncertain
+        told = {name: _between(ends, share) for (name, ends), share in zip(live.items(), box, strict=False)}
+        errors = {
+            name: _between(ends, share)
+            for (name, ends), share in zip(uncertain.items(), box[len(live) :], strict=True)
+        }
+        parameters, places = _machine(self.spec, told, errors)
+        travel = self.spec.limits.of(0).travel
+        assert travel is not None
+        places[0] = _between(travel, _widened(start))
+        rows = choices[5 + self.box :].reshape(MOST_COMMANDS, _PER_COMMAND)[: int(amount * MOST_COMMANDS)]
+        return History(
+            live=told,
+            parameters=parameters,
+            places=tuple(places),
+            commands=tuple(self._commands(rows, first, manner, ending)),
+        )
+
+    def _commands(self, rows: Array, first: float, manner: float, ending: float) -> Iterator[Command]:
+        """Follow the rows until their time is over, then come to rest."""
+        within = max(COMMANDED, PERIODS * self.period)
+        likely = MANNERS[int(manner * len(MANNERS))]
+        time = first * SOONEST
+        for which, value, lasts in rows.tolist():
+            if time > within:
+                break
+            yield self._command(time, int(np.searchsorted(np.cumsum(likely), which)), value)
+            time += self.period * SHORTEST * (LONGEST / SHORTEST) ** lasts
+        time = min(time, within)
+        if ending < 0.05:
+            yield Command(time=time, command="quick-stop", value=0.0, live={})
+        else:
+            yield self._command(time, 0 if ending < 0.5 else 2, (ending - 0.05) / 0.45)
+
+    def _command(self, time: float, which: int, value: float) -> Command:
+        limits = self.spec.limits.of(0)
+        assert limits.velocity and limits.travel
+        match which:
+            case 0:
+                return Command(
+                    time=time, command="position", value=_between(limits.travel, _widened(value)), live={}
+                )
+            case 1:
+                ends = (-limits.velocity, limits.velocity)
+                return Command(
+                    time=time, command="velocity", value=_between(ends, _widened(value, 0.25)), live={}
+                )
+        return Command(time=time, command="stop", value=0.0, live={})
+
+
+def _between(ends: tuple[float, float], share: float) -> float:
+    low, high = ends
+    return float(low + share * (high - low)) if share < 1.0 else high
+
+
+def _widened(share: float, margin: float = 0.05) -> float:
+    """Stretch, so that both ends are chosen with a share of `margin` each."""
+    return min(max((share - margin) / (1.0 - 2.0 * margin), 0.0), 1.0)
+
+
+def _machine(
+    spec: Spec, told: Mapping[str, float], errors: Mapping[str, float]
+) -> tuple[dict[str, float], list[float]]:
+    """Parameters of a machine and places of its axes: as the block is told, but for the errors."""
+    plant, parameters = spec.machine(), dict(spec.plant.parameters)
+    for known in plant.parameters:
+        value = told.get(known.name, parameters[known.name])
+        if known.name in errors:
+            value = errors[known.name] * (value if known.name in told else 1.0)
+        parameters[known.name] = min(max(value, known.lower), known.upper)
+    axes = zip(plant.actuated, spec.move.start, strict=True)
+    return parameters, [told.get(axis.name, start) for axis, start in axes]

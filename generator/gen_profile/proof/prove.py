@@ -1,0 +1,135 @@
+"""Proving a written planner block: all histories run, the worst sought, some of them judged by FMPy, too."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from gen_profile.progress import Progress, untold
+from gen_profile.proof.closed_loop import ClosedLoop
+from gen_profile.proof.histories import Histories
+from gen_profile.proof.judging import judge_run
+from gen_profile.proof.numbering import KEPT, Numbering
+from gen_profile.proof.verdict import JudgedHistory, Proof
+from gen_profile.spec.model import Spec
+from gen_profile.verification.cosimulation import ERROR_FLOOR
+from gen_profile.verification.monte_carlo import CURVATURE
+
+HISTORIES = 200
+BY_FMPY = 100  # of so many histories, one is judged by FMPy
+FEWEST_BY_FMPY = 2
+TOLD = 50  # histories between two signs of life
+
+
+def prove(
+    spec: Spec,
+    text: str,
+    *,
+    histories: int = HISTORIES,
+    workers: int | None = None,
+    progress: Progress = untold,
+) -> Proof:
+    """Prove a written block on many histories, which the spec's `check.seed` draws.
+
+    Parameters
+    ----------
+    spec : Spec
+        Whose planner block it is.
+    text : str
+        The block, as it was written.
+    histories : int
+    workers : int, optional
+        Processors to use; all that there are by default. What is found does not depend on it.
+    progress : callable
+        Told what is being done.
+
+    Raises
+    ------
+    ExportError
+        It is no planner block's text.
+    CosimulationError
+        Something cannot be compiled or loaded.
+    """
+    numbering = Numbering.of(Histories.of(spec), histories, spec.check.seed)
+    with closed_loop(spec, text, numbering.histories, workers, progress) as loop:
+        judged = _judge(spec, loop, numbering, range(len(numbering.drawn)), progress)
+        for numbers in numbering.rounds:
+            worst = sorted(judged, key=lambda one: _share(spec, one), reverse=True)[:KEPT]
+            numbering = numbering.after_round([one.number for one in worst])
+            judged += _judge(spec, loop, numbering, numbers, progress)
+        return _verdict(spec, loop, numbering, judged)
+
+
+def replay(spec: Spec, text: str, numbering: Numbering, number: int, progress: Progress = untold) -> Proof:
+    """Run one history again.
+
+    Parameters
+    ----------
+    numbering : Numbering
+        With the rounds that a search has come to.
+    number : int
+        Of the history, below `numbering.count`.
+
+    Returns
+    -------
+    Proof
+        That judges nothing else, with the history's trace.
+    """
+    with closed_loop(spec, text, numbering.histories, 1, progress) as loop:
+        return _verdict(spec, loop, numbering, _judge(spec, loop, numbering, [number], progress))
+
+
+def closed_loop(
+    spec: Spec, text: str, histories: Histories, workers: int | None, progress: Progress
+) -> ClosedLoop:
+    """Load block and machine for that many processors."""
+    progress("compiling block and machine, once")
+    return ClosedLoop(spec, text, histories, workers=workers or os.cpu_count() or 1)
+
+
+def _judge(
+    spec: Spec, loop: ClosedLoop, numbering: Numbering, numbers: Sequence[int], progress: Progress
+) -> list[JudgedHistory]:
+    """Run the histories of some numbers."""
+    histories = [numbering.history(number) for number in numbers]
+    judged = []
+    for number, history, run in zip(numbers, histories, loop.runs(histories), strict=True):
+        group = numbering.group(number)
+        judged.append(judge_run(spec, run, history, cycle=loop.cycle, number=number, group=group))
+        if number % TOLD == 0:
+            progress("proving", number, numbering.count)
+    return judged
+
+
+def _share(spec: Spec, judged: JudgedHistory) -> float:
+    """Tell how near a history comes to a limit; a fault is beyond all."""
+    return np.inf if judged.faults else judged.share(spec.check.residual_sway, 0.0)
+
+
+def _verdict(spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequence[JudgedHistory]) -> Proof:
+    """Bound the error at the worst histories, and let FMPy judge these and some others."""
+    sound = [one for one in judged if not one.faults] or list(judged)
+    worst = sorted(sound, key=lambda one: _share(spec, one), reverse=True)[:KEPT]
+    halved = 0.5 * min(loop.max_step, loop.cycle)
+    error = ERROR_FLOOR
+    for one in worst:
+        finer = loop.run(one.history, max_step=halved).residual
+        coarse = np.array(list(one.residual.values()))
+        between = CURVATURE * (numbering.histories.fastest * loop.cycle) ** 2 / 8.0 * coarse.max()
+        error = max(error, ERROR_FLOOR + float(np.abs(finer - coarse).max() + between))
+    chosen = np.random.default_rng(numbering.seed).permutation(len(sound))
+    some = [sound[k] for k in chosen[: max(FEWEST_BY_FMPY, len(sound) // BY_FMPY)]]
+    by_fmpy = {one.number: one for one in (worst[0], *some)}
+    apart = max(loop.distance_from_fmpy(one.history, one.cycles) for one in by_fmpy.values())
+    return Proof(
+        limit=dict(spec.check.residual_sway),
+        error_bound=error,
+        seed=numbering.seed,
+        count=numbering.count,
+        parents=numbering.parents,
+        judged=tuple(judged),
+        by_fmpy=tuple(by_fmpy),
+        apart=apart,
+    )

@@ -1,0 +1,199 @@
+"""What the proof of a planner block found: values only, no work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import CheckFailed
+from gen_profile.proof.histories import History
+from gen_profile.proof.numbering import CORNERS, DRAWS, SEARCH
+
+GROUPS = {
+    CORNERS: "ends of all live and uncertain ranges at once",
+    DRAWS: "drawn from all ranges and commands",
+    SEARCH: "steps that climb from the worst of these",
+}
+QUANTILES = (0.5, 0.9, 0.99)
+AGREEMENT = 1e-9  # m, by which FMPy may find another sway
+LISTED = 10  # of the worst histories
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class JudgedHistory:
+    """One history, and what became of it.
+
+    Attributes
+    ----------
+    number : int
+    group : str
+        One of `GROUPS`.
+    history : History
+    cycles : int
+    rests_after : float or None
+        Time in s from the last command to standstill.
+    promise : bool
+        Whether the block promises at the end that no sway remains.
+    residual, on_the_way : mapping of str to float
+        Greatest sway of every load in m: once the axes stand, and at any time.
+    limits : mapping of str to float
+        Greatest velocity, acceleration and jerk, each as a share of its limit, and by how much, in m, the
+        travel was left.
+    faults : tuple of str
+        What else is wrong, in words that end a sentence.
+    """
+
+    number: int
+    group: str
+    history: History
+    cycles: int
+    rests_after: float | None
+    promise: bool
+    residual: Mapping[str, float]
+    on_the_way: Mapping[str, float]
+    limits: Mapping[str, float]
+    faults: tuple[str, ...]
+
+    def share(self, limit: Mapping[str, float], error_bound: float) -> float:
+        """Share of the limits of residual sway that it takes up; 0 where the block promises nothing."""
+        if not self.promise:
+            return 0.0
+        return max((self.residual[load] + error_bound) / most for load, most in limit.items())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        return {
+            "number": self.number,
+            "group": self.group,
+            "start_m": self.history.places[0],
+            "live": dict(self.history.live),
+            "parameters": dict(self.history.parameters),
+            "commands": [
+                {"time_s": command.time, "command": command.command, "value": command.value}
+                for command in self.history.commands
+            ],
+            "promise": self.promise,
+            "rests_after_s": self.rests_after,
+            "residual_peaks_m": dict(self.residual),
+            "sway_peaks_m": dict(self.on_the_way),
+            "limits": dict(self.limits),
+            "faults": list(self.faults),
+        }
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Proof:
+    """Verdict on a planner block.
+
+    Attributes
+    ----------
+    limit : mapping of str to float
+        Allowed residual sway of every load in m.
+    error_bound : float
+        No residual is further than this from the truth, in m.
+    seed, count : int
+        With which the histories were drawn, and how many.
+    parents : sequence of sequences of int
+        From which histories each round of the search began.
+    judged : tuple of JudgedHistory
+    by_fmpy : tuple of int
+        Numbers of the histories that FMPy's own importer co-simulated, too.
+    apart : float
+        m, by which it found another sway at most.
+    """
+
+    limit: Mapping[str, float]
+    error_bound: float
+    seed: int
+    count: int
+    parents: Sequence[Sequence[int]]
+    judged: tuple[JudgedHistory, ...]
+    by_fmpy: tuple[int, ...]
+    apart: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether every history keeps every limit, and FMPy agrees."""
+        return not self.reasons()
+
+    def raise_for_failure(self) -> None:
+        """Do nothing where the proof passed.
+
+        Raises
+        ------
+        CheckFailed
+            With the reasons.
+        """
+        if not self.passed:
+            raise CheckFailed("\n".join(self.reasons()))
+
+    def share(self, judged: JudgedHistory) -> float:
+        """Share of the limit of residual sway that a history takes up, the error bound included."""
+        return judged.share(self.limit, self.error_bound)
+
+    @property
+    def worst(self) -> JudgedHistory:
+        """The history that takes up the greatest share of the limit."""
+        return max(self.judged, key=self.share)
+
+    def reasons(self) -> tuple[str, ...]:
+        """Say why the proof failed, a sentence each; none when it passed."""
+        sentences = []
+        if self.share(self.worst) > 1.0:
+            load = max(self.limit, key=lambda name: self.worst.residual[name] / self.limit[name])
+            sentences.append(
+                f"The {load} sways by {1e3 * self.worst.residual[load]:.4g} mm after history "
+                f"{self.worst.number}, and {1e3 * self.limit[load]:.4g} mm are allowed "
+                "(check.residual_sway): narrow check.uncertain, allow more, or accelerate less."
+            )
+        by_kind: dict[str, list[JudgedHistory]] = {}
+        for judged in self.judged:
+            for fault in judged.faults:
+                by_kind.setdefault(fault.split(" by ")[0], []).append(judged)
+        for kind, those in by_kind.items():
+            first = next(fault for fault in those[0].faults if fault.split(" by ")[0] == kind)
+            others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
+            sentences.append(f"In history {those[0].number} {first}{others}.")
+        if self.apart > AGREEMENT:
+            sentences.append(
+                f"FMPy co-simulates another sway, by {self.apart:.2g} m; this is an error of gen-profile: "
+                "please report it."
+            )
+        return tuple(sentences)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON and the manifest."""
+        ranked = sorted(self.judged, key=self.share, reverse=True)
+        return {
+            "passed": self.passed,
+            "limits_m": dict(self.limit),
+            "error_bound_m": self.error_bound,
+            "histories": self.count,
+            "seed": self.seed,
+            "search_parents": [list(numbers) for numbers in self.parents],
+            "share": self.share(self.worst),
+            "worst": self.worst.to_dict(),
+            "next_worst": [{"number": one.number, "share": self.share(one)} for one in ranked[1:LISTED]],
+            "groups": [self._group(name) for name in GROUPS if self._of(name)],
+            "limits": {name: max(one.limits[name] for one in self.judged) for name in self.judged[0].limits},
+            "longest_rest_s": max((one.rests_after or 0.0 for one in self.judged), default=0.0),
+            "fmpy": {"histories": list(self.by_fmpy), "apart_m": self.apart},
+            "reasons": list(self.reasons()),
+        }
+
+    def _of(self, group: str) -> list[JudgedHistory]:
+        return [one for one in self.judged if one.group == group]
+
+    def _group(self, name: str) -> dict[str, Any]:
+        shares = [self.share(one) for one in self._of(name)]
+        quantiles = np.quantile(shares, QUANTILES)
+        return {
+            "group": name,
+            "what": GROUPS[name],
+            "histories": len(shares),
+            "worst_share": max(shares),
+            "quantiles": {f"{part:g}": float(q) for part, q in zip(QUANTILES, quantiles, strict=True)},
+        }

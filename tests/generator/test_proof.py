@@ -1,0 +1,208 @@
+"""The proof of a planner block: against other equations and another importer, and that it can fail."""
+
+import re
+
+import attrs
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from gen_profile.planner.commands import Command, play
+from gen_profile.planner.design import planner_block
+from gen_profile.proof.closed_loop import ClosedLoop
+from gen_profile.proof.histories import Histories, History
+from gen_profile.proof.judging import judge_run
+from gen_profile.proof.numbering import CORNERS, DRAWS, SEARCH, Numbering
+from gen_profile.proof.prove import prove, replay
+from gen_profile.spec.reading import parse_spec
+from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
+
+G = 9.81
+CYCLE = 0.004
+BAY = f"""
+name = "bay 3"
+plant = {{ type = "double-pendulum-crane", m1 = 350.0, m2 = 2000.0, L1 = 6.0, L2 = 1.5 }}
+move = {{ distance = 8.0, duration = 14.0 }}
+limits = {{ velocity = 1.0, acceleration = 0.3, jerk = 1.0, travel = [0.0, 40.0] }}
+planner = {{ live = {{ L1 = [3.0, 9.0], m2 = [0.0, 2000.0] }} }}
+robustness = {{ uncertain = {{ L1 = 0.05 }} }}
+check = {{ residual_sway = 0.05 }}
+export = {{ cycle_time = {CYCLE} }}
+"""
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return parse_spec(BAY)
+
+
+@pytest.fixture(scope="module")
+def text(spec):
+    return planner_block(spec).text
+
+
+@pytest.fixture(scope="module")
+def proof(spec, text):
+    return prove(spec, text, histories=40)
+
+
+def swing(time, acceleration, m1, m2, L1, L2, **_):
+    """Sway of two point masses below a cart, by absolute angles and their Lagrangian equations."""
+
+    def slope(t, state):
+        a, b, da, db = state
+        push = np.interp(t, time, acceleration)
+        mass = [[(m1 + m2) * L1, m2 * L2 * np.cos(a - b)], [L1 * np.cos(a - b), L2]]
+        force = [
+            (m1 + m2) * (push * np.cos(a) - G * np.sin(a)) - m2 * L2 * db**2 * np.sin(a - b),
+            push * np.cos(b) - G * np.sin(b) + L1 * da**2 * np.sin(a - b),
+        ]
+        return [da, db, *np.linalg.solve(mass, force)]
+
+    found = solve_ivp(slope, (0.0, time[-1]), np.zeros(4), max_step=0.1, rtol=1e-8, atol=1e-10, t_eval=time)
+    hook = L1 * np.sin(found.y[0])
+    return np.abs([hook, hook + L2 * np.sin(found.y[1])])
+
+
+def test_a_history_against_other_equations(spec, text):
+    """The setpoints are those of `planner play`; the machine's rope is 4 % longer than the block is told."""
+    machine = dict(spec.plant.parameters) | {"L1": 1.04 * 6.0}
+    commands = (
+        Command(time=0.4, command="position", value=9.0, live={}),
+        Command(time=5.0, command="velocity", value=-0.7, live={}),
+        Command(time=9.0, command="stop", value=0.0, live={}),
+    )
+    table = play(text, "time_s,command,value\n0.4,position,9\n5,velocity,-0.7\n9,stop,0\n").table
+    columns = np.array([line.split(",")[:4] for line in table.splitlines()[1:]], dtype=float).T
+    history = History(live={"L1": 6.0, "m2": 2000.0}, parameters=machine, places=(0.0,), commands=commands)
+    with ClosedLoop(spec, text, Histories.of(spec)) as loop:
+        run = loop.run(history)
+    time = CYCLE * np.arange(run.cycles)
+    acceleration = np.zeros(run.cycles)
+    acceleration[: len(columns[3])] = columns[3][: run.cycles]
+    sway = swing(time, acceleration, **machine)
+    assert run.on_the_way == pytest.approx(sway.max(axis=1), abs=1e-5)
+    assert run.residual == pytest.approx(sway[:, run.stands :].max(axis=1), abs=1e-5)
+    assert run.residual.max() > 1e-4
+
+
+def test_a_sound_block_is_proved(spec, proof):
+    assert proof.passed
+    assert {one.group for one in proof.judged} == {CORNERS, DRAWS, SEARCH}
+    assert [one.number for one in proof.judged] == list(range(40))
+    assert 0.0 < proof.share(proof.worst) < 1.0
+    assert proof.apart < 1e-12
+    assert len(proof.by_fmpy) >= 2
+    live, ropes = spec.planner.live, [one.history.parameters["L1"] for one in proof.judged]
+    assert min(ropes) == pytest.approx(0.95 * live["L1"][0])
+    assert max(ropes) == pytest.approx(1.05 * live["L1"][1])
+    document = proof.to_dict()
+    for name in ("velocity", "acceleration", "jerk"):
+        assert 0.9 < document["limits"][name] <= 1.0 + 1e-9
+
+
+def test_every_history_can_be_had_again_by_its_number(spec, text, proof):
+    numbering = Numbering.of(Histories.of(spec), proof.count, proof.seed, proof.parents)
+    for number in (0, 20, 39):
+        (again,) = replay(spec, text, numbering, number).judged
+        assert again.to_dict() == proof.judged[number].to_dict()
+
+
+def test_what_is_found_does_not_depend_on_the_number_of_workers(spec, text, proof):
+    other = prove(spec, text, histories=40, workers=3)
+    assert other.to_dict() == proof.to_dict()
+
+
+def scaled(text, name, factor, part=slice(None)):
+    """The text with some numbers of a constant array multiplied."""
+    found = re.search(rf"{name} : (?:ARRAY \[[^]]*\] OF )?LREAL := (?:\[([^]]*)\]|([^;]*));", text)
+    group = 1 if found[1] else 2
+    numbers = [float(number) for number in found[group].split(",")]
+    numbers[part] = [factor * number for number in numbers[part]]
+    return text[: found.start(group)] + ", ".join(map(repr, numbers)) + text[found.end(group) :]
+
+
+@pytest.mark.slow
+def test_a_block_with_altered_constants_fails(spec, text):
+    """Frequencies 10 % too high (their squares' sum and product are stored), and 1 % above the velocity."""
+    stored = text.split("cFrequency")[1].split(";")[0].count(",") + 1
+    altered = scaled(text, "cFrequency", 1.1**2, slice(0, stored // 2))
+    altered = scaled(altered, "cFrequency", 1.1**4, slice(stored // 2, None))
+    proof = prove(spec, scaled(altered, "cVelocity", 1.01), histories=20)
+    sway, velocity = proof.reasons()
+    assert "sways by" in sway
+    assert "are allowed (check.residual_sway)" in sway
+    assert "the velocity is above its limit by" in velocity
+
+
+@pytest.mark.slow
+def test_another_machine_is_proved():
+    """A hoist that is told live; its rope is exact."""
+    spec = parse_spec(
+        """
+        name = "hoist"
+        plant = { type = "single-pendulum-crane" }
+        move = { distance = [1.0, 0.0], duration = 8.0 }
+        limits = { velocity = 0.5, acceleration = 0.3, jerk = 2.0, travel = [0.0, 6.0] }
+        planner = { live = { hoist = [0.0, 2.0] } }
+        robustness = { uncertain = {} }
+        check = { residual_sway = 0.01 }
+        export = { cycle_time = 0.004 }
+        """
+    )
+    proof = prove(spec, planner_block(spec).text, histories=24)
+    assert proof.reasons() == ()
+    assert proof.worst.history.places[1] > 0.0
+
+
+GOOD = BlockRun(
+    axes=(
+        AxisExtremes(
+            velocity=1.0, acceleration=0.3, jerk=1.0, lowest=0.0, highest=40.0, gap=1e-14, creep=0.0
+        ),
+    ),
+    on_the_way=np.array([0.1, 0.1]),
+    residual=np.array([0.01, 0.01]),
+    cycles=100,
+    stands=50,
+    unpromised=0,
+    promise=True,
+    error=0,
+    fault=0,
+)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({}, None),
+        ({"velocity": 1.0 + 2e-9}, "the velocity is above its limit"),
+        ({"acceleration": 0.31}, "the acceleration is above its limit by 3.33 %"),
+        ({"jerk": np.inf}, "the jerk is above its limit"),
+        ({"lowest": -2e-9}, "the axis leaves its travel by 2e-09 m"),
+        ({"highest": np.inf}, "the axis leaves its travel"),
+        ({"gap": 1e-6}, "a setpoint jumps by 1e-06 m"),
+        ({"creep": 1e-6}, "the axis moves on at rest"),
+        ({"stands": -1}, "the axis does not come to rest"),
+        ({"error": 3}, "the block shows error 3"),
+        ({"promise": False}, "the block takes its promise back"),
+        ({"fault": 2}, "the block repeats a loop without end"),
+    ],
+)
+def test_every_fault_of_a_run_is_told(spec, changed, words):
+    axis = {name: value for name, value in changed.items() if hasattr(GOOD.axes[0], name)}
+    others = {name: value for name, value in changed.items() if name not in axis}
+    run = attrs.evolve(GOOD, axes=(attrs.evolve(GOOD.axes[0], **axis),), **others)
+    stop = Command(time=0.1, command="stop", value=0.0, live={})
+    history = History(live={}, parameters={}, places=(0.0,), commands=(stop,))
+    faults = judge_run(spec, run, history, cycle=CYCLE, number=0, group=DRAWS).faults
+    assert faults == () if words is None else words in faults[0]
+
+
+def test_after_a_quick_stop_nothing_is_promised(spec):
+    stop = Command(time=0.1, command="quick-stop", value=0.0, live={})
+    history = History(live={}, parameters={}, places=(0.0,), commands=(stop,))
+    swaying = attrs.evolve(GOOD, promise=False, residual=np.array([1.0, 1.0]))
+    judged = judge_run(spec, swaying, history, cycle=CYCLE, number=0, group=DRAWS)
+    assert judged.faults == ()
+    assert judged.share(spec.check.residual_sway, 0.0) == 0.0
