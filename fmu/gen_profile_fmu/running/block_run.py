@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping, Sequence
 from ctypes import POINTER, Structure, byref, c_bool, c_double, c_int, c_long, c_size_t, c_uint, c_void_p
-from functools import cache
 from types import TracebackType
 from typing import Any, Self
 
@@ -17,7 +16,7 @@ from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.variables import variable_name
-from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loop
+from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops
 from gen_profile_fmu.running.instances import slave
 
 
@@ -308,10 +307,8 @@ def _doubles(array: Array) -> Any:
     return array.ctypes.data_as(POINTER(c_double))
 
 
-@cache
 def _loop() -> Any:
-    """Compile the loop, or find it in the cache, and load it."""
-    function = compiled_loop("block_run")
+    function = compiled_loops().block_run
     function.argtypes = [
         *(POINTER(kind) for kind in (CalledFmu, _Block, _History, c_double, _Found)),
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import Structure, c_void_p
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.description.fmu_files import Version, digest, standard_headers
 from gen_profile_fmu.model.c_sources import FOLDER
 
-_HEADER = "called_fmu.h"
+_HEADER, _SOURCE, _NAME = "called_fmu.h", "loops.c", "loops"
+_LOOPS = ("many_runs", "sampled_run", "block_run")  # each a C file and the function in it
 _FUNCTIONS = {
     Version.FMI2: (
         "fmi2Reset",
@@ -54,26 +56,28 @@ def called(slave: Any, version: Version) -> CalledFmu:
     return fmu
 
 
-def compiled_loop(name: str) -> Any:
-    """Compile a loop of this package, or find it in the cache, and load it.
+def loop_sources() -> dict[str, str]:
+    """Read the loops of this package and their header, by file name; `loops.c` includes all."""
+    files = (_HEADER, *(f"{name}.c" for name in _LOOPS))
+    texts = {file: (FOLDER / file).read_text(encoding="utf-8") for file in files}
+    return {**texts, _SOURCE: "".join(f'#include "{name}.c"\n' for name in _LOOPS)}
 
-    Parameters
-    ----------
-    name : str
-        Of its C file without suffix, and of the function there.
+
+@cache
+def compiled_loops() -> Any:
+    """Compile the loops of this package, or find them in the cache, and load them.
 
     Raises
     ------
     CosimulationError
         There is no compiler, it fails, or no cache folder can be written.
     """
-    compiler, library, source = find_compiler(), f"{name}{fmpy.sharedLibraryExtension}", f"{name}.c"
-    texts = {file: (FOLDER / file).read_text(encoding="utf-8") for file in (source, _HEADER)}
+    compiler, library, texts = find_compiler(), f"{_NAME}{fmpy.sharedLibraryExtension}", loop_sources()
     for version in Version:
         texts |= standard_headers(version)
 
     def make(cache: Path) -> dict[str, bytes]:
-        return {library: compile_texts(texts, source, compiler, library, cache)}
+        return {library: compile_texts(texts, _SOURCE, compiler, library, cache)}
 
     parts = (part.encode("utf-8") for part in (compiler.identity, *texts.values()))
-    return getattr(ctypes.CDLL(str(cached(f"{name}-{digest(*parts)[:32]}", make) / library)), name)
+    return ctypes.CDLL(str(cached(f"{_NAME}-{digest(*parts)[:32]}", make) / library))

@@ -1,17 +1,16 @@
-"""Co-simulation of a plant FMU that is fed with a controller's setpoints, by FMPy."""
+"""Co-simulation of a plant FMU that follows setpoints: FMPy loads it, a compiled loop takes its steps."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from ctypes import byref, c_double, c_uint, sizeof
+from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
 from types import TracebackType
 from typing import Any, Self
 
 import attrs
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import fmi2True
 
 from gen_profile.errors import CosimulationError
 from gen_profile.evaluation.simulation import AT_REST, Response
@@ -21,6 +20,7 @@ from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
 from gen_profile_fmu.model.variables import variable_name
+from gen_profile_fmu.running.called_fmu import called, compiled_loops
 from gen_profile_fmu.running.instances import slave
 
 # blocks of variables that are read after every step, and what a Response calls them
@@ -55,6 +55,16 @@ class Steps:
     setpoints: Array
 
 
+class _Steps(Structure):
+    """What sampled_run.c calls `Steps`."""
+
+    _fields_ = [
+        *((name, c_size_t) for name in ("steps", "n_inputs", "n_outputs")),
+        *((name, POINTER(c_double)) for name in ("times", "sizes", "inputs")),
+        *((name, POINTER(c_uint)) for name in ("input_references", "output_references")),
+    ]
+
+
 class PlantCosimulation:
     """A plant FMU in memory, to be run as often as wanted; a context manager.
 
@@ -75,6 +85,7 @@ class PlantCosimulation:
         self._fmu = plant_fmu(plant, on_build)
         self._messages: list[str] = []
         self._slave = slave(self._fmu, Version.FMI2, self._messages)
+        self._called = called(self._slave, Version.FMI2)
         variables = self._fmu.variables
         self._setpoints = _references(variables.references("INPUTS"))
         self._outputs = _references(variables.references(*_OBSERVED))
@@ -159,8 +170,7 @@ class PlantCosimulation:
 
     def _observe(self, steps: Steps) -> dict[str, Array]:
         """Take steps from where the FMU is; what is observed before the first and after each, by name."""
-        with self._explained():
-            samples = np.split(self._march(steps), self._output_blocks, axis=1)
+        samples = np.split(self._march(steps), self._output_blocks, axis=1)
         return dict(zip(_OBSERVED.values(), samples, strict=True))
 
     @contextmanager
@@ -170,10 +180,12 @@ class PlantCosimulation:
         try:
             yield
         except FMICallException as error:
-            reason = " ".join(self._messages) or f"{error.function} returned status {error.status}."
-            raise CosimulationError(
-                f"The FMU of plant {self._plant.type} could not go on: {reason}"
-            ) from error
+            raise self._refusal(f"{error.function} returned status {error.status}.") from error
+
+    def _refusal(self, reason: str) -> CosimulationError:
+        return CosimulationError(
+            f"The FMU of plant {self._plant.type} could not go on: {' '.join(self._messages) or reason}"
+        )
 
     def _plant_values(self, parameters: Mapping[str, float]) -> dict[str, float]:
         known = {parameter.name for parameter in self._plant.parameters}
@@ -201,21 +213,24 @@ class PlantCosimulation:
         }
 
     def _march(self, steps: Steps) -> Array:
-        """Take all steps, reading setpoints and writing samples in place; a step costs a few microseconds."""
-        fmu, component = self._slave, self._slave.component
-        set_real, do_step, get_real = fmu.fmi2SetReal, fmu.fmi2DoStep, fmu.fmi2GetReal
-        inputs, outputs = self._setpoints, self._outputs
-        n_inputs, n_outputs = len(inputs), len(outputs)
-        samples = np.empty((len(steps.times), n_outputs))
-        given = np.array(steps.setpoints)
-        first_setpoint, first_sample = c_double.from_buffer(given.data), c_double.from_buffer(samples.data)
-        input_row, output_row = n_inputs * sizeof(c_double), n_outputs * sizeof(c_double)
-
-        get_real(component, outputs, n_outputs, byref(first_sample))
-        for k, (time, size) in enumerate(zip(steps.times.tolist(), steps.sizes.tolist(), strict=False)):
-            set_real(component, inputs, n_inputs, byref(first_setpoint, k * input_row))
-            do_step(component, time, size, fmi2True)
-            get_real(component, outputs, n_outputs, byref(first_sample, (k + 1) * output_row))
+        """Take all steps in a compiled loop; samples before the first and after each."""
+        samples = np.empty((len(steps.times), len(self._outputs)))
+        loop = compiled_loops().sampled_run
+        loop.restype = c_size_t
+        plan = _Steps(
+            steps=len(steps.sizes),
+            n_inputs=len(self._setpoints),
+            n_outputs=len(self._outputs),
+            times=_doubles(steps.times),
+            sizes=_doubles(steps.sizes),
+            inputs=_doubles(np.ascontiguousarray(steps.setpoints)),
+            input_references=self._setpoints,
+            output_references=self._outputs,
+        )
+        self._messages.clear()
+        done = loop(byref(self._called), byref(plan), _doubles(samples))
+        if done < len(samples):
+            raise self._refusal(f"it refused the step at {steps.times[max(done - 1, 0)]:g} s.")
         return samples
 
 
@@ -241,3 +256,7 @@ def _steps(
 
 def _references(references: Any) -> Any:
     return (c_uint * len(references))(*references)
+
+
+def _doubles(array: Array) -> Any:
+    return array.ctypes.data_as(POINTER(c_double))

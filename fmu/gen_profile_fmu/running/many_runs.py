@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
-from functools import cache
 from types import TracebackType
 from typing import Any, Self
 
@@ -17,7 +16,7 @@ from gen_profile.motion.profile import Array
 from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.variables import variable_name
-from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loop
+from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops
 from gen_profile_fmu.running.instances import slave
 
 
@@ -207,10 +206,8 @@ def _doubles(array: Array) -> Any:
     return array.ctypes.data_as(POINTER(c_double))
 
 
-@cache
 def _loop() -> Any:
-    """Compile the loop, or find it in the cache, and load it."""
-    function = compiled_loop("many_runs")
+    function = compiled_loops().many_runs
     places = (POINTER(c_double), POINTER(c_double))
     function.argtypes = [POINTER(CalledFmu), POINTER(_Plan), c_size_t, c_size_t, *places]
     function.restype = c_size_t
