@@ -14,6 +14,7 @@ import pytest
 from command_line import run_here, run_process
 from matplotlib import image, pyplot
 
+import gen_profile as gp
 from gen_profile.charts.comparison import draw
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.comparison.compare import Comparison, compare
@@ -68,6 +69,12 @@ def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path, preset, load):
     assert f"<!-- worst residual sway of the {load} over all machines (mm); dotted: " in text
     assert f"<!-- {load} sway (mm) -->" in text and "<!-- nominal machine -->" in text
     assert "payload-" not in text
+
+
+def test_a_notebook_shows_what_a_file_holds(plain, tmp_path):
+    shown = gp.plot(plain)
+    gp.plot(plain, tmp_path / "picture.svg")
+    assert shown._repr_svg_() == (tmp_path / "picture.svg").read_text("utf-8")
 
 
 @pytest.mark.slow

@@ -1,8 +1,11 @@
-"""A result as a picture in a file, whichever result it is."""
+"""A result as a picture, whichever result it is, in a file or in a notebook."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import attrs
 
 from gen_profile.charts import comparison, identification, robustness
 from gen_profile.charts.picture import require_drawable
@@ -11,20 +14,35 @@ from gen_profile.comparison.robustness import Robustness
 from gen_profile.identification.identify import Identification
 
 
-def plot(result: Comparison | Robustness | Identification, path: Path | str) -> None:
+@attrs.frozen
+class Picture:
+    """A picture that a notebook shows."""
+
+    svg: str = attrs.field(repr=False)
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+
+def plot(result: Comparison | Robustness | Identification, path: Path | str | None = None) -> Picture | None:
     """Draw a comparison, robustness curves, or a fitted swing.
 
     Parameters
     ----------
     result : Comparison, Robustness or Identification
-    path : Path or str
-        Of a PNG, SVG or PDF file.
+    path : Path or str, optional
+        Of a PNG, SVG or PDF file. Without one the picture is returned, for a notebook to show.
 
     Raises
     ------
     OutputError
         The file cannot be written, Matplotlib is not installed, or there is nothing to draw.
     """
+    if path is None:
+        with TemporaryDirectory() as folder:
+            drawn = Path(folder) / "picture.svg"
+            plot(result, drawn)
+            return Picture(drawn.read_text("utf-8"))
     path = Path(path)
     require_drawable(path)
     match result:
@@ -36,3 +54,4 @@ def plot(result: Comparison | Robustness | Identification, path: Path | str) -> 
             identification.draw(result, path)
         case _:
             raise TypeError(f"There is no picture of a {type(result).__name__}.")
+    return None
