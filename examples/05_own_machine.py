@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import gen_profile as gp
-from gen_profile.spec.reading import parse_spec
 
 SPEC = """
 name = "inclined"
@@ -33,7 +32,7 @@ residual_sway = 0.03
 """
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "gen-profile-out")
-outcome = gp.design(parse_spec(SPEC, folder=Path(__file__).parent), ["csv"], folder)
+outcome = gp.design(gp.parse_spec(SPEC, folder=Path(__file__).parent), ["csv"], folder)
 if not outcome.passed:
     sys.exit("\n".join(outcome.check.reasons()))
 

@@ -12,12 +12,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import gen_profile as gp
-from gen_profile.designs.design import Design
 
 AGREEMENT = 2e-6  # relative, of the costs
 
 
-def checked(name: str, robustness: str, method: str) -> Design:
+def checked(name: str, robustness: str, method: str) -> gp.Design:
     """Design a motion and have it checked; stop where either fails."""
     spec = gp.preset_spec(name, robustness={"method": robustness}, solver={"method": method})
     with TemporaryDirectory() as folder:

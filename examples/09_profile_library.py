@@ -8,26 +8,20 @@ The same as `gen-profile sweep`, `gen-profile lookup` and `gen-profile library`;
 import sys
 from pathlib import Path
 
-from gen_profile.spec.reading import preset_text
-from gen_profile.sweep.grid import parse_grid
-from gen_profile.sweep.library import write_library
-from gen_profile.sweep.lookup import lookup
-from gen_profile.sweep.plan import prepare
-from gen_profile.sweep.run import sweep
+import gen_profile as gp
 
 
 def main(folder: Path) -> None:
-    text = (preset_text("paper"), "paper", Path())
-    grid = parse_grid(["move.distance=0.2:0.3:2", "plant.L1=0.45:0.5:3"])
-    done = sweep(prepare(text, ["export.cycle_time=0.01"], grid, ["plc"], folder))
-    print(f"{len(grid)} cases: {done.statuses}; {done.table.name} has a row for each")
+    spec = gp.preset_spec("paper", export={"cycle_time": 0.01})
+    done = gp.run_sweep(spec, {"move.distance": [0.2, 0.3], "plant.L1": [0.45, 0.475, 0.5]}, ["plc"], folder)
+    print(f"{sum(done.statuses.values())} cases: {done.statuses}; {done.table.name} has a row for each")
 
-    found = lookup(folder, {"move.distance": "0.28", "plant.L1": "0.46"})
+    found = gp.lookup(folder, {"move.distance": 0.28, "plant.L1": 0.46})
     expected, designed = found.sway
     print(f"0.28 m on a rope of 0.46 m: case {found.row['case']}, designed for {found.used},")
     print(f"leaves {1e3 * expected:.2f} mm at worst, {1e3 * designed:.2f} mm on its own crane")
 
-    library = write_library(folder, folder / "profiles.st")
+    library = gp.write_library(folder, folder / "profiles.st")
     print(f"{library.path.name}: {library.block} plays any of {len(library.profiles)}, by nProfile")
 
 

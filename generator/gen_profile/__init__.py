@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from gen_profile.charts.plot import plot as plot
     from gen_profile.comparison.compare import compare as compare
     from gen_profile.comparison.robustness import robustness as robustness
+    from gen_profile.designs.design import Design as Design
     from gen_profile.designs.design import design as design
     from gen_profile.designs.fmu import export_fmu as export_fmu
     from gen_profile.designs.plan import plan as plan
@@ -34,14 +35,19 @@ if TYPE_CHECKING:
     from gen_profile.spec.model import Spec as Spec
     from gen_profile.spec.reading import evolve_spec as evolve_spec
     from gen_profile.spec.reading import make_spec as make_spec
+    from gen_profile.spec.reading import parse_spec as parse_spec
     from gen_profile.spec.reading import preset_spec as preset_spec
     from gen_profile.spec.reading import presets as presets
     from gen_profile.spec.reading import read_spec as read_spec
+    from gen_profile.sweep.from_python import run_sweep as run_sweep
+    from gen_profile.sweep.library import write_library as write_library
+    from gen_profile.sweep.lookup import lookup as lookup
     from gen_profile.verification.check import check_artefact as check_artefact
 
 _HOMES = {
     "CheckFailed": "errors",
     "CosimulationError": "errors",
+    "Design": "designs.design",
     "ExportError": "errors",
     "GenProfileError": "errors",
     "InfeasibleProblem": "errors",
@@ -60,6 +66,8 @@ _HOMES = {
     "export_fmu": "designs.fmu",
     "identify": "identification.identify",
     "make_spec": "spec.reading",
+    "lookup": "sweep.lookup",
+    "parse_spec": "spec.reading",
     "plan": "designs.plan",
     "plot": "charts.plot",
     "preset_spec": "spec.reading",
@@ -67,7 +75,9 @@ _HOMES = {
     "read_spec": "spec.reading",
     "read_swing": "identification.identify",
     "robustness": "comparison.robustness",
+    "run_sweep": "sweep.from_python",
     "sample": "motion.profile",
+    "write_library": "sweep.library",
 }
 
 

@@ -1,6 +1,7 @@
 """What a sweep varies, as the command line states it."""
 
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from gen_profile.errors import SpecError
 from gen_profile.spec.reading import preset_spec
-from gen_profile.sweep.grid import CHAIN, GridAxis, overrides, parse_grid
+from gen_profile.sweep.grid import CHAIN, GridAxis, grid_of_values, overrides, parse_grid
 
 
 def test_the_last_axis_changes_fastest():
@@ -25,6 +26,26 @@ def test_a_range_is_that_of_numpy_without_its_rounding(low, high, count):
     values = parse_grid([f"a={low}:{high}:{count}"]).axes[0].values
     np.testing.assert_allclose(values, np.linspace(low, high, count), rtol=1e-11)
     assert (values[0], values[-1]) == (low, high)
+
+
+def test_values_are_the_grid_that_their_texts_are():
+    values = {"plant.L1": [0.4, 0.5], "robustness.method": ["none", "sensitivity"]}
+    assert grid_of_values(values) == parse_grid(["plant.L1=0.4,0.5", "robustness.method=none,sensitivity"])
+
+
+@pytest.mark.parametrize(
+    ("vary", "reason"),
+    [
+        ({}, "vary: name a key and its values"),
+        ({"plant.L1": []}, "vary plant.L1: there is no value."),
+        ({"plant.L1": [0.4, 0.4]}, "vary plant.L1: a value comes twice."),
+        ({"plant.L1": [float("nan")]}, "vary plant.L1: values are finite numbers"),
+        ({"plant.L1": list(range(10_000)), "plant.L2": list(range(10_000))}, "vary: more than 10000000"),
+    ],
+)
+def test_values_of_which_no_grid_can_be_made(vary, reason):
+    with pytest.raises(SpecError, match=re.escape(reason)):
+        grid_of_values(vary)
 
 
 def test_a_range_has_short_numbers():

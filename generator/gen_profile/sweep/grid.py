@@ -90,17 +90,36 @@ def parse_grid(texts: Sequence[str]) -> Grid:
     SpecError
         An axis makes no sense, there is none, a key comes twice, or there are too many cases.
     """
-    axes = tuple(_axis(text) for text in texts)
+    axes = tuple(_parse_axis(text) for text in texts)
     if not axes:
         raise SpecError("--vary: name what to vary, such as --vary move.distance=0.1:2:20.")
     keys = [axis.key for axis in axes]
     for key in keys:
         if keys.count(key) > 1:
             raise SpecError(f"--vary {key}: a key is varied once.")
-    grid = Grid(axes=axes)
+    return _grid(axes, "--vary")
+
+
+def grid_of_values(vary: Mapping[str, Sequence[Any]]) -> Grid:
+    """Combine values by key.
+
+    Raises
+    ------
+    SpecError
+        There is no key, a key has no values or one twice, or there are too many cases.
+    """
+    for key, values in vary.items():
+        if not values:
+            raise SpecError(f"vary {key}: there is no value.")
+    if not vary:
+        raise SpecError("vary: name a key and its values, such as {'move.distance': [0.1, 0.2]}.")
+    return _grid(tuple(_axis(f"vary {key}", key, values) for key, values in vary.items()), "vary")
+
+
+def _grid(axes: tuple[GridAxis, ...], where: str) -> Grid:
     if math.prod(len(axis.values) for axis in axes) > MOST_CASES:
-        raise SpecError(f"--vary: more than {MOST_CASES} combinations; vary less, or in several sweeps.")
-    return grid
+        raise SpecError(f"{where}: more than {MOST_CASES} combinations; vary less, or in several sweeps.")
+    return Grid(axes=axes)
 
 
 def overrides(values: Mapping[str, Any]) -> tuple[str, ...]:
@@ -108,19 +127,23 @@ def overrides(values: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in values.items())
 
 
-def _axis(text: str) -> GridAxis:
+def _parse_axis(text: str) -> GridAxis:
     key, equals, stated = (part.strip() for part in text.partition("="))
     if not equals or not stated or not all(step.strip() for step in key.split(".")):
         raise SpecError(f"--vary {text!r}: write KEY=LO:HI:N or KEY=VALUE,VALUE,…")
     parts = stated.split(":")
     numbers = len(parts) > 1 and all(_is_number(part.replace(",", ".")) for part in parts)
     values = _range(text, parts) if numbers or len(parts) == 3 else _listed(stated)
+    return _axis(f"--vary {text!r}", key, values)
+
+
+def _axis(where: str, key: str, values: Sequence[Any]) -> GridAxis:
     try:
         different = {json.dumps(value, allow_nan=False) for value in values}
     except (TypeError, ValueError) as error:
-        raise SpecError(f"--vary {text!r}: values are finite numbers, texts or arrays of these.") from error
+        raise SpecError(f"{where}: values are finite numbers, texts or arrays of these.") from error
     if len(different) < len(values):
-        raise SpecError(f"--vary {text!r}: a value comes twice.")
+        raise SpecError(f"{where}: a value comes twice.")
     return GridAxis(key=key, values=tuple(values))
 
 

@@ -63,14 +63,14 @@ class Library:
         }
 
 
-def write_library(folder: Path, path: Path) -> Library:
+def write_library(folder: Path | str, path: Path | str) -> Library:
     """Put the PLC blocks of all cases that passed into one, and make sure that it issues the same.
 
     Parameters
     ----------
-    folder : Path
+    folder : Path or str
         Of a finished sweep that exported a format with the playback block.
-    path : Path
+    path : Path or str
         File to write, such as ``crane.st``; the function block is named after it, and its suffix tells the
         format, which need not be the sweep's.
 
@@ -83,6 +83,7 @@ def write_library(folder: Path, path: Path) -> Library:
     ExportError
         The profiles do not fit into one block.
     """
+    folder, path = Path(folder), Path(path)
     format_ = container_of(path)
     container, stem = find_container(format_), path.name[: -len(formats()[format_].suffix)]
     grid = grid_of(folder)

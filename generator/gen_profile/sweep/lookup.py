@@ -94,7 +94,7 @@ class LookupResult:
 
 
 def lookup(
-    folder: Path, asked: Mapping[str, str], progress: Callable[[str], None] = lambda _: None
+    folder: Path | str, asked: Mapping[str, Any], progress: Callable[[str], None] = lambda _: None
 ) -> LookupResult:
     """Find the nearest profile that keeps the limits on the machine asked for, by co-simulation of the file.
 
@@ -104,10 +104,10 @@ def lookup(
 
     Parameters
     ----------
-    folder : Path
+    folder : Path or str
         Of a finished sweep.
-    asked : mapping of str to str
-        A value for every varied key.
+    asked : mapping
+        A value, or a text of one, for every varied key.
     progress : callable, optional
         Told every step.
 
@@ -120,8 +120,9 @@ def lookup(
     CheckFailed
         No profile near is safe there, or what was asked for lies beyond the grid.
     """
+    folder = Path(folder)
     grid = grid_of(folder)
-    wanted = _wanted(grid, asked)
+    wanted = _wanted(grid, {key: str(value) for key, value in asked.items()})
     rows, nearest = _near(grid, read_table(folder, grid), wanted)
     if nearest is None:
         raise CheckFailed(f"The sweep in {folder} has no profile that passed and could be used.")

@@ -1,0 +1,54 @@
+"""Sweeps of values, as Python has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from gen_profile.spec.model import Spec
+from gen_profile.sweep.grid import grid_of_values
+from gen_profile.sweep.plan import prepare, require_libraries
+from gen_profile.sweep.run import Sweep, sweep
+
+
+def run_sweep(
+    spec: Spec,
+    vary: Mapping[str, Sequence[Any]],
+    formats: Sequence[str],
+    folder: Path | str,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> Sweep:
+    """Design, export and check all combinations of values, or go on where such a sweep was interrupted.
+
+    Parameters
+    ----------
+    spec : Spec
+    vary : mapping of str to sequence
+        Values by key of the spec, such as ``{"plant.L1": [0.4, 0.5]}``.
+    formats : sequence of str
+        To export, such as ``["plc"]``.
+    folder : Path or str
+        To write to.
+    workers : int, optional
+        Processes of this computer; by default one for each of its processors. They import the script that
+        calls this, which must not start another sweep then: ``if __name__ == "__main__":``.
+    scheduler : str, optional
+        Address of a Dask scheduler, whose workers to use instead.
+
+    Raises
+    ------
+    SpecError
+        A key or all of its values make no sense, or the scheduler does not answer.
+    OutputError
+        Dask or PyArrow are not installed, or the folder holds another sweep or cannot be written.
+    """
+    require_libraries()
+    grid = grid_of_values({key: np.asarray(values).tolist() for key, values in vary.items()})
+    text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())
+    return sweep(prepare(text, (), grid, formats, Path(folder)), scheduler=scheduler, workers=workers)
