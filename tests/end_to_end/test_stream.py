@@ -22,7 +22,7 @@ from exporters.can.bench import MS, FakeClock, RigidLoad
 from gen_profile.artefacts import writing as delivery
 from gen_profile.artefacts.manifest import parse_manifest
 from gen_profile.streaming import stream as workflow
-from gen_profile_exporters.can.host.clock import SharedClock, SystemClock
+from gen_profile_exporters.can.host.clock import SharedClock
 from gen_profile_exporters.can.simulation.drive_bank import FAREWELL, DriveBank
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
@@ -66,8 +66,9 @@ class HastyClock(SharedClock):
 
 @pytest.fixture
 def hasty(monkeypatch):
-    """Have a simulation take no longer than its computations do."""
+    """Have a simulation, or a self-test, take no longer than its computations do."""
     monkeypatch.setattr(workflow, "SharedClock", HastyClock)
+    monkeypatch.setattr(workflow, "SystemClock", lambda *_: HastyClock(longest=MS))
 
 
 def patiently(*arguments):
@@ -329,11 +330,11 @@ def test_sigterm_stops_the_axis(deployed, monkeypatch, hasty):
 
 @pytest.mark.slow
 def test_a_machine_that_cannot_hold_the_cycle(deployed, monkeypatch):
-    class Slow(SystemClock):
+    class Slow(HastyClock):
         def now(self):
-            return super().now() + 15_000_000 * (super().now() // 50_000_000 % 2)
+            return super().now() + 15 * MS * (super().now() // (50 * MS) % 2)
 
-    monkeypatch.setattr(workflow, "SystemClock", Slow)
+    monkeypatch.setattr(workflow, "SystemClock", lambda *_: Slow(longest=MS))
     outcome = run_here("stream", deployed / "paper.log", "--simulate-drive", "--self-test")
     assert outcome.code == 6
     assert "cannot hold a cycle of 20 ms" in outcome.err

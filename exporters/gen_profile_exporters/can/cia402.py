@@ -41,6 +41,7 @@ class Controlword(IntEnum):
     FAULT_RESET = 0x80
 
 
+MODES = {"ip": 7, "csp": 8, "csv": 9}  # 6060h
 MOVING = frozenset({State.ENABLED, State.QUICK_STOP, State.FAULT_REACTION})
 FAULTS = frozenset({State.FAULT_REACTION, State.FAULT})
 

@@ -1,25 +1,14 @@
-"""Which frames carry what: COB-IDs, the content of each PDO, and how much of the bus they take.
+"""Which frames carry the PDOs, and how much of the bus they take.
 
-Per axis (node ids count up from ``can.node``, or stand in ``can.nodes``), after the predefined connection set
-of CiA 301, unless ``can.cob_ids`` states others:
-
-========== ======================= ================================================ =========================
-COB-ID     PDO                     content                                          sent
-========== ======================= ================================================ =========================
-200h + n   RPDO1, to the drive     controlword 6040h                                when it changes
-300h + n   RPDO2, to the drive     607Ah, and 60B1h or 60B2h; 60C1h:01; or 60FFh    every cycle, before SYNC
-400h + n   RPDO3, to the drive     60B2h beside 60B1h: 80 bits are more than one    every cycle, before SYNC
-                                   frame holds; not used otherwise
-180h + n   TPDO1, from the drive   statusword 6041h, actual position 6064h          on SYNC
-========== ======================= ================================================ =========================
-
-The controlword has a PDO of its own, so that setpoints which still wait in a queue cannot undo a quick stop.
+Per axis (node ids count up from ``can.node``, or stand in ``can.nodes``), COB-IDs are those of the predefined
+connection set of CiA 301 (200h + n for RPDO1 of node n, 180h + n for TPDO1 …), unless ``can.cob_ids`` states
+others.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
 
 import attrs
@@ -29,16 +18,21 @@ from numpy.typing import NDArray
 
 from gen_profile.errors import ExportError
 from gen_profile.spec.can import CanSpec, CobIdsSpec
+from gen_profile_exporters.can.pdos import (
+    CONTROLWORD,
+    Field,
+    constants,
+    enabling,
+    layout,
+    packing,
+    setpoint_fields,
+)
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.setpoints import two_digits_up
 
 NMT = 0x000
 SYNC = 0x080  # and EMCY, of node n: 080h + n
 EMCY = 0x080
-TPDO1 = 0x180
-RPDO1 = 0x200
-RPDO2 = 0x300
-RPDO3 = 0x400
 SDO_ANSWER = 0x580
 SDO_REQUEST = 0x600
 HEARTBEAT = 0x700
@@ -51,79 +45,9 @@ MICROSECONDS = 1_000_000
 Integers = NDArray[np.int64]
 
 
-@attrs.frozen(kw_only=True)
-class Field:
-    """One object in a PDO.
-
-    Attributes
-    ----------
-    index, sub : int
-        Of the object dictionary.
-    code : str
-        Its type, as `struct` spells it: ``"H"`` for UNSIGNED16, ``"i"`` for INTEGER32 …
-    name : str
-        As a DBC calls it.
-    """
-
-    index: int
-    sub: int
-    code: str
-    name: str
-
-    @property
-    def bits(self) -> int:
-        """Length."""
-        return 8 * struct.calcsize(self.code)
-
-    @property
-    def mapping(self) -> int:
-        """Value of a mapping entry (1600h and following): index, subindex, length in bits."""
-        return self.index << 16 | self.sub << 8 | self.bits
-
-
-CONTROLWORD = Field(index=0x6040, sub=0, code="H", name="Controlword")
-STATUSWORD = Field(index=0x6041, sub=0, code="H", name="Statusword")
-ACTUAL_POSITION = Field(index=0x6064, sub=0, code="i", name="ActualPosition")
-TARGET_POSITION = Field(index=0x607A, sub=0, code="i", name="TargetPosition")
-INTERPOLATION_DATA = Field(index=0x60C1, sub=1, code="i", name="InterpolationData")
-TARGET_VELOCITY = Field(index=0x60FF, sub=0, code="i", name="TargetVelocity")
-VELOCITY_OFFSET = Field(index=0x60B1, sub=0, code="i", name="VelocityOffset")
-TORQUE_OFFSET = Field(index=0x60B2, sub=0, code="h", name="TorqueOffset")
-
-# PDOs by the COB-ID of node 0, as can.cob_ids calls them
-PDO_NAMES = {RPDO1: "command", RPDO2: "setpoint", RPDO3: "feed_forward", TPDO1: "feedback"}
-COMMAND = (CONTROLWORD,)
-FEEDBACK = (STATUSWORD, ACTUAL_POSITION)
-
-Pdos = Mapping[int, tuple[Field, ...]]  # by COB-ID of node 0
-
-_OTHER_MODES: Mapping[str, Pdos] = {"ip": {RPDO2: (INTERPOLATION_DATA,)}, "csv": {RPDO2: (TARGET_VELOCITY,)}}
-_FEED_FORWARD: Mapping[str, Pdos] = {
-    "none": {RPDO2: (TARGET_POSITION,)},
-    "velocity": {RPDO2: (TARGET_POSITION, VELOCITY_OFFSET)},
-    "torque": {RPDO2: (TARGET_POSITION, TORQUE_OFFSET)},
-    "both": {RPDO2: (TARGET_POSITION, VELOCITY_OFFSET), RPDO3: (TORQUE_OFFSET,)},
-}
-
-
-def setpoint_pdos(can: CanSpec) -> Pdos:
-    """List what the RPDOs with a drive's setpoints hold."""
-    return _OTHER_MODES.get(can.mode, _FEED_FORWARD[can.feed_forward])
-
-
-def setpoint_fields(can: CanSpec) -> tuple[Field, ...]:
-    """List what a drive is sent in each cycle, in all its RPDOs."""
-    return tuple(field for fields in setpoint_pdos(can).values() for field in fields)
-
-
 def message(cob_id: int, data: bytes = b"") -> Message:
     """Make a frame with an 11-bit identifier."""
     return Message(arbitration_id=cob_id, data=data, is_extended_id=False)
-
-
-def packing(fields: Sequence[Field]) -> struct.Struct:
-    """Pack the fields as a PDO does: little-endian, without gaps."""
-    return struct.Struct("<" + "".join(field.code for field in fields))
 
 
 @attrs.frozen(kw_only=True)
@@ -135,19 +59,39 @@ class SetpointFrame:
     cob_id : int
     column : int
         Of the axes, whose it is.
-    fields : slice
-        Which of the axis's fields it carries.
-    packing : struct.Struct
+    fields : tuple of Field
+        What it carries.
+    places : tuple of int
+        Where each field that is used stands among the axis's setpoints, and behind them the constants.
+    width : int
+        How many setpoints an axis has.
+    constants : tuple of int
+        What is the same in every cycle of the motion.
     """
 
     cob_id: int
     column: int
-    fields: slice
-    packing: struct.Struct
+    fields: tuple[Field, ...]
+    places: tuple[int, ...]
+    width: int
+    constants: tuple[int, ...]
+    packing: struct.Struct = attrs.field(init=False)
+
+    @packing.default
+    def _packing(self) -> struct.Struct:
+        return packing(self.fields)
 
     def pack(self, setpoints: Sequence[Sequence[int]]) -> bytes:
-        """Take its content from all fields of all axes in one cycle."""
-        return self.packing.pack(*setpoints[self.column][self.fields])
+        """Take its content from all setpoints of all axes in one cycle."""
+        known = (*setpoints[self.column], *self.constants)
+        return self.packing.pack(*[known[place] for place in self.places])
+
+    def keeps_constants(self, data: bytes) -> bool:
+        """Tell whether a frame holds what is the same in every cycle."""
+        found = zip(self.places, self.packing.unpack(data), strict=True)
+        return all(
+            place < self.width or value == self.constants[place - self.width] for place, value in found
+        )
 
 
 def nodes(target: Target) -> tuple[int, ...]:
@@ -184,13 +128,19 @@ def cob_ids(target: Target) -> tuple[Mapping[int, int], ...]:
     ExportError
         There are too few node ids, or two PDOs have the same COB-ID.
     """
-    used = {RPDO1, TPDO1, *setpoint_pdos(target.can)}
+    plan = layout(target.can)
+    used = sorted({*plan.received, plan.feedback})
     found, taken = [], dict[int, str]()
     for axis, node in zip(target.axes, nodes(target), strict=True):
-        own = target.can.cob_ids.get(axis.name, CobIdsSpec())
-        found.append({pdo: getattr(own, name) or pdo + node for pdo, name in PDO_NAMES.items()})
-        for pdo in sorted(used):
-            cob_id, place = found[-1][pdo], f"can.cob_ids.{axis.name}.{PDO_NAMES[pdo]}"
+        stated = target.can.cob_ids.get(axis.name, CobIdsSpec())
+        if plan.shared and stated.command:
+            raise ExportError(
+                f"can.cob_ids.{axis.name}.command: by can.fixed_pdos the controlword goes with the setpoint; "
+                "state that one's COB-ID only."
+            )
+        found.append({pdo: getattr(stated, plan.role(pdo)) or pdo + node for pdo in used})
+        for pdo, cob_id in found[-1].items():
+            place = f"can.cob_ids.{axis.name}.{plan.role(pdo)}"
             if taken.setdefault(cob_id, place) != place:
                 raise ExportError(f"{place}: {cob_id:03X}h is {taken[cob_id]} already; choose another one.")
     return tuple(found)
@@ -202,23 +152,44 @@ def setpoint_frames(target: Target) -> tuple[SetpointFrame, ...]:
     Raises
     ------
     ExportError
-        There are too few node ids, or two PDOs have the same COB-ID.
+        There are too few node ids, two PDOs have the same COB-ID, or a fixed mapping lacks what is needed.
     """
-    found = []
-    for column, own in enumerate(cob_ids(target)):
-        first = 0
-        for pdo, fields in setpoint_pdos(target.can).items():
-            carried = slice(first, first + len(fields))
-            found.append(
-                SetpointFrame(cob_id=own[pdo], column=column, fields=carried, packing=packing(fields))
-            )
-            first = carried.stop
-    return tuple(found)
+    return _frames(target, layout(target.can).setpoints)
+
+
+def command_frames(target: Target) -> tuple[SetpointFrame, ...]:
+    """List the frames with controlwords, one per axis; they may be among the setpoints' frames.
+
+    Raises
+    ------
+    ExportError
+        As `setpoint_frames`.
+    """
+    return _frames(target, [layout(target.can).command])
+
+
+def _frames(target: Target, pdos: Iterable[int]) -> tuple[SetpointFrame, ...]:
+    kept = {CONTROLWORD: enabling(target.can), **constants(target.can)}
+    sent = setpoint_fields(target.can)
+    known = [*sent, *kept]
+    received = layout(target.can).received
+    return tuple(
+        SetpointFrame(
+            cob_id=own[pdo],
+            column=column,
+            fields=received[pdo],
+            places=tuple(known.index(field) for field in received[pdo] if field.used),
+            width=len(sent),
+            constants=tuple(kept.values()),
+        )
+        for column, own in enumerate(cob_ids(target))
+        for pdo in pdos
+    )
 
 
 def commanding_cob_ids(target: Target) -> set[int]:
     """List the COB-IDs that only the controller of these drives may send: commands and setpoints."""
-    sent = (RPDO1, *setpoint_pdos(target.can))
+    sent = layout(target.can).received
     return {own[pdo] for own in cob_ids(target) for pdo in sent}
 
 
@@ -258,8 +229,9 @@ def frame_bits(data_bytes: int) -> int:
 
 def cycle_bits(target: Target) -> int:
     """Bits of one cycle at their most: SYNC and, per axis, setpoints and an answer."""
-    setpoints = [packing(fields).size for fields in setpoint_pdos(target.can).values()]
-    return frame_bits(0) + len(target.axes) * sum(map(frame_bits, [*setpoints, packing(FEEDBACK).size]))
+    plan = layout(target.can)
+    sizes = [packing(fields).size for fields in (*plan.setpoints.values(), plan.told)]
+    return frame_bits(0) + len(target.axes) * sum(map(frame_bits, sizes))
 
 
 def require_load(target: Target) -> None:

@@ -16,8 +16,9 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.spec.can import CanSpec
 from gen_profile.units import AxisScale
-from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.frames import Field, Integers
+from gen_profile_exporters.can import pdos
+from gen_profile_exporters.can.frames import Integers
+from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.exporter import Target
 from gen_profile_exporters.setpoints import INT16, INT32, TOO_FAR, require_within
 
@@ -188,7 +189,7 @@ def _velocities(motion: SampledProfile, target: Target) -> Integers:
 
 
 def _offsets(motion: SampledProfile, target: Target) -> Integers:
-    offsets = frames.setpoint_fields(target.can)[1:]
+    offsets = pdos.setpoint_fields(target.can)[1:]
     columns = [_offset(field, motion, target) for field in offsets]
     return np.stack(columns, axis=2) if columns else np.empty((*motion.position.shape, 0), dtype=np.int64)
 
@@ -197,7 +198,7 @@ def _offset(field: Field, motion: SampledProfile, target: Target) -> Integers:
     columns = []
     for column, axis in enumerate(target.axes):
         ratio = exact(axis.counts_per_si)
-        if field == frames.VELOCITY_OFFSET:
+        if field == pdos.VELOCITY_OFFSET:
             values, limits, what = motion.velocity, INT32, "velocity"
             cure = "lower axis.counts_per_metre"
         else:

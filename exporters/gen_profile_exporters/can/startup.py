@@ -1,7 +1,8 @@
 """What the drives must be set to before they follow: the SDO start-up list, as a table and as concise DCF.
 
 The list makes a drive stop by itself when nobody feeds it any more: it watches the master's heartbeat (1016h)
-and the setpoints' arrival (1401h:05), and answers both with a quick stop (6007h, 605Ah, 6085h).
+and the setpoints' arrival (1401h:05 if they come by RPDO2), and answers both with a quick stop (6007h, 605Ah,
+6085h).
 
 Objects: CiA 301 (1000h to 1FFFh), CiA 402-2 (6000h and up), CiA 302-3 (concise DCF).
 """
@@ -19,8 +20,9 @@ import attrs
 from gen_profile.errors import ExportError
 from gen_profile.spec.can import CanSpec
 from gen_profile.units import AxisScale
-from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.frames import Field
+from gen_profile_exporters.can import frames, pdos
+from gen_profile_exporters.can.cia402 import MODES
+from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.can.scaling import (
     Setpoints,
     magnitude_counts,
@@ -29,7 +31,6 @@ from gen_profile_exporters.can.scaling import (
 )
 from gen_profile_exporters.exporter import Target
 
-MODES = {"ip": 7, "csp": 8, "csv": 9}  # 6060h
 QUICK_STOP_ON_LOST_CONNECTION = 3  # 6007h
 RAMP_THEN_DISABLE = 2  # 605Ah
 OFF = 1 << 31  # of a PDO's COB-ID
@@ -37,11 +38,21 @@ NO_REMOTE_REQUEST = 1 << 30
 PDO_PARAMETERS = {*range(0x1400, 0x1600), *range(0x1800, 0x1A00)}
 ON_SYNC, ON_EVENT = 1, 255  # transmission types
 AT_ONCE = {254, ON_EVENT}  # event-driven, as the maker or the device profile defines it: alike for an RPDO
-# PDOs that are not always used: their parameters, and COB-ID of node 0
-OTHERS = {0x1402: frames.RPDO3, 0x1403: 0x500, 0x1801: 0x280, 0x1802: 0x380, 0x1803: 0x480}
+PARAMETERS = {
+    pdo: first + number
+    for first, group in ((0x1400, pdos.RPDOS), (0x1800, pdos.TPDOS))
+    for number, pdo in enumerate(group)
+}  # of each PDO, by the COB-ID of node 0
 SHORTEST_TIMEOUT = 0.02  # s, unless the spec asks for less
 CYCLES_PER_TIMEOUT = 3
 SLOWEST_HEARTBEAT = 100  # ms; a drive's own
+
+NAMES = {
+    "command": "controlword",
+    "setpoint": "setpoint",
+    "feed_forward": "feed-forward",
+    "feedback": "feedback",
+}
 
 Lists = Mapping[int, "tuple[Entry, ...]"]
 
@@ -60,6 +71,8 @@ class Entry:
     meaning : str
     optional : bool
         A drive without this object will do.
+    fixed : bool
+        The drive must hold it already.
     """
 
     index: int
@@ -68,6 +81,7 @@ class Entry:
     value: int
     meaning: str
     optional: bool = False
+    fixed: bool = False
 
     @property
     def data(self) -> bytes:
@@ -120,6 +134,7 @@ def table(lists: Lists) -> bytes:
 
 def concise_dcf(entries: Sequence[Entry]) -> bytes:
     """Render one node's list as the content of object 1F22h, for CANopen managers."""
+    entries = [entry for entry in entries if not entry.fixed]
     parts = [struct.pack("<I", len(entries))]
     parts += [struct.pack("<HBI", entry.index, entry.sub, len(entry.data)) + entry.data for entry in entries]
     return b"".join(parts)
@@ -164,29 +179,46 @@ def _monitoring(can: CanSpec) -> Iterator[Entry]:
 
 
 def _mapping(node: int, own: Mapping[int, int], can: CanSpec) -> Iterator[Entry]:
-    yield from _pdo(0x1400, own[frames.RPDO1], ON_EVENT, frames.COMMAND, "controlword")
-    used = frames.setpoint_pdos(can)
-    yield from _pdo(0x1401, own[frames.RPDO2], ON_SYNC, used[frames.RPDO2], "setpoint")
-    yield Entry(0x1401, 5, 16, timeout_ms(can), "longest wait for a setpoint (ms)", optional=True)
-    if frames.RPDO3 in used:
-        yield from _pdo(0x1402, own[frames.RPDO3], ON_SYNC, used[frames.RPDO3], "feed-forward")
-    answer = NO_REMOTE_REQUEST | own[frames.TPDO1]
-    yield from _pdo(0x1800, answer, ON_SYNC, frames.FEEDBACK, "feedback")
-    for index, cob_id in OTHERS.items():
-        if cob_id not in used:
-            yield Entry(index, 1, 32, OFF | cob_id + node, "not used: off", optional=True)
+    layout = pdos.layout(can)
+    for pdo, fields in layout.received.items():
+        every_cycle = pdo in layout.setpoints
+        kind, name = (ON_SYNC if every_cycle else ON_EVENT), NAMES[layout.role(pdo)]
+        yield from _pdo(PARAMETERS[pdo], own[pdo], kind, fields, name, fixed=layout.fixed)
+        if pdo == layout.leading:
+            yield Entry(
+                PARAMETERS[pdo], 5, 16, timeout_ms(can), "longest wait for a setpoint (ms)", optional=True
+            )
+    answer, parameters = NO_REMOTE_REQUEST | own[layout.feedback], PARAMETERS[layout.feedback]
+    yield from _pdo(parameters, answer, ON_SYNC, layout.told, NAMES["feedback"], fixed=layout.fixed)
+    for pdo, index in PARAMETERS.items():
+        if pdo not in own:
+            yield Entry(index, 1, 32, OFF | pdo + node, "not used: off", optional=True)
 
 
-def _pdo(index: int, cob_id: int, kind: int, fields: Sequence[Field], name: str) -> Iterator[Entry]:
+def _pdo(
+    index: int, cob_id: int, kind: int, fields: Sequence[Field], name: str, *, fixed: bool
+) -> Iterator[Entry]:
     """Set up a PDO in the order that CiA 301 asks for: off, mapping, on."""
-    mapping = index + 0x200
     yield Entry(index, 1, 32, OFF | cob_id, f"{name}: off while it changes")
+    yield from (
+        _fixed_entries(index + 0x200, fields, name) if fixed else _entries_of(index + 0x200, fields, name)
+    )
+    yield Entry(index, 2, 8, kind, f"{name}: {'on SYNC' if kind == ON_SYNC else 'at once'}")
+    yield Entry(index, 1, 32, cob_id, f"{name}: on")
+
+
+def _entries_of(mapping: int, fields: Sequence[Field], name: str) -> Iterator[Entry]:
     yield Entry(mapping, 0, 8, 0, f"{name}: mapping cleared")
     for number, field in enumerate(fields, start=1):
         yield Entry(mapping, number, 32, field.mapping, f"{name}: {field.name}")
     yield Entry(mapping, 0, 8, len(fields), f"{name}: entries")
-    yield Entry(index, 2, 8, kind, f"{name}: {'on SYNC' if kind == ON_SYNC else 'at once'}")
-    yield Entry(index, 1, 32, cob_id, f"{name}: on")
+
+
+def _fixed_entries(mapping: int, fields: Sequence[Field], name: str) -> Iterator[Entry]:
+    """List what a mapping holds that cannot be changed, as the spec states it."""
+    yield Entry(mapping, 0, 8, len(fields), f"{name}: entries, as can.fixed_pdos has them", fixed=True)
+    for number, field in enumerate(fields, start=1):
+        yield Entry(mapping, number, 32, field.mapping, f"{name}: {field.name or 'not used'}", fixed=True)
 
 
 def _limits(axis: AxisScale, can: CanSpec) -> Iterator[Entry]:

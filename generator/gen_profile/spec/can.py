@@ -37,6 +37,46 @@ class CobIdsSpec:
     feedback: PdoCobId | None = None
 
 
+Mapped = tuple[Unsigned32, ...]
+
+
+@attrs.frozen(kw_only=True)
+class FixedPdosSpec:
+    """PDOs of drives that cannot be mapped anew, as their manual states them.
+
+    Attributes
+    ----------
+    rpdo1, rpdo2, rpdo3, rpdo4 : tuple of int
+        Entries of 1600h to 1603h, such as 0x60400010 and 0x607A0020; empty for what is not used.
+    tpdo1, tpdo2, tpdo3, tpdo4 : tuple of int
+        Entries of 1A00h to 1A03h.
+    """
+
+    rpdo1: Mapped = ()
+    rpdo2: Mapped = ()
+    rpdo3: Mapped = ()
+    rpdo4: Mapped = ()
+    tpdo1: Mapped = ()
+    tpdo2: Mapped = ()
+    tpdo3: Mapped = ()
+    tpdo4: Mapped = ()
+
+    @property
+    def received(self) -> tuple[Mapped, ...]:
+        """Entries of each RPDO."""
+        return self.rpdo1, self.rpdo2, self.rpdo3, self.rpdo4
+
+    @property
+    def sent(self) -> tuple[Mapped, ...]:
+        """Entries of each TPDO."""
+        return self.tpdo1, self.tpdo2, self.tpdo3, self.tpdo4
+
+    @property
+    def stated(self) -> bool:
+        """Whether there are any."""
+        return any((*self.received, *self.sent))
+
+
 @attrs.frozen(kw_only=True)
 class CanSpec:
     """The drives on the CAN bus, and how they are to be fed, watched and stopped.
@@ -49,6 +89,8 @@ class CanSpec:
         Nodes of all axes by name, where they do not count up from `node`; empty where they do.
     cob_ids : mapping of str to CobIdsSpec
         By axis, where they are not those of the predefined connection set.
+    fixed_pdos : FixedPdosSpec
+        What the drives' own PDOs carry, where they cannot be mapped anew; nothing where they can.
     bitrate : int
         bit/s.
     mode : str
@@ -86,6 +128,7 @@ class CanSpec:
     node: NodeId = 1
     nodes: Mapping[str, NodeId] = attrs.field(factory=dict, converter=frozen_mapping)
     cob_ids: Mapping[str, CobIdsSpec] = attrs.field(factory=dict, converter=frozen_mapping)
+    fixed_pdos: FixedPdosSpec = attrs.field(factory=FixedPdosSpec)
     bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
     mode: Literal["csp", "ip", "csv"] = "csp"
     sync_period: CycleTime = 0.004

@@ -252,7 +252,7 @@ def drive_bank(
 ) -> DriveBank:
     """Put a simulated drive on the bus for every axis, at rest at the start of the move.
 
-    They are those that the spec asks for, by vendor, product and serial number.
+    They are those that the spec asks for, by vendor, product, serial number and fixed mapping.
     """
     from gen_profile_exporters.can.simulation.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
     from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive  # noqa: PLC0415
@@ -268,12 +268,13 @@ def drive_bank(
 
 
 def _of_identity(make: DriveVariant, can: CanSpec, axis: str) -> DriveVariant:
-    """Give a make the identity that a spec asks for."""
+    """Give a make the identity and the fixed mapping that a spec asks for."""
     return attrs.evolve(
         make,
         vendor=can.vendor or make.vendor,
         product=can.product or make.product,
         serial=can.serial.get(axis, make.serial),
+        fixed_pdos=can.fixed_pdos,
     )
 
 

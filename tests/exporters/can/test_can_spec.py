@@ -18,6 +18,7 @@ def test_everything_stated_comes_back():
             "can.encoder=[65536, 1]", "can.gear=[3, 1]", "can.feed=[40000, 1]", "can.vendor=0x2E5",
             "can.product=1", "can.homed=[0x2003, 0, 1]", "can.serial=7", "can.nodes={cart=9}",
             "can.cob_ids={cart={setpoint=0x321, feedback=0x195}}",
+            "can.fixed_pdos={rpdo3=[0x60400010, 0x607A0020], tpdo3=[0x60410010, 0x60640020]}",
         ],
     )  # fmt: skip
     assert spec.can.travel == {"cart": (-0.1, 0.5)}
@@ -26,6 +27,7 @@ def test_everything_stated_comes_back():
     assert spec.can.homed == (0x2003, 0, 1)
     assert (spec.can.serial, spec.can.nodes) == ({"cart": 7}, {"cart": 9})
     assert spec.can.cob_ids == {"cart": CobIdsSpec(setpoint=0x321, feedback=0x195)}
+    assert spec.can.fixed_pdos.received == ((), (), (0x60400010, 0x607A0020), ())
     assert spec_from_dict(spec.to_dict()) == spec
 
 
@@ -51,6 +53,8 @@ def test_everything_stated_comes_back():
         ),
         ("can.cob_ids={cart={setpoints=0x301}}", "can.cob_ids.cart.setpoints: unknown key"),
         ("can.cob_ids=3", "can.cob_ids: must be a table such as { cart = { setpoint = 0x321 } }, found 3."),
+        ("can.fixed_pdos={rpdo3=[-1]}", "can.fixed_pdos.rpdo3.0: must be at least 1"),
+        ("can.fixed_pdos={pdo3=[1]}", "can.fixed_pdos.pdo3: unknown key"),
         ("can.mode=pp", "can.mode: unknown value, found text 'pp'"),
     ],
 )

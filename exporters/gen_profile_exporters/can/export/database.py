@@ -6,13 +6,13 @@ import re
 from fractions import Fraction
 
 from gen_profile.units import AxisScale
-from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.frames import Field
+from gen_profile_exporters.can import frames, pdos
+from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.can.scaling import exact
 from gen_profile_exporters.exporter import Target
 
 MASTER_NAME = "Controller"
-SETPOINTS = {frames.RPDO2: "Setpoint", frames.RPDO3: "FeedForward"}
+NAMES = {"command": "Command", "setpoint": "Setpoint", "feed_forward": "FeedForward"}
 
 
 def dbc(target: Target) -> bytes:
@@ -20,18 +20,17 @@ def dbc(target: Target) -> bytes:
 
     The format is that of Vector's *DBC File Format Documentation*, version 1.0.5.
     """
-    names = [identifier(axis.name) for axis in target.axes]
+    names, layout = [identifier(axis.name) for axis in target.axes], pdos.layout(target.can)
     blocks = ['VERSION ""', "NS_ :", "BS_:", f"BU_: {MASTER_NAME} {' '.join(names)}"]
     blocks.append(f"BO_ {frames.SYNC} Sync: 0 {MASTER_NAME}")
     for name, axis, own in zip(names, target.axes, frames.cob_ids(target), strict=True):
         blocks += [
-            _message(own[frames.RPDO1], f"{name}_Command", frames.COMMAND, axis, (MASTER_NAME, name)),
-            *(
-                _message(own[pdo], f"{name}_{SETPOINTS[pdo]}", fields, axis, (MASTER_NAME, name))
-                for pdo, fields in frames.setpoint_pdos(target.can).items()
-            ),
-            _message(own[frames.TPDO1], f"{name}_Feedback", frames.FEEDBACK, axis, (name, MASTER_NAME)),
+            _message(own[pdo], f"{name}_{NAMES[layout.role(pdo)]}", fields, axis, (MASTER_NAME, name))
+            for pdo, fields in layout.received.items()
         ]
+        blocks.append(
+            _message(own[layout.feedback], f"{name}_Feedback", layout.told, axis, (name, MASTER_NAME))
+        )
     return ("\n\n".join(blocks) + "\n").encode("ascii")
 
 
@@ -43,14 +42,15 @@ def identifier(name: str) -> str:
 
 def _message(cob_id: int, name: str, fields: tuple[Field, ...], axis: AxisScale, way: tuple[str, str]) -> str:
     sender, receiver = way
-    lines = [f"BO_ {cob_id} {name}: {frames.packing(fields).size} {sender}"]
+    lines = [f"BO_ {cob_id} {name}: {pdos.packing(fields).size} {sender}"]
     start = 0
     for field in fields:
         sign = "-" if field.code.islower() else "+"
         factor, unit = _physical(field, axis)
-        lines.append(
-            f' SG_ {field.name} : {start}|{field.bits}@1{sign} ({factor},0) [0|0] "{unit}" {receiver}'
-        )
+        if field.used:
+            lines.append(
+                f' SG_ {field.name} : {start}|{field.bits}@1{sign} ({factor},0) [0|0] "{unit}" {receiver}'
+            )
         start += field.bits
     return "\n".join(lines)
 
@@ -59,8 +59,8 @@ def _physical(field: Field, axis: AxisScale) -> tuple[str, str]:
     """Factor and unit of a signal: what one count means."""
     metre = repr(float(Fraction(1) / exact(axis.counts_per_si)))
     length = "rad" if axis.unit in {"rad", "deg"} else "m"
-    if field in {frames.TARGET_POSITION, frames.INTERPOLATION_DATA, frames.ACTUAL_POSITION}:
+    if field in {pdos.TARGET_POSITION, pdos.INTERPOLATION_DATA, pdos.ACTUAL_POSITION}:
         return metre, length
-    if field in {frames.VELOCITY_OFFSET, frames.TARGET_VELOCITY}:
+    if field in {pdos.VELOCITY_OFFSET, pdos.TARGET_VELOCITY}:
         return metre, f"{length}/s"
-    return ("0.1", "%") if field == frames.TORQUE_OFFSET else ("1", "")
+    return ("0.1", "%") if field == pdos.TORQUE_OFFSET else ("1", "")

@@ -10,16 +10,15 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import pairwise
-from struct import Struct
 
 import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile
-from gen_profile_exporters.can import frames, startup
+from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.export import candump, database, traces
 from gen_profile_exporters.can.export.candump import Frame
-from gen_profile_exporters.can.frames import MICROSECONDS, SYNC
+from gen_profile_exporters.can.frames import MICROSECONDS, SYNC, SetpointFrame
 from gen_profile_exporters.can.scaling import Setpoints, setpoints, travelled
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.setpoints import in_si, plausible_cycle_time, sampled
@@ -65,7 +64,7 @@ def replay(content: bytes, target: Target) -> SampledProfile:
     if target.can.mode == "csv":
         return _led_by_velocity(taken[:, :, 0], _cycle_time(stamps), target)
     velocity = None
-    if frames.VELOCITY_OFFSET in frames.setpoint_fields(target.can):
+    if pdos.VELOCITY_OFFSET in pdos.setpoint_fields(target.can):
         velocity = in_si(taken[:, :, 1].astype(np.float64), counts_per_si)
     return SampledProfile(
         cycle_time=_cycle_time(stamps),
@@ -98,24 +97,36 @@ def cyclic_frames(motion: Setpoints, target: Target) -> Iterator[Frame]:
 
 def read_setpoints(content: bytes, target: Target) -> tuple[frames.Integers, list[Frame]]:
     """Read a log: what the drives are sent in each cycle, shape (cycles, axes, fields), and the SYNCs."""
-    expected = {frame.cob_id: frame.packing for frame in frames.setpoint_frames(target)}
+    expected = {frame.cob_id: frame for frame in frames.setpoint_frames(target)}
+    width = len(pdos.setpoint_fields(target.can))
     taken: list[list[int]] = []
     syncs: list[Frame] = []
     pending: dict[int, tuple[int, ...]] = {}
     for frame in candump.read(content):
         if frame.cob_id == SYNC:
             _require_complete(pending, expected, frame)
-            taken.append([value for cob_id in expected for value in pending[cob_id]])
+            taken.append(_setpoints(pending, expected.values()))
             syncs.append(frame)
             pending = {}
         else:
             _require_expected(frame, pending, expected)
-            pending[frame.cob_id] = expected[frame.cob_id].unpack(frame.data)
+            pending[frame.cob_id] = expected[frame.cob_id].packing.unpack(frame.data)
     if pending:
         raise ExportError("The CAN log ends without a SYNC after its last setpoint; export it again.")
     if len(syncs) < 2:
         raise ExportError(f"The CAN log holds {len(syncs)} SYNCs, a motion needs 2 or more; export it again.")
-    return np.array(taken, dtype=np.int64).reshape(len(taken), len(target.axes), -1), syncs
+    return np.array(taken, dtype=np.int64).reshape(len(taken), len(target.axes), width), syncs
+
+
+def _setpoints(pending: Mapping[int, tuple[int, ...]], layout: Iterable[SetpointFrame]) -> list[int]:
+    """Put the setpoints of one cycle in the axes' order."""
+    by_place = {
+        frame.column * frame.width + place: value
+        for frame in layout
+        for place, value in zip(frame.places, pending[frame.cob_id], strict=True)
+        if place < frame.width
+    }
+    return [by_place[place] for place in range(len(by_place))]
 
 
 def _require_complete(pending: Container[int], expected: Iterable[int], sync: Frame) -> None:
@@ -131,7 +142,7 @@ def _require_complete(pending: Container[int], expected: Iterable[int], sync: Fr
         )
 
 
-def _require_expected(frame: Frame, pending: Container[int], expected: Mapping[int, Struct]) -> None:
+def _require_expected(frame: Frame, pending: Container[int], expected: Mapping[int, SetpointFrame]) -> None:
     if frame.cob_id not in expected:
         known = ", ".join(f"{cob_id:03X}h" for cob_id in (*expected, SYNC))
         raise ExportError(
@@ -142,11 +153,16 @@ def _require_expected(frame: Frame, pending: Container[int], expected: Mapping[i
         raise ExportError(
             f"line {frame.line}: second setpoint {frame.cob_id:03X}h before a SYNC; export the log again."
         )
-    size = expected[frame.cob_id].size
+    size = expected[frame.cob_id].packing.size
     if len(frame.data) != size:
         raise ExportError(
             f"line {frame.line}: setpoint {frame.cob_id:03X}h with {len(frame.data)} data bytes instead of "
             f"{size}; export the log again."
+        )
+    if not expected[frame.cob_id].keeps_constants(frame.data):
+        raise ExportError(
+            f"line {frame.line}: setpoint {frame.cob_id:03X}h with another controlword or mode than "
+            "a drive that follows gets; export the log again."
         )
 
 

@@ -106,6 +106,7 @@ class DriveBank:
             self._synced = self._clock.now()
             for drive in self.drives:  # where they are now; then they set out for the next SYNC
                 self._tell(drive.feedback())
+                drive.synchronise()
             self._advance()
             return
         data = bytearray(message.data)

@@ -11,6 +11,7 @@ import canopen
 from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
 from canopen.objectdictionary.eds import export_eds
 
+from gen_profile.spec.can import FixedPdosSpec
 from gen_profile_exporters.can.startup import AT_ONCE, OFF, PDO_PARAMETERS
 
 U8, U16, U32 = datatypes.UNSIGNED8, datatypes.UNSIGNED16, datatypes.UNSIGNED32
@@ -46,6 +47,8 @@ class DriveVariant:
         60C2h cannot be changed: digits and power of ten.
     own_mapping : bool
         Its PDOs come with another content and other COB-IDs than CiA 402 proposes.
+    fixed_pdos : FixedPdosSpec
+        What its PDOs carry, if they cannot be mapped anew.
     following_error : int
         6065h, in counts.
     modes : int
@@ -59,6 +62,7 @@ class DriveVariant:
     misses: int = 3
     fixed_period: tuple[int, int] | None = None
     own_mapping: bool = False
+    fixed_pdos: FixedPdosSpec = attrs.field(factory=FixedPdosSpec)
     following_error: int = WINDOW
     modes: int = 1 << 8 | 1 << 7 | 1 << 6  # csv, csp and ip
 
@@ -72,7 +76,7 @@ def dictionary(node: int, make: DriveVariant) -> canopen.ObjectDictionary:
         found.add_object(_variable(index, 0, name, of, access=access, value=value))
     for index, name, kind, access, values in _records(node, make):
         record = ODRecord(name, index) if index != 0x1016 else ODArray(name, index)
-        record.add_member(_count(index, values))
+        record.add_member(_count(index, values, "const" if access == "const" else "rw"))
         for sub, value in enumerate(values, start=1):
             if isinstance(kind, dict) and sub not in kind:
                 continue
@@ -222,11 +226,14 @@ def _records(
             kinds = {1: U32, 2: U8, 3: U16, 5: U16}
             yield base + pdo, f"{word} {pdo + 1} parameter", kinds, "rw", (used, 255, 0, 0, 0)
             entries = (*mapping, *(0,) * (MAPPED - len(mapping)))
-            yield base + 0x200 + pdo, f"{word} {pdo + 1} mapping", U32, "rw", entries
+            access = "const" if make.fixed_pdos.stated else "rw"
+            yield base + 0x200 + pdo, f"{word} {pdo + 1} mapping", U32, access, entries
 
 
 def _default_mapping(make: DriveVariant, pdo: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Entries of an RPDO and a TPDO as they come: CiA 402's proposal, or the maker's own."""
+    if make.fixed_pdos.stated:
+        return make.fixed_pdos.received[pdo], make.fixed_pdos.sent[pdo]
     proposed = {
         0: ((0x6040_0010,), (0x6041_0010,)),
         1: ((0x6040_0010, 0x6060_0008), (0x6041_0010, 0x6061_0008)),
@@ -235,11 +242,11 @@ def _default_mapping(make: DriveVariant, pdo: int) -> tuple[tuple[int, ...], tup
     return (own if make.own_mapping else proposed).get(pdo, ((), ()))
 
 
-def _count(index: int, values: tuple[int, ...]) -> ODVariable:
+def _count(index: int, values: tuple[int, ...], access: str) -> ODVariable:
     """Make subindex 0; in a mapping it counts the objects that are in use."""
     if index & 0x0200 and index < 0x1C00:
         used = len(values) - values.count(0)
-        return _variable(index, 0, "Number of mapped objects", U8, access="rw", value=used)
+        return _variable(index, 0, "Number of mapped objects", U8, access=access, value=used)
     return _variable(index, 0, "Highest sub-index supported", U8, access="const", value=len(values))
 
 

@@ -18,6 +18,7 @@ from gen_profile_exporters.can.cia402 import (
     FOLLOWS,
     IP_ENABLE,
     LIMIT_ACTIVE,
+    MODES,
     REMOTE,
     VOLTAGE,
     Controlword,
@@ -32,7 +33,7 @@ from gen_profile_exporters.can.simulation.drive_dictionary import (
     refusal,
     supports,
 )
-from gen_profile_exporters.can.startup import AT_ONCE, MODES, OFF
+from gen_profile_exporters.can.startup import AT_ONCE, OFF
 
 HEARTBEAT_LOST, SETPOINT_LOST = 0x8130, 0x8250  # EMCY codes of CiA 301
 FOLLOWING, SYNC_LOST = 0x8611, 0x8700  # and of CiA 402
@@ -62,7 +63,8 @@ class SimulatedDrive:
         self._misses, self._fresh, self._flags, self._late = 0, False, 0, 0.0
         self._controlword = 0
         self._values: dict[tuple[int, int], int] = {}  # as `value` read them, until they are written
-        self._setpoint_heard: int | None = None
+        self._waiting: dict[int, bytes] = {}  # by RPDO: what counts from the next SYNC on
+        self._heard: dict[int, int] = {}  # by RPDO, when
         self._master_heard: int | None = None
         self._syncs = 0
         self._told: dict[int, tuple[int, bytes]] = {}  # by TPDO that is sent on change: when, and what
@@ -103,7 +105,7 @@ class SimulatedDrive:
         self.local.data_store.clear()
         self._values.clear()
         self.local.nmt.stop_heartbeat()
-        self._setpoint_heard = self._master_heard = None
+        self._waiting, self._heard, self._master_heard = {}, {}, None
         self._syncs = 0
         self.boot()
 
@@ -115,10 +117,24 @@ class SimulatedDrive:
             return
         for pdo in PDOS:
             if self.value(0x1400 + pdo, 1) == cob_id:
-                for index, sub, value in _unpacked(self._mapping(0x1600 + pdo), data):
-                    self.store(index, sub, value)
-                    if index in SETPOINTS:
-                        self._fresh, self._setpoint_heard = True, now
+                self._heard[pdo] = now
+                if self.value(0x1400 + pdo, 2) in AT_ONCE:
+                    self._take(pdo, data)
+                else:
+                    self._waiting[pdo] = data
+
+    def synchronise(self) -> None:
+        """Take what was sent for this SYNC."""
+        waiting, self._waiting = self._waiting, {}
+        for pdo, data in waiting.items():
+            self._take(pdo, data)
+
+    def _take(self, pdo: int, data: bytes) -> None:
+        for index, sub, value in _unpacked(self._mapping(0x1600 + pdo), data):
+            if index not in self.local.object_dictionary:  # it stands for bits that nobody uses
+                continue
+            self.store(index, sub, value)
+            self._fresh |= index in SETPOINTS
 
     def watch(self, now: int) -> None:
         """Look for a master that fell silent."""
@@ -127,9 +143,9 @@ class SimulatedDrive:
         wait = self.value(0x1016, 1) & 0xFFFF
         if wait and self._master_heard is not None and _over(now, self._master_heard, wait):
             self._lose_connection(HEARTBEAT_LOST)
-        wait = self.value(0x1401, 5)
-        if wait and self._setpoint_heard is not None and _over(now, self._setpoint_heard, wait):
-            self._lose_connection(SETPOINT_LOST)
+        for pdo, heard in self._heard.items():
+            if (wait := self.value(0x1400 + pdo, 5)) and _over(now, heard, wait):
+                self._lose_connection(SETPOINT_LOST)
 
     def next_command(self) -> float:
         """Advance the command by one period and return it, in counts."""
@@ -297,7 +313,8 @@ class SimulatedDrive:
     def _packed(self, mapping: list[int]) -> bytes:
         parts = []
         for entry in mapping:
-            data = self.local.get_data(entry >> 16, entry >> 8 & 0xFF)
+            there = entry >> 16 in self.local.object_dictionary
+            data = self.local.get_data(entry >> 16, entry >> 8 & 0xFF) if there else bytes(8)
             parts.append(data[: (entry & 0xFF) // 8])
         return b"".join(parts)
 

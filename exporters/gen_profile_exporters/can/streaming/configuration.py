@@ -19,10 +19,10 @@ from canopen.sdo.exceptions import SdoError
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
-from gen_profile_exporters.can.cia402 import FAULTS, MOVING, Controlword, State, state_of
+from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.scaling import Setpoints, magnitude_counts
-from gen_profile_exporters.can.startup import AT_ONCE, MODES, PDO_PARAMETERS, Entry, startup_lists
+from gen_profile_exporters.can.startup import AT_ONCE, PDO_PARAMETERS, Entry, startup_lists
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.restoration import (
     HEARTBEAT_WATCHED,
@@ -247,6 +247,8 @@ def _set(link: Link, node: Node, entries: Sequence[Entry], found: Restoration) -
 
     found.remember(node.number, settings_of(held, changed, read))
     for entry in entries:
+        if entry.fixed:
+            continue
         try:
             link.sdo(node.number).download(entry.index, entry.sub, entry.data)
         except SdoAbortedError:  # fixed in this drive: what counts is what is read back

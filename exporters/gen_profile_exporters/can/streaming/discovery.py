@@ -11,8 +11,8 @@ from canopen.sdo.exceptions import SdoError
 
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.cia402 import MODES
 from gen_profile_exporters.can.host.clock import NANOSECONDS
-from gen_profile_exporters.can.startup import MODES
 from gen_profile_exporters.can.streaming.link import Link
 
 LISTEN = NANOSECONDS // 2  # before anything is asked; several heartbeats of ours, and of most drives

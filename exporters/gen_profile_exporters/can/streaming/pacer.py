@@ -7,13 +7,12 @@ ahead.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-
 import can
 
-from gen_profile_exporters.can import frames, startup
+from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.streaming.link import Link
+from gen_profile_exporters.can.streaming.plan import Cycle
 from gen_profile_exporters.exporter import Target
 
 HEARTBEATS_PER_TIMEOUT = 3
@@ -38,11 +37,15 @@ class Pacer:
         Instant of the next cycle, in ns.
     launch : int
         Instant of the latest cycle handed over, in ns.
+    standing : tuple of can.Message
+        Setpoints that lead no axis any further: the latest ones, or no velocity.
     """
 
     def __init__(self, link: Link, target: Target) -> None:
         self.link, self._clock = link, link.clock
-        self._commands = [own[frames.RPDO1] for own in frames.cob_ids(target)]
+        self._commands = _Commands(target)
+        self._by_velocity = target.can.mode == "csv"
+        self.standing: Cycle = ()
         self.period = frames.period_microseconds(target.can) * 1000
         self.timeout = startup.timeout_ms(target.can) * NANOSECONDS // 1000
         self.due = self.launch = 0
@@ -70,7 +73,7 @@ class Pacer:
             self._clock.sleep_until(self.due)
         return (self._clock.now() - self.due + self.period // 2) // self.period
 
-    def send(self, messages: Iterable[can.Message]) -> None:
+    def send(self, messages: Cycle) -> None:
         """Send frames, and SYNC after them, for the instant that is due.
 
         Raises
@@ -78,6 +81,8 @@ class Pacer:
         StreamAborted
         """
         self.launch = self.due
+        if not self._by_velocity:
+            self.standing = messages
         for frame in messages:
             self.link.send(frame, self.due)
         self.link.send(self._sync, self.due)
@@ -103,7 +108,44 @@ class Pacer:
         """Sleep until what was handed over is on the bus, so that no setpoint follows a stop."""
         self._clock.sleep_until(self.launch)
 
-    def commands(self, word: int) -> Sequence[can.Message]:
-        """Make controlwords, one for each drive."""
-        data = frames.packing(frames.COMMAND).pack(word)
-        return [frames.message(cob_id, data) for cob_id in self._commands]
+    def within(self, word: int, setpoints: Cycle) -> Cycle:
+        """Make a cycle whose setpoints' frames hold a controlword, where they hold one."""
+        return self._commands.within(word, setpoints)
+
+    def commanding(self, word: int, setpoints: Cycle) -> Cycle:
+        """Make a cycle that commands each drive as well, in frames of their own or in the setpoints'."""
+        return (*self._commands.alone(word), *self._commands.within(word, setpoints))
+
+    def commands(self, word: int) -> Cycle:
+        """Make controlwords, one for each drive, which lead no axis any further."""
+        return self._commands.alone(word) or self._commands.within(word, self.standing)
+
+
+class _Commands:
+    """Controlwords: in frames of their own, or in the setpoints' where the drives' mapping has them there."""
+
+    def __init__(self, target: Target) -> None:
+        layout, found = pdos.layout(target.can), frames.command_frames(target)
+        self._shared = layout.shared
+        offset = layout.offset(pdos.CONTROLWORD, layout.received[layout.command])
+        self._places = {frame.cob_id: offset for frame in found}
+        still = [[0] * found[0].width] * len(found)
+        self._own = () if layout.shared else tuple(frames.message(f.cob_id, f.pack(still)) for f in found)
+
+    def alone(self, word: int) -> Cycle:
+        """Make frames with nothing else to follow; none where there are no such frames."""
+        return tuple(self._with(word, message) for message in self._own)
+
+    def within(self, word: int, setpoints: Cycle) -> Cycle:
+        """Make setpoints' frames that hold the controlword, where they hold one."""
+        if not self._shared:
+            return setpoints
+        return tuple(self._with(word, message) for message in setpoints)
+
+    def _with(self, word: int, message: can.Message) -> can.Message:
+        place = self._places.get(message.arbitration_id)
+        if place is None:
+            return message
+        data = bytearray(message.data)
+        pdos.packing([pdos.CONTROLWORD]).pack_into(data, place, word)
+        return frames.message(message.arbitration_id, bytes(data))

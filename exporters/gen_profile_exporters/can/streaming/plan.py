@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import SampledProfile
-from gen_profile_exporters.can import frames
+from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.export.exporter import read_setpoints, replay
 from gen_profile_exporters.can.frames import Integers, SetpointFrame, message
 from gen_profile_exporters.can.scaling import Setpoints
@@ -37,7 +37,7 @@ class StreamPlan:
 
     def preload(self, position: Sequence[int]) -> Cycle:
         """Make setpoints at which the axes stand still where they are."""
-        rest = [0] * len(frames.setpoint_fields(self.target.can))
+        rest = [0] * len(pdos.setpoint_fields(self.target.can))
         held = [rest if self.motion.velocity is not None else [at, *rest[1:]] for at in position]
         return _cycle(frames.setpoint_frames(self.target), held)
 

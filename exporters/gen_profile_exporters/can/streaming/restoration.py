@@ -9,7 +9,7 @@ from canopen import SdoAbortedError
 from canopen.sdo.exceptions import SdoError
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can import frames
+from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import MOVING, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.startup import OFF, PDO_PARAMETERS
@@ -72,7 +72,7 @@ def _is_off(link: Link, node: int) -> bool:
     deadline = link.clock.now() + PATIENCE
     while link.clock.now() < deadline:
         try:
-            told = link.sdo(node).upload(frames.STATUSWORD.index, frames.STATUSWORD.sub)
+            told = link.sdo(node).upload(pdos.STATUSWORD.index, pdos.STATUSWORD.sub)
         except SILENCE:
             return False
         if state_of(int.from_bytes(told[:2], "little")) not in MOVING:
@@ -99,7 +99,8 @@ def settings_of(
     pdos = {index if index in PDO_PARAMETERS else index - MAPPING for index, _ in changed}
     pdos = {index for index in pdos & PDO_PARAMETERS if held.get((index + MAPPING, 0)) is not None}
     for index in sorted(pdos):
-        yield from _pdo(index, held, read)
+        remapped = any(place[0] == index + MAPPING for place in changed)
+        yield from _pdo(index, held, read, remapped=remapped)
     for index, sub in changed:
         data = held[index, sub]
         if data is not None and not {index, index - MAPPING} & pdos:
@@ -107,19 +108,28 @@ def settings_of(
 
 
 def _pdo(
-    index: int, held: Mapping[Place, bytes | None], read: Callable[[int, int], bytes | None]
+    index: int,
+    held: Mapping[Place, bytes | None],
+    read: Callable[[int, int], bytes | None],
+    *,
+    remapped: bool,
 ) -> Iterator[Setting]:
     cob_id, count = held[index, 1], held[index + MAPPING, 0]
     assert cob_id is not None and count is not None  # a PDO with a mapping has a COB-ID
     yield index, 1, (int.from_bytes(cob_id, "little") | OFF).to_bytes(4, "little")
-    yield index + MAPPING, 0, b"\0"
-    if count[0] <= MOST_MAPPED:
-        for sub in range(1, count[0] + 1):
-            entry = read(index + MAPPING, sub)
-            if entry is not None:
-                yield index + MAPPING, sub, entry
-        yield index + MAPPING, 0, count
+    if remapped:
+        yield from _mapping(index + MAPPING, count, read)
     for (of, sub), data in held.items():
         if of == index and sub != 1 and data is not None:
             yield index, sub, data
     yield index, 1, cob_id
+
+
+def _mapping(index: int, count: bytes, read: Callable[[int, int], bytes | None]) -> Iterator[Setting]:
+    yield index, 0, b"\0"
+    if count[0] <= MOST_MAPPED:
+        for sub in range(1, count[0] + 1):
+            entry = read(index, sub)
+            if entry is not None:
+                yield index, sub, entry
+        yield index, 0, count

@@ -18,7 +18,7 @@ import attrs
 import can
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can import frames
+from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import Controlword
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.streaming.pacer import Pacer
@@ -27,8 +27,8 @@ from gen_profile_exporters.can.streaming.watch import Watch, WatchedAxis
 AGAIN = NANOSECONDS // 20  # after which an SDO counts as lost
 _SDO = struct.Struct("<BHBHxx")  # an expedited transfer of 16 bits: command, index, subindex, data (CiA 301)
 _WRITE, _READ, _READ_ANSWER = 0x2B, 0x40, 0x40  # commands; of an answer the upper three bits
-CONTROLWORD = (frames.CONTROLWORD.index, frames.CONTROLWORD.sub)
-STATUSWORD = (frames.STATUSWORD.index, frames.STATUSWORD.sub)
+CONTROLWORD = (pdos.CONTROLWORD.index, pdos.CONTROLWORD.sub)
+STATUSWORD = (pdos.STATUSWORD.index, pdos.STATUSWORD.sub)
 
 
 @attrs.frozen(kw_only=True)

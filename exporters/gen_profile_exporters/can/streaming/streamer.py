@@ -6,15 +6,15 @@ Before each cycle the drives' answers to the one before are judged. Whatever is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import can
 import numpy as np
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can import frames, startup
-from gen_profile_exporters.can.cia402 import FOLLOWS, IP_ENABLE, Controlword, State
+from gen_profile_exporters.can import frames, pdos, startup
+from gen_profile_exporters.can.cia402 import FOLLOWS, Controlword, State
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 from gen_profile_exporters.can.scaling import (
@@ -26,7 +26,7 @@ from gen_profile_exporters.can.streaming import configuration
 from gen_profile_exporters.can.streaming.approach import approach
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.pacer import Pacer
-from gen_profile_exporters.can.streaming.plan import StreamPlan, cycles_of
+from gen_profile_exporters.can.streaming.plan import Cycle, StreamPlan, cycles_of
 from gen_profile_exporters.can.streaming.record import Phase, Record, Recorder
 from gen_profile_exporters.can.streaming.restoration import Restoration
 from gen_profile_exporters.can.streaming.stopping import quick_stop
@@ -67,9 +67,10 @@ class Streamer:
         self._reset_fault = reset_fault
         self._link = Link(bus, clock)
         self._pacer = Pacer(self._link, plan.target)
+        layout = pdos.layout(plan.target.can)
         self._watch = Watch(
             [
-                WatchedAxis(axis.name, node, own[frames.TPDO1])
+                WatchedAxis(axis.name, node, own[layout.feedback])
                 for axis, node, own in zip(
                     plan.target.axes, frames.nodes(plan.target), frames.cob_ids(plan.target), strict=True
                 )
@@ -78,6 +79,7 @@ class Streamer:
             period=self._pacer.period,
             heartbeat=startup.heartbeat_ms(plan.target.can) * NANOSECONDS // 1000,
             timeout=self._pacer.timeout,
+            told=layout.told,
             ours=frames.commanding_cob_ids(plan.target),
         )
         self._link.subscribe(self._watch.take)
@@ -149,20 +151,19 @@ class Streamer:
         """Make the drives' setpoints equal to where they stand, before power goes on."""
         self._begin(Phase.ALIGN)
         self._commanded = True
-        self._preload = self._plan.preload(standing)
+        self._pacer.standing = self._preload = self._plan.preload(standing)
         self._led = np.array(standing)
         configuration.start(self._link, self._plan.target)
         self._pacer.begin()
         for _ in range(ALIGN_CYCLES):
-            self._cycle(self._preload)
+            self._cycle(self._pacer.within(Controlword.DISABLE_VOLTAGE, self._preload))
         self._watch.raise_alert(SupervisionLevel.CYCLIC)
 
     def _enable(self) -> None:
         self._begin(Phase.ENABLE)
-        enable = Controlword.ENABLE | (IP_ENABLE if self._plan.target.can.mode == "ip" else 0)
         self._command(Controlword.SHUTDOWN, State.READY, self._preload)
         self._command(Controlword.SWITCH_ON, State.SWITCHED_ON, self._preload)
-        self._command(enable, State.ENABLED, self._preload, bits=FOLLOWS)
+        self._command(pdos.enabling(self._plan.target.can), State.ENABLED, self._preload, bits=FOLLOWS)
         self._watch.raise_alert(SupervisionLevel.FOLLOWING)
 
     def _approach(self, standing: Sequence[int]) -> None:
@@ -244,9 +245,9 @@ class Streamer:
         ]
         return STOP_MARGIN + 10 * self._pacer.period + int(max(ramps) * NANOSECONDS)
 
-    def _command(self, word: int, state: State, setpoints: Sequence[can.Message], *, bits: int = 0) -> None:
+    def _command(self, word: int, state: State, setpoints: Cycle, *, bits: int = 0) -> None:
         """Send a controlword every cycle until all drives are in a state."""
-        commands, deadline = self._pacer.commands(word), self._clock.now() + PATIENCE
+        cycle, deadline = self._pacer.commanding(word, setpoints), self._clock.now() + PATIENCE
         while not all(axis.state is state and axis.statusword & bits == bits for axis in self._watch.axes):
             if self._clock.now() > deadline:
                 words = ", ".join(f"{axis.name}: {axis.state.words}" for axis in self._watch.axes)
@@ -254,9 +255,9 @@ class Streamer:
                     f"The drives do not reach {state.words!r} within {PATIENCE // NANOSECONDS} s ({words}); "
                     "check power, brakes and enabling inputs."
                 )
-            self._cycle((*commands, *setpoints))
+            self._cycle(cycle)
 
-    def _cycle(self, messages: Iterable[can.Message]) -> None:
+    def _cycle(self, messages: Cycle) -> None:
         """Send frames and SYNC at the next instant, judged before."""
         self._judge()
         self._pacer.missed()

@@ -9,9 +9,10 @@ import attrs
 import can
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can import frames
+from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, MOVING, State, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
+from gen_profile_exporters.can.pdos import Field
 
 OPERATIONAL = 5
 # command specifiers of SDO requests (CiA 301) that change nothing: upload, its segments, abort, block upload
@@ -78,6 +79,8 @@ class Watch:
         SYNC period, and period of the drives' heartbeats, in ns.
     timeout : int
         How long a drive may leave SYNC unanswered, in ns.
+    told : sequence of Field
+        What the drives' feedback holds.
     ours : iterable of int
         COB-IDs of commands and setpoints, which nobody else may send.
     """
@@ -90,13 +93,16 @@ class Watch:
         period: int,
         heartbeat: int,
         timeout: int,
+        told: Sequence[Field],
         ours: Iterable[int],
     ) -> None:
         self.axes = tuple(axes)
         self.alert = SupervisionLevel.LISTENING
         self.fault: str | None = None
         self._clock, self._period, self._heartbeat, self._timeout = clock, period, heartbeat, timeout
-        self._feedback = frames.packing(frames.FEEDBACK)
+        self._feedback = pdos.packing(told)
+        used = [field for field in told if field.used]
+        self._statusword, self._position = map(used.index, (pdos.STATUSWORD, pdos.ACTUAL_POSITION))
         self._takers = {
             cob_id: (take, axis)
             for axis in self.axes
@@ -155,7 +161,8 @@ class Watch:
 
     def _take_feedback(self, axis: WatchedAxis, data: bytes) -> None:
         if len(data) == self._feedback.size:
-            axis.statusword, axis.position = self._feedback.unpack(data)
+            values = self._feedback.unpack(data)
+            axis.statusword, axis.position = values[self._statusword], values[self._position]
             axis.heard = self._clock.now()
             self._look_at(axis)
         elif self.alert >= SupervisionLevel.CYCLIC:
