@@ -42,6 +42,15 @@ def test_never_steps_longer_than_a_cycle(cosimulation, crane, setpoints, output_
     assert len(response.times) == 331
 
 
+def test_fmpy_takes_the_same_steps(cosimulation, crane, setpoints):
+    given = {"tau": 0.02, "max_step": 1e-3, "settle": 0.3, "output_step": 0.003}
+    compiled, stepped = (
+        cosimulation.run(setpoints, crane.nominal(), **given, by_fmpy=by_fmpy) for by_fmpy in (False, True)
+    )
+    for field in attrs.fields(type(compiled)):
+        np.testing.assert_array_equal(getattr(compiled, field.name), getattr(stepped, field.name))
+
+
 def test_is_what_fmpy_simulates_from_the_archive(crane, cosimulation, setpoints):
     """The same archive, run by FMPy's own loop with its own reading of inputs, gives the same numbers."""
     p = {**crane.nominal(), "L1": 0.55}

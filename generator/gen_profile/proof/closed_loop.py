@@ -137,6 +137,7 @@ class ClosedLoop:
                 tau=self._spec.actuator.tau or 0.0,
                 max_step=self.max_step,
                 settle=0.0,
+                by_fmpy=True,
             )
         return float(np.abs(response.sway[1:] - traced[:, len(self.outputs) :]).max())
 

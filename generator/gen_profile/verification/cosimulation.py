@@ -36,7 +36,7 @@ def cosimulate(
     output_step: float,
     on_build: Callable[[], None] | None = None,
 ) -> tuple[Response, ...]:
-    """Let the plant's FMU follow setpoints, once with every machine.
+    """Let the plant's FMU follow setpoints, once with every machine: the first by FMPy's own steps.
 
     Parameters
     ----------
@@ -71,8 +71,9 @@ def cosimulate(
                 output_step=output_step,
                 initial=spec.move.initial,
                 final_velocity=spec.move.final_velocity,
+                by_fmpy=row == 0,
             )
-            for machine in machines
+            for row, machine in enumerate(machines)
         )
 
 
