@@ -80,6 +80,13 @@ class BlockSource:
         """Put it together as Structured Text."""
         return f"{self.header}{self.declaration()}\n{self.body}END_FUNCTION_BLOCK\n"
 
+    def program(self) -> tuple[object, ...]:
+        """Give what the block does, however its text is laid out."""
+        variables = {
+            (v.section, v.name, v.type, *(v.elements if v.array else [v.initial])) for v in self.variables
+        }
+        return variables, self.body.split()
+
     def declaration(self) -> str:
         """Everything before the statements, header excepted."""
         lines = [f"FUNCTION_BLOCK {self.name}"]

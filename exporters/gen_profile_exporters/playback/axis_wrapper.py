@@ -211,6 +211,12 @@ IF bFeed AND fbInPosition{n}.CommandAborted THEN nCause := 23; END_IF;""",
 )
 
 
+def axis_wrappers(block: BlockSource, axes: int, library: MotionLibrary) -> tuple[BlockSource, ...]:
+    """Write the wrapper of a playback block; others have none."""
+    plays = any(v.section == "VAR_INPUT" and v.name == "bAbort" for v in block.variables)
+    return (axis_wrapper(block, axes, library),) if plays else ()
+
+
 def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> BlockSource:
     """Write the block around a playback block, with the same inputs and outputs but the axes' own."""
     inputs = [v for v in block.variables if v.section == "VAR_INPUT" and v.name != ACTUAL]

@@ -128,19 +128,11 @@ def read_library(library: BlockSource, target: Target) -> tuple[SampledProfile, 
     except (KeyError, ValueError, IndexError) as error:
         raise ExportError("The block is no library of motions, or was altered; export it again.") from error
     motions = tuple(read_block(single.text(), target) for single in singles)
-    if _program(_assembled(singles, library.header, library.name)) != _program(library):
+    if _assembled(singles, library.header, library.name).program() != library.program():
         raise ExportError(
             "The block does not select its motions as it should: it was altered; export it again."
         )
     return motions
-
-
-def _program(source: BlockSource) -> tuple[object, ...]:
-    """Give what a block does, however its text is laid out."""
-    variables = {
-        (v.section, v.name, v.type, *(v.elements if v.array else [v.initial])) for v in source.variables
-    }
-    return variables, source.body.split()
 
 
 def _assembled(sources: Sequence[BlockSource], header: str, name: str) -> BlockSource:

@@ -14,7 +14,7 @@ from lxml import etree
 from gen_profile.motion.profile import Profile
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.playback.axis_wrapper import CODESYS, axis_wrapper
+from gen_profile_exporters.playback.axis_wrapper import CODESYS, axis_wrappers
 from gen_profile_exporters.playback.structured_text import block_text, literal
 from gen_profile_exporters.vendors import plcopen_xml
 from gen_profile_exporters.vendors.cam_points import QuinticPoints, quintic_points
@@ -37,7 +37,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
 
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
-    """Write the project with any playback block, and its wrapper."""
+    """Write the project with any block, and the wrapper of one that plays."""
     return _project(source, target, [])
 
 
@@ -45,8 +45,8 @@ unwrap, replay = plcopen_xml.unwrap, plcopen_xml.replay
 
 
 def _project(source: BlockSource, target: Target, cams: list[etree._Element]) -> tuple[File, ...]:
-    wrapper = axis_wrapper(source, len(target.axes), CODESYS)
-    pous = [plcopen_xml.CODESYS.pou(source), plcopen_xml.CODESYS.pou(wrapper), *cams]
+    blocks = (source, *axis_wrappers(source, len(target.axes), CODESYS))
+    pous = [*map(plcopen_xml.CODESYS.pou, blocks), *cams]
     return (
         File(
             filename=f"{target.name}.codesys.xml",

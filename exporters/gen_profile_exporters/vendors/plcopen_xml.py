@@ -78,7 +78,7 @@ class XmlDialect:
                     group.set("constant", "true")
             self._variable(groups[variable.section], variable)
         self._formatted(self._append(self._append(element, "body"), "ST"), source.body)
-        self._formatted(self._append(element, "documentation"), source.header.strip("(*) \n"))
+        self._formatted(self._append(element, "documentation"), _uncommented(source.header))
         return element
 
     def initialise_structures(self, pou: etree._Element, name: str, elements: list[dict[str, str]]) -> None:
@@ -183,6 +183,10 @@ def _default(namespace: str) -> dict[str, str]:
     """Name a default namespace; lxml's stubs do not know that its prefix is None."""
     prefixes: dict[Any, str] = {None: namespace}
     return prefixes
+
+
+def _uncommented(comment: str) -> str:
+    return comment.strip().removeprefix("(*").removesuffix("*)").strip()
 
 
 def _source(element: etree._Element) -> BlockSource:

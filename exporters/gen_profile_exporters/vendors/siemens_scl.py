@@ -18,7 +18,7 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile, sample
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, ordered, parse_function_block
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.playback.axis_wrapper import SIEMENS, axis_wrapper
+from gen_profile_exporters.playback.axis_wrapper import SIEMENS, axis_wrappers
 from gen_profile_exporters.playback.block import layout_of, variable_names
 from gen_profile_exporters.playback.structured_text import block_text, literal, read_block
 from gen_profile_exporters.setpoints import axis_table
@@ -62,7 +62,7 @@ def replay(content: bytes, target: Target) -> SampledProfile:
 
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
-    """Write the source with any playback block, and its wrapper.
+    """Write the source with any block, and the wrapper of one that plays.
 
     Raises
     ------
@@ -76,8 +76,8 @@ def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
             f"{MOST_BYTES / 1000:g} kB; "
             'take "segments", a longer export.cycle_time, or fewer motions in a library.'
         )
-    wrapper = axis_wrapper(source, len(target.axes), SIEMENS)
-    text = "\n".join([_scl(source), _scl(wrapper)])
+    wrappers = axis_wrappers(source, len(target.axes), SIEMENS)
+    text = "\n".join(map(_scl, (source, *wrappers)))
     return (File(filename=f"{target.name}.scl", content=text.encode("ascii")),)
 
 
@@ -98,12 +98,13 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
     source = parse_function_block(
         f"{header}FUNCTION_BLOCK {name}\n{declarations.lstrip()}\n{portable.lstrip()}END_FUNCTION_BLOCK\n"
     )
-    arrays_back = [
-        attrs.evolve(variable, section="VAR CONSTANT") if _is_table(variable) else variable
-        for variable in source.variables
-    ]
+    tables = [variable for variable in source.variables if _is_table(variable)]
+    others = [variable for variable in source.variables if not _is_table(variable)]
+    constants = [attrs.evolve(variable, section="VAR CONSTANT") for variable in tables]
+    back = attrs.evolve(source, variables=(*others, *constants))
     names = variable_names(layout_of(text), len(target.axes))
-    return ordered(attrs.evolve(source, variables=tuple(arrays_back)), names)
+    plays = {name.lower() for name in names} <= {variable.name.lower() for variable in others + tables}
+    return ordered(back, names) if plays else back
 
 
 def _scl(source: BlockSource) -> str:

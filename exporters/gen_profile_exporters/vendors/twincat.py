@@ -15,7 +15,7 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.playback.axis_wrapper import TWINCAT, axis_wrapper
+from gen_profile_exporters.playback.axis_wrapper import TWINCAT, axis_wrappers
 from gen_profile_exporters.playback.structured_text import block_name, block_text, literal, read_block
 from gen_profile_exporters.vendors.cam_points import QuinticPoints, quintic_points
 from gen_profile_exporters.vendors.xml_documents import child, parse_xml, write_xml
@@ -47,8 +47,8 @@ def replay(content: bytes, target: Target) -> SampledProfile:
 
 
 def wrap(source: BlockSource, target: Target) -> tuple[File, ...]:
-    """Write any playback block, and its wrapper."""
-    return (_pou(source), _pou(axis_wrapper(source, len(target.axes), TWINCAT)))
+    """Write any block, and the wrapper of one that plays."""
+    return (_pou(source), *map(_pou, axis_wrappers(source, len(target.axes), TWINCAT)))
 
 
 def unwrap(content: bytes, target: Target) -> BlockSource:
