@@ -11,14 +11,15 @@ from gen_profile.spec.reading import parse_spec
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
 
-SPEC = parse_spec("""
+BAY = """
 name = "bay 3"
 plant = { type = "double-pendulum-crane", m1 = 350.0, m2 = 2000.0, L1 = 6.0, L2 = 1.5 }
 move = { distance = 8.0, duration = 14.0 }
 limits = { velocity = 1.0, acceleration = 0.3, jerk = 1.0, travel = [0.0, 40.0] }
 planner = { live = { L1 = [5.0, 7.0] } }
 export = { cycle_time = 0.004 }
-""")
+"""
+SPEC = parse_spec(BAY)
 
 
 @pytest.fixture(scope="module")
@@ -53,12 +54,7 @@ def test_a_format_without_blocks_is_refused(block):
 def test_the_command_line_plays_any_of_them(tmp_path, monkeypatch):
     """And writes none where one is refused."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "bay.toml").write_text(
-        'plant = { type = "single-pendulum-crane", m = 100.0, L0 = 4.0 }\n'
-        'name = "bay"\nmove = { distance = [1.0, 0.0], duration = 9.0 }\nexport = { cycle_time = 0.02 }\n'
-        "limits = { velocity = 1.0, acceleration = 0.3, jerk = 1.0, travel = [0.0, 40.0] }\n"
-        "planner = { live = { L0 = [3.0, 5.0] } }\n"
-    )
+    (tmp_path / "bay.toml").write_text(BAY)
     refused = run_here(
         "planner", "write", "bay.toml", "--out", "deploy", "--export", "plc", "--export", "csv"
     )
