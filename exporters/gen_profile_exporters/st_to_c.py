@@ -8,7 +8,7 @@ computes bit for bit what the text says.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -130,10 +130,41 @@ def translate(text: str) -> Translation:
     ExportError
         It is no function block of this subset of the language.
     """
+    name, variables, body = translate_statements(text, {}, checked=True)
+    inputs, outputs = (
+        tuple(v for v in variables if v.section == section) for section in ("VAR_INPUT", "VAR_OUTPUT")
+    )
+    return Translation(name, inputs, outputs, _header(name, variables), _source(name, variables, body))
+
+
+class Statements(NamedTuple):
+    """A function block's name, its declarations, and its statements as lines of C."""
+
+    name: str
+    variables: list[StVariable]
+    body: list[str]
+
+
+def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool = False) -> Statements:
+    """Translate a function block's statements.
+
+    Parameters
+    ----------
+    text : str
+    owners : mapping of str to str
+        What stands before the names of a section's variables, such as ``in->``; ``fb->`` if not given.
+    checked : bool
+        Whether the lines use the macros by which an altered text is ended.
+
+    Raises
+    ------
+    ExportError
+        It is no function block of this subset of the language.
+    """
     try:
         tree = _parser().parse(text)
         variables = [v for section in tree.find_data("section") for v in _declared(section)]
-        translated: Any = _Translator(variables).transform(tree)
+        translated: Any = _Translator(variables, owners, checked).transform(tree)
         name, *_, body = translated.children
     except UnexpectedInput as error:
         place = f"line {error.line}, column {error.column}"
@@ -141,12 +172,7 @@ def translate(text: str) -> Translation:
     except (LarkError, KeyError) as error:
         reason = getattr(error, "orig_exc", error)
         raise ExportError(f"{_NO_BLOCK}: {reason.args[0]}.") from error
-    inputs, outputs = (
-        tuple(v for v in variables if v.section == section) for section in ("VAR_INPUT", "VAR_OUTPUT")
-    )
-    return Translation(
-        str(name), inputs, outputs, _header(str(name), variables), _source(str(name), variables, body)
-    )
+    return Statements(str(name), variables, body)
 
 
 @cache
@@ -173,9 +199,10 @@ def _declared(section: Any) -> Iterator[StVariable]:
 class _Translator(Transformer[Token, object]):
     """Expressions become `_Code`, statements lines of C."""
 
-    def __init__(self, variables: list[StVariable]) -> None:
+    def __init__(self, variables: list[StVariable], owners: Mapping[str, str], checked: bool) -> None:
         super().__init__()
         self._variables = {v.name.lower(): v for v in variables}
+        self._owners, self._checked = {"VAR CONSTANT": "", **owners}, checked
 
     def real(self, parts):  # type: ignore[no-untyped-def]
         return _Code(str(parts[0]), "LREAL")
@@ -194,11 +221,19 @@ class _Translator(Transformer[Token, object]):
         declared = self._variables.get(name.lower())
         if declared is None:
             raise KeyError(f"{name} is not declared")
-        owner = "" if declared.section == "VAR CONSTANT" else "fb->"
         if (index is None) != (declared.length == 0):
             raise KeyError(f"{name} is {'an array' if declared.length else 'no array'}")
-        element = "" if index is None else f"[AT({index.text}, {declared.length})]"
-        return _Code(f"{owner}{declared.name}{element}", declared.type)
+        element = "" if index is None else f"[{self._index(index.text, declared.length)}]"
+        return _Code(f"{self._owned(declared)}{element}", declared.type)
+
+    def _owned(self, variable: StVariable) -> str:
+        return self._owners.get(variable.section, "fb->") + variable.name
+
+    def _index(self, index: str, length: int) -> str:
+        return f"AT({index}, {length})" if self._checked else index
+
+    def _counted(self, work: int) -> list[str]:
+        return [f"OPERATIONS({work});"] if work and self._checked else []
 
     def prefixed(self, parts):  # type: ignore[no-untyped-def]
         sign, operand = parts
@@ -212,7 +247,7 @@ class _Translator(Transformer[Token, object]):
         type_ = left.type if operator in "+-*/" else "BOOL"
         work = left.work + right.work + (left.type == "LREAL")
         left_text, right_text = left.text, right.text
-        if operator == "/" and type_ == "DINT":
+        if operator == "/" and type_ == "DINT" and self._checked:
             return _Code(f"QUOTIENT({left_text}, {right_text})", type_, work)
         if operator == "OR":
             left_text, right_text = f"({left_text})", f"({right_text})"
@@ -226,7 +261,7 @@ class _Translator(Transformer[Token, object]):
         target, value = parts
         if target.type != value.type:
             raise KeyError(f"{target.text} takes no {value.type}")
-        return [*_counted(value.work), f"{target.text} = {value.text};"]
+        return [*self._counted(value.work), f"{target.text} = {value.text};"]
 
     def body(self, statements):  # type: ignore[no-untyped-def]
         return [line for statement in statements for line in statement]
@@ -242,7 +277,7 @@ class _Translator(Transformer[Token, object]):
 
     def choice(self, parts):  # type: ignore[no-untyped-def]
         *branches, otherwise = parts
-        lines = _counted(sum(condition.work for condition, _ in branches))
+        lines = self._counted(sum(condition.work for condition, _ in branches))
         word = "if"
         for condition, body in branches:
             lines += [f"{word} ({condition.text}) {{", *_indented(body)]
@@ -258,29 +293,32 @@ class _Translator(Transformer[Token, object]):
 
     def count(self, parts):  # type: ignore[no-untyped-def]
         name, first, last, body = parts
-        variable = f"fb->{self._variables[name.lower()].name}"
-        loop = f"for ({variable} = {first.text}; {variable} <= last && TURN(); ++{variable}) {{"
+        variable = self._owned(self._variables[name.lower()])
+        goes_on = f"{variable} <= last{self._turn}"
+        loop = f"for ({variable} = {first.text}; {goes_on}; ++{variable}) {{"
         return ["{", f"    const int32_t last = {last.text};", *_indented([loop, *_indented(body), "}"]), "}"]
 
     def repeat(self, parts):  # type: ignore[no-untyped-def]
         condition, body = parts
-        return [f"while (({condition.text}) && TURN()) {{", *_indented(body), "}"]
+        test = f"({condition.text}){self._turn}" if self._checked else condition.text
+        return [f"while ({test}) {{", *_indented(body), "}"]
 
-
-def _counted(work: int) -> list[str]:
-    return [f"OPERATIONS({work});"] if work else []
+    @property
+    def _turn(self) -> str:
+        return " && TURN()" if self._checked else ""
 
 
 def _indented(lines: list[str]) -> list[str]:
     return [f"    {line}" for line in lines]
 
 
-def _member(variable: StVariable) -> str:
+def c_member(variable: StVariable) -> str:
+    """Declare a variable."""
     return f"{_TYPES[variable.type]} {variable.name}" + (f"[{variable.length}]" if variable.length else "")
 
 
 def _header(name: str, variables: list[StVariable]) -> str:
-    members = "\n".join(f"    {_member(v)};" for v in variables if v.section != "VAR CONSTANT")
+    members = "\n".join(f"    {c_member(v)};" for v in variables if v.section != "VAR CONSTANT")
     return f"""\
 #ifndef {name}_H
 #define {name}_H
@@ -307,7 +345,7 @@ void {name}_step({name} *fb);
 
 def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
     constants = [
-        f"static const {_member(v)} = {_initial(v)};" for v in variables if v.section == "VAR CONSTANT"
+        f"static const {c_member(v)} = {c_initial(v)};" for v in variables if v.section == "VAR CONSTANT"
     ]
     initials = [
         f"    fb->{v.name} = {v.initial[0]};" for v in variables if v.section != "VAR CONSTANT" and v.initial
@@ -377,5 +415,6 @@ static inline int32_t quotient({name} *fb, int32_t dividend, int32_t divisor)
 #endif"""
 
 
-def _initial(variable: StVariable) -> str:
+def c_initial(variable: StVariable) -> str:
+    """Write its initial value; it has one."""
     return f"{{{', '.join(variable.initial)}}}" if variable.length else variable.initial[0]

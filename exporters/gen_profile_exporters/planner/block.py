@@ -42,6 +42,8 @@ class PlannerConstants:
     travel : (float, float)
     live : mapping of str to (float, float)
         Ranges of the live parameters.
+    units : tuple of str
+        In which they are given.
     nominal : tuple of float
         Their values where the controller gives none.
     drift : tuple of float
@@ -69,6 +71,7 @@ class PlannerConstants:
     quick_jerk: float
     travel: tuple[float, float]
     live: Mapping[str, tuple[float, float]]
+    units: tuple[str, ...]
     nominal: tuple[float, ...]
     drift: tuple[float, ...]
     degrees: int
@@ -94,10 +97,14 @@ def _values(c: PlannerConstants) -> dict[str, str]:
     modes, terms = c.frequencies.shape
     conditions = 1 + 4 * modes
     lives = list(c.live)
-    ranges = [f"f{name}: live parameter {name}, {low:g} to {high:g}" for name, (low, high) in c.live.items()]
+    known = list(zip(c.live.items(), c.units, c.nominal, strict=True))
+    ranges = [
+        f"f{name}: live parameter {name}, {low:g} to {high:g} {unit}".rstrip()
+        for (name, (low, high)), unit, _ in known
+    ]
     inputs = [
-        f"    f{name} : LREAL := {literal(value)}; (* {low:g} to {high:g} *)"
-        for (name, (low, high)), value in zip(c.live.items(), c.nominal, strict=True)
+        f"    f{name} : LREAL := {literal(value)}; (* {unit or 1}, {low:g} to {high:g} *)"
+        for (name, (low, high)), unit, value in known
     ]
     lasts = {
         "future": FUTURE,

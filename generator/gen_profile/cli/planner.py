@@ -29,7 +29,7 @@ class PlannerGroup(DefaultGroup):
 def _complete_forms(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import containers
 
-    return [CompletionItem(name) for name in containers() if name.startswith(incomplete)]
+    return [CompletionItem(name) for name in (*containers(), "c") if name.startswith(incomplete)]
 
 
 @cli.group(cls=PlannerGroup, epilog="Example: gen-profile planner crane.toml --out deploy")
@@ -49,7 +49,7 @@ def planner() -> None:
     multiple=True,
     default=("plc",),
     shell_complete=_complete_forms,
-    help="Form of the block: plc or another format that carries blocks. Repeatable; plc by default.",
+    help="Form of the block: plc, another format that carries blocks, or c. Repeatable; plc by default.",
 )
 @click.option(
     "--out",

@@ -71,6 +71,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         quick_jerk=quick_limits(spec)[1],
         travel=travel,
         live=found.live,
+        units=tuple(_unit(spec, name) for name in found.live),
         nominal=tuple(_nominal(spec, name) for name in found.live),
         drift=tuple(STEADY * high for _, high in found.live.values()),
         degrees=int(interpolant.exponents.max(initial=0)) + 1,
@@ -114,6 +115,12 @@ def _limits(spec: Spec) -> tuple[float, float, float, tuple[float, float]]:
     if quick_jerk is not None and quick_jerk < jerk:
         raise SpecError(f"planner.quick_stop_jerk: at least limits.jerk ({jerk:g}), found {quick_jerk:g}.")
     return velocity, acceleration, jerk, travel
+
+
+def _unit(spec: Spec, name: str) -> str:
+    plant = spec.machine()
+    units = {axis.name: axis.unit for axis in plant.actuated} | {p.name: p.unit for p in plant.parameters}
+    return units[name]
 
 
 def _nominal(spec: Spec, name: str) -> float:

@@ -11,20 +11,23 @@ from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import ExportSpec, Spec
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.exporter import File, Target, target_of
+from gen_profile_exporters.planner.c_source import c_files
 from gen_profile_exporters.registry import container_of, find_container, format_named
 
 PORTABLE = "plc"
+C = "c"
 
 
 def require_forms(formats: Iterable[str]) -> None:
-    """Refuse formats that carry no function block.
+    """Refuse formats that carry no function block and are not C.
 
     Raises
     ------
     SpecError
     """
     for name in formats:
-        find_container(name)
+        if name != C:
+            find_container(name)
 
 
 def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tuple[File, ...]:
@@ -36,7 +39,7 @@ def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tupl
     spec : Spec
         Its spec.
     formats : iterable of str
-        Names of formats that carry function blocks.
+        Names of formats that carry function blocks, or `C`.
 
     Raises
     ------
@@ -52,6 +55,8 @@ def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tupl
 def _files(block: PlannerBlock, spec: Spec, format_: str) -> tuple[File, ...]:
     if format_ == PORTABLE:
         return (File(filename=block.filename, content=block.text.encode("ascii")),)
+    if format_ == C:
+        return c_files(block.text, spec.name)
     container, target = find_container(format_), target_of(spec)
     source = parse_function_block(block.text)
     files = container.wrap(source, target)
