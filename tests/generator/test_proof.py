@@ -1,10 +1,12 @@
 """The proof of a planner block: against other equations and another importer, and that it can fail."""
 
+import json
 import re
 
 import attrs
 import numpy as np
 import pytest
+from command_line import run_here
 from scipy.integrate import solve_ivp
 
 from gen_profile.planner.commands import Command, play
@@ -206,3 +208,78 @@ def test_after_a_quick_stop_nothing_is_promised(spec):
     judged = judge_run(spec, swaying, history, cycle=CYCLE, number=0, group=DRAWS)
     assert judged.faults == ()
     assert judged.share(spec.check.residual_sway, 0.0) == 0.0
+
+
+@pytest.fixture(scope="module")
+def deployed(tmp_path_factory):
+    """The bay crane's block as the command line writes it."""
+    folder = tmp_path_factory.mktemp("deployed")
+    (folder / "bay.toml").write_text(BAY)
+    options = ("--out", folder, "--histories", 24, "--plot", folder / "proof.svg", "--json")
+    written = run_here("planner", "write", folder / "bay.toml", *options)
+    return folder, written.document
+
+
+def test_the_command_line_delivers_what_is_proved(deployed, text):
+    folder, document = deployed
+    assert (folder / "bay 3.st").read_text() == text
+    assert document["proof"]["passed"]
+    assert (folder / "proof.svg").read_text().count("<path") > 20
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["check"] == document["proof"]
+    assert [artefact["format"] for artefact in manifest["artefacts"]] == ["planner"]
+
+
+def test_check_repeats_the_proof_from_the_file(deployed):
+    folder, document = deployed
+    again = run_here("check", folder / "bay 3.st", "--json").document
+    assert again["artefact"]["manifest"] == "matches"
+    assert again["proof"] == document["proof"]
+
+
+def test_check_replays_one_history(deployed):
+    folder, document = deployed
+    worst = document["proof"]["worst"]
+    one = run_here("check", folder / "bay 3.st", "--history", worst["number"], "--json").document
+    share, own = one["history"].pop("share"), worst.pop("share")
+    assert one["history"] == worst
+    assert share == pytest.approx(own, rel=1e-3)  # the error bound is that of the history alone
+    assert "passed" in run_here("check", folder / "bay 3.st", "--history", 0).out
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--history", 24), "numbered from 0 to 23"),
+        (("--samples", 5), "--samples: is for a motion"),
+        (("--scale", "x=0.5"), "--scale: is for a motion"),
+    ],
+)
+def test_what_means_nothing_for_a_block_is_refused(deployed, options, words):
+    refused = run_here("check", deployed[0] / "bay 3.st", *options)
+    assert refused.code == 2
+    assert words in refused.err
+
+
+def test_a_block_that_sways_too_much_is_not_written(tmp_path):
+    (tmp_path / "bay.toml").write_text(BAY.replace("residual_sway = 0.05", "residual_sway = 0.001"))
+    options = ("--out", tmp_path / "out", "--histories", 8, "--json")
+    failed = run_here("planner", "write", tmp_path / "bay.toml", *options)
+    assert failed.code == 4
+    assert "sways by" in failed.err
+    assert "Nothing was written" in failed.err
+    assert failed.document["path"] is None
+    assert not (tmp_path / "out").exists()
+    run_here("planner", "write", tmp_path / "bay.toml", *options, "--keep-failed")
+    assert not json.loads((tmp_path / "out" / "manifest.json").read_text())["check"]["passed"]
+
+
+def test_an_altered_file_is_told(deployed, tmp_path):
+    for name in ("bay 3.st", "manifest.json"):
+        (tmp_path / name).write_bytes((deployed[0] / name).read_bytes())
+    (tmp_path / "bay 3.st").write_text((tmp_path / "bay 3.st").read_text() + "(* altered *)\n")
+    options = ("--histories", 4, "--json")
+    altered = run_here("check", tmp_path / "bay 3.st", *options)
+    assert altered.code == 4
+    assert altered.document["artefact"]["manifest"] == "differs"
+    assert "altered after its export" in altered.err

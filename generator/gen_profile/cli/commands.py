@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,6 +12,7 @@ from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import (
     OutputFile,
     as_overrides,
+    block_plot_option,
     chosen_spec,
     complete_presets,
     debug_option,
@@ -21,6 +24,11 @@ from gen_profile.cli.options import (
 )
 from gen_profile.cli.outcome import fail, print_outcome, warn
 from gen_profile.errors import OutputError, SpecError
+
+if TYPE_CHECKING:
+    from gen_profile.proof.check import BlockJudgement
+    from gen_profile.spec.model import Spec
+    from gen_profile.verification.check import Judgement
 
 
 @click.group(cls=DefaultGroup, epilog="Example: gen-profile crane.toml --export plc --out deploy")
@@ -171,6 +179,14 @@ def compare(
     type=OutputFile(),
     help="Write all scenarios as a table, one row each.",
 )
+@click.option(
+    "--histories",
+    metavar="N",
+    type=click.IntRange(1, 1_000_000),
+    help="Prove a planner block on N histories of commands.",
+)
+@click.option("--history", metavar="N", type=int, help="Run only this history of a planner block's proof.")
+@block_plot_option
 @json_option
 @debug_option
 def check(
@@ -179,14 +195,8 @@ def check(
     preset: str | None,
     overrides: tuple[str, ...],
     *,
-    samples: int | None,
-    scenario: int | None,
-    strict: bool,
-    scale: tuple[str, ...],
-    mirror: tuple[str, ...],
-    offset: tuple[str, ...],
-    table_path: Path | None,
     as_json: bool,
+    **options: Any,
 ) -> None:
     """Replay, co-simulate and judge an artefact.
 
@@ -196,8 +206,40 @@ def check(
     if overrides and not given:
         raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")
     spec = chosen_spec(spec_path, preset, overrides) if given else None
-    from gen_profile.artefacts.writing import deliver, require_place
     from gen_profile.cli import words
+    from gen_profile.proof.check import is_planner_block
+
+    judgement: Judgement | BlockJudgement
+    if is_planner_block(artefact):
+        _require_only(options, BLOCK_OPTIONS, "a motion, and this is a planner block")
+        judgement = _check_block(artefact, spec, **{name: options[name] for name in BLOCK_OPTIONS})
+        text = words.block_judgement(judgement)
+    else:
+        _require_only(options, MOTION_OPTIONS, "a planner block, and this is none")
+        judgement = _check_motion(artefact, spec, **{name: options[name] for name in MOTION_OPTIONS})
+        text = words.judgement(judgement)
+    print_outcome(judgement.to_dict(), text, as_json)
+    warn(judgement.check)
+    if not judgement.check.passed:
+        fail(judgement.check.reasons(), "Do not deploy it.")
+
+
+MOTION_OPTIONS = ("samples", "scenario", "strict", "scale", "mirror", "offset", "table_path")
+BLOCK_OPTIONS = ("histories", "history", "picture")
+
+
+def _require_only(options: Mapping[str, Any], known: Sequence[str], other: str) -> None:
+    """Refuse options that mean nothing here."""
+    for name, value in options.items():
+        if name not in known and value not in (None, False, ()):
+            option = {"table_path": "csv", "picture": "plot"}.get(name, name)
+            raise SpecError(f"--{option}: is for {other}.")
+
+
+def _check_motion(
+    artefact: Path, spec: Spec | None, *, scenario: int | None, table_path: Path | None, **options: Any
+) -> Judgement:
+    from gen_profile.artefacts.writing import deliver, require_place
     from gen_profile.cli.progress import progress
     from gen_profile.verification.check import check_artefact
     from gen_profile.verification.scenario_table import table
@@ -210,20 +252,31 @@ def check(
             artefact,
             spec,
             lambda: tell("compiling the plant's FMU, once"),
-            samples=samples,
             row=scenario,
-            strict=strict,
-            scale=scale,
-            mirror=mirror,
-            offset=offset,
             progress=lambda done, total: tell("checking by co-simulation", done, total),
+            **options,
         )
     if table_path is not None:
         deliver(table_path, table(judgement.spec, judgement.check).encode("utf-8"))
-    print_outcome(judgement.to_dict(), words.judgement(judgement), as_json)
-    warn(judgement.check)
-    if not judgement.check.passed:
-        fail(judgement.check.reasons(), "Do not deploy it.")
+    return judgement
+
+
+def _check_block(
+    artefact: Path, spec: Spec | None, *, histories: int | None, history: int | None, picture: Path | None
+) -> BlockJudgement:
+    from gen_profile.cli.progress import progress
+    from gen_profile.proof.check import check_block
+
+    if picture is not None:
+        from gen_profile.charts.picture import require_drawable
+        from gen_profile.charts.proof import draw
+
+        require_drawable(picture)
+    with progress() as tell:
+        judgement = check_block(artefact, spec, histories=histories, history=history, progress=tell)
+        if picture is not None:
+            draw(judgement.spec, judgement.text, judgement.check, picture, tell)
+    return judgement
 
 
 @cli.command(epilog="Example: gen-profile formats")

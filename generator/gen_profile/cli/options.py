@@ -120,6 +120,13 @@ plot_option = click.option(
     type=OutputFile(),
     help="Draw it (png, svg or pdf).",
 )
+block_plot_option = click.option(
+    "--plot",
+    "picture",
+    metavar="FILE",
+    type=OutputFile(),
+    help="Draw a planner block's worst history (or --history), and the worst over the live parameters.",
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
 debug_option = click.option(
     "--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."

@@ -14,6 +14,7 @@ import click
 from gen_profile.errors import CheckFailed, GenProfileError, OutputError
 
 if TYPE_CHECKING:
+    from gen_profile.proof.verdict import Proof
     from gen_profile.verification.verdict import Check
 
 INTERRUPTED = 128 + signal.SIGINT  # as shells count it
@@ -35,7 +36,7 @@ def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
         raise OutputError(f"Cannot print the outcome: {error.strerror}.") from error
 
 
-def warn(check: Check | None) -> None:
+def warn(check: Check | Proof | None) -> None:
     """Say what is wrong without counting."""
     beware(() if check is None else check.warnings())
 

@@ -11,13 +11,14 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import (
     OutputFile,
+    block_plot_option,
     chosen_spec,
     debug_option,
     json_option,
     spec_options,
 )
-from gen_profile.cli.outcome import print_outcome
-from gen_profile.errors import OutputError
+from gen_profile.cli.outcome import fail, print_outcome
+from gen_profile.errors import OutputError, SpecError
 
 
 class PlannerGroup(DefaultGroup):
@@ -59,6 +60,15 @@ def planner() -> None:
     default=Path("gen-profile-out"),
     help="Folder to write to; ./gen-profile-out by default.",
 )
+@click.option(
+    "--histories",
+    metavar="N",
+    type=click.IntRange(1, 1_000_000),
+    help="Prove it on N histories of commands; on 200 by default.",
+)
+@click.option("--no-check", is_flag=True, help="Skip the proof; the manifest then says unverified.")
+@click.option("--keep-failed", is_flag=True, help="Write the block even where the proof fails.")
+@block_plot_option
 @json_option
 @debug_option
 def write(
@@ -67,39 +77,47 @@ def write(
     overrides: tuple[str, ...],
     formats: tuple[str, ...],
     folder: Path,
+    histories: int | None,
+    no_check: bool,
+    keep_failed: bool,
+    picture: Path | None,
     as_json: bool,
 ) -> None:
-    """Write the planner block of a machine."""
+    """Write the planner block of a machine, proved by co-simulation."""
     spec = chosen_spec(spec_path, preset, overrides)
-    from gen_profile.artefacts.writing import staged
+    if picture is not None and no_check:
+        raise SpecError("--plot: draws what the proof found; leave --no-check out.")
+    from gen_profile.artefacts.manifest import FILENAME
+    from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.planner.design import planner_block
-    from gen_profile.planner.forms import block_files, require_forms
+    from gen_profile.designs.planner import deploy
+    from gen_profile.planner.forms import require_forms
+    from gen_profile.proof.prove import HISTORIES
 
     require_forms(formats)
 
+    if picture is not None:
+        from gen_profile.charts.picture import require_drawable
+        from gen_profile.charts.proof import draw
+
+        require_drawable(picture)
     with progress() as tell:
-        tell("finding the modes over the live ranges")
-        block = planner_block(spec)
-    files = block_files(block, spec, formats)
-    with staged(folder) as staging:
-        for file in files:
-            staging.write(file.filename, file.content)
-        staging.deliver()
-    sizes = {str(folder / file.filename): len(file.content) for file in files}
-    path, size = next(iter(sizes.items()))
-    document = {
-        "name": spec.name,
-        "path": path,
-        "bytes": size,
-        "files": [{"path": path, "bytes": size} for path, size in sizes.items()],
-        "modes": block.modes,
-        "live": {name: list(ends) for name, ends in spec.planner.live.items()},
-        "frequency_error": block.frequency_error,
-    }
-    lines = [f"{path}: {size} bytes" for path, size in sizes.items()]
-    lines.append(f"{block.modes} modes. Its motions are not proved by co-simulation.")
-    print_outcome(document, "\n".join(lines), as_json)
+        outcome = deploy(
+            spec,
+            formats,
+            folder,
+            histories=histories or HISTORIES,
+            check=not no_check,
+            keep_failed=keep_failed,
+            progress=tell,
+        )
+        if picture is not None and outcome.proof is not None:
+            draw(spec, outcome.block.text, outcome.proof, picture, tell)
+    print_outcome(outcome.to_dict(), words.deployment(outcome), as_json)
+    if outcome.proof is not None and not outcome.proof.passed:
+        before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
+        kept = "The block was kept." if outcome.files else f"Nothing was written{before}."
+        fail(outcome.proof.reasons(), kept)
 
 
 @planner.command(

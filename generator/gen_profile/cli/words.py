@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from gen_profile.comparison.compare import Comparison
     from gen_profile.comparison.robustness import Robustness
     from gen_profile.designs.design import Design
+    from gen_profile.designs.planner import Deployment
     from gen_profile.identification.identify import Identification
+    from gen_profile.proof.check import BlockJudgement
+    from gen_profile.proof.verdict import Proof
     from gen_profile.report.build import Report
     from gen_profile.spec.model import Spec
     from gen_profile.sweep.library import Library
@@ -33,6 +36,7 @@ MANIFEST_WORDS = {
     "none": "no manifest of this spec beside the file",
 }
 
+MOTION_LIMITS = ("velocity", "acceleration", "jerk")
 COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
 COSTLY_OVERSHOOT = 0.1  # of the sway on the way, likewise
 NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
@@ -99,6 +103,58 @@ def judgement(found: Judgement) -> str:
         ("check", _verdict(check)),
     ]
     return _block(str(found.path), rows)
+
+
+def deployment(outcome: Deployment) -> str:
+    """Tell what planner block was written, and how it was judged."""
+    rows = [("machine", f"{outcome.spec.plant.type}, {outcome.block.modes} modes")]
+    rows += [] if outcome.proof is None else _proof(outcome.proof)
+    if outcome.proof is None:
+        rows.append(("proof", "skipped"))
+    rows += [("wrote", f"{outcome.folder / file.path}, {file.bytes} bytes") for file in outcome.files]
+    return _block(outcome.spec.name, rows)
+
+
+def block_judgement(found: BlockJudgement) -> str:
+    """Tell how a planner block was judged, or what became of one history."""
+    rows = [("manifest", MANIFEST_WORDS[found.manifest])]
+    if found.history is None:
+        return _block(str(found.path), [*rows, *_proof(found.check)])
+    worst = found.check.worst
+    commands = (
+        f"{command.time:.3g} s {command.command}"
+        + (f" {command.value:.4g}" if command.command in ("position", "velocity") else "")
+        for command in worst.history.commands
+    )
+    rows += [
+        ("history", f"{worst.number}, {worst.group}, from {worst.history.places[0]:.4g} m"),
+        ("told", ", ".join(f"{name} {value:.4g}" for name, value in worst.history.live.items())),
+        ("commands", "; ".join(commands)),
+        ("residual sway", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.residual.items())),
+        ("sway on the way", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.on_the_way.items())),
+        ("history kept", "passed" if found.check.passed else "FAILED"),
+    ]
+    return _block(str(found.path), rows)
+
+
+def _proof(proof: Proof) -> list[tuple[str, str]]:
+    document, verdict = proof.to_dict(), "passed" if proof.passed else "FAILED"
+    worst = ", ".join(f"{load} {mm(sway)}" for load, sway in proof.worst.residual.items())
+    groups = [
+        (
+            f"{group['group']}, {group['histories']}",
+            f"worst {100.0 * group['worst_share']:.3g} % of the limit, "
+            + ", ".join(f"{100.0 * float(q):g} % ≤ {100.0 * s:.3g} %" for q, s in group["quantiles"].items()),
+        )
+        for group in document["groups"]
+    ]
+    limits = ", ".join(f"{name} {100.0 * document['limits'][name]:.4g} %" for name in MOTION_LIMITS)
+    return [
+        *groups,
+        ("limits", limits),
+        ("worst history", f"{proof.worst.number}: residual sway {worst}"),
+        ("proof", f"{verdict}: {100.0 * document['share']:.3g} % of the limit"),
+    ]
 
 
 def _groups(check: Check) -> list[tuple[str, str]]:

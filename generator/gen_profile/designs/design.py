@@ -158,9 +158,9 @@ def design(
         progress("exporting")
         artefacts, replayed = _export(spec, planned.evaluation.command, exporters, staging)
         worst = _check(spec, planned, replayed, progress) if check else None
-        _accompany(spec, staging)
+        accompany(spec, staging)
         manifest = _manifest(spec, planned, artefacts, worst)
-        staging.write(FILENAME, _after_earlier_ones(manifest, folder / FILENAME).to_json())
+        staging.write(FILENAME, after_earlier_ones(manifest, folder / FILENAME).to_json())
         delivered = worst is None or worst.passed or keep_failed
         if delivered:
             staging.deliver()
@@ -168,7 +168,7 @@ def design(
     return Design(spec=spec, plan=planned, check=worst, artefacts=kept, folder=folder)
 
 
-def _accompany(spec: Spec, staging: Staging) -> None:
+def accompany(spec: Spec, staging: Staging) -> None:
     """Put beside the manifest what the spec in it names: an own machine, a foreign judge."""
     if spec.plant.file is not None:
         staging.write(spec.plant.file.name, spec.plant.file.content)
@@ -256,7 +256,7 @@ def _manifest(spec: Spec, planned: Plan, artefacts: tuple[Artefact, ...], check:
     )
 
 
-def _after_earlier_ones(manifest: Manifest, path: Path) -> Manifest:
+def after_earlier_ones(manifest: Manifest, path: Path) -> Manifest:
     """Keep what the manifest in the output folder says of files that stay; replace a damaged one."""
     if not path.is_file():
         return manifest

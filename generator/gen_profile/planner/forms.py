@@ -81,9 +81,13 @@ def read_block(path: Path) -> str:
         It holds no function block.
     """
     try:
-        content = path.read_bytes()
+        return block_in(path, path.read_bytes())
     except OSError as error:
         raise OutputError(f"Cannot read the block {path}: {error.strerror}.") from error
+
+
+def block_in(path: Path, content: bytes) -> str:
+    """Read a function block's text out of what a file holds; raises as `read_block` does."""
     try:
         format_ = container_of(path)
     except SpecError:

@@ -153,6 +153,10 @@ class Histories:
             commands=tuple(self._commands(rows, first, manner, ending)),
         )
 
+    def machine(self, history: History, errors: Mapping[str, float]) -> dict[str, float]:
+        """Parameters of a machine that differs by some errors from what the block is told in a history."""
+        return _machine(self.spec, history.live, errors)[0]
+
     def _commands(self, rows: Array, first: float, manner: float, ending: float) -> Iterator[Command]:
         """Follow the rows until their time is over, then come to rest."""
         within = max(COMMANDED, PERIODS * self.period)

@@ -103,6 +103,8 @@ class Proof:
         Numbers of the histories that FMPy's own importer co-simulated, too.
     apart : float
         m, by which it found another sway at most.
+    faults : tuple of str
+        What else is wrong with the file, a sentence each.
     """
 
     limit: Mapping[str, float]
@@ -113,6 +115,7 @@ class Proof:
     judged: tuple[JudgedHistory, ...]
     by_fmpy: tuple[int, ...]
     apart: float
+    faults: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -162,7 +165,11 @@ class Proof:
                 f"FMPy co-simulates another sway, by {self.apart:.2g} m; this is an error of gen-profile: "
                 "please report it."
             )
-        return tuple(sentences)
+        return (*sentences, *self.faults)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Say what is wrong without counting: nothing."""
+        return ()
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON and the manifest."""
@@ -175,7 +182,7 @@ class Proof:
             "seed": self.seed,
             "search_parents": [list(numbers) for numbers in self.parents],
             "share": self.share(self.worst),
-            "worst": self.worst.to_dict(),
+            "worst": self.described(self.worst),
             "next_worst": [{"number": one.number, "share": self.share(one)} for one in ranked[1:LISTED]],
             "groups": [self._group(name) for name in GROUPS if self._of(name)],
             "limits": {name: max(one.limits[name] for one in self.judged) for name in self.judged[0].limits},
@@ -183,6 +190,10 @@ class Proof:
             "fmpy": {"histories": list(self.by_fmpy), "apart_m": self.apart},
             "reasons": list(self.reasons()),
         }
+
+    def described(self, judged: JudgedHistory) -> dict[str, Any]:
+        """Nest plain values of a history for JSON, its share of the limit among them."""
+        return {**judged.to_dict(), "share": self.share(judged)}
 
     def _of(self, group: str) -> list[JudgedHistory]:
         return [one for one in self.judged if one.group == group]

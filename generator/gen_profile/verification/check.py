@@ -112,16 +112,16 @@ def check_artefact(
     path = Path(path)
     content, format_ = read_artefact(path), format_of(path)
     manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
-    spec = spec or _spec_of(manifest, path)
+    spec = spec or spec_of(manifest, path)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
     variant = parse_variant(spec, scale, mirror, offset)
-    standing = _provenance(manifest, content, spec)
+    standing = provenance(manifest, content, spec)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     judged = varied(spec, setpoints, variant) if variant.told() else (spec, setpoints)
     rows, searched = _rows(*judged, row, on_build)
     check = _verdict(*judged, rows, on_build, progress)
-    faults = (*check.faults, *_alterations(path, standing))
+    faults = (*check.faults, *alterations(path, standing))
     check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
     return Judgement(
         path=path, format=format_, spec=spec, check=check, manifest=standing, variant=variant.told()
@@ -194,7 +194,13 @@ def _every_other(setpoints: SampledProfile) -> SampledProfile:
     )
 
 
-def _spec_of(manifest: Manifest | None, path: Path) -> Spec:
+def spec_of(manifest: Manifest | None, path: Path) -> Spec:
+    """Read the spec in the manifest beside a file.
+
+    Raises
+    ------
+    OutputError
+    """
     if manifest is None:
         raise OutputError(
             f"There is no {FILENAME} beside {path}, so its spec is unknown; name the spec: "
@@ -206,7 +212,8 @@ def _spec_of(manifest: Manifest | None, path: Path) -> Spec:
         raise OutputError(f"The spec in {path.parent / FILENAME} is faulty: {error}") from error
 
 
-def _provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
+def provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
+    """Tell whether a file is the one of a manifest: it matches, differs, or there is none of this spec."""
     if manifest is None or manifest.spec_sha256 != spec.sha256():
         return "none"
     if sha256(content) in {artefact.sha256 for artefact in manifest.artefacts}:
@@ -214,7 +221,7 @@ def _provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
     return "differs"
 
 
-def _alterations(path: Path, standing: str) -> tuple[str, ...]:
+def alterations(path: Path, standing: str) -> tuple[str, ...]:
     """Say that a file is none of those that were exported."""
     if standing != "differs":
         return ()

@@ -1,0 +1,129 @@
+"""From a spec to a planner block that was proved by co-simulation before anyone can take it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, sha256
+from gen_profile.artefacts.writing import staged
+from gen_profile.designs.design import LIBRARIES, accompany, after_earlier_ones
+from gen_profile.planner.design import PlannerBlock, planner_block
+from gen_profile.planner.forms import block_files, block_in
+from gen_profile.progress import Progress, untold
+from gen_profile.proof.check import FORMAT
+from gen_profile.proof.prove import HISTORIES, prove
+from gen_profile.proof.verdict import Proof
+from gen_profile.spec.model import Spec
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Deployment:
+    """A planner block, and how it was judged.
+
+    Attributes
+    ----------
+    spec : Spec
+    block : PlannerBlock
+    proof : Proof or None
+        None where none was asked for.
+    folder : Path
+    files : tuple of Artefact
+        What was delivered; empty when the proof failed.
+    """
+
+    spec: Spec
+    block: PlannerBlock
+    proof: Proof | None
+    folder: Path
+    files: tuple[Artefact, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON; see the command-line contract."""
+        files = [
+            {"path": os.path.relpath(self.folder / file.path), "bytes": file.bytes, "sha256": file.sha256}
+            for file in self.files
+        ]
+        return {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "path": files[0]["path"] if files else None,
+            "bytes": files[0]["bytes"] if files else None,
+            "files": files,
+            "modes": self.block.modes,
+            "live": {name: list(ends) for name, ends in self.spec.planner.live.items()},
+            "frequency_error": self.block.frequency_error,
+            "proof": None if self.proof is None else self.proof.to_dict(),
+        }
+
+
+def deploy(
+    spec: Spec,
+    formats: Sequence[str],
+    folder: Path | str,
+    *,
+    histories: int = HISTORIES,
+    check: bool = True,
+    keep_failed: bool = False,
+    progress: Progress = untold,
+) -> Deployment:
+    """Write a planner block, prove what was written, and deliver what passes.
+
+    Parameters
+    ----------
+    spec : Spec
+    formats : sequence of str
+        Names of formats that carry function blocks. All hold the same program; that of the first is executed.
+    folder : Path or str
+        Made if needed; files of the same names are replaced, others are left alone.
+    histories : int
+        Of commands, that it is proved on.
+    check : bool
+        Without it the manifest says ``"unverified"``.
+    keep_failed : bool
+        Deliver even what failed, marked so in the manifest.
+    progress : callable
+        Told what is being done.
+
+    Raises
+    ------
+    GenProfileError
+        Nothing was written.
+    """
+    folder = Path(folder)
+    progress("finding the modes over the live ranges")
+    block = planner_block(spec)
+    files = block_files(block, spec, formats)
+    with staged(folder) as staging:
+        written = {file.filename: staging.write(file.filename, file.content) for file in files}
+        first = files[0].filename
+        text = block_in(Path(first), written[first])
+        proof = prove(spec, text, histories=histories, progress=progress) if check else None
+        accompany(spec, staging)
+        manifest = _manifest(spec, written, proof)
+        staging.write(FILENAME, after_earlier_ones(manifest, folder / FILENAME).to_json())
+        delivered = proof is None or proof.passed or keep_failed
+        if delivered:
+            staging.deliver()
+    kept = manifest.artefacts if delivered else ()
+    return Deployment(spec=spec, block=block, proof=proof, folder=folder, files=kept)
+
+
+def _manifest(spec: Spec, written: Mapping[str, bytes], proof: Proof | None) -> Manifest:
+    return Manifest(
+        name=spec.name,
+        spec=spec.to_dict(),
+        spec_sha256=spec.sha256(),
+        profile_sha256="",  # it holds no motion
+        versions={library: version(library) for library in LIBRARIES},
+        artefacts=tuple(
+            Artefact(format=FORMAT, path=name, sha256=sha256(content), bytes=len(content))
+            for name, content in written.items()
+        ),
+        check=None if proof is None else proof.to_dict(),
+    )

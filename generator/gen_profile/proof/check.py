@@ -1,0 +1,138 @@
+"""Proving a planner block that lies on disk, whoever wrote or altered it, and replaying its histories."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from gen_profile.artefacts.manifest import FILENAME, Manifest
+from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.errors import ExportError, SpecError
+from gen_profile.planner.forms import block_in, read_block
+from gen_profile.progress import Progress, untold
+from gen_profile.proof.histories import Histories
+from gen_profile.proof.numbering import Numbering
+from gen_profile.proof.prove import HISTORIES, prove, replay
+from gen_profile.proof.verdict import Proof
+from gen_profile.spec.model import Spec
+from gen_profile.verification.check import alterations, provenance, spec_of
+from gen_profile_exporters.registry import container_of
+
+FORMAT = "planner"
+_FUNCTION_BLOCK = re.compile(r"^\s*FUNCTION_BLOCK\s+\w+_planner\s*$", re.MULTILINE | re.IGNORECASE)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class BlockJudgement:
+    """A proof of one file, and what its manifest says about it.
+
+    Attributes
+    ----------
+    path : Path
+    text : str
+    spec : Spec
+    check : Proof
+        Of all histories, or of the one that was asked for.
+    manifest : str
+        ``"matches"``, ``"differs"`` (the file is not the one that was written), or ``"none"`` for this spec.
+    history : int or None
+        Number of the only one.
+    """
+
+    path: Path
+    text: str = attrs.field(repr=False)
+    spec: Spec
+    check: Proof
+    manifest: str
+    history: int | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        named = {
+            "name": self.spec.name,
+            "spec_sha256": self.spec.sha256(),
+            "artefact": {"format": FORMAT, "path": str(self.path), "manifest": self.manifest},
+        }
+        if self.history is None:
+            return {**named, "proof": self.check.to_dict()}
+        history = self.check.described(self.check.worst)
+        return {**named, "history": history, "reasons": list(self.check.reasons())}
+
+
+def is_planner_block(path: Path) -> bool:
+    """Tell by a file's text whether it holds a planner block.
+
+    Raises
+    ------
+    OutputError
+        It cannot be read.
+    """
+    try:
+        container_of(path)
+        return _FUNCTION_BLOCK.search(read_block(path)) is not None
+    except (SpecError, ExportError):  # none that carries blocks, or that holds none
+        return False
+
+
+def check_block(
+    path: Path | str,
+    spec: Spec | None = None,
+    *,
+    histories: int | None = None,
+    history: int | None = None,
+    progress: Progress = untold,
+) -> BlockJudgement:
+    """Prove a file again, or replay one history of its proof, and compare it with its manifest.
+
+    Parameters
+    ----------
+    path : Path or str
+        A planner block.
+    spec : Spec, optional
+        Taken from ``manifest.json`` beside the file when not given.
+    histories : int, optional
+        How many, in place of those that the manifest tells of.
+    history : int, optional
+        Number of the only one to run.
+    progress : callable
+        Told what is being done.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read, or there is no spec.
+    SpecError
+        There is no history of that number, or the spec has no planner block.
+    ExportError
+        It is no planner block that can be executed.
+    CosimulationError
+    """
+    path = Path(path)
+    content = read_artefact(path)
+    manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
+    spec = spec or spec_of(manifest, path)
+    text = block_in(path, content)
+    standing = provenance(manifest, content, spec)
+    known = _record(manifest) if standing != "none" else {}
+    count = histories or known.get("histories", HISTORIES)
+    if history is not None and not 0 <= history < count:
+        raise SpecError(f"--history {history}: the histories are numbered from 0 to {count - 1}.")
+    if history is None:
+        found = prove(spec, text, histories=count, progress=progress)
+    else:
+        if known.get("histories") != count:  # the search's histories depend on what it has found
+            known = prove(spec, text, histories=count, progress=progress).to_dict()
+        seed, parents = known["seed"], known["search_parents"]
+        numbering = Numbering.of(Histories.of(spec), count, seed, parents)
+        found = replay(spec, text, numbering, history, progress)
+    check = attrs.evolve(found, faults=alterations(path, standing))
+    return BlockJudgement(path=path, text=text, spec=spec, check=check, manifest=standing, history=history)
+
+
+def _record(manifest: Manifest | None) -> Mapping[str, Any]:
+    """Read what the manifest tells of the proof; nothing of a block that was not proved."""
+    return (manifest.check if manifest else None) or {}
