@@ -130,7 +130,9 @@ def test_the_command_line_plays_any_of_them(tmp_path, monkeypatch):
     assert refused.code == 2
     assert not (tmp_path / "deploy").exists()
     formats = [word for name in ("plc", "siemens-scl", "codesys") for word in ("--export", name)]
-    written = run_here("planner", "write", "bay.toml", "--out", "deploy", *formats, "--json").document
+    written = run_here(
+        "planner", "write", "bay.toml", "--out", "deploy", *formats, "--histories", 4, "--json"
+    ).document
     (tmp_path / "commands.csv").write_text("time_s,command,value\n0,position,0.5\n")
     tables = []
     for file in written["files"]:

@@ -39,8 +39,21 @@ def spec():
 
 
 @pytest.fixture(scope="module")
-def text(spec):
-    return planner_block(spec).text
+def block(spec):
+    return planner_block(spec)
+
+
+@pytest.fixture(scope="module")
+def text(block):
+    return block.text
+
+
+@pytest.fixture(scope="module")
+def designed(block):
+    """Spare the command line the design of the block, which depends on neither errors nor limits of sway."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("gen_profile.designs.planner.planner_block", lambda _: block)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +126,17 @@ def test_every_history_can_be_had_again_by_its_number(spec, text, proof):
 def test_what_is_found_does_not_depend_on_the_number_of_workers(spec, text, proof):
     other = prove(spec, text, histories=40, workers=3)
     assert other.to_dict() == proof.to_dict()
+
+
+def test_the_ends_of_every_choice_make_a_history(spec):
+    histories = Histories.of(spec)
+    for end, rope, load, place in ((0.0, 0.95 * 3.0, 1e-6, 0.0), (1.0, 1.05 * 9.0, 2000.0, 40.0)):
+        history = histories.history(np.full(histories.choices, end))
+        assert history.parameters["L1"] == pytest.approx(rope)
+        assert history.parameters["m2"] == pytest.approx(load, abs=1.0)
+        assert history.places == (place,)
+        assert history.commands
+        assert [one.time for one in history.commands] == sorted(one.time for one in history.commands)
 
 
 def scaled(text, name, factor, part=slice(None)):
@@ -211,12 +235,13 @@ def test_after_a_quick_stop_nothing_is_promised(spec):
 
 
 @pytest.fixture(scope="module")
-def deployed(tmp_path_factory):
+def deployed(tmp_path_factory, designed):
     """The bay crane's block as the command line writes it."""
     folder = tmp_path_factory.mktemp("deployed")
     (folder / "bay.toml").write_text(BAY)
     options = ("--out", folder, "--histories", 24, "--plot", folder / "proof.svg", "--json")
     written = run_here("planner", "write", folder / "bay.toml", *options)
+    assert written.code == 0, written.err
     return folder, written.document
 
 
@@ -261,6 +286,7 @@ def test_what_means_nothing_for_a_block_is_refused(deployed, options, words):
     assert words in refused.err
 
 
+@pytest.mark.usefixtures("designed")
 def test_a_block_that_sways_too_much_is_not_written(tmp_path):
     (tmp_path / "bay.toml").write_text(BAY.replace("residual_sway = 0.05", "residual_sway = 0.001"))
     options = ("--out", tmp_path / "out", "--histories", 8, "--json")
@@ -270,7 +296,8 @@ def test_a_block_that_sways_too_much_is_not_written(tmp_path):
     assert "Nothing was written" in failed.err
     assert failed.document["path"] is None
     assert not (tmp_path / "out").exists()
-    run_here("planner", "write", tmp_path / "bay.toml", *options, "--keep-failed")
+    kept = run_here("planner", "write", tmp_path / "bay.toml", *options, "--keep-failed")
+    assert kept.code == 4
     assert not json.loads((tmp_path / "out" / "manifest.json").read_text())["check"]["passed"]
 
 

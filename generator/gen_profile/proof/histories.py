@@ -160,7 +160,7 @@ class Histories:
     def _commands(self, rows: Array, first: float, manner: float, ending: float) -> Iterator[Command]:
         """Follow the rows until their time is over, then come to rest."""
         within = max(COMMANDED, PERIODS * self.period)
-        likely = MANNERS[int(manner * len(MANNERS))]
+        likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
         time = first * SOONEST
         for which, value, lasts in rows.tolist():
             if time > within:
