@@ -17,7 +17,7 @@ from gen_profile.cli.options import (
     json_option,
     spec_options,
 )
-from gen_profile.cli.outcome import fail, print_outcome
+from gen_profile.cli.outcome import fail, print_outcome, warn
 from gen_profile.errors import OutputError, SpecError
 
 
@@ -114,6 +114,7 @@ def write(
         if picture is not None and outcome.proof is not None:
             draw(spec, outcome.block.text, outcome.proof, picture, tell)
     print_outcome(outcome.to_dict(), words.deployment(outcome), as_json)
+    warn(outcome.proof)
     if outcome.proof is not None and not outcome.proof.passed:
         before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
         kept = "The block was kept." if outcome.files else f"Nothing was written{before}."

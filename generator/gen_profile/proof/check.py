@@ -11,8 +11,8 @@ import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, Manifest
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
-from gen_profile.errors import ExportError, SpecError
-from gen_profile.planner.forms import block_in, read_block
+from gen_profile.errors import ExportError, OutputError, SpecError
+from gen_profile.planner.forms import block_in
 from gen_profile.progress import Progress, untold
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
@@ -71,10 +71,11 @@ def is_planner_block(path: Path) -> bool:
     OutputError
         It cannot be read.
     """
+    content = read_artefact(path)
     try:
         container_of(path)
-        return _FUNCTION_BLOCK.search(read_block(path)) is not None
-    except (SpecError, ExportError):  # none that carries blocks, or that holds none
+        return _FUNCTION_BLOCK.search(block_in(path, content)) is not None
+    except (SpecError, ExportError, OutputError):  # none that carries blocks, or that holds none
         return False
 
 

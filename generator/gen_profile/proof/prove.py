@@ -132,4 +132,5 @@ def _verdict(spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequenc
         judged=tuple(judged),
         by_fmpy=tuple(by_fmpy),
         apart=apart,
+        sway_limit=spec.limits.sway,
     )

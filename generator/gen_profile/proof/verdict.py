@@ -103,6 +103,8 @@ class Proof:
         Numbers of the histories that FMPy's own importer co-simulated, too.
     apart : float
         m, by which it found another sway at most.
+    sway_limit : float or None
+        Allowed sway of the end load at any time in m, which no planner block keeps.
     faults : tuple of str
         What else is wrong with the file, a sentence each.
     """
@@ -115,6 +117,7 @@ class Proof:
     judged: tuple[JudgedHistory, ...]
     by_fmpy: tuple[int, ...]
     apart: float
+    sway_limit: float | None = None
     faults: tuple[str, ...] = ()
 
     @property
@@ -168,8 +171,16 @@ class Proof:
         return (*sentences, *self.faults)
 
     def warnings(self) -> tuple[str, ...]:
-        """Say what is wrong without counting: nothing."""
-        return ()
+        """Say what is wrong without counting: sway on the way."""
+        end_load = list(self.limit)[-1]
+        swaying = max(self.judged, key=lambda one: one.on_the_way[end_load])
+        if self.sway_limit is None or swaying.on_the_way[end_load] <= self.sway_limit:
+            return ()
+        return (
+            f"The {end_load} sways by {1e3 * swaying.on_the_way[end_load]:.4g} mm on the way in history "
+            f"{swaying.number}, and {1e3 * self.sway_limit:.4g} mm are stated (limits.sway), which a planner "
+            "block does not look at: accelerate less.",
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON and the manifest."""
