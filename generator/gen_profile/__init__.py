@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from gen_profile.motion.profile import Profile as Profile
     from gen_profile.motion.profile import SampledProfile as SampledProfile
     from gen_profile.motion.profile import sample as sample
+    from gen_profile.planner.planner import Planner as Planner
     from gen_profile.spec.model import Spec as Spec
     from gen_profile.spec.reading import evolve_spec as evolve_spec
     from gen_profile.spec.reading import make_spec as make_spec
@@ -53,6 +54,7 @@ _HOMES = {
     "InfeasibleProblem": "errors",
     "LimitViolation": "errors",
     "OutputError": "errors",
+    "Planner": "planner.planner",
     "Profile": "motion.profile",
     "SampledProfile": "motion.profile",
     "SolverDiverged": "errors",

@@ -1,7 +1,9 @@
 """The forms of the planner block: containers, C99 and Python do what its Structured Text says."""
 
 import ctypes
+import io
 import math
+import re
 import subprocess
 import sys
 
@@ -11,7 +13,9 @@ from command_line import run_here
 from lxml import etree
 from system_parts import program as program_of
 
+import gen_profile as gp
 from gen_profile.errors import SpecError
+from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block
@@ -113,6 +117,67 @@ def test_c_plus_plus_takes_the_header(block, tmp_path):
     command = [sys.executable, "-m", "ziglang", "c++", "-Wall", "-Werror", "-c", "user.cpp", "-o", "user.o"]
     subprocess.run(command, cwd=tmp_path, check=True)
     assert b"_Z10bay_3_init" not in (tmp_path / "user.o").read_bytes()  # the mangled name
+
+
+class TestInPython:
+    def test_a_history_is_that_of_the_played_block(self, block):
+        """Steps, stretches and columns are the same inputs."""
+        commands = (
+            "time_s,command,value,L1\n0.4,position,3.0,5.5\n2,position,2.5,\n4,velocity,0.3,\n8,stop,,\n"
+        )
+        played = np.genfromtxt(io.StringIO(play(block.text, commands).table), delimiter=",", names=True)
+        planner = gp.Planner(SPEC)
+        parts = [
+            planner.hold(0.4),
+            planner.hold(1.6, target=3.0, live={"L1": 5.5}),
+            planner.hold(1.0, target=2.5),
+            planner.hold(1.0),
+            planner.hold(4.0, velocity=np.full(1000, 0.3)),
+        ]
+        steps = [planner.step(stop=True) for _ in range(500)]
+        for name, column in (
+            ("position", "position_m"),
+            ("stop_distance", "stop_distance_m"),
+            ("busy", "busy"),
+        ):
+            issued = [*np.concatenate([getattr(p, name) for p in parts]), *(getattr(s, name) for s in steps)]
+            np.testing.assert_array_equal(issued, played[column][: len(issued)])
+        assert planner.live == {"L1": 5.5}
+
+    def test_a_target_of_every_cycle_is_one_command_and_a_new_one_another(self):
+        planner = gp.Planner(SPEC)
+        for target in (0.5, 0.5, 0.6, 0.7):
+            planner.step(target=target)
+        assert planner.step(target=0.7).outputs["fDistanceToGo"] == 0.7
+        assert planner.hold(20.0, target=0.7).position[-1] == 0.7
+        assert planner.step(target=0.7).done
+
+    def test_it_goes_on_after_a_quick_stop(self):
+        planner = gp.Planner(SPEC, position=4.0)
+        planner.hold(4.0, target=9.0)
+        stopped = planner.hold(3.0, quick_stop=True)
+        assert not stopped.promise[-1]
+        planner.restart(stopped.position[-1])
+        again = planner.hold(15.0, target=9.0)
+        assert again.promise[-1]
+        assert again.done[-1]
+        assert again.position[-1] == 9.0
+
+    def test_what_makes_no_sense_is_refused_in_a_sentence(self, tmp_path):
+        planner = gp.Planner(SPEC)
+        for given, words in (
+            ({"target": 1.0, "stop": True}, "give one of target, velocity, stop and quick_stop"),
+            ({"live": {"L2": 1.0}}, "no live parameter 'L2' (known: L1)"),
+            ({"target": "far"}, "target: must be a number, found 'far'"),
+            ({"velocity": np.zeros(3)}, "velocity: must be a number or one for each of 250 cycles"),
+        ):
+            with pytest.raises(gp.SpecError, match=re.escape(words)):
+                planner.hold(1.0, **given)
+        with pytest.raises(gp.SpecError, match=r"at least one cycle of 0\.004 s"):
+            planner.hold(0.0)
+        with pytest.raises(gp.OutputError, match=r"Cannot read the block .*none.st: No such file"):
+            gp.Planner(tmp_path / "none.st")
+        assert planner.hold(0.1, target=math.nan).error_id[-1] == 3
 
 
 def test_a_format_without_blocks_is_refused(block):

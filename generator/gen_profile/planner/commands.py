@@ -135,10 +135,7 @@ def play(text: str, commands_text: str) -> IssuedSetpoints:
     """
     block = BlockInstance(text)
     initial = block.inputs
-    live = tuple(name[1:] for name in initial if name not in STANDARD)
-    if missing := [name for name in STANDARD if name not in initial]:
-        raise SpecError(f"The function block has no input {missing[0]}, so it is no planner block.")
-    commands = read_commands(commands_text, live)
+    commands = read_commands(commands_text, tuple(live_inputs(initial)))
     cycle = initial["fCycleTime"]
     issued = np.vstack(list(_issued(block, commands, cycle)))
     places = {name: block.outputs.index(output) for name, output in COLUMNS.items()}
@@ -155,6 +152,19 @@ STANDARD = (
     *("bEnable", "bExecute", "bVelocity", "bStop", "bQuickStop", "fTarget", "fVelocityCommand"),
     *("fVelocityLimit", "rOverride", "fActPosition", "fCycleTime"),
 )
+
+
+def live_inputs(inputs: Mapping[str, float]) -> dict[str, str]:
+    """Tell which inputs of a planner block are live parameters, by the parameters' names.
+
+    Raises
+    ------
+    SpecError
+        It is no planner block.
+    """
+    if missing := [name for name in STANDARD if name not in inputs]:
+        raise SpecError(f"The function block has no input {missing[0]}, so it is no planner block.")
+    return {name[1:]: name for name in inputs if name not in STANDARD}
 
 
 def input_rows(
