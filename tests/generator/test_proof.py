@@ -2,6 +2,7 @@
 
 import json
 import re
+from time import sleep
 
 import attrs
 import numpy as np
@@ -132,6 +133,27 @@ def test_sway_on_the_way_is_told_where_it_is_limited(proof):
     (sentence,) = attrs.evolve(proof, sway_limit=0.1).warnings()
     assert "mm on the way" in sentence
     assert "100 mm are stated (limits.sway)" in sentence
+
+
+def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypatch):
+    begun = []
+
+    def run(self, history):
+        begun.append(history)
+        sleep(0.01)
+        return GOOD
+
+    monkeypatch.setattr(ClosedLoop, "run", run)
+    histories = Histories.of(spec)
+    many = [histories.history(choices) for choices in histories.drawn(4, seed=0)] * 1000
+    with (
+        ClosedLoop(spec, text, histories) as loop,
+        pytest.raises(KeyboardInterrupt),
+        loop.runs(many) as runs,
+    ):
+        next(runs)
+        raise KeyboardInterrupt
+    assert len(begun) < len(many)
 
 
 def test_every_history_can_be_had_again_by_its_number(spec, text, proof):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
@@ -85,10 +85,14 @@ class ClosedLoop:
         """Names of the block's outputs, which a trace begins with; the loads' sway follows."""
         return self._block.outputs
 
-    def runs(self, histories: Iterable[History]) -> Iterator[BlockRun]:
-        """Run histories on all workers; in their order."""
-        with ThreadPoolExecutor(self._workers) as pool:
-            yield from pool.map(self.run, histories)
+    @contextmanager
+    def runs(self, histories: Iterable[History]) -> Iterator[Iterator[BlockRun]]:
+        """Run histories on all workers, in their order; those not begun when it closes are left out."""
+        pool = ThreadPoolExecutor(self._workers)
+        try:
+            yield pool.map(self.run, histories)
+        finally:
+            pool.shutdown(cancel_futures=True)
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
         """Let the machine of a history follow the block.

@@ -95,11 +95,12 @@ def _judge(
     """Run the histories of some numbers."""
     histories = [numbering.history(number) for number in numbers]
     judged = []
-    for number, history, run in zip(numbers, histories, loop.runs(histories), strict=True):
-        group = numbering.group(number)
-        judged.append(judge_run(spec, run, history, cycle=loop.cycle, number=number, group=group))
-        if number % TOLD == 0:
-            progress("proving", number, numbering.count)
+    with loop.runs(histories) as runs:
+        for number, history, run in zip(numbers, histories, runs, strict=True):
+            group = numbering.group(number)
+            judged.append(judge_run(spec, run, history, cycle=loop.cycle, number=number, group=group))
+            if number % TOLD == 0:
+                progress("proving", number, numbering.count)
     return judged
 
 
