@@ -462,3 +462,27 @@ class TestSlowMotions:
     def test_what_cannot_be_meant(self, deployed, options, words):
         outcome = run_here("stream", deployed / "paper.log", *AWAY, *options)
         assert (outcome.code, words in outcome.err) == (2, True)
+
+
+class TestSeveralBuses:
+    SPEC = (
+        *("--preset", "gantry-crane", "--set", "can.channels={x='left', y='right'}"),
+        *("--set", "can.sync_period=0.05", "--set", "can.timeout=0.5"),
+    )
+
+    def test_a_simulation(self, hasty):
+        outcome = run_here("stream", *self.SPEC, "--simulate-drive", "--json")
+        assert (outcome.code, outcome.document["state"], outcome.document["reason"]) == (0, "done", "")
+        assert outcome.document["drive"]["position_error_m"] < 1e-6
+
+    def test_the_spec_names_the_channels(self):
+        bus = ("--interface", "virtual", "--channel", "left")
+        outcome = run_here("stream", *self.SPEC, *bus)
+        assert (outcome.code, "--channel: the spec states every axis's" in outcome.err) == (2, True)
+
+    def test_a_channel_that_is_not_there(self):
+        outcome = run_here("drive-sim", *self.SPEC, "--interface", "socketcan")
+        assert (outcome.code, "--interface socketcan --channel left: cannot be opened" in outcome.err) == (
+            2,
+            True,
+        )

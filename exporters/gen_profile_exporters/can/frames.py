@@ -8,6 +8,7 @@ others.
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
 
@@ -38,6 +39,7 @@ SDO_REQUEST = 0x600
 HEARTBEAT = 0x700
 MASTER = 127  # node id under which the streamer sends its heartbeat
 LAST_NODE = 126
+CHANNEL = "can0"  # of drives that are all on one bus
 
 MOST_LOAD = Decimal("0.7")  # of the bus, at worst; the rest is for SDOs, heartbeats and repeated frames
 MICROSECONDS = 1_000_000
@@ -56,6 +58,7 @@ class SetpointFrame:
 
     Attributes
     ----------
+    channel : str
     cob_id : int
     column : int
         Of the axes, whose it is.
@@ -69,6 +72,7 @@ class SetpointFrame:
         What is the same in every cycle of the motion.
     """
 
+    channel: str
     cob_id: int
     column: int
     fields: tuple[Field, ...]
@@ -92,6 +96,16 @@ class SetpointFrame:
         return all(
             place < self.width or value == self.constants[place - self.width] for place, value in found
         )
+
+
+def channels(target: Target) -> tuple[str, ...]:
+    """List the channel of each axis's drive, in the axes' order."""
+    return tuple(target.can.channels.get(axis.name, CHANNEL) for axis in target.axes)
+
+
+def buses(target: Target) -> tuple[str, ...]:
+    """List the channels, in the order in which SYNC is sent on them."""
+    return tuple(dict.fromkeys(channels(target)))
 
 
 def nodes(target: Target) -> tuple[int, ...]:
@@ -175,6 +189,7 @@ def _frames(target: Target, pdos: Iterable[int]) -> tuple[SetpointFrame, ...]:
     received = layout(target.can).received
     return tuple(
         SetpointFrame(
+            channel=channel,
             cob_id=own[pdo],
             column=column,
             fields=received[pdo],
@@ -182,7 +197,7 @@ def _frames(target: Target, pdos: Iterable[int]) -> tuple[SetpointFrame, ...]:
             width=len(sent),
             constants=tuple(kept.values()),
         )
-        for column, own in enumerate(cob_ids(target))
+        for column, (channel, own) in enumerate(zip(channels(target), cob_ids(target), strict=True))
         for pdo in pdos
     )
 
@@ -228,10 +243,14 @@ def frame_bits(data_bytes: int) -> int:
 
 
 def cycle_bits(target: Target) -> int:
-    """Bits of one cycle at their most: SYNC and, per axis, setpoints and an answer."""
+    """Bits of one cycle at their most: SYNC and, per axis, setpoints and an answer; on the fullest bus."""
     plan = layout(target.can)
     sizes = [packing(fields).size for fields in (*plan.setpoints.values(), plan.told)]
-    return frame_bits(0) + len(target.axes) * sum(map(frame_bits, sizes))
+    return frame_bits(0) + _most_axes(target) * sum(map(frame_bits, sizes))
+
+
+def _most_axes(target: Target) -> int:
+    return max(Counter(channels(target)).values())
 
 
 def require_load(target: Target) -> None:
@@ -242,7 +261,7 @@ def require_load(target: Target) -> None:
     ExportError
         With the shortest period that fits.
     """
-    axes, can, bits = len(target.axes), target.can, cycle_bits(target)
+    axes, can, bits = _most_axes(target), target.can, cycle_bits(target)
     shortest = bits / (MOST_LOAD * can.bitrate)
     if Decimal(repr(can.sync_period)) < shortest:
         raise ExportError(

@@ -24,9 +24,11 @@ from gen_profile.errors import OutputError, SpecError, StreamAborted
 
 if TYPE_CHECKING:
     from gen_profile.progress import Progress
+    from gen_profile.spec.can import CanSpec
     from gen_profile.streaming.outcome import Source, StreamOutcome
     from gen_profile_exporters.can.host.lateness import Lateness
     from gen_profile_exporters.can.host.port import Port
+    from gen_profile_exporters.exporter import Target
 
 VIRTUAL = ("virtual", "gen-profile")
 _MISSES = ("extrapolate", "hold", "stop")
@@ -104,12 +106,17 @@ def stream(
     from gen_profile_exporters.can.host.port import Port
 
     run.require_extra()
+    from gen_profile_exporters.can.streaming import joint_bus
+
     overrides += as_overrides({"can.mode": mode, "can.node": node})
     with progress() as tell:
 
-        def require_bus(bitrate: int) -> None:
+        def port_of(can: CanSpec) -> Port:
+            return Port(**_port(interface, channel, simulate_drive, can))
+
+        def require_bus(target: Target) -> None:
             if not dry_run:
-                Port(**_port(interface, channel, simulate_drive)).open(bitrate).shutdown()
+                joint_bus.opened(port_of(target.can), target).shutdown()
 
         source = _source(
             spec_path,
@@ -121,7 +128,7 @@ def stream(
         )
         if to_start or jog:
             _require_moving_alone(to_start, jog, dry_run)
-            port = Port(**_port(interface, channel, simulate_drive))
+            port = port_of(source.spec.can)
             slow = _slow(source, port, jog, simulate_drive, tell)
             if slow is None:
                 print_outcome(*_at_start(source), as_json)
@@ -131,7 +138,7 @@ def stream(
             plan = run.summary(source)
             print_outcome(plan, _plan_words(plan, _units(source)), as_json)
             return
-        port = Port(**_port(interface, channel, simulate_drive))
+        port = port_of(source.spec.can)
         if table is not None:
             require_place(table)  # the log of a motion that was made must not be lost
         notes: tuple[str, ...] = ()
@@ -179,17 +186,19 @@ def drive_sim(
     from gen_profile.streaming.load import CraneLoad
     from gen_profile_exporters.can.host.port import Port
     from gen_profile_exporters.can.simulation import drive_dictionary
+    from gen_profile_exporters.can.streaming import joint_bus
+    from gen_profile_exporters.exporter import target_of
 
     spec = chosen_spec(spec_path, preset, overrides)
     make = drive_dictionary.DriveVariant(miss=miss, own_mapping=own_mapping)
     if eds is not None:
         deliver(eds, drive_dictionary.eds(spec.can.node, make, eds.name).encode("utf-8"))
         return
-    port = Port(**_port(interface, channel, False))
+    port = Port(**_port(interface, channel, False, spec.can))
     with (
         progress() as tell,
         CraneLoad(spec, lambda: tell("compiling the plant's FMU, once")) as load,
-        port.open(spec.can.bitrate) as bus,
+        joint_bus.opened(port, target_of(spec)) as bus,
     ):
         bank = run.drive_bank(spec, bus, load, make)
         tell("waiting for a stream, or serving it")
@@ -262,11 +271,12 @@ def _source(
     overrides: tuple[str, ...],
     *,
     accept_unverified: bool,
-    require_bus: Callable[[int], None],
+    require_bus: Callable[[Target], None],
     tell: Progress,
 ) -> Source:
     """Take an artefact, or design one for a spec, once there is a bus for it."""
     from gen_profile.streaming.stream import designed, require_rest, verified
+    from gen_profile_exporters.exporter import target_of
 
     if path is not None and path.suffix.lower() != ".toml":
         if preset is not None or overrides:
@@ -278,7 +288,7 @@ def _source(
     if spec.can.nodes and any(override.startswith("can.node=") for override in overrides):
         raise SpecError("--node: the spec states every node in can.nodes; change these.")
     require_rest(spec)
-    require_bus(spec.can.bitrate)
+    require_bus(target_of(spec))
     return designed(spec, tell)
 
 
@@ -320,7 +330,12 @@ def _self_test(source: Source, tell: Progress) -> str:
     return found
 
 
-def _port(interface: str | None, channel: str | None, simulated: bool) -> dict[str, str]:
+def _port(interface: str | None, channel: str | None, simulated: bool, can: CanSpec) -> dict[str, str]:
+    if can.channels:
+        if channel is not None:
+            raise SpecError("--channel: the spec states every axis's in can.channels; change these.")
+        channel = ""
+        interface = interface or (VIRTUAL[0] if simulated else None)
     if interface is None and channel is None and simulated:
         return dict(zip(("interface", "channel"), VIRTUAL, strict=True))
     if interface is None or channel is None:

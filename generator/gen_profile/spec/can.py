@@ -87,6 +87,8 @@ class CanSpec:
         CANopen node of the first axis; the second axis takes the next one, and so on.
     nodes : mapping of str to int
         Nodes of all axes by name, where they do not count up from `node`; empty where they do.
+    channels : mapping of str to str
+        The CAN channel of each axis's drive, such as ``"can0"``, where they are on several buses.
     cob_ids : mapping of str to CobIdsSpec
         By axis, where they are not those of the predefined connection set.
     fixed_pdos : FixedPdosSpec
@@ -127,6 +129,7 @@ class CanSpec:
 
     node: NodeId = 1
     nodes: Mapping[str, NodeId] = attrs.field(factory=dict, converter=frozen_mapping)
+    channels: Mapping[str, str] = attrs.field(factory=dict, converter=frozen_mapping)
     cob_ids: Mapping[str, CobIdsSpec] = attrs.field(factory=dict, converter=frozen_mapping)
     fixed_pdos: FixedPdosSpec = attrs.field(factory=FixedPdosSpec)
     bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000

@@ -18,6 +18,7 @@ from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_mac
 from gen_profile.plants.plant import Coordinate, Plant
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.spec.can import CanSpec
+from gen_profile.spec.can_table import can_table
 from gen_profile.spec.check_table import KEYS as CHECK_KEYS
 from gen_profile.spec.check_table import check_table
 from gen_profile.spec.external_fmu import KEYS as FOREIGN_KEYS
@@ -42,13 +43,6 @@ FILE_KEYS = ("file", "file_sha256")
 DEFAULT_NAME = "profile"
 PLACEHOLDER_DURATION = 1.0  # s, until the shortest duration is found
 LARGEST_ANGLE = 1.4  # rad, of a load at the start
-# tables of [can] by axis, with an example of each
-BY_AXIS = {
-    "travel": "cart = [0.0, 0.5]",
-    "nodes": "bridge = 5, trolley = 9",
-    "cob_ids": "cart = { setpoint = 0x321 }",
-    "serial": "cart = 0x12345678",
-}
 SHORTEST_MOVE = 1e-12  # m (or rad); squares of what is smaller come near to what floats can hold
 FLAT = {
     "actuator": ActuatorSpec,
@@ -89,7 +83,7 @@ def complete(document: Mapping[str, Any], folder: Path, faults: Faults) -> Table
     tables["limits"] = _limits(tables["limits"], tables["move"], plant, faults)
     tables["axis"] = _axis(tables["axis"], plant, faults)
     _check_columns(tables["export"].get("csv_columns"), faults)
-    tables["can"] = _can(tables["can"], plant, faults)
+    tables["can"] = can_table(tables["can"], plant, faults)
     tables["planner"] = planner_table(tables["planner"], plant, faults)
     return tables
 
@@ -422,52 +416,6 @@ def _feed_constant(table: Mapping[str, Any], where: str, faults: Faults) -> Tabl
         faults.add(f"{where}.counts_per_metre", problem)
         numbers = [1.0, 1.0]
     return {**table, "counts_per_metre": numbers[0] / numbers[1]}
-
-
-def _can(table: Table, plant: Plant | None, faults: Faults) -> Table:
-    names = [axis.name for axis in plant.actuated] if plant else None
-    if names and len(names) == 1 and isinstance(table.get("serial"), int):
-        table = {**table, "serial": {names[0]: table["serial"]}}
-    for key, example in BY_AXIS.items():
-        table = _by_axis(table, key, example, names, faults)
-    _nodes(table["nodes"], names, faults)
-    ahead = table.get("feed_forward", "none")
-    if ahead in ("torque", "both") and "torque_per_acceleration" not in table:
-        faults.add(
-            "can.torque_per_acceleration",
-            f'required with feed_forward = "{ahead}" (‰ of the rated torque per m/s²)',
-        )
-    if table.get("mode") in ("ip", "csv") and ahead != "none":
-        faults.add("can.feed_forward", 'only with mode = "csp"; remove it or set the mode')
-    if table.get("mode") == "csv" and "following_error" not in table:
-        faults.add(
-            "can.following_error", 'required with mode = "csv": how far the axis may be off the motion, in m'
-        )
-    return table
-
-
-def _by_axis(table: Table, key: str, example: str, names: Sequence[str] | None, faults: Faults) -> Table:
-    """Hold a table of `[can]` to the machine's axes; without a fault of its own where it is none."""
-    by_axis = table.get(key, {})
-    if not isinstance(by_axis, Mapping):
-        faults.add(f"can.{key}", f"must be a table such as {{ {example} }}, found {found(by_axis)}")
-        by_axis = {}
-    for axis in by_axis:
-        if names and axis not in names:
-            faults.add(place(f"can.{key}", axis), f"unknown axis{suggestion(axis, names)}")
-    return {**table, key: by_axis}
-
-
-def _nodes(nodes: Mapping[str, Any], names: Sequence[str] | None, faults: Faults) -> None:
-    """Have every axis a node of its own, or none of them."""
-    taken: dict[Any, str] = {}
-    for axis, node in nodes.items():
-        if isinstance(node, int) and taken.setdefault(node, axis) != axis:
-            faults.add(place("can.nodes", axis), f"{node} is the node of the axis {taken[node]} already")
-    known = set(names or ()) >= nodes.keys()
-    for axis in names or ():
-        if nodes and known and axis not in nodes:
-            faults.add(place("can.nodes", axis), "required beside the other axes' nodes")
 
 
 def _check_columns(columns: Any, faults: Faults) -> None:

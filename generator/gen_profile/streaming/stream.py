@@ -127,11 +127,12 @@ def standing(source: Source, port: Port, tell: Tell) -> tuple[float, ...]:
     """
     from gen_profile_exporters.can.streaming.configuration import positions  # noqa: PLC0415  # canopen
     from gen_profile_exporters.can.streaming.discovery import listen  # noqa: PLC0415  # is an extra
+    from gen_profile_exporters.can.streaming.joint_bus import opened  # noqa: PLC0415
     from gen_profile_exporters.can.streaming.link import Link  # noqa: PLC0415
 
     target = source.plan.target
     tell("asking where the axes stand")
-    with port.open(source.spec.can.bitrate) as bus:
+    with opened(port, target) as bus:
         link = Link(bus, SystemClock())
         listen(link)
         counts = positions(link, target, source.plan.motion)
@@ -214,11 +215,12 @@ def stream(
     CosimulationError
         The simulated machine cannot be built.
     """
-    from gen_profile_exporters.can.streaming.streamer import Streamer  # noqa: PLC0415  # canopen is an extra
+    from gen_profile_exporters.can.streaming.joint_bus import opened  # noqa: PLC0415  # canopen is an extra
+    from gen_profile_exporters.can.streaming.streamer import Streamer  # noqa: PLC0415
 
     with ExitStack() as stack:
         simulation = stack.enter_context(_simulated(source, port, tell)) if simulate_drive else None
-        bus = port.open(source.spec.can.bitrate)
+        bus = opened(port, source.plan.target)
         stack.callback(_shut_down, bus)
         aside = stack.enter_context(told_aside(tell))
         refused = stack.enter_context(real_time())
@@ -228,7 +230,7 @@ def stream(
         before = 0 if simulation is None else simulation.clock.catch_up()
         record = streamer.run()
     if simulation is None:
-        sway, remarks = None, port.remarks(record.launched)
+        sway, remarks = None, port.remarks(record.launched, _several_buses(source))
     else:
         sway, remarks = simulation.sway, _stalls(simulation.clock.stalled - before)
     said = (*notes, *refused, *remarks, *_afterwards(record))
@@ -264,7 +266,8 @@ def drive_bank(
         SimulatedDrive(node, _of_identity(make, target.can, axis.name), round(at * axis.counts_per_si))
         for axis, node, at in axes
     ]
-    return DriveBank(bus, clock or SystemClock(), drives, scales, load)
+    channels = frames.channels(target) if target.can.channels else ()
+    return DriveBank(bus, clock or SystemClock(), drives, scales, load, channels=channels)
 
 
 def _of_identity(make: DriveVariant, can: CanSpec, axis: str) -> DriveVariant:
@@ -286,6 +289,10 @@ class _Simulation:
     sway: float | None = None
 
 
+def _several_buses(source: Source) -> tuple[str, ...]:
+    return frames.buses(source.plan.target) if source.spec.can.channels else ()
+
+
 def _afterwards(record: Record) -> tuple[str, ...]:
     """Say what went wrong when the motion was done, which the next stream may meet."""
     return (f"When the drives were switched off: {record.aftermath}",) if record.aftermath else ()
@@ -304,11 +311,12 @@ def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
     """Have simulated drives work on the bus whenever the streamer sleeps."""
     from gen_profile.streaming.load import CraneLoad  # noqa: PLC0415  # FMPy and CasADi, 0.5 s
     from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant  # noqa: PLC0415  # canopen is an extra
+    from gen_profile_exporters.can.streaming.joint_bus import opened  # noqa: PLC0415
 
     period = frames.period_microseconds(source.spec.can) * 1000
     with (
         CraneLoad(source.spec, lambda: tell("compiling the plant's FMU, once")) as load,
-        port.open(source.spec.can.bitrate) as bus,
+        opened(port, source.plan.target) as bus,
     ):
         clock = SharedClock(longest=period // 4)
         clock.work = drive_bank(source.spec, bus, load, DriveVariant(), clock).poll

@@ -13,9 +13,11 @@ from exporters.motions import quintic, target
 
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.export import exporter
+from gen_profile_exporters.can.host.port import Port
 from gen_profile_exporters.can.simulation.drive_bank import DriveBank
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
+from gen_profile_exporters.can.streaming.joint_bus import opened
 from gen_profile_exporters.can.streaming.plan import plan_of
 from gen_profile_exporters.can.streaming.streamer import Streamer
 
@@ -82,9 +84,13 @@ class Tampered:
         self.receiving = lambda message: message
         self.inbox = []
 
-    def send(self, message):
+    def send(self, message, timeout=None):
+        del timeout
         if self.sending(message):
             self._bus.send(message)
+
+    def shutdown(self):
+        self._bus.shutdown()
 
     def recv(self, timeout=None):
         return self.receiving(self.inbox.pop() if self.inbox else self._bus.recv(timeout))
@@ -128,6 +134,7 @@ class Heard:
     at: float
     cob_id: int
     data: bytes
+    channel: str = ""
 
 
 class Bench:
@@ -147,12 +154,12 @@ class Bench:
         kind=SimulatedDrive,
         **options,
     ):
-        channel = f"bench-{next(_channels)}"
         self.clock = FakeClock(step)
         self.target = target(*names, **options)
         files = exporter.encode(profile or quintic((0.1, 0.4)), self.target)
         self.plan = plan_of(files[0].content, self.target)
-        self._buses = [can.Bus(channel, interface="virtual") for _ in range(3)]
+        port = Port(interface="virtual", channel=f"bench-{next(_channels)}")
+        self._buses = [opened(port, self.target) for _ in range(3)]
         self.witness = self._buses[0]
         self.drive_end = Tampered(self._buses[1])
         self.streamer_end = Launching(self._buses[2], self.clock) if launching else Tampered(self._buses[2])
@@ -229,7 +236,9 @@ class Bench:
 
     def _listen(self):
         while (message := self.witness.recv(0)) is not None:
-            self.heard.append(Heard(self.now, message.arbitration_id, bytes(message.data)))
+            self.heard.append(
+                Heard(self.now, message.arbitration_id, bytes(message.data), str(message.channel))
+            )
 
     def _drives(self, kind, make, load, stand):
         first = [int(at) for at in (self.plan.motion.position[0] if stand is None else stand)]
@@ -237,4 +246,7 @@ class Bench:
         nodes = frames.nodes(self.target)
         drives = [kind(node, make, at) for node, at in zip(nodes, first, strict=True)]
         rest = [at / count for at, count in zip(first, counts, strict=True)]
-        return DriveBank(self.drive_end, self.clock, drives, counts, load or RigidLoad(rest))
+        channels = frames.channels(self.target) if self.target.can.channels else ()
+        return DriveBank(
+            self.drive_end, self.clock, drives, counts, load or RigidLoad(rest), channels=channels
+        )

@@ -18,6 +18,7 @@ def test_everything_stated_comes_back():
             "can.encoder=[65536, 1]", "can.gear=[3, 1]", "can.feed=[40000, 1]", "can.vendor=0x2E5",
             "can.product=1", "can.homed=[0x2003, 0, 1]", "can.serial=7", "can.nodes={cart=9}",
             "can.cob_ids={cart={setpoint=0x321, feedback=0x195}}",
+            "can.channels={cart='can1'}",
             "can.fixed_pdos={rpdo3=[0x60400010, 0x607A0020], tpdo3=[0x60410010, 0x60640020]}",
         ],
     )  # fmt: skip
@@ -55,6 +56,8 @@ def test_everything_stated_comes_back():
         ("can.cob_ids=3", "can.cob_ids: must be a table such as { cart = { setpoint = 0x321 } }, found 3."),
         ("can.fixed_pdos={rpdo3=[-1]}", "can.fixed_pdos.rpdo3.0: must be at least 1"),
         ("can.fixed_pdos={pdo3=[1]}", "can.fixed_pdos.pdo3: unknown key"),
+        ("can.channels={cart='can 0'}", "can.channels.cart: must be the name of a channel, such as 'can0'"),
+        ("can.channels={cart=0}", "can.channels.cart: "),
         ("can.mode=pp", "can.mode: unknown value, found text 'pp'"),
     ],
 )

@@ -18,9 +18,7 @@ from collections.abc import Iterable, Iterator
 import attrs
 
 from gen_profile.errors import ExportError
-from gen_profile_exporters.can.frames import MICROSECONDS
-
-CHANNEL = "can0"
+from gen_profile_exporters.can.frames import CHANNEL, MICROSECONDS
 
 _FRAME = re.compile(r"\((\d{1,12})\.(\d{6})\) (\S+) ([0-9A-F]{3})#((?:[0-9A-F]{2}){0,8})")
 
@@ -38,18 +36,20 @@ class Frame:
     data : bytes
     line : int
         Where it was read, from 1; 0 where it was not.
+    channel : str
     """
 
     stamp: int
     cob_id: int
     data: bytes
     line: int = 0
+    channel: str = CHANNEL
 
 
 def write(frames: Iterable[Frame]) -> bytes:
     """Render frames, ASCII."""
     return "".join(
-        f"({frame.stamp // MICROSECONDS:010d}.{frame.stamp % MICROSECONDS:06d}) {CHANNEL} "
+        f"({frame.stamp // MICROSECONDS:010d}.{frame.stamp % MICROSECONDS:06d}) {frame.channel} "
         f"{frame.cob_id:03X}#{frame.data.hex().upper()}\n"
         for frame in frames
     ).encode("ascii")
@@ -61,25 +61,24 @@ def read(content: bytes) -> Iterator[Frame]:
     Raises
     ------
     ExportError
-        A line is none, the text breaks off, a stamp falls, or the channel changes.
+        A line is none, the text breaks off, or a stamp falls.
     """
     lines = content.decode("latin-1").split("\n")
     if lines.pop().strip():
         raise ExportError(
             f"line {len(lines) + 1}: the CAN log breaks off without a line end; export it again."
         )
-    stamp, channel = 0, None
+    stamp = 0
     for number, text in enumerate(lines, start=1):
         match = _FRAME.fullmatch(text.rstrip("\r"))
         if match is None:
             raise ExportError(
                 f"line {number}: {text[:60]!r} is no frame in candump's format; export the log again."
             )
-        seconds, microseconds, found, cob_id, data = match.groups()
-        frame = Frame(
-            int(seconds) * MICROSECONDS + int(microseconds), int(cob_id, 16), bytes.fromhex(data), number
-        )
-        if frame.stamp < stamp or found != (channel or found):
-            raise ExportError(f"line {number}: the stamp falls or the channel changes; export the log again.")
-        stamp, channel = frame.stamp, found
+        seconds, microseconds, channel, cob_id, data = match.groups()
+        instant = int(seconds) * MICROSECONDS + int(microseconds)
+        frame = Frame(instant, int(cob_id, 16), bytes.fromhex(data), number, channel)
+        if frame.stamp < stamp:
+            raise ExportError(f"line {number}: the stamp falls; export the log again.")
+        stamp = frame.stamp
         yield frame

@@ -88,34 +88,66 @@ def _led_by_velocity(velocity: frames.Integers, period: float, target: Target) -
 def cyclic_frames(motion: Setpoints, target: Target) -> Iterator[Frame]:
     """List the frames of all cycles in the order in which they are sent."""
     period = frames.period_microseconds(target.can)
-    expected = frames.setpoint_frames(target)
+    expected, buses = frames.setpoint_frames(target), frames.buses(target)
     for cycle, values in enumerate(motion.sent.tolist()):
+        stamp = cycle * period
         for frame in expected:
-            yield Frame(cycle * period, frame.cob_id, frame.pack(values))
-        yield Frame(cycle * period, SYNC, b"")
+            yield Frame(stamp, frame.cob_id, frame.pack(values), channel=frame.channel)
+        for channel in buses:
+            yield Frame(stamp, SYNC, b"", channel=channel)
 
 
 def read_setpoints(content: bytes, target: Target) -> tuple[frames.Integers, list[Frame]]:
-    """Read a log: what the drives are sent in each cycle, shape (cycles, axes, fields), and the SYNCs."""
+    """Read a log: what drives are sent in each cycle, shape (cycles, axes, fields), and its last SYNC."""
     expected = {frame.cob_id: frame for frame in frames.setpoint_frames(target)}
     width = len(pdos.setpoint_fields(target.can))
     taken: list[list[int]] = []
     syncs: list[Frame] = []
     pending: dict[int, tuple[int, ...]] = {}
-    for frame in candump.read(content):
-        if frame.cob_id == SYNC:
-            _require_complete(pending, expected, frame)
-            taken.append(_setpoints(pending, expected.values()))
-            syncs.append(frame)
-            pending = {}
-        else:
+    synced: list[str] = []
+    for frame in _on_their_channels(candump.read(content), expected, target):
+        if frame.cob_id != SYNC:
             _require_expected(frame, pending, expected)
             pending[frame.cob_id] = expected[frame.cob_id].packing.unpack(frame.data)
+            continue
+        _require_complete(pending, expected, frame)
+        synced.append(frame.channel)
+        if _all_synced(synced, frame, target):
+            taken.append(_setpoints(pending, expected.values()))
+            syncs.append(frame)
+            pending, synced = {}, []
     if pending:
         raise ExportError("The CAN log ends without a SYNC after its last setpoint; export it again.")
     if len(syncs) < 2:
         raise ExportError(f"The CAN log holds {len(syncs)} SYNCs, a motion needs 2 or more; export it again.")
     return np.array(taken, dtype=np.int64).reshape(len(taken), len(target.axes), width), syncs
+
+
+def _on_their_channels(
+    found: Iterable[Frame], expected: Mapping[int, SetpointFrame], target: Target
+) -> Iterator[Frame]:
+    """Require each frame on its drive's channel; drives that are all on one bus may be on any."""
+    only: str | None = None
+    for frame in found:
+        own = frame.channel
+        if not target.can.channels:
+            own = only = only or frame.channel
+        elif frame.cob_id in expected:
+            own = expected[frame.cob_id].channel
+        if frame.channel != own:
+            raise ExportError(
+                f"line {frame.line}: frame {frame.cob_id:03X}h is on the channel {frame.channel} instead of "
+                f"{own}; export the log again."
+            )
+        yield frame
+
+
+def _all_synced(synced: Sequence[str], latest: Frame, target: Target) -> bool:
+    """Tell whether a cycle's SYNC was sent on every bus, and require that it was once on each, in turn."""
+    buses = frames.buses(target)
+    if target.can.channels and tuple(synced) != buses[: len(synced)]:
+        raise ExportError(f"line {latest.line}: SYNC on {latest.channel} out of turn; export the log again.")
+    return len(synced) == len(buses)
 
 
 def _setpoints(pending: Mapping[int, tuple[int, ...]], layout: Iterable[SetpointFrame]) -> list[int]:

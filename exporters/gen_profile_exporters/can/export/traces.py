@@ -22,9 +22,10 @@ Begin Triggerblock Thu Jan 1 00:00:00.000 1970
 
 def asc(frames: Iterable[Frame]) -> bytes:
     """Render as ASC, for CANoe, CANalyzer and python-can."""
+    numbers = _Numbers()
     lines = [
-        f"{frame.stamp // MICROSECONDS:4d}.{frame.stamp % MICROSECONDS:06d} 1  {frame.cob_id:<15X} Tx   "
-        f"d {len(frame.data)} {frame.data.hex(' ').upper()}".rstrip()
+        f"{frame.stamp // MICROSECONDS:4d}.{frame.stamp % MICROSECONDS:06d} {numbers[frame.channel] + 1}  "
+        f"{frame.cob_id:<15X} Tx   d {len(frame.data)} {frame.data.hex(' ').upper()}".rstrip()
         for frame in frames
     ]
     return (_HEAD + "\n".join(lines) + "\nEnd TriggerBlock\n").encode("ascii")
@@ -32,7 +33,7 @@ def asc(frames: Iterable[Frame]) -> bytes:
 
 def blf(frames: Iterable[Frame]) -> bytes:
     """Render as BLF, for the same."""
-    file = _Kept()
+    file, numbers = _Kept(), _Numbers()
     with BLFWriter(file) as writer:
         for frame in frames:
             writer.on_message_received(
@@ -42,9 +43,18 @@ def blf(frames: Iterable[Frame]) -> bytes:
                     data=frame.data,
                     is_extended_id=False,
                     is_rx=False,
+                    channel=numbers[frame.channel],
                 )
             )
     return file.getvalue()
+
+
+class _Numbers(dict[str, int]):
+    """Channels counted from 0, as they come."""
+
+    def __missing__(self, channel: str) -> int:
+        self[channel] = len(self)
+        return self[channel]
 
 
 class _Kept(BytesIO):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 import attrs
 import can
@@ -14,10 +15,10 @@ from gen_profile_exporters.can.host import detection
 
 @attrs.frozen(kw_only=True)
 class Port:
-    """A CAN interface as python-can names it, and its channel."""
+    """A CAN interface as python-can names it, and its channel; none where a spec states every axis's."""
 
     interface: str
-    channel: str
+    channel: str = ""
 
     def open(self, bitrate: int) -> can.BusABC:
         """Open it; what may send at given instants (Linux) can be asked to do so.
@@ -54,13 +55,14 @@ class Port:
         there = f"channels found: {', '.join(channels)}" if channels else "no channel was found"
         return f"{detection.needs(self.interface, self.channel)}; {there}"
 
-    def remarks(self, launched: bool) -> tuple[str, ...]:
+    def remarks(self, launched: bool, channels: Sequence[str]) -> tuple[str, ...]:
         """Say what there is to say about who sends each cycle at its instant."""
         if launched:
             return ("The kernel sent every cycle at its instant (launch times).",)
         if self.interface != "socketcan":
             return ()
+        commands = [f"`tc qdisc replace dev {channel} root fq`" for channel in channels or (self.channel,)]
         return (
-            f"Frames left when this program woke up; `tc qdisc replace dev {self.channel} root fq` would "
-            "have the kernel send each at its instant.",
+            f"Frames left when this program woke up; {' and '.join(commands)} would have the kernel send "
+            "each at its instant.",
         )

@@ -36,6 +36,8 @@ class DriveBank:
     counts_per_si : sequence of float
         Of each axis.
     load : Load
+    channels : sequence of str
+        Of each drive, where they are on several buses; each answers the SYNC of its own.
     """
 
     def __init__(
@@ -45,12 +47,16 @@ class DriveBank:
         drives: Sequence[SimulatedDrive],
         counts_per_si: Sequence[float],
         load: Load,
+        *,
+        channels: Sequence[str] = (),
     ) -> None:
         self.drives = tuple(drives)
         self._bus, self._clock, self.load = bus, clock, load
         self._counts_per_si = tuple(counts_per_si)
         self._network = _Network(bus, clock)
         self._synced = clock.now()
+        self._channels = tuple(channels)
+        self._waiting = set(self._channels)  # for SYNC in this cycle
         for drive in self.drives:
             self._network.add_node(drive.local)
         self._network.subscribe(frames.NMT, self._obey_reset)  # after canopen's own
@@ -104,10 +110,7 @@ class DriveBank:
             return
         if message.arbitration_id == frames.SYNC:
             self._synced = self._clock.now()
-            for drive in self.drives:  # where they are now; then they set out for the next SYNC
-                self._tell(drive.feedback())
-                drive.synchronise()
-            self._advance()
+            self._synchronise(str(message.channel))
             return
         data = bytearray(message.data)
         for drive in self.drives:
@@ -115,6 +118,22 @@ class DriveBank:
         if (message.arbitration_id == frames.NMT and len(data) == 2) or self._is_request(message):
             with suppress(struct.error):  # canopen cannot refuse a request that goes on with none
                 self._network.notify(message.arbitration_id, data, message.timestamp)
+
+    def _synchronise(self, channel: str) -> None:
+        """Have drives tell where they are now, and then set out for the next SYNC, once all had theirs."""
+        if self._channels and channel not in self._waiting:  # another bus had none
+            self._set_out()
+        for number, drive in enumerate(self.drives):
+            if not self._channels or self._channels[number] == channel:
+                self._tell(drive.feedback())
+                drive.synchronise()
+        self._waiting.discard(channel)
+        if not self._waiting:
+            self._set_out()
+
+    def _set_out(self) -> None:
+        self._waiting = set(self._channels)
+        self._advance()
 
     def _tell(self, pdos: Sequence[tuple[int, bytes]]) -> None:
         for cob_id, data in pdos:
