@@ -17,12 +17,11 @@ import canopen
 import numpy as np
 import pytest
 from command_line import PROGRAM, run_here, run_process
-from exporters.can.bench import MS, FakeClock, RigidLoad
+from exporters.can.bench import MS, FakeClock, HastyClock, RigidLoad
 
 from gen_profile.artefacts import writing as delivery
 from gen_profile.artefacts.manifest import parse_manifest
 from gen_profile.streaming import stream as workflow
-from gen_profile_exporters.can.host.clock import SharedClock
 from gen_profile_exporters.can.simulation.drive_bank import FAREWELL, DriveBank
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
@@ -47,21 +46,6 @@ def deployed(tmp_path_factory):
     )
     assert run_here("--preset", "paper", *options).code == 0
     return folder
-
-
-class HastyClock(SharedClock):
-    """A shared clock that waits for nobody: each sleep is over as soon as the others have worked."""
-
-    passed = 0
-
-    def now(self):
-        return self.passed
-
-    def sleep_until(self, instant):
-        self.work()
-        while self.passed < instant:
-            self.passed = min(self.passed + MS, instant)
-            self.work()
 
 
 @pytest.fixture

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.progress import progress
 from gen_profile.errors import OutputError, SpecError, StreamAborted
 
 if TYPE_CHECKING:
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from gen_profile.streaming.outcome import Source, StreamOutcome
     from gen_profile_exporters.can.host.lateness import Lateness
     from gen_profile_exporters.can.host.port import Port
+    from gen_profile_exporters.can.streaming.record import Book
     from gen_profile_exporters.exporter import Target
 
 VIRTUAL = ("virtual", "gen-profile")
@@ -66,6 +69,7 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
     is_flag=True,
     help="First measure, for as long as the motion lasts, whether this machine can hold the cycle.",
 )
+@click.option("--live", is_flag=True, help="Draw the motion on the terminal while it runs.")
 @click.option("--dry-run", is_flag=True, help="Print the plan, and touch no bus.")
 @click.option("--accept-unverified", is_flag=True, help="Stream what was exported without its check.")
 @click.option(
@@ -90,6 +94,7 @@ def stream(
     jog: tuple[str, ...],
     reset_fault: bool,
     self_test: bool,
+    live: bool,
     dry_run: bool,
     accept_unverified: bool,
     table: Path | None,
@@ -101,11 +106,12 @@ def stream(
     checked first. No safety function: emergency stop and STO stay in hardware.
     """
     from gen_profile.artefacts.writing import require_place
-    from gen_profile.cli.progress import progress
     from gen_profile.streaming import stream as run
     from gen_profile_exporters.can.host.port import Port
 
     run.require_extra()
+    if live:
+        _require_terminal()
     from gen_profile_exporters.can.streaming import joint_bus
 
     overrides += as_overrides({"can.mode": mode, "can.node": node})
@@ -144,8 +150,15 @@ def stream(
         notes: tuple[str, ...] = ()
         if self_test:
             notes = (_self_test(source, tell),)
+    with _shown(source, live) as (tell_phase, book):
         outcome = run.stream(
-            source, port, simulate_drive=simulate_drive, reset_fault=reset_fault, notes=notes, tell=tell
+            source,
+            port,
+            simulate_drive=simulate_drive,
+            reset_fault=reset_fault,
+            notes=notes,
+            tell=tell_phase,
+            book=book,
         )
     _conclude(outcome, table, as_json)
 
@@ -177,7 +190,6 @@ def drive_sim(
 
     Ends after one stream, when all drives have been switched off again, and tells how far the load sways.
     """
-    from gen_profile.cli.progress import progress
     from gen_profile.streaming import stream as run
 
     run.require_extra()
@@ -290,6 +302,25 @@ def _source(
     require_rest(spec)
     require_bus(target_of(spec))
     return designed(spec, tell)
+
+
+@contextmanager
+def _shown(source: Source, live: bool) -> Iterator[tuple[Callable[[str], None], Book | None]]:
+    """Show a stream: by its phases, or by curves, which need the terminal for themselves."""
+    if not live:
+        with progress() as tell:
+            yield tell, None
+        return
+    from gen_profile.streaming.live import watched
+    from gen_profile.streaming.live_terminal import show
+
+    with watched(source, show) as book:
+        yield lambda _: None, book
+
+
+def _require_terminal() -> None:
+    if not sys.stderr.isatty():
+        raise SpecError("--live: standard error is no terminal to draw on; leave it out.")
 
 
 def _require_moving_alone(to_start: bool, jog: tuple[str, ...], dry_run: bool) -> None:

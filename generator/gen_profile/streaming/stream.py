@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from gen_profile.streaming.load import CraneLoad
     from gen_profile_exporters.can.simulation.drive_bank import DriveBank
     from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
-    from gen_profile_exporters.can.streaming.record import Record
+    from gen_profile_exporters.can.streaming.record import Book, Record
 
 Tell = Callable[[str], None]
 SPIN = 200_000  # ns before each cycle, where a processor can be spared for it
@@ -192,6 +192,7 @@ def stream(
     reset_fault: bool = False,
     notes: tuple[str, ...] = (),
     tell: Tell = lambda _: None,
+    book: Book | None = None,
 ) -> StreamOutcome:
     """Stream a motion, and stop the axes whatever happens.
 
@@ -207,6 +208,8 @@ def stream(
         What there is to say beforehand.
     tell : callable
         Told each phase.
+    book : Book, optional
+        Where to take down how it goes, for those who watch.
 
     Raises
     ------
@@ -225,7 +228,7 @@ def stream(
         aside = stack.enter_context(told_aside(tell))
         refused = stack.enter_context(real_time())
         clock = _clock(refused) if simulation is None else simulation.clock
-        streamer = Streamer(bus, clock, source.plan, aside, reset_fault=reset_fault)
+        streamer = Streamer(bus, clock, source.plan, aside, reset_fault=reset_fault, book=book)
         stack.enter_context(stopped_by_signals(streamer.ask_to_stop))
         before = 0 if simulation is None else simulation.clock.catch_up()
         record = streamer.run()

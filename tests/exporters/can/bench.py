@@ -13,6 +13,7 @@ from exporters.motions import quintic, target
 
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.export import exporter
+from gen_profile_exporters.can.host.clock import SharedClock
 from gen_profile_exporters.can.host.port import Port
 from gen_profile_exporters.can.simulation.drive_bank import DriveBank
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
@@ -26,6 +27,21 @@ BEGINNING = 1_000 * MS
 QUICK_STOP = b"\x02\x00"
 OTHER_MAKE = DriveVariant(own_mapping=True, fixed_period=(40, -4), miss="hold")  # 4 ms, said in another way
 _channels = itertools.count()
+
+
+class HastyClock(SharedClock):
+    """A shared clock that waits for nobody: each sleep is over as soon as the others have worked."""
+
+    passed = 0
+
+    def now(self):
+        return self.passed
+
+    def sleep_until(self, instant):
+        self.work()
+        while self.passed < instant:
+            self.passed = min(self.passed + MS, instant)
+            self.work()
 
 
 @attrs.define

@@ -55,7 +55,7 @@ class Port:
         there = f"channels found: {', '.join(channels)}" if channels else "no channel was found"
         return f"{detection.needs(self.interface, self.channel)}; {there}"
 
-    def remarks(self, launched: bool, channels: Sequence[str]) -> tuple[str, ...]:
+    def remarks(self, launched: bool, channels: Sequence[str] = ()) -> tuple[str, ...]:
         """Say what there is to say about who sends each cycle at its instant."""
         if launched:
             return ("The kernel sent every cycle at its instant (launch times).",)

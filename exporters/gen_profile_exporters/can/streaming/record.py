@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import Enum
+from typing import Any
 
 import attrs
 import numpy as np
@@ -62,32 +63,78 @@ class Record:
     final: tuple[int, ...]
 
 
+class Book:
+    """What is known of a stream so far, in one piece of memory, which another process may read meanwhile.
+
+    Parameters
+    ----------
+    memory : buffer
+        Of `size` bytes, zero at first.
+    cycles, axes : int
+        Of the motion.
+
+    Attributes
+    ----------
+    phase : (1,) integer array
+        Number of the `Phase` in its order.
+    late : (cycles,) integer array
+        How late each was sent, in ns, plus one; zero for one that was not.
+    told : (cycles,) integer array
+        Not zero where the drives answered.
+    actual : (cycles, axes) integer array
+        Where they then were, in counts.
+    """
+
+    def __init__(self, memory: Any, cycles: int, axes: int) -> None:
+        table = np.frombuffer(memory, dtype=np.int64, count=1 + cycles * (2 + axes))
+        self.phase, self.late, self.told, actual = np.split(table, [1, 1 + cycles, 1 + 2 * cycles])
+        self.actual = actual.reshape(cycles, axes)
+
+    @staticmethod
+    def size(cycles: int, axes: int) -> int:
+        """Bytes that it takes."""
+        return 8 * (1 + cycles * (2 + axes))
+
+    @classmethod
+    def blank(cls, cycles: int, axes: int) -> Book:
+        """Begin one that nobody else reads."""
+        return cls(bytearray(cls.size(cycles, axes)), cycles, axes)
+
+    @property
+    def state(self) -> Phase:
+        """Where the streamer is."""
+        return list(Phase)[int(self.phase[0])]
+
+
 class Recorder:
     """Takes down what was sent and answered, cycle by cycle.
 
     Parameters
     ----------
-    cycles, axes : int
-        Of the motion.
+    book : Book
+        To be written; nothing here waits for those who read it.
     """
 
-    def __init__(self, cycles: int, axes: int) -> None:
-        self._late = np.full(cycles, -1, dtype=np.int64)
-        self._actual = np.zeros((cycles, axes), dtype=np.int64)
-        self._told = np.zeros(cycles, dtype=np.bool_)
+    def __init__(self, book: Book) -> None:
+        self._book = book
 
     @property
     def sent(self) -> int:
         """How many cycles were sent."""
-        return int(np.count_nonzero(self._late >= 0))
+        return int(np.count_nonzero(self._book.late))
+
+    def begin(self, phase: Phase) -> None:
+        """Take down where the streamer is."""
+        self._book.phase[0] = list(Phase).index(phase)
 
     def take_sent(self, cycle: int, late: int) -> None:
         """Take down that a cycle was sent, and how late, in ns."""
-        self._late[cycle] = max(0, late)
+        self._book.late[cycle] = 1 + max(0, late)
 
     def take_answer(self, cycle: int, position: Sequence[int]) -> None:
         """Take down where the drives were at a cycle's SYNC."""
-        self._actual[cycle], self._told[cycle] = position, True
+        self._book.actual[cycle] = position
+        self._book.told[cycle] = 1
 
     def record(
         self,
@@ -100,15 +147,16 @@ class Recorder:
         period: int,
     ) -> Record:
         """Make the record; the period is that of SYNC, in ns."""
-        cycles = np.flatnonzero(self._late >= 0)
+        book = self._book
+        cycles = np.flatnonzero(book.late)
         return Record(
             phase=phase,
             reason=reason,
             aftermath=aftermath,
             launched=launched,
             sent=self.sent,
-            lateness=Lateness(cycles=cycles, late=self._late[cycles], period=period),
-            actual=self._actual,
-            told=self._told,
+            lateness=Lateness(cycles=cycles, late=book.late[cycles] - 1, period=period),
+            actual=book.actual.copy(),
+            told=book.told != 0,
             final=final,
         )

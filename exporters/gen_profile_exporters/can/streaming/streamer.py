@@ -27,7 +27,7 @@ from gen_profile_exporters.can.streaming.approach import approach
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.pacer import Pacer
 from gen_profile_exporters.can.streaming.plan import Cycle, StreamPlan, cycles_of
-from gen_profile_exporters.can.streaming.record import Phase, Record, Recorder
+from gen_profile_exporters.can.streaming.record import Book, Phase, Record, Recorder
 from gen_profile_exporters.can.streaming.restoration import Restoration
 from gen_profile_exporters.can.streaming.stopping import quick_stop
 from gen_profile_exporters.can.streaming.watch import SupervisionLevel, Watch, WatchedAxis
@@ -52,6 +52,8 @@ class Streamer:
         Told each phase as it begins. While it works the drives get nothing.
     reset_fault : bool
         Whether drives that are in fault are reset first.
+    book : Book, optional
+        Where to take down how it goes.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class Streamer:
         tell: Callable[[str], None] = lambda _: None,
         *,
         reset_fault: bool = False,
+        book: Book | None = None,
     ) -> None:
         self._plan, self._clock, self._tell = plan, clock, tell
         self._reset_fault = reset_fault
@@ -83,7 +86,7 @@ class Streamer:
             ours=frames.commanding_cob_ids(plan.target),
         )
         self._link.subscribe(self._watch.take)
-        self._recorder = Recorder(len(plan.cycles), len(plan.target.axes))
+        self._recorder = Recorder(book or Book.blank(len(plan.cycles), len(plan.target.axes)))
         self._found = Restoration()
         self._left: tuple[str, ...] = ()  # of the settings found, what could not be put back
         self._stop_asked = ""
@@ -120,6 +123,7 @@ class Streamer:
         return self._record(Phase.DONE, "")
 
     def _begin(self, phase: Phase) -> None:
+        self._recorder.begin(phase)
         with suppress(OSError, ValueError):  # whoever is told may be gone
             self._tell(phase.value)
 
@@ -311,6 +315,7 @@ class Streamer:
     def _record(self, phase: Phase, reason: str) -> Record:
         if phase is Phase.ABORTED:
             self._begin(phase)
+        self._recorder.begin(phase)
         fault = self._watch.fault if phase is Phase.DONE else None
         return self._recorder.record(
             phase,

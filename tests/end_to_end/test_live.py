@@ -1,0 +1,126 @@
+"""A stream watched while it runs: what is drawn, and that those who draw disturb nobody."""
+
+import multiprocessing
+import os
+import pty
+import re
+import signal
+import subprocess
+import time
+from contextlib import suppress
+from io import StringIO
+
+import numpy as np
+import pytest
+from command_line import PROGRAM, run_here
+from exporters.can.bench import HastyClock
+from rich.console import Console
+
+from gen_profile.streaming import live, live_terminal
+from gen_profile.streaming import stream as workflow
+from gen_profile_exporters.can.host.port import Port
+from gen_profile_exporters.can.streaming.record import Book, Phase, Recorder
+
+VIEW = live.View(
+    name="bay-3",
+    axes=("bridge",),
+    units=("m",),
+    period=0.5,
+    planned=np.array([[0.0], [1.0], [2.0], [3.0]]),
+    scale=np.array([1000.0]),
+)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("live")
+    spec = ("--set", "can.timeout=0.5", "--set", "can.sync_period=0.02")
+    assert run_here("--preset", "paper", *spec, "--export", "can", "--out", folder).code == 0
+    return folder / "paper.log"
+
+
+def begun():
+    """Take down half a motion: the second answer is missing, the third cycle was late."""
+    book = Book.blank(4, 1)
+    recorder = Recorder(book)
+    recorder.begin(Phase.STREAM)
+    for cycle, late in enumerate((1000, 2000, 9000)):
+        recorder.take_sent(cycle, late)
+    recorder.take_answer(0, [0])
+    recorder.take_answer(2, [1990])
+    return book
+
+
+def test_a_glance_at_a_stream_that_runs():
+    glance = live.Glance.at(begun(), VIEW)
+    assert (glance.phase, glance.cycle, glance.late) == (Phase.STREAM, 3, 9.0)
+    np.testing.assert_array_equal(glance.actual[:, 0], [0.0, np.nan, 1.99, np.nan])
+    assert glance.apart == pytest.approx([0.01])
+
+
+def test_what_is_drawn():
+    console = Console(width=24, record=True, file=StringIO())
+    console.print(live_terminal.picture(VIEW, live.Glance.at(begun(), VIEW), 24))
+    words = " ".join(console.export_text().split())
+    assert "bay-3: stream, 1.0 of 1.5 s, late by 9 µs at most" in words
+    assert "bridge: 1.99 m, at most 10 mm off the motion" in words
+
+
+def test_curves_go_where_they_belong():
+    rising, nothing = np.linspace(-1.0, 1.0, 8), np.full(8, np.nan)
+    lines = [line.plain[live_terminal.MARGIN :] for line in live_terminal.curves(rising, nothing, 4, 2)]
+    assert lines == ["\u2800\u2800⡠⠊", "⡠⠊\u2800\u2800"]
+    assert [line.plain.split()[0] for line in live_terminal.curves(rising, nothing, 4, 2)] == ["1", "-1"]
+    above = live_terminal.curves(rising, np.where(rising < 0, rising, np.nan), 4, 2)
+    assert [span.style for line in above for span in line.spans].count(live_terminal.ACTUAL) == 2
+
+
+def hang(view, look, over):
+    """Neither look nor end."""
+    time.sleep(60.0)
+
+
+def fail(view, look, over):
+    raise OSError("the terminal is gone")
+
+
+def die(view, look, over):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.parametrize("show", [hang, fail, die])
+def test_nobody_waits_for_a_viewer(log, show, monkeypatch):
+    monkeypatch.setattr(live, "LAST_LOOK", 0.1)
+    monkeypatch.setattr(workflow, "SharedClock", HastyClock)
+    source = workflow.verified(log)
+    with live.watched(source, show) as book:
+        port = Port(interface="virtual", channel="live")
+        outcome = workflow.stream(source, port, simulate_drive=True, book=book)
+        assert book.state is Phase.DONE
+    assert (outcome.record.reason, outcome.record.sent) == ("", 151)
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.slow
+def test_on_a_terminal(log):
+    master, slave = pty.openpty()
+    command = [PROGRAM, "stream", log, "--simulate-drive", "--live"]
+    environment = {**os.environ, "COLUMNS": "80", "TERM": "xterm"}
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=slave, env=environment)
+    os.close(slave)
+    drawn = b""
+    with suppress(OSError):  # which is how its end is told
+        while part := os.read(master, 65536):
+            drawn += part
+    os.close(master)
+    assert process.wait() == 0
+    text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", drawn.decode("utf-8"))
+    assert "paper: stream, " in text
+    assert re.search(r"paper: done, 3\.0 of 3\.0 s", text)
+    assert re.search(r"cart: 0\.3 m, at most [\d.e-]+ mm off the motion", text)
+    assert max(text) > "\u2800"
+
+
+def test_without_a_terminal(log):
+    outcome = run_here("stream", log, "--simulate-drive", "--live")
+    assert (outcome.code, "--live: standard error is no terminal" in outcome.err) == (2, True)
