@@ -170,7 +170,7 @@ class TestReplay:
             (
                 4,
                 "(0000000000.008000) can1 301#A0860100",
-                r"line 5: frame 301h is on the channel can1 instead of can0",
+                r"line 5: frame 301h is on the channel can1 instead",
             ),
             (4, "(0000000000.008000) can0 080#", r"line 5: SYNC without a setpoint 301h"),
             (5, "(0000000000.008000) can0 301#A0860100", r"line 6: second setpoint 301h before a SYNC"),
