@@ -23,7 +23,7 @@ ARGUMENTS = (
     "--disable-gpu",
     "--hide-scrollbars",
     "--force-device-scale-factor=1",
-    "--host-resolver-rules=MAP * ~NOTFOUND",  # offline, whatever a page asks for
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",  # offline, whatever a page asks for
 )
 PATIENCE = 300.0  # s until a page that does not answer counts as broken
 
@@ -39,8 +39,12 @@ class Browser:
         size = {"width": width, "height": 844, "deviceScaleFactor": 1, "mobile": mobile}
         self._driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         self._driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": mobile})
-        self._driver.get(page.as_uri())
+        self.visit(page.as_uri())
         self.wait("return document.documentElement.dataset.drawn === 'true'")
+
+    def visit(self, address: str) -> None:
+        """Load whatever is at an address."""
+        self._driver.get(address)
 
     def run(self, script: str, *arguments: object) -> Any:
         """Run a function's body in the page."""

@@ -1,5 +1,6 @@
 """A stream watched while it runs: what is drawn, and that those who draw disturb nobody."""
 
+import json
 import multiprocessing
 import os
 import pty
@@ -9,14 +10,18 @@ import subprocess
 import time
 from contextlib import suppress
 from io import StringIO
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
+import attrs
 import numpy as np
 import pytest
 from command_line import PROGRAM, run_here
 from exporters.can.bench import HastyClock
+from headless import browser
 from rich.console import Console
 
-from gen_profile.streaming import live, live_terminal
+from gen_profile.streaming import live, live_page, live_terminal
 from gen_profile.streaming import stream as workflow
 from gen_profile_exporters.can.host.port import Port
 from gen_profile_exporters.can.streaming.record import Book, Phase, Recorder
@@ -104,7 +109,7 @@ def test_nobody_waits_for_a_viewer(log, show, monkeypatch):
 @pytest.mark.slow
 def test_on_a_terminal(log):
     master, slave = pty.openpty()
-    command = [PROGRAM, "stream", log, "--simulate-drive", "--live"]
+    command = [PROGRAM, "stream", log, "--simulate-drive", "--live", "terminal"]
     environment = {**os.environ, "COLUMNS": "80", "TERM": "xterm"}
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=slave, env=environment)
     os.close(slave)
@@ -122,5 +127,73 @@ def test_on_a_terminal(log):
 
 
 def test_without_a_terminal(log):
-    outcome = run_here("stream", log, "--simulate-drive", "--live")
-    assert (outcome.code, "--live: standard error is no terminal" in outcome.err) == (2, True)
+    outcome = run_here("stream", log, "--simulate-drive", "--live", "terminal")
+    assert (outcome.code, "--live terminal: standard error is no terminal" in outcome.err) == (2, True)
+
+
+@pytest.fixture
+def page():
+    with live_page.Server(VIEW, lambda: live.Glance.at(begun(), VIEW)) as server:
+        yield server
+
+
+def answer(address, **headers):
+    """Ask for a page; returns its status and content."""
+    try:
+        with urlopen(Request(address, headers=headers)) as found:
+            return found.status, found.read()
+    except HTTPError as error:
+        with error:
+            return error.code, b""
+
+
+class TestPage:
+    def test_it_tells_the_state(self, page):
+        status, content = answer(f"{page.address}state")
+        (axis,) = (told := json.loads(content))["axes"]
+        assert (status, told["phase"], told["over"]) == (200, "stream", False)
+        assert (told["time"], told["duration"]) == (1.0, 1.5)
+        assert axis["planned"] == [0.0, 1.0, 2.0, 3.0]
+        assert axis["actual"] == [0.0, None, 1.99, None]
+
+    @pytest.mark.parametrize(
+        "path", ["/", "/state", "/live.js", "/{guess}/state", "{own}../state", "{own}live_page.py"]
+    )
+    def test_only_who_knows_the_address(self, page, path):
+        path = path.format(guess="A" * 22, own=page.path)
+        assert answer(f"http://{page.host}{path}")[0] == 404
+
+    def test_not_under_another_name(self, page):
+        """As a page elsewhere would ask, whose name was made to mean this machine."""
+        assert answer(f"{page.address}state", Host=f"elsewhere.example:{page.server_port}")[0] == 404
+        assert page.server_address[0] == "127.0.0.1"
+
+    def test_long_motions_are_thinned_out(self):
+        long = attrs.evolve(VIEW, planned=np.zeros((100_000, 1)))
+        book = Book.blank(100_000, 1)
+        (axis,) = live_page._state(long, live.Glance.at(book, long))["axes"]
+        assert len(axis["planned"]) == len(axis["actual"]) <= 500
+
+    @pytest.mark.slow
+    def test_a_browser_draws_it(self, page):
+        with browser() as window:
+            window.visit(page.address)
+            window.wait("return document.querySelectorAll('polyline.planned').length === 1")
+            words = window.run("return ['h1', 'h2'].map((name) => document.querySelector(name).textContent)")
+            assert words == [
+                "bay-3: stream, 1.0 of 1.5 s, late by 9 µs at most",
+                "bridge: at most 10.0 mm off the motion",
+            ]
+            assert window.complaints() == []
+
+
+@pytest.mark.slow
+def test_the_address_is_told(log):
+    command = [PROGRAM, "stream", log, "--simulate-drive", "--live", "browser", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        address = next(
+            line.split()[-1] for line in process.stderr if line.startswith("Watch at http://127.0.0.1:")
+        )
+        told = json.loads(answer(f"{address}state")[1])
+        out, _ = process.communicate()
+    assert (told["name"], process.returncode, json.loads(out)["state"]) == ("paper", 0, "done")

@@ -69,7 +69,11 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
     is_flag=True,
     help="First measure, for as long as the motion lasts, whether this machine can hold the cycle.",
 )
-@click.option("--live", is_flag=True, help="Draw the motion on the terminal while it runs.")
+@click.option(
+    "--live",
+    type=click.Choice(["terminal", "browser"]),
+    help="Draw the motion while it runs: here, or on a page of this machine.",
+)
 @click.option("--dry-run", is_flag=True, help="Print the plan, and touch no bus.")
 @click.option("--accept-unverified", is_flag=True, help="Stream what was exported without its check.")
 @click.option(
@@ -94,7 +98,7 @@ def stream(
     jog: tuple[str, ...],
     reset_fault: bool,
     self_test: bool,
-    live: bool,
+    live: str | None,
     dry_run: bool,
     accept_unverified: bool,
     table: Path | None,
@@ -110,7 +114,7 @@ def stream(
     from gen_profile_exporters.can.host.port import Port
 
     run.require_extra()
-    if live:
+    if live == "terminal":
         _require_terminal()
     from gen_profile_exporters.can.streaming import joint_bus
 
@@ -305,22 +309,28 @@ def _source(
 
 
 @contextmanager
-def _shown(source: Source, live: bool) -> Iterator[tuple[Callable[[str], None], Book | None]]:
-    """Show a stream: by its phases, or by curves, which need the terminal for themselves."""
-    if not live:
+def _shown(source: Source, live: str | None) -> Iterator[tuple[Callable[[str], None], Book | None]]:
+    """Show a stream: by its phases, and by curves, which need the terminal for themselves."""
+    if live is None:
         with progress() as tell:
             yield tell, None
         return
+    from gen_profile.streaming import live_page, live_terminal
     from gen_profile.streaming.live import watched
-    from gen_profile.streaming.live_terminal import show
 
-    with watched(source, show) as book:
-        yield lambda _: None, book
+    if live == "browser":
+        with progress() as tell, watched(source, live_page.show) as book:
+            yield tell, book
+    else:
+        with watched(source, live_terminal.show) as book:
+            yield lambda _: None, book
 
 
 def _require_terminal() -> None:
     if not sys.stderr.isatty():
-        raise SpecError("--live: standard error is no terminal to draw on; leave it out.")
+        raise SpecError(
+            "--live terminal: standard error is no terminal to draw on; leave it out, or use --live browser."
+        )
 
 
 def _require_moving_alone(to_start: bool, jog: tuple[str, ...], dry_run: bool) -> None:
