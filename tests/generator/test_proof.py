@@ -351,8 +351,9 @@ def test_a_block_that_sways_too_much_is_not_written(tmp_path):
     assert "Nothing was written" in failed.err
     assert failed.document["path"] is None
     assert not (tmp_path / "out").exists()
-    kept = run_here("planner", "write", tmp_path / "bay.toml", *options, "--keep-failed")
+    kept = run_here("planner", "write", tmp_path / "bay.toml", *options, "--keep-failed", "--export", "c")
     assert kept.code == 4
+    assert len(kept.document["files"]) > 1
     assert not json.loads((tmp_path / "out" / "manifest.json").read_text())["check"]["passed"]
 
 

@@ -14,7 +14,7 @@ from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, sha256
 from gen_profile.artefacts.writing import staged
 from gen_profile.designs.design import LIBRARIES, accompany, after_earlier_ones
 from gen_profile.planner.design import PlannerBlock, planner_block
-from gen_profile.planner.forms import block_files, block_in
+from gen_profile.planner.forms import block_files, block_in, is_c
 from gen_profile.progress import Progress, untold
 from gen_profile.proof.check import FORMAT
 from gen_profile.proof.prove import HISTORIES, prove
@@ -78,7 +78,7 @@ def deploy(
     ----------
     spec : Spec
     formats : sequence of str
-        Names of formats that carry function blocks. All hold the same program; that of the first is executed.
+        Names of formats that carry function blocks, or C. All hold the same program; one is executed.
     folder : Path or str
         Made if needed; files of the same names are replaced, others are left alone.
     histories : int
@@ -101,8 +101,7 @@ def deploy(
     files = block_files(block, spec, formats)
     with staged(folder) as staging:
         written = {file.filename: staging.write(file.filename, file.content) for file in files}
-        first = files[0].filename
-        text = block_in(Path(first), written[first])
+        text = _executed(block, written)
         proof = prove(spec, text, histories=histories, progress=progress) if check else None
         accompany(spec, staging)
         manifest = _manifest(spec, written, proof)
@@ -112,6 +111,12 @@ def deploy(
             staging.deliver()
     kept = manifest.artefacts if delivered else ()
     return Deployment(spec=spec, block=block, proof=proof, folder=folder, files=kept)
+
+
+def _executed(block: PlannerBlock, written: Mapping[str, bytes]) -> str:
+    """Read the text that is proved out of the first file that holds it; C is its translation."""
+    texts = (block_in(Path(name), content) for name, content in written.items() if not is_c(name))
+    return next(texts, block.text)
 
 
 def _manifest(spec: Spec, written: Mapping[str, bytes], proof: Proof | None) -> Manifest:

@@ -30,6 +30,11 @@ def require_forms(formats: Iterable[str]) -> None:
             find_container(name)
 
 
+def is_c(filename: str) -> bool:
+    """Whether a file of a block is C, out of which its text cannot be read."""
+    return Path(filename).suffix in (".c", ".h")
+
+
 def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tuple[File, ...]:
     """Write a planner block in every form that is asked for, and read each back.
 
