@@ -382,6 +382,7 @@ class TestSlowMotions:
         return run_here("stream", deployed / "paper.log", *AWAY, *options, "--json")
 
     @pytest.mark.slow
+    @pytest.mark.slow
     def test_to_the_start_and_then_the_motion(self, deployed, drive_away):
         refused = self.streamed(deployed)
         assert (refused.code, "stands at 0.07" in refused.document["reason"]) == (6, True)
@@ -403,6 +404,7 @@ class TestSlowMotions:
         assert told["state"] == "done"
         assert drive_away.actual == pytest.approx(60_000)
 
+    @pytest.mark.slow
     def test_they_stop_as_every_stream_does(self, deployed, drive_away, monkeypatch):
         send, sent = Pacer.send, []
 

@@ -112,6 +112,7 @@ class TestWholeStream:
         assert record.phase is Phase.ABORTED
         assert "do not settle" in record.reason
 
+    @pytest.mark.slow
     def test_no_drift_in_an_hour(self):
         hour = quintic((0.0, 1.0), duration=3600.0)
         with Bench(profile=hour, sync_period=1.0, step=500 * MS) as bench:
