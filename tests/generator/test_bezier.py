@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
-from gen_profile.solvers.direct.bezier import Piece, bernstein, elevation, gram, power_basis
+from gen_profile.solvers.direct.bezier import Piece, bernstein, elevation, gram, halving, power_basis
 
 numbers = st.floats(-10.0, 10.0)
 TIMES = np.linspace(0.0, 1.0, 41)
@@ -17,6 +17,14 @@ def test_powers_are_the_same_polynomial(degree):
     coefficients = np.arange(1.0, degree + 2.0) ** 2 - 3.0
     powers = Polynomial(power_basis(degree) @ coefficients)
     assert powers(TIMES) == pytest.approx(bernstein(degree, TIMES) @ coefficients, abs=1e-9)
+
+
+@pytest.mark.parametrize("degree", range(1, 7))
+def test_halves_are_the_same_polynomial(degree):
+    coefficients = np.sin(np.arange(degree + 1.0))
+    for half, map_ in enumerate(halving(degree)):
+        whole = bernstein(degree, (TIMES + half) / 2.0) @ coefficients
+        assert bernstein(degree, TIMES) @ map_ @ coefficients == pytest.approx(whole, abs=1e-12)
 
 
 @pytest.mark.parametrize("degree", range(1, 7))

@@ -3,14 +3,17 @@
 import attrs
 import numpy as np
 import pytest
-from generator.crane_problems import EFFORTS, crane_problem
+from generator.crane_problems import CRANE, EFFORTS, crane_problem
+from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost
 
 from gen_profile.motion.metrics import greatest
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.problem import problem_of
+from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.direct.refinement import bisected, switching
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
@@ -117,13 +120,41 @@ def test_programs_that_overshoot_back_and_forth_settle(weight):
     assert one.cost == pytest.approx(other.cost, rel=1e-6 if weight == 0.0 else 3e-5)
 
 
-def test_snap_within_a_limit_of_the_sway_takes_few_programs_and_intervals(monkeypatch):
-    task = ["cost.effort=snap", "move.duration=6.0", "limits.sway=0.003"]
-    few = direct.solve(problem_of(preset_spec("slosh-tank", task)))
+def test_a_bisected_mesh_holds_the_same_motion():
+    (setup, _), cost = set_up.set_up(limited(acceleration=0.3)), SwayCost(beta=50.0, gamma=50.0)
+    goal = direct.CostProgram(setup=setup, sway_cost=cost, sway_limit=None)
+    found = direct.sequence(setup.transcription.rest(), goal)
+    where = switching(setup, found.iterate, None)
+    finer, motion = bisected(setup, found.iterate, where)
+    assert 0 < where.sum() < len(where)
+    assert finer.effort(motion.local) == pytest.approx(setup.effort(found.iterate.local), rel=1e-12)
+    assert finer.cost(motion, cost) == pytest.approx(setup.cost(found.iterate, cost), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_the_cost_within_a_limit_is_what_another_program_finds():
+    found = direct.solve(limited(acceleration=0.3)).raise_for_status()
+    apart = CraneOptimalControl(dict(CRANE.nominal()), "jerk", None, 50.0, 50.0)
+    acceleration = np.eye(apart.size + 1)[6]
+    cost = direct_cost(apart, 0.3, 3.0, 100, limit=(acceleration, 0.3))
+    assert found.cost - 3.0 * 50.0 == pytest.approx(cost, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("machine", "task", "loss"),
+    [
+        ("slosh-tank", ["cost.effort=snap", "move.duration=6.0", "limits.sway=0.003"], 1e-3),
+        ("paper", ["limits.velocity=0.145"], 1e-4),
+        ("paper", ["actuator.type=first-order", "actuator.tau=0.067", "limits.jerk=10"], 1e-4),
+    ],
+)
+def test_few_programs_find_what_a_fine_mesh_does(monkeypatch, machine, task, loss):
+    problem = problem_of(preset_spec(machine, task))
+    few = direct.solve(problem)
     assert few.iterations <= 20
-    monkeypatch.setattr(set_up, "INTERVALS", 60)  # of which there are twice as many, with limits
-    many = direct.solve(problem_of(preset_spec("slosh-tank", task)))
-    assert many.raise_for_status().cost == pytest.approx(few.raise_for_status().cost, rel=0.01)
+    monkeypatch.setattr(set_up, "INTERVALS", 120)
+    many = direct.solve(problem)
+    assert few.raise_for_status().cost == pytest.approx(many.raise_for_status().cost, rel=loss)
 
 
 def test_a_limit_that_makes_the_cost_of_sway_steep_is_kept():

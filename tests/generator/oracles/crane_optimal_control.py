@@ -72,15 +72,17 @@ def direct_cost(
     *,
     swung: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     final_velocity: float = 0.0,
+    limit: tuple[Sequence[float], float] | None = None,
 ) -> float:
     """Minimum of ∫ g dt by direct collocation at five Gauss points, solved by IPOPT from a quintic move.
 
-    ``swung`` holds the angles and their rates at the start.
+    ``swung`` holds the angles and their rates at the start, ``limit`` factors of all states and the control,
+    whose sum is bounded at the collocation points, and the bound.
     """
-    solver, guess = direct_program(
-        problem, distance, duration, intervals, swung=swung, final_velocity=final_velocity
+    solver, guess, bounds = direct_program(
+        problem, distance, duration, intervals, swung=swung, final_velocity=final_velocity, limit=limit
     )
-    found = solver(x0=guess, lbg=0.0, ubg=0.0)
+    found = solver(x0=guess, lbg=-bounds, ubg=bounds)
     assert solver.stats()["success"], solver.stats()["return_status"]
     return float(found["f"])
 
@@ -93,8 +95,9 @@ def direct_program(
     *,
     swung: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     final_velocity: float = 0.0,
-) -> tuple[ca.Function, np.ndarray]:
-    """IPOPT's program of `direct_cost`, and its first guess.
+    limit: tuple[Sequence[float], float] | None = None,
+) -> tuple[ca.Function, np.ndarray, np.ndarray]:
+    """IPOPT's program of `direct_cost`, its first guess, and bounds of its constraints: zero for equations.
 
     The first multipliers are the costates at the start.
     """
@@ -102,7 +105,8 @@ def direct_program(
     points = np.array(ca.collocation_points(degree, "legendre"))
     C, D, B = _lagrange(points)
     h = duration / intervals
-    variables, equations, guess, cost = [], [], [], 0
+    variables, equations, limited, guess, cost = [], [], [], [], 0
+    factors, bound = limit or (np.zeros(problem.size + 1), np.inf)
 
     def unknown(time: float, control: bool) -> tuple[ca.MX, ca.MX | None]:
         x = ca.MX.sym("x", problem.size)
@@ -127,6 +131,8 @@ def direct_program(
         for j, (x, u) in enumerate(stages):
             slope = sum(C[i, j + 1] * values[i] for i in range(degree + 1))
             equations.append(slope - h * problem.rates(x, u))
+            if limit is not None:
+                limited.append(ca.dot(ca.DM(factors), ca.vertcat(x, u)))
             cost += h * B[j + 1] * problem.running_cost(x, u)
         node_end = sum(D[i] * values[i] for i in range(degree + 1))
         node, _ = unknown((k + 1) * h, False)
@@ -137,10 +143,11 @@ def direct_program(
     solver = ca.nlpsol(
         "solver",
         "ipopt",
-        {"x": ca.vertcat(*variables), "f": cost, "g": ca.vertcat(*equations)},
+        {"x": ca.vertcat(*variables), "f": cost, "g": ca.vertcat(*equations, *limited)},
         {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-9},
     )
-    return solver, np.concatenate(guess)
+    bounds = np.concatenate([np.zeros(sum(e.numel() for e in equations)), np.full(len(limited), bound)])
+    return solver, np.concatenate(guess), bounds
 
 
 def _lagrange(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -40,6 +40,13 @@ def elevation(degree: int) -> Array:
     return raised
 
 
+def halving(degree: int) -> Array:
+    """Cut a polynomial in two by de Casteljau's algorithm, shape (2, degree + 1, degree + 1)."""
+    i = np.arange(degree + 1)
+    first = comb(i[:, None], i) / 2.0 ** i[:, None]
+    return np.stack([first, first[::-1, ::-1]])
+
+
 def power_basis(degree: int) -> Array:
     """Turn Bézier coefficients into those of powers, lowest first, shape (degree + 1, degree + 1)."""
     i = np.arange(degree + 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 
 import attrs
 import numpy as np
@@ -107,17 +107,33 @@ def approach(transcription: Transcription, sway_cost: SwayCost, before: Iterate,
     return after
 
 
-def keep_limits(
-    program: ConicProgram, problem: Problem, transcription: Transcription, loosened: Container[str] = ()
-) -> None:
-    """Bound the command of every axis, and its travel, at every instant.
+@attrs.frozen(kw_only=True, eq=False)
+class AxisLimit:
+    """Bounds of what Bézier coefficients say of one axis.
 
-    Parameters
+    Attributes
     ----------
-    loosened : container of str
-        Places of limits that the program's last variable widens so many times, such as ``limits.jerk``;
-        travel at either end by so many times its width, less one.
+    place : str
+        In the spec, such as ``limits.jerk``.
+    axis : int
+    rows : (intervals, coefficients, size) array
+        From the local coordinates.
+    low, high : float
+        Dimensionless.
+    give : float
+        By how much either is widened for every time that the limit is, beyond the first.
     """
+
+    place: str
+    axis: int
+    rows: Array
+    low: float
+    high: float
+    give: float
+
+
+def axis_limits(problem: Problem, transcription: Transcription) -> Iterator[AxisLimit]:
+    """List the limits of every axis' command, and of its travel."""
     duration = problem.duration
     lag = (problem.tau or 0.0) / duration
     for axis, reach in enumerate(axis_reach(problem)):
@@ -132,9 +148,25 @@ def keep_limits(
             else:
                 give = high = WITHIN * limit * duration**order / reach
                 low = -high
-            loose = problem.limits.place(axis, name) in loosened
             rows = transcription.piece.leading(order, lag)
-            transcription.bound(program, rows, (low, high), axis, give if loose else 0.0)
+            place = problem.limits.place(axis, name)
+            yield AxisLimit(place=place, axis=axis, rows=rows, low=low, high=high, give=give)
+
+
+def keep_limits(
+    program: ConicProgram, problem: Problem, transcription: Transcription, loosened: Container[str] = ()
+) -> None:
+    """Bound the command of every axis, and its travel, at every instant.
+
+    Parameters
+    ----------
+    loosened : container of str
+        Places of limits that the program's last variable widens so many times, such as ``limits.jerk``;
+        travel at either end by so many times its width, less one.
+    """
+    for limit in axis_limits(problem, transcription):
+        give = limit.give if limit.place in loosened else 0.0
+        transcription.bound(program, limit.rows, (limit.low, limit.high), limit.axis, give)
 
 
 def keep_sway(

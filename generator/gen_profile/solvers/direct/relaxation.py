@@ -73,7 +73,7 @@ class LeastShare:
         program.at_most(-linear[None], np.zeros(1))
         return self.price * transcription.effort(self.setup.forms, program.variables), linear
 
-    def step(self, solutions: Sequence[ConicSolution]) -> float:
+    def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
         """Measure by how much the share changed last, in units of what would be noticed."""
         share, before = float(solutions[-1].x[-1]), float("inf")
         if len(solutions) > 1:
@@ -126,14 +126,13 @@ def relaxed(problem: Problem, loosened: Sequence[str]) -> Relaxed | None:
         sway_cost=SwayCost(beta=0.0, gamma=1.0),
         sway_limit=None,
     )
-    unlimited = sequence(setup, setup.transcription.rest(), free)
+    unlimited = sequence(setup.transcription.rest(), free)
     if unlimited.verdict is not ConicStatus.SOLVED:
         return None
-    x = unlimited.solutions[-1].x
-    effort = 0.5 * float(x @ (setup.transcription.effort(setup.forms, len(x)) @ x))
+    effort = setup.effort(unlimited.iterate.local)
     for price in PRICES:
         goal = LeastShare(setup=setup, loosened=tuple(loosened), price=price / effort)
-        found = sequence(setup, unlimited.iterate, goal)
+        found = sequence(unlimited.iterate, goal)
         if found.verdict is ConicStatus.SOLVED:
             return Relaxed(share=float(found.solutions[-1].x[-1]), iterate=found.iterate)
         if found.verdict is ConicStatus.INFEASIBLE or found.iterations == MAX_ITERATIONS:

@@ -16,10 +16,11 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.problem.motion_equations import motion_equations
 from gen_profile.problem.pontryagin import SNAP_TIME, optimality_system
 from gen_profile.problem.problem import Problem
+from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.bezier import Piece
 from gen_profile.solvers.direct.condensing import axes_map
-from gen_profile.solvers.direct.transcription import TranscribedMachine, Transcription
+from gen_profile.solvers.direct.transcription import Iterate, TranscribedMachine, Transcription
 from gen_profile.solvers.indirect.boundary_value_problem import (
     BoundaryValueProblem,
     canonical_problem,
@@ -40,6 +41,8 @@ class Setup:
     ----------
     problem : Problem
     transcription : Transcription
+    effort_weights : (m,) array
+        Of the axes, in units of `cost_scale`.
     forms : tuple of (intervals, size, size) arrays
         Twice the effort of every axis, in units of `cost_scale`.
     cost_scale : float
@@ -50,6 +53,7 @@ class Setup:
 
     problem: Problem
     transcription: Transcription
+    effort_weights: Array
     forms: tuple[Array, ...]
     cost_scale: float
     tried: tuple[goals.Amplitudes, ...] = ()
@@ -58,6 +62,20 @@ class Setup:
     def extra(self) -> int:
         """Number of variables that bounding the worst machine takes."""
         return goals.worst_case_variables(self.tried) if self.tried else 0
+
+    def effort(self, local: Array) -> float:
+        """Evaluate the effort of a motion, in units of `cost_scale`."""
+        axes = local.reshape(self.transcription.intervals, len(self.forms), -1).swapaxes(0, 1)
+        return sum(
+            0.5 * float(np.einsum("ka,kab,kb->", own, form, own))
+            for own, form in zip(axes, self.forms, strict=True)
+        )
+
+    def cost(self, iterate: Iterate, sway_cost: SwayCost) -> float:
+        """Evaluate eq. (26) in SI units."""
+        swayed = sway_cost.values(self.transcription.end_sway_found(iterate))
+        running = self.cost_scale * self.effort(iterate.local) + self.transcription.quadrature() @ swayed
+        return self.problem.duration * float(running)
 
 
 def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tuple[Setup, tuple[str, ...]]:
@@ -78,8 +96,8 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     )
     jerks = [problem.limits.of(axis).jerk for axis in range(system.layout.m)]
     commands_jerk = problem.tau is not None and any(jerk is not None for jerk in jerks)
-    piece = Piece(order=4 if problem.effort == "snap" or commands_jerk else 3, length=_mesh(problem))
-    reach = axis_reach(problem)
+    order = 4 if problem.effort == "snap" or commands_jerk else 3
+    piece, reach = Piece(order=order, length=_mesh(problem)), axis_reach(problem)
     transcription = Transcription(
         piece=piece,
         axes=axes_map(piece, np.array(problem.start), reach, problem.duration),
@@ -88,17 +106,34 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
         final_velocity=np.array(problem.final_velocity) * problem.duration / reach,
         machines=machines,
     )
-    form, usual = goals.effort_form(problem, piece), goals.usual_effort(problem)
-    cost_scale = canonical.data.cost_scale * usual
-    unit = canonical.data.effort_weights * reach**2 / problem.duration**6 / cost_scale
+    cost_scale = canonical.data.cost_scale * goals.usual_effort(problem)
+    weights = canonical.data.effort_weights * reach**2 / problem.duration**6 / cost_scale
     setup = Setup(
         problem=problem,
         transcription=transcription,
-        forms=tuple(share * form for share in unit),
+        effort_weights=weights,
+        forms=_forms(problem, piece, weights),
         cost_scale=cost_scale,
         tried=_amplitudes(problem, machines, others),
     )
     return setup, redundant
+
+
+def on_mesh(setup: Setup, lengths: Array) -> Setup:
+    """Transcribe the same problem on another mesh, of such relative lengths of intervals."""
+    problem, transcription = setup.problem, setup.transcription
+    piece = attrs.evolve(transcription.piece, length=lengths)
+    axes = axes_map(piece, np.array(problem.start), axis_reach(problem), problem.duration)
+    return attrs.evolve(
+        setup,
+        transcription=attrs.evolve(transcription, piece=piece, axes=axes),
+        forms=_forms(problem, piece, setup.effort_weights),
+    )
+
+
+def _forms(problem: Problem, piece: Piece, weights: Array) -> tuple[Array, ...]:
+    form = goals.effort_form(problem, piece)
+    return tuple(weight * form for weight in weights)
 
 
 def _nominal(
@@ -150,8 +185,7 @@ def _mesh(problem: Problem) -> Array:
     """Choose relative lengths of intervals: resolve the fastest mode and, for snap, layers at the ends."""
     fastest = linearize(problem.plant, problem.parameters, problem.target).frequencies[-1]
     enough = fastest * problem.duration / RADIANS_PER_INTERVAL
-    bends = problem.effort == "snap" and bool(problem.limits.stated())  # where limits begin to bind, too
-    longest = 1.0 / float(np.clip(np.ceil(enough), (1 + bends) * INTERVALS, MAX_INTERVALS))
+    longest = 1.0 / float(np.clip(np.ceil(enough), INTERVALS, MAX_INTERVALS))
     shortest = SNAP_TIME / problem.duration if problem.effort == "snap" else longest
     graded = longest * GROWTH ** -np.arange(1.0, MAX_GRADED)
     graded = graded[graded > shortest / GROWTH][::-1]

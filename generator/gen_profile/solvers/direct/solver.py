@@ -26,6 +26,7 @@ from gen_profile.solvers.direct.acceleration import accelerate
 from gen_profile.solvers.direct.bezier import power_basis
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
+from gen_profile.solvers.direct.refinement import bisected, switching
 from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
@@ -33,11 +34,15 @@ from gen_profile.solvers.solution import Optimum, Solution, Status
 from gen_profile.spec.model import LimitsSpec
 
 METHOD = "direct"
-STEP_TOLERANCE = 1e-8  # of the motion's coordinates, relative
-STALLED = 1e-5  # step that is still taken for the programs' own tolerance when it ceases to shrink
-ROUGH = 2e-4  # step that is taken for it where a program was solved less exactly than asked for
+STEP_TOLERANCE = 1e-8  # of the motion, relative
+ROUGH = 0.5  # step after which a mesh is refined: what programs on coarse ones end at need not be exact
+STALLED = (
+    2e-4  # step that is taken for the programs' own tolerance when it ceases to shrink; costs its square
+)
 SLOW = 0.3  # share of the step before from which on steps are combined
 MAX_ITERATIONS = 50
+MAX_BISECTIONS = 6
+WORTH_BISECTING = 1e-4  # relative change of the cost from one mesh to the next; what is left is less
 WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
 LEAST_SHARE = 0.01  # of a load's limit, of which a change is still measured
 HORIZONTAL = np.pi / 2.0
@@ -45,8 +50,9 @@ HORIZONTAL = np.pi / 2.0
 
 @attrs.frozen(kw_only=True, eq=False)
 class ProgramSequence:
-    """Where a sequence of programs ended."""
+    """Where a sequence of programs ended, on which mesh."""
 
+    setup: Setup
     verdict: ConicStatus
     iterate: Iterate
     solutions: tuple[ConicSolution, ...]
@@ -62,6 +68,11 @@ class Goal(Protocol):
     """What programs shall achieve."""
 
     @property
+    def setup(self) -> Setup:
+        """The problem, transcribed."""
+        ...
+
+    @property
     def extra(self) -> int:
         """Number of variables of its own, the program's last."""
         ...
@@ -72,7 +83,7 @@ class Goal(Protocol):
         """Add limits and constraints of its own to a program, and give its cost: P and q."""
         ...
 
-    def step(self, solutions: Sequence[ConicSolution]) -> float:
+    def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
         """Measure by how much what counts changed from one program to the next."""
         ...
 
@@ -104,11 +115,10 @@ def solve(problem: Problem, near: Iterate | None = None) -> Solution:
     start = near or setup.transcription.rest()
 
     def attempt(sway_limit: float | None) -> Solution:
-        nonlocal iterations, start
-        goal = CostProgram(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
-        found = sequence(setup, start, goal)
-        iterations, start = iterations + found.iterations, found.iterate
-        return conclude(setup, found, sway_cost, iterations)
+        nonlocal setup, iterations, start
+        found = refined(start, CostProgram(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit))
+        setup, start, iterations = found.setup, found.iterate, iterations + found.iterations
+        return conclude(found, sway_cost, iterations)
 
     return within_sway(problem.limits.sway, attempt)
 
@@ -129,9 +139,30 @@ def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
     ), solution.iterations
 
 
-def sequence(setup: Setup, start: Iterate, goal: Goal) -> ProgramSequence:
-    """Solve programs linearised about one another's motion until what counts stays."""
-    transcription, iterate = setup.transcription, start
+def refined(start: Iterate, goal: CostProgram) -> ProgramSequence:
+    """Solve programs on a mesh that is bisected where limits begin or cease to bind, as long as that pays."""
+    if not goal.setup.problem.limits.stated():
+        return sequence(start, goal)
+    solutions: tuple[ConicSolution, ...] = ()
+    cost = float("inf")
+    for _ in range(MAX_BISECTIONS):
+        found = sequence(start, goal, ROUGH)
+        solutions += found.solutions
+        if found.verdict is not ConicStatus.SOLVED:
+            return attrs.evolve(found, solutions=solutions)
+        start, before, cost = found.iterate, cost, goal.setup.cost(found.iterate, goal.sway_cost)
+        where = switching(goal.setup, start, goal.sway_limit)
+        if abs(before - cost) < WORTH_BISECTING * cost or not where.any():
+            break
+        finer, start = bisected(goal.setup, start, where)
+        goal = attrs.evolve(goal, setup=finer)
+    found = sequence(start, goal)
+    return attrs.evolve(found, solutions=(*solutions, *found.solutions))
+
+
+def sequence(start: Iterate, goal: Goal, enough: float = STEP_TOLERANCE) -> ProgramSequence:
+    """Solve programs linearised about one another's motion until what counts changes by little enough."""
+    transcription, iterate = goal.setup.transcription, start
     solutions: list[ConicSolution] = []
     points: list[Array] = []
     images: list[Array] = []
@@ -143,18 +174,20 @@ def sequence(setup: Setup, start: Iterate, goal: Goal) -> ProgramSequence:
         if solutions[-1].verdict is not ConicStatus.SOLVED:
             verdict = solutions[-1].verdict
             break
-        before, step = step, goal.step(solutions)
+        before, step = step, goal.step(solutions, start)
         points.append(iterate.flat())
         iterate = transcription.iterate(solutions[-1].x, maps)
         images.append(iterate.flat())
-        stalled = step < STALLED and step > 0.5 * before
-        if step < STEP_TOLERANCE or stalled or (step < ROUGH and not solutions[-1].exact):
+        stalled = step < STALLED and (step > 0.5 * before or not solutions[-1].exact)
+        if step < enough or stalled:
             verdict = ConicStatus.SOLVED
         else:
             if step > SLOW * before:
                 iterate = iterate.of_flat(accelerate(points, images, transcription.importance))
             iterate = goal.approach(iterate.of_flat(points[-1]), iterate)
-    return ProgramSequence(verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)
+    return ProgramSequence(
+        setup=goal.setup, verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step
+    )
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -197,12 +230,13 @@ class CostProgram:
         quadratic, linear = goals.cost(transcription, self.setup.forms, scaled, iterate, maps[0])
         return _widen(quadratic, program.variables), np.pad(linear, (0, program.variables - len(linear)))
 
-    def step(self, solutions: Sequence[ConicSolution]) -> float:
-        """Measure by how much the motion changed last."""
-        columns = slice(0, self.setup.transcription.intervals * self.setup.transcription.breadth)
+    def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
+        """Measure by how much the motion changed last, as the effort of the change relative to its own."""
+        transcription = self.setup.transcription
+        columns = slice(0, transcription.intervals * transcription.breadth)
         after = solutions[-1].x[columns]
-        before = solutions[-2].x[columns] if len(solutions) > 1 else np.zeros_like(after)
-        return float(np.abs(after - before).max() / np.abs(after).max())
+        before = solutions[-2].x[columns] if len(solutions) > 1 else start.local.ravel()
+        return float(np.sqrt(self.setup.effort(after - before) / self.setup.effort(after)))
 
     def approach(self, before: Iterate, after: Iterate) -> Iterate:
         """Go as far as the sway's cost may be believed."""
@@ -234,7 +268,7 @@ class LeastWorst:
         linear[column] = 1.0
         return self.trace * transcription.effort(self.setup.forms, program.variables), linear
 
-    def step(self, solutions: Sequence[ConicSolution]) -> float:
+    def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
         """Measure by how much the worst share changed last, in units of what would be noticed."""
         before = solutions[-2].x[-1] if len(solutions) > 1 else float("inf")
         noticed = WORTHWHILE * max(abs(float(solutions[-1].x[-1])), LEAST_SHARE)
@@ -251,30 +285,30 @@ def _widen(matrix: Matrix, width: int) -> Matrix:
     return widened
 
 
-def conclude(setup: Setup, found: ProgramSequence, sway_cost: SwayCost, iterations: int) -> Solution:
+def conclude(found: ProgramSequence, sway_cost: SwayCost, iterations: int) -> Solution:
     """Turn the outcome of programs into a solution."""
-    problem = setup.problem
+    problem = found.setup.problem
     status, cure = Status.CONVERGED, ""
     if found.verdict is ConicStatus.INFEASIBLE:
         status, cure = Status.INFEASIBLE, "Allow more time (move.duration), or wider limits."
     elif found.verdict is not ConicStatus.SOLVED:
         status, cure = Status.DIVERGED, "Allow more time (move.duration)."
-    elif greatest_angle(setup, found.iterate) > HORIZONTAL:
+    elif greatest_angle(found) > HORIZONTAL:
         status, cure = Status.SWINGS_TOO_FAR, "Allow more time (move.duration), or shorten the move."
     return Solution(
         status=status,
         method=METHOD,
         problem=problem,
-        optimum=_optimum(setup, found, sway_cost) if status is Status.CONVERGED else None,
+        optimum=_optimum(found, sway_cost) if status is Status.CONVERGED else None,
         iterations=iterations,
         residual=found.step,
         cure=cure,
     )
 
 
-def _optimum(setup: Setup, found: ProgramSequence, sway_cost: SwayCost) -> Optimum:
+def _optimum(found: ProgramSequence, sway_cost: SwayCost) -> Optimum:
     """Return to SI units."""
-    problem, transcription = setup.problem, setup.transcription
+    problem, transcription = found.setup.problem, found.setup.transcription
     piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
     intervals, axes = transcription.intervals, len(reach)
     local = found.iterate.local.reshape(intervals, axes, piece.size)
@@ -285,7 +319,7 @@ def _optimum(setup: Setup, found: ProgramSequence, sway_cost: SwayCost) -> Optim
     stages, machine = found.iterate.stages[0], transcription.machines[0]
     points = stages.reshape(-1, stages.shape[2])
     felt = transcription.axes(found.iterate.local).reshape(len(points), -1)
-    states, costates = _nodes(setup, found)
+    states, costates = _nodes(found)
     return Optimum(
         knots=knots,
         states=states,
@@ -296,8 +330,8 @@ def _optimum(setup: Setup, found: ProgramSequence, sway_cost: SwayCost) -> Optim
         / lengths[:, None, None] ** np.arange(control.shape[1])[:, None],
         top_order=piece.order,
         sway=machine.equations.sway(points, felt, machine.parameters)[:, :, 0],
-        angle=greatest_angle(setup, found.iterate),
-        cost=_cost(setup, found.iterate, sway_cost),
+        angle=greatest_angle(found),
+        cost=found.setup.cost(found.iterate, sway_cost),
         sway_weight=sway_cost.beta,
         sway_scale=sway_cost.gamma,
         defect=None,
@@ -305,13 +339,13 @@ def _optimum(setup: Setup, found: ProgramSequence, sway_cost: SwayCost) -> Optim
     )
 
 
-def _nodes(setup: Setup, found: ProgramSequence) -> tuple[Array, Array]:
+def _nodes(found: ProgramSequence) -> tuple[Array, Array]:
     """Read the nominal machine's states and costates at the nodes off a program, in SI units.
 
     A costate is what the cost would lose if its state were displaced there, which is the multiplier of the
     constraint that carries the state to the node.
     """
-    problem, transcription = setup.problem, setup.transcription
+    problem, transcription = found.setup.problem, found.setup.transcription
     piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
     axes, orders, intervals = len(reach), piece.order, transcription.intervals
     x, multipliers, scale = (
@@ -335,26 +369,14 @@ def _nodes(setup: Setup, found: ProgramSequence) -> tuple[Array, Array]:
     start[:, 0] = problem.start
     return (
         in_order(swung * scale, moved * units + start),
-        setup.cost_scale * duration * in_order(swung_costates / scale, moved_costates / units),
+        found.setup.cost_scale * duration * in_order(swung_costates / scale, moved_costates / units),
     )
 
 
-def greatest_angle(setup: Setup, iterate: Iterate) -> float:
+def greatest_angle(found: ProgramSequence) -> float:
     """Greatest rope angle of the nominal machine at the collocation points, in rad."""
-    machine, stages = setup.transcription.machines[0], iterate.stages[0]
+    transcription, stages = found.setup.transcription, found.iterate.stages[0]
+    machine = transcription.machines[0]
     points = stages.reshape(-1, stages.shape[2])
-    felt = setup.transcription.axes(iterate.local).reshape(len(points), -1)
+    felt = transcription.axes(found.iterate.local).reshape(len(points), -1)
     return float(np.abs(machine.equations.angle(points, felt, machine.parameters)).max())
-
-
-def _cost(setup: Setup, iterate: Iterate, sway_cost: SwayCost) -> float:
-    """Evaluate eq. (26) in SI units."""
-    transcription, duration = setup.transcription, setup.problem.duration
-    local = iterate.local.reshape(transcription.intervals, len(setup.forms), -1)
-    effort = sum(
-        0.5 * float(np.einsum("ka,kab,kb->", local[:, axis], form, local[:, axis]))
-        for axis, form in enumerate(setup.forms)
-    )
-    sway = transcription.end_sway_found(iterate)
-    swayed = float(transcription.quadrature() @ sway_cost.values(sway))
-    return duration * (setup.cost_scale * effort + swayed)

@@ -113,9 +113,9 @@ def solve_within_limits(problem: Problem) -> Solution:
         goal = CostProgram(
             setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=1.0 - MARGIN
         )
-        found = sequence(setup, setup.transcription.rest(), goal)
+        found = sequence(setup.transcription.rest(), goal)
         iterations += found.iterations
-        solution = conclude(setup, found, sway_cost, iterations)
+        solution = conclude(found, sway_cost, iterations)
         if solution.optimum is None:
             return solution
         shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
@@ -134,17 +134,17 @@ def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
         goal = CostProgram(
             setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=GOOD_ENOUGH
         )
-        bound, found = 0.0, sequence(setup, setup.transcription.rest(), goal)
+        bound, found = 0.0, sequence(setup.transcription.rest(), goal)
         if found.verdict is not ConicStatus.SOLVED:
             best = _least_worst(setup, traces)
             iterations += best.iterations
             bound = float(best.solutions[0].x[-1])
             if best.verdict is not ConicStatus.SOLVED:
-                return conclude(setup, best, sway_cost, iterations)
+                return conclude(best, sway_cost, iterations)
             goal = attrs.evolve(goal, worst=SLACK * float(best.solutions[-1].x[-1]) + MARGIN)
-            found = sequence(setup, best.iterate, goal)
+            found = sequence(best.iterate, goal)
         iterations += found.iterations
-        solution = conclude(setup, found, sway_cost, iterations)
+        solution = conclude(found, sway_cost, iterations)
         if solution.optimum is None:
             return solution
         shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
@@ -157,7 +157,7 @@ def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
 def _least_worst(setup: Setup, traces: Sequence[float]) -> ProgramSequence:
     """Minimise the worst share, for as little effort besides as the programs can tell from none."""
     for trace in traces:
-        best = sequence(setup, setup.transcription.rest(), LeastWorst(setup=setup, trace=trace))
+        best = sequence(setup.transcription.rest(), LeastWorst(setup=setup, trace=trace))
         if best.verdict is not ConicStatus.FAILED:
             break
     return best
