@@ -27,7 +27,7 @@ def test_no_duration_does(tmp_path):
     spec = tmp_path / "spec.toml"
     spec.write_text(
         '[plant]\ntype = "double-pendulum-crane"\n[move]\ndistance = 0.3\nduration = "minimum"\n'
-        "[limits]\nacceleration = 1.0\nsway = 1e-6\n"
+        "[move.initial]\ntheta1 = 0.02\n[limits]\nacceleration = 1.0\nsway = 0.01\n"
     )
     outcome = run_here(spec, "--out", tmp_path / "new")
     assert outcome.code == 3

@@ -63,7 +63,7 @@ def swing(push: Callable[[float], float], times: Array, p: Parameters) -> Array:
 
 def swing_from(phi: Array, rate: Array, push: Callable[[float], float], times: Array, p: Parameters) -> Array:
     """Angles and their rates from any state under a smooth cart acceleration, shape (times, 4)."""
-    return _integrate(np.concatenate((phi, rate)), push, times, p)
+    return _integrate(np.concatenate((phi, rate)), push, times, p, rtol=1e-9)
 
 
 def swing_freely(phi: Array, rate: Array, times: Array, p: Parameters) -> Array:
@@ -98,12 +98,14 @@ def sway(phi: Array, p: Parameters) -> Array:
     return np.column_stack((hook, hook + p["L2"] * np.sin(phi[:, 1])))
 
 
-def _integrate(state: Array, push: Callable[[float], float], times: Array, p: Parameters) -> Array:
+def _integrate(
+    state: Array, push: Callable[[float], float], times: Array, p: Parameters, rtol: float = 1e-11
+) -> Array:
     def rates(time: float, x: Array) -> Array:
         return np.concatenate((x[2:], accelerations(x[:2], x[2:], push(time), p)))
 
     span = (times[0], times[-1])
-    solution = solve_ivp(rates, span, state, method="DOP853", rtol=1e-11, atol=1e-13, t_eval=times)
+    solution = solve_ivp(rates, span, state, method="DOP853", rtol=rtol, atol=0.01 * rtol, t_eval=times)
     return solution.y.T
 
 
