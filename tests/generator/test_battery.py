@@ -1,0 +1,45 @@
+"""A sample of the battery: what is found keeps its limits and costs least, what is refused is told a cure."""
+
+import numpy as np
+import pytest
+from generator.battery import cures
+from generator.random_specs import random_spec
+
+from gen_profile.designs.plan import plan
+from gen_profile.errors import InfeasibleProblem
+from gen_profile.problem.problem import problem_of
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct import set_up
+from gen_profile.solvers.direct import solver as direct
+from gen_profile.spec.reading import overridden, spec_from_dict
+
+SOLVED = [3, 13, 19, 20, 25, 29, 35, 45]  # tower, joint, chain, double pendulum, tower, chain, tank, gantry
+ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
+
+
+@pytest.mark.parametrize("index", SOLVED)
+def test_what_is_found_keeps_its_limits_and_costs_least(monkeypatch, index):
+    spec = spec_from_dict(random_spec(f"now-{index}"))
+    found = plan(spec)
+    for name, order in ORDERS.items():
+        limit = getattr(spec.limits, name)
+        if limit is not None:
+            assert np.abs(found.command.within_segments(33, order)[1]).max() <= limit * (1.0 + 1e-9)
+    if spec.limits.sway is not None:
+        assert found.figures["sway_transient_peak_m"] <= spec.limits.sway
+    monkeypatch.setattr(set_up, "INTERVALS", 120)
+    fine = direct.solve(problem_of(spec)).raise_for_status()
+    assert found.solution.raise_for_status().cost == pytest.approx(fine.cost, rel=2e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [28])
+def test_what_is_refused_is_told_cures_that_work(index):
+    document = random_spec(f"now-{index}")
+    with pytest.raises(InfeasibleProblem) as refusal:
+        plan(spec_from_dict(document))
+    named = cures(str(refusal.value))
+    assert named
+    for changes in named:
+        problem = problem_of(spec_from_dict(overridden(document, changes)))
+        assert choice.keeps_limits(choice.attempt(problem))
