@@ -8,7 +8,8 @@ computes bit for bit what the text says.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -294,9 +295,15 @@ class _Translator(Transformer[Token, object]):
     def count(self, parts):  # type: ignore[no-untyped-def]
         name, first, last, body = parts
         variable = self._owned(self._variables[name.lower()])
-        goes_on = f"{variable} <= last{self._turn}"
+        end = f"last_{self._variables[name.lower()].name}"  # loops within each other have other variables
+        goes_on = f"{variable} <= {end}{self._turn}"
         loop = f"for ({variable} = {first.text}; {goes_on}; ++{variable}) {{"
-        return ["{", f"    const int32_t last = {last.text};", *_indented([loop, *_indented(body), "}"]), "}"]
+        return [
+            "{",
+            f"    const int32_t {end} = {last.text};",
+            *_indented([loop, *_indented(body), "}"]),
+            "}",
+        ]
 
     def repeat(self, parts):  # type: ignore[no-untyped-def]
         condition, body = parts
@@ -310,6 +317,16 @@ class _Translator(Transformer[Token, object]):
 
 def _indented(lines: list[str]) -> list[str]:
     return [f"    {line}" for line in lines]
+
+
+def c_constants(variables: Iterable[StVariable], body: list[str]) -> list[str]:
+    """Declare the constants that statements use; compilers warn of others."""
+    used = set(re.findall(r"\w+", "\n".join(body)))
+    return [
+        f"static const {c_member(v)} = {c_initial(v)};"
+        for v in variables
+        if v.section == "VAR CONSTANT" and v.name in used
+    ]
 
 
 def c_member(variable: StVariable) -> str:
@@ -334,19 +351,17 @@ typedef struct {{
 }} {name};
 
 /* Once, before all else. */
-void {name}_init({name} *fb);
+static void {name}_init({name} *fb);
 
 /* Once in every cycle, the inputs set; then read the outputs. */
-void {name}_step({name} *fb);
+static void {name}_step({name} *fb);
 
 #endif
 """
 
 
 def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
-    constants = [
-        f"static const {c_member(v)} = {c_initial(v)};" for v in variables if v.section == "VAR CONSTANT"
-    ]
+    constants = c_constants(variables, body)
     initials = [
         f"    fb->{v.name} = {v.initial[0]};" for v in variables if v.section != "VAR CONSTANT" and v.initial
     ]
@@ -367,12 +382,12 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             "",
             *constants,
             "",
-            f"void {name}_init({name} *fb) {{",
+            f"static void {name}_init({name} *fb) {{",
             "    memset(fb, 0, sizeof *fb);",
             *initials,
             "}",
             "",
-            f"void {name}_step({name} *fb) {{",
+            f"static void {name}_step({name} *fb) {{",
             "    BEGIN();",
             *_indented(body),
             "}",

@@ -2,16 +2,40 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Profile
+from gen_profile.planner.design import planner_block
 from gen_profile.plants.plant import Plant
+from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.model.contents import Model, plant_model, profile_model, system_model
+from gen_profile_fmu.model.planner import planner_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 INPUTS = {f"plant-{kind.value}": kind for kind in InputKind}
-KINDS = (*INPUTS, "profile", "system")
+KINDS = (*INPUTS, "profile", "system")  # of any plant
+ALL_KINDS = (*KINDS, "planner")
+
+
+PLANNED = preset_spec(
+    "paper",
+    limits={"velocity": 0.5, "acceleration": 1.0, "jerk": 20.0, "travel": (-1.0, 1.0)},
+    planner={"live": {"L1": (0.4, 0.5)}},
+    export={"cycle_time": 0.01},
+)
+
+
+@cache
+def planner_text() -> str:
+    return planner_block(PLANNED).text
+
+
+@cache
+def _planner() -> Model:
+    return planner_model("paper planner", planner_text(), "cart", tuple(PLANNED.planner.live))
 
 
 def machine_of(plant: Plant, **changes: float) -> PlantInstance:
@@ -34,6 +58,8 @@ def model_of(kind: str, plant: Plant, profile: Profile | None = None) -> Model:
     profile = profile or motion(len(plant.actuated))
     if kind == "profile":
         return profile_model("paper profile", plant.actuated, profile)
+    if kind == "planner":
+        return _planner()
     if kind == "system":
         return system_model("paper system", machine_of(plant), profile)
     machine = attrs.evolve(machine_of(plant), tau=0.1 if kind == "plant-velocity" else 0.0)

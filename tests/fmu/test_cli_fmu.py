@@ -14,6 +14,8 @@ from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
 from gen_profile_fmu.model.plant_variables import InputKind
 
 FAST = ("--set", "plant.L1=0.5")
+LIMITS = ("--set", "limits={velocity=0.5, acceleration=1.0, jerk=20.0, travel=[-1.0, 1.0]}")
+LIMITS += ("--set", "planner.live={L1=[0.4, 0.5]}")
 
 
 @pytest.mark.slow
@@ -21,7 +23,8 @@ FAST = ("--set", "plant.L1=0.5")
 @pytest.mark.parametrize("version", ["2", "3"])
 def test_writes_an_fmu_that_others_run(tmp_path, kind, version):
     path = tmp_path / "a.fmu"
-    done = run_here("fmu", kind, "--fmi", version, *FAST, "--out", path, "--json")
+    changes = (*FAST, *LIMITS) if kind == "planner" else FAST
+    done = run_here("fmu", kind, "--fmi", version, *changes, "--out", path, "--json")
     assert (done.code, done.errors) == (0, [])
     document = done.document
     assert document["path"] == str(path)
@@ -32,9 +35,12 @@ def test_writes_an_fmu_that_others_run(tmp_path, kind, version):
     assert description.modelName == document["model_identifier"] == f"paper_{kind}"
     starts = {variable.name: variable.start for variable in description.modelVariables}
     if kind != "profile":
-        assert float(starts["L1"]) == 0.5
-    result = simulate_fmu(str(path), stop_time=4.0, output_interval=0.01, fmi_type="CoSimulation")
-    if kind == "profile":
+        assert float(starts["live.L1" if kind == "planner" else "L1"]) == 0.5
+    orders = {"enable": True, "execute": True, "target": 0.3} if kind == "planner" else {}
+    result = simulate_fmu(
+        str(path), stop_time=4.0, output_interval=0.01, fmi_type="CoSimulation", start_values=orders
+    )
+    if kind in {"profile", "planner"}:
         assert result["cart.setpoint"][-1] == pytest.approx(0.3, abs=1e-12)
     if kind == "system":
         assert result["cart.position"][-1] == pytest.approx(0.3, abs=1e-12)
@@ -111,7 +117,7 @@ def test_choices_are_those_of_the_workflow():
         (("fmu",), 2, "Missing argument"),
         (("fmu", "crane"), 2, "'crane' is not one of"),
         (("fmu", "plant", "--fmi", "1"), 2, "'1' is not one of"),
-        (("fmu", "profile", "--input", "velocity"), 2, "--input: a profile has no inputs but its trigger"),
+        (("fmu", "profile", "--input", "velocity"), 2, "--input: the inputs of a profile are its own"),
         (("fmu", "plant", "--source-only", "--platform", "all"), 2, "--source-only puts no binary in"),
         (("fmu", "plant", "--set", "plant.L1=-1"), 2, "plant.L1: must be a number"),
         (("fmu", "plant", "--out", "/proc/none/a.fmu"), 2, "there is no folder /proc/none; make it"),

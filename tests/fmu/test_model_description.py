@@ -19,7 +19,7 @@ import ziglang
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from fmu.hoisting_pendulum import PLANT as WINCH
-from fmu.kinds import INPUTS, KINDS, model_of
+from fmu.kinds import ALL_KINDS, INPUTS, KINDS, model_of
 
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Coordinate, Parameter
@@ -63,6 +63,7 @@ def test_fmpy_finds_no_fault(plant, kind, version, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_fmutool_finds_no_fault(kind, version):
     tool = Path(sys.executable).with_name("fmutool")
     built = cached_fmu(model_of(kind, CRANE), version).archive
@@ -109,6 +110,7 @@ def test_says_what_the_plant_says(plant, kind, version):
         assert variables["energy"].unit == "J"
 
 
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_claims_the_capabilities_importers_look_for(kind, version):
     root = ElementTree.fromstring(sources(model_of(kind, CRANE), version).description)
     assert root.get("fmiVersion") == f"{version.value}.0"

@@ -7,7 +7,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from fmu.hoisting_pendulum import PLANT as WINCH
-from fmu.kinds import KINDS, model_of
+from fmu.kinds import ALL_KINDS, model_of
 from lxml import etree
 
 from gen_profile.plants.registry import BUILT_IN, find_plant
@@ -46,7 +46,7 @@ def variables(files):
     return {variable.get("name"): variable for variable in root.find("ModelVariables")}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_are_what_the_standard_says(schema, kind):
     files = files_of(model_of(kind, find_plant("double-pendulum-crane")))
     schema["TerminalsAndIcons"].assertValid(

@@ -8,7 +8,7 @@ from textwrap import indent
 
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File
-from gen_profile_exporters.st_to_c import StVariable, c_initial, c_member, translate_statements
+from gen_profile_exporters.st_to_c import StVariable, c_constants, c_member, translate_statements
 
 OWNERS = {"VAR_INPUT": "in->", "VAR_OUTPUT": "state->out.", "VAR": "state->"}
 
@@ -123,15 +123,7 @@ def c_files(text: str, file: str) -> tuple[File, File]:
     """
     source, statements = parse_function_block(text), translate_statements(text, OWNERS)
     names = {"file": file, "name": c_name(file), "guard": c_name(file).upper(), "block": source.name}
-    by_section = {
-        section: [v for v in statements.variables if v.section == section]
-        for section in (*OWNERS, "VAR CONSTANT")
-    }
-    body = "\n".join(statements.body)
-    used = set(re.findall(r"\w+", body))
-    constants = [
-        f"static const {c_member(v)} = {c_initial(v)};" for v in by_section["VAR CONSTANT"] if v.name in used
-    ]
+    by_section = {section: [v for v in statements.variables if v.section == section] for section in OWNERS}
     initials = [
         f"{OWNERS[v.section]}{v.name} = {v.initial[0]};"
         for section in OWNERS
@@ -140,9 +132,9 @@ def c_files(text: str, file: str) -> tuple[File, File]:
     ]
     code = SOURCE.format(
         **names,
-        constants="\n".join(constants),
+        constants="\n".join(c_constants(statements.variables, statements.body)),
         initials=indent("\n".join(initials), "    "),
-        body=indent(body, "    "),
+        body=indent("\n".join(statements.body), "    "),
     )
     header = HEADER.format(
         **names,

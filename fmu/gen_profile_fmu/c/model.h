@@ -11,6 +11,10 @@
 
 #include "variables.h"
 
+#ifdef HAS_BLOCK
+#include "planner_block.h"
+#endif
+
 enum { N_SLOPES = 3 };             /* time derivatives of an input that a step takes */
 
 static const double EVENT_TOLERANCE = 1e-13;  /* relative */
@@ -25,7 +29,10 @@ typedef struct {
     double slopes[N_A][N_SLOPES];  /* time derivatives of the inputs from SLOPED_INPUTS on, for the coming step */
     double began;                  /* when the motion began; infinite before */
     int segment;                   /* of the motion; -1 before it, N_SEGMENTS after it */
-    int samples;                   /* setpoints taken in model exchange */
+    int samples;                   /* setpoints taken in model exchange, or cycles of a block */
+#ifdef HAS_BLOCK
+    PlannerBlock block;            /* with all that it remembers */
+#endif
 } Model;
 
 /*

@@ -83,6 +83,15 @@ def system_page(name: str, machine: PlantInstance, command: Profile, table: Vari
     return _page(name, parts)
 
 
+def block_page(name: str, words: str, table: VariableTable) -> str:
+    """Describe a planner block, in HTML, by its own words."""
+    text = (
+        "<p>A planner block as a sampled controller: it is called once in every cycle. In co-simulation the "
+        "cycles that begin within a step are called with the inputs of the step's beginning.</p>"
+    )
+    return _page(name, (text, f"<h2>The block</h2><pre>{escape(words)}</pre>", _variables(table)))
+
+
 def _page(title: str, parts: Iterable[str]) -> str:
     style = (
         "body{font-family:sans-serif;max-width:60em;margin:2em auto} svg{display:block;margin:1em 0} "

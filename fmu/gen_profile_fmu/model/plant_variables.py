@@ -86,7 +86,7 @@ def plant_variables(machine: PlantInstance, kind: InputKind) -> VariableTable:
             "INPUTS": _inputs(machine, kind),
             "PERIOD": _period(machine.period, kind),
             **_states_and_outputs(machine),
-            "TIME": (_time(),),
+            "TIME": (time_variable(),),
         }
     )
     _check_names(machine.plant, table)
@@ -95,7 +95,9 @@ def plant_variables(machine: PlantInstance, kind: InputKind) -> VariableTable:
 
 def profile_variables(axes: Sequence[Coordinate], motion: Profile) -> VariableTable:
     """List the variables of a motion alone; raises as `plant_variables` does."""
-    table = VariableTable(blocks={**_way(axes, motion), **_trigger(), **_command(axes), "TIME": (_time(),)})
+    table = VariableTable(
+        blocks={**_way(axes, motion), **_trigger(), **_command(axes), "TIME": (time_variable(),)}
+    )
     require_good_names("Profile", [axis.name for axis in axes], table)
     return table
 
@@ -109,7 +111,7 @@ def system_variables(machine: PlantInstance, motion: Profile) -> VariableTable:
             **_trigger(),
             **_states_and_outputs(machine),
             **_command(machine.plant.actuated),
-            "TIME": (_time(),),
+            "TIME": (time_variable(),),
         }
     )
     _check_names(machine.plant, table)
@@ -340,7 +342,8 @@ def _command(axes: Sequence[Coordinate]) -> Blocks:
     }
 
 
-def _time() -> FmuVariable:
+def time_variable() -> FmuVariable:
+    """Declare the simulation time."""
     return FmuVariable(name="time", description="simulation time", unit="s", kind=Kind.INDEPENDENT)
 
 

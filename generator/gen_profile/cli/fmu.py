@@ -12,7 +12,7 @@ from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
 # spelled out here because --help must not wait for CasADi; a test holds them against those of designs/fmu.py
-KINDS = ("plant", "profile", "system", "ssp")
+KINDS = ("plant", "profile", "system", "planner", "ssp")
 INPUTS = ("setpoint", "acceleration", "velocity")
 PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86_64", "macos-arm64", "all")
 
@@ -58,9 +58,9 @@ def fmu(
     author: str | None,
     as_json: bool,
 ) -> None:
-    """Write an FMU of a plant, of a profile, or of the system of both; or both FMUs as an SSP."""
+    """Write an FMU of a plant, profile, planner, or plant and profile in one; or these two as an SSP."""
     if input_name is not None and kind not in {"plant", "ssp"}:
-        raise SpecError(f"--input: a {kind} has no inputs but its trigger; leave it out, or write a plant.")
+        raise SpecError(f"--input: the inputs of a {kind} are its own; leave it out, or write a plant.")
     if source_only and platform is not None:
         raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
     spec = chosen_spec(spec_path, preset, overrides)

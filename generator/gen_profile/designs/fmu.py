@@ -1,4 +1,4 @@
-"""From a spec to an FMU of its plant, of its motion, or of both, joined in one FMU or as a system of two."""
+"""From a spec to an FMU of its plant, motion or planner, or of plant and motion, joined or as a system."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from gen_profile.artefacts.writing import deliver
 from gen_profile.designs.plan import plan
 from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError
 from gen_profile.motion.profile import Profile
+from gen_profile.planner.design import planner_block
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
@@ -31,10 +32,11 @@ from gen_profile_fmu.model.contents import (
     system_model,
 )
 from gen_profile_fmu.model.nominals import smooth_move, state_nominals
+from gen_profile_fmu.model.planner import planner_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
-KINDS = ("plant", "profile", "system", "ssp")
+KINDS = ("plant", "profile", "system", "planner", "ssp")
 
 
 @attrs.frozen(kw_only=True)
@@ -140,6 +142,10 @@ def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Progress) -> 
     name = identifier_of(f"{spec.name} {kind}")
     if kind == "plant":
         return plant_model(_machine(spec, _rough_nominals(spec)), input_kind, name)
+    if kind == "planner":
+        progress("finding the modes over the live ranges")
+        axis = spec.machine().actuated[0].name
+        return planner_model(name, planner_block(spec).text, axis, tuple(spec.planner.live))
     evaluation = plan(spec, progress=progress).evaluation
     if kind == "profile":
         return profile_model(name, spec.machine().actuated, evaluation.command)

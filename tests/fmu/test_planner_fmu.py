@@ -1,0 +1,120 @@
+"""The planner's FMU issues what the planner block does, bit for bit, in both interfaces of FMI."""
+
+import numpy as np
+import pytest
+from fmu.drivers import Instance
+from fmu.kinds import PLANNED, model_of, planner_text
+
+from gen_profile.planner.execution import BlockInstance
+from gen_profile.plants.registry import find_plant
+from gen_profile_fmu.building.plant_fmu import cached_fmu
+from gen_profile_fmu.description.fmu_files import Version
+
+CYCLE = PLANNED.export.cycle_time
+START = 2.0
+ORDERS = [  # cycles, the block's inputs that change from there on
+    (20, {"bEnable": 1.0}),
+    (200, {"bExecute": 1.0, "fTarget": 0.3, "fL1": 0.45}),
+    (90, {"bExecute": 0.0, "bVelocity": 1.0, "fVelocityCommand": -0.2}),
+    (120, {"bVelocity": 0.0, "bStop": 1.0, "rOverride": 2.0}),
+]
+NAMES = {"bEnable": "enable", "bExecute": "execute", "bVelocity": "velocity", "bStop": "stop"}
+NAMES |= {"fTarget": "target", "fVelocityCommand": "velocity_command", "fL1": "live.L1"}
+NAMES |= {"rOverride": "override"}
+OUTPUTS = {
+    "cart.setpoint": "fPosition",
+    "cart.setpoint_velocity": "fVelocity",
+    "cart.setpoint_acceleration": "fAcceleration",
+    "error_id": "nErrorId",
+    "stop_distance": "fStopDistance",
+}
+
+
+@pytest.fixture(params=Version)
+def version(request):
+    return request.param
+
+
+@pytest.fixture
+def instance(version, request):
+    fmu = cached_fmu(model_of("planner", find_plant("double-pendulum-crane")), version)
+    made = Instance(fmu, version, exchange=getattr(request, "param", False))
+    made.begin({"act_position": -0.1}, START)
+    yield made
+    made.close()
+
+
+def expected():
+    block = BlockInstance(planner_text())
+    inputs, rows = block.inputs | {"fActPosition": -0.1}, []
+    for cycles, changes in ORDERS:
+        inputs |= changes
+        rows.append(block.call(np.tile(list(inputs.values()), (cycles, 1))))
+    return np.vstack(rows)[:, [block.outputs.index(name) for name in OUTPUTS.values()]]
+
+
+def order(instance, changes):
+    for name, value in changes.items():
+        if name[0] == "b":
+            instance.set_boolean(NAMES[name], bool(value))
+        else:
+            instance.write({NAMES[name]: value})
+
+
+def issued(instance, advance):
+    rows, number = [], 0
+    for cycles, changes in ORDERS:
+        order(instance, changes)
+        for _ in range(cycles):
+            advance(number)
+            rows.append(instance.read(*OUTPUTS))
+            number += 1
+    return np.array(rows)
+
+
+def test_each_step_of_a_cycle_issues_the_blocks_setpoint(instance):
+    due = expected()
+    assert instance.read(*OUTPUTS).tolist() == [-0.1, 0.0, 0.0, 0.0, 0.0]  # where the axis stands
+    time = START
+
+    def advance(_):
+        nonlocal time
+        instance.fmu.doStep(time, CYCLE)
+        time += CYCLE  # as masters do, who add up their steps
+
+    assert issued(instance, advance).tolist() == due.tolist()
+    assert due[:, 3].tolist()[-1] == 5.0
+    assert np.ptp(due[:, 0]) > 0.3
+
+
+@pytest.mark.parametrize("instance", [True], indirect=True)
+def test_each_cycle_is_an_event_of_model_exchange(instance):
+    following = [START]
+
+    def advance(number):
+        if number > 0:
+            assert following[-1] == pytest.approx(START + number * CYCLE, abs=1e-12)
+            instance.fmu.setTime(following[-1])
+        following.append(instance.events())
+
+    assert issued(instance, advance).tolist() == expected().tolist()
+
+
+def test_steps_need_not_be_cycles_and_a_saved_state_goes_on(instance):
+    """In a step of several cycles all have its inputs; a state holds all that the block remembers."""
+    due = expected()
+    order(instance, ORDERS[0][1])
+    instance.fmu.doStep(START, 20 * CYCLE)
+    assert instance.read(*OUTPUTS).tolist() == due[19].tolist()
+    order(instance, ORDERS[1][1])
+    instance.fmu.doStep(START + 20 * CYCLE, 80 * CYCLE)
+    state = instance.fmu.getFMUState()
+    for cycles in (100.0, 99.5):  # a cycle that has begun is called, however long the step goes on
+        time, ends = START + 100 * CYCLE, START + (100 + cycles) * CYCLE
+        while time < ends - 1e-9:
+            step = min(2.5 * CYCLE, ends - time)
+            instance.fmu.doStep(time, step)
+            time += step
+        assert instance.read(*OUTPUTS).tolist() == due[199].tolist()
+        instance.fmu.setFMUState(state)
+    instance.fmu.freeFMUState(state)
