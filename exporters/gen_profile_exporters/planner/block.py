@@ -13,17 +13,26 @@ from numpy.typing import NDArray
 from gen_profile_exporters.planner.interface_text import HEADER, INTERFACE
 from gen_profile_exporters.planner.motion_text import INPUTS, OUTPUTS, SLOTS
 from gen_profile_exporters.planner.planning_text import PLANNING
-from gen_profile_exporters.planner.programme_text import PROGRAMME, ROW, STEP
+from gen_profile_exporters.planner.programme_text import EXTENT, PROGRAMME
 from gen_profile_exporters.playback.structured_text import block_name, initialiser, literal
 
 Array = NDArray[np.float64]
 
-COLUMNS = 96  # slots of a committed future
-MOST = 56  # slots of a plan
-FUTURE = 128
-WORK = 2850  # floating-point operations that a cycle may spend, by a cautious count
-ITERATIONS = 7
+FUTURE = 256  # slots of a committed future
+LONGEST = 248  # of a plan
+MOST = 48  # unknowns of a plan; in a longer one the slots in the middle have the same velocity
+KERNEL_SLOTS = 56
+WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
+REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), MOST, 56, 72, 104, LONGEST)  # of motions that the block measures
+CHUNK = 60  # slots that a phase takes at once
+WORK = 2960  # floating-point operations that a cycle may spend, by a cautious count
+ITERATIONS = 6
+SPARE = 0.3  # slots more than expected
+MORE_ITERATIONS = 3  # where these do not lead to a plan
+WAY_ITERATIONS = 13  # where the axis moves already
 SLOTS_PER_PERIOD = 20.0  # of the slowest mode
+CENTRE = 0.15  # of an interior-point iteration: the complementarity it aims at, relative to that of now
+STEP = 0.93  # share of the way to the nearest bound that it goes
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 
 
@@ -47,16 +56,15 @@ class PlannerConstants:
     nominal : tuple of float
         Their values where the controller gives none.
     drift : tuple of float
-        By how much each may change on the way before the promise is lost.
+        By how much each may change before it is taken over anew.
+    rates : tuple of float
+        How fast each may change on the way, in its unit per s; faster, the promise is lost.
     degrees : int
         Chebyshev polynomials per live parameter.
     exponents : (parameters, terms) array of int
         Which of them are multiplied.
     frequencies, decays : (modes, terms) arrays
         Coefficients for the sum of the squared frequencies (and, of two, the product), and for the decays.
-    reach_first, reach_step : int
-    reaches : (slot counts, terms) array
-        Coefficients for the distance from rest to rest in so many slots.
     """
 
     name: str
@@ -74,20 +82,17 @@ class PlannerConstants:
     units: tuple[str, ...]
     nominal: tuple[float, ...]
     drift: tuple[float, ...]
+    rates: tuple[float, ...]
     degrees: int
     exponents: NDArray[np.int64]
     frequencies: Array
     decays: Array
-    reach_first: int
-    reach_step: int
-    reaches: Array
 
 
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
     body = PLANNING.replace("@programme\n", PROGRAMME)
-    for hole, part in (("@row\n", ROW), ("@step\n", STEP)):
-        body = body.replace(hole, indent(part, 20 * " "))
+    body = body.replace("@extent\n", indent(EXTENT, 16 * " "))
     text = HEADER + INTERFACE + INPUTS + SLOTS + body + OUTPUTS
     values = _values(constants)
     return re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
@@ -111,13 +116,13 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "power": max(1, len(lives)) * c.degrees,
         "live": max(1, len(lives)),
         "mode": modes,
-        "column": COLUMNS,
-        "wide": MOST + 8,
-        "conditions": conditions * COLUMNS,
+        "column": WIDE,
+        "wide": WIDE,
+        "conditions": conditions * KERNEL_SLOTS,
         "row": conditions,
         "gram": conditions**2,
-        "bounds": 3 * (MOST + 8),
-        "reach": len(c.reaches),
+        "bounds": 3 * WIDE,
+        "reach": len(REACH_SLOTS),
     }
     return {
         "name": c.name,
@@ -134,6 +139,8 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "quick_deceleration": f"{c.quick_deceleration:g}",
         "quick_jerk": f"{c.quick_jerk:g}",
         "live_lines": "\n    ".join(ranges) or "No live parameters.",
+        "live_rates": ", ".join(f"{name} at {rate:g}/s" for name, rate in zip(c.live, c.rates, strict=True))
+        or "at all",
         "live_inputs": "\n".join(inputs),
         "take_live": "\n".join(f"aLiveNow[{k}] := f{name};" for k, name in enumerate(lives)),
         "constants": _constants(c, terms, conditions),
@@ -148,17 +155,21 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cLives": len(c.live),
         "cTerms": terms,
         "cDegrees": c.degrees,
-        "cColumns": COLUMNS,
+        "cColumns": KERNEL_SLOTS,
         "cMost": MOST,
+        "cHalf": MOST // 2,
+        "cLongest": LONGEST,
+        "cKernelFirst": 18,
         "cLongKernel": 40,
-        "cWide": MOST + 8,
+        "cWide": WIDE,
+        "cChunk": CHUNK,
         "cFuture": FUTURE,
         "cWork": WORK,
         "cIterations": ITERATIONS,
-        "cColumnWork": 285 + 9 * conditions + conditions * conditions + 2 * conditions,
-        "cReaches": len(c.reaches),
-        "cReachFirst": c.reach_first,
-        "cReachStep": c.reach_step,
+        "cMoreIterations": MORE_ITERATIONS,
+        "cWayIterations": WAY_ITERATIONS,
+        "cColumnWork": 220 + 12 * conditions + conditions * conditions,
+        "cReaches": len(REACH_SLOTS),
     }
     real = {
         "cCycle": c.cycle,
@@ -171,9 +182,9 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cTravelHigh": c.travel[1],
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cInside": INSIDE,
-        "cReachShare": 0.985,  # reached by these iterations of the shortest plan's distance
-        "cCentre": 0.15,
-        "cStep": 0.93,
+        "cSpare": SPARE,
+        "cCentre": CENTRE,
+        "cStep": STEP,
     }
     lives = c.live or {"": (0.0, 1.0)}
     exponents = c.exponents if c.live else np.zeros((1, terms), dtype=np.int64)
@@ -181,14 +192,15 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveDrift": c.drift or (0.0,),
+        "cLiveRate": c.rates or (0.0,),
         "cFrequency": c.frequencies.ravel(),
         "cDecay": c.decays.ravel(),
-        "cReach": c.reaches.ravel(),
     }
     lines = [f"    {name} : DINT := {value};" for name, value in whole.items()]
     lines += [f"    {name} : LREAL := {literal(value)};" for name, value in real.items()]
     lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in arrays.items()]
     lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))
+    lines.append(_array("cReachSlots", "DINT", [str(v) for v in REACH_SLOTS]))
     return "\n".join(lines)
 
 

@@ -15,7 +15,8 @@ HEADER = """\
     axis follows fVelocityCommand (a stick). bStop stops without sway, as does dropping bVelocity or bEnable.
     bQuickStop brakes at once, with @quick_deceleration m/s2 and @quick_jerk m/s3: the load swings then.
     rOverride (above 0, to 1) and fVelocityLimit (0: none) slow down what is planned from then on.
-    The live parameters are taken over at standstill. bPromise drops where they change on the way.
+    The live parameters may change at any time; on the way bPromise drops where they change faster than
+    @live_rates.
 
     nErrorId: 0 none
               1 fCycleTime is not the cycle time of this block
@@ -102,7 +103,9 @@ VAR
     aLiveNow : ARRAY [0..@last_live] OF LREAL;
     aFrequency : ARRAY [0..@last_mode] OF LREAL; (* rad/s *)
     aDecay : ARRAY [0..@last_mode] OF LREAL; (* 1/s *)
-    aTurnRe : ARRAY [0..@last_mode] OF LREAL; (* of the mode in half a slot *)
+    aHalfRe : ARRAY [0..@last_mode] OF LREAL; (* turn of the mode in half a slot, undamped *)
+    aHalfIm : ARRAY [0..@last_mode] OF LREAL;
+    aTurnRe : ARRAY [0..@last_mode] OF LREAL; (* in a slot, damped *)
     aTurnIm : ARRAY [0..@last_mode] OF LREAL;
     aNow : ARRAY [0..@last_mode] OF LREAL;
     fRe : LREAL;
@@ -116,15 +119,16 @@ VAR
     aKernel : ARRAY [0..@last_column] OF LREAL;
     nKernel : DINT;
 
-    (* Planning, spread over cycles: nJob 0 none, 1 kernel, 2 position, 3 stop. *)
+    (* Planning, spread over cycles: nJob 0 none, 1 kernel, 2 position, 3 stop, 4 measuring what plans reach. *)
     nJob : DINT;
     nPhase : DINT;
     nPart : DINT;
     bPlanned : BOOL; (* the plan waits for its slot *)
     nAhead : DINT; (* slots until the plan takes over *)
-    nColumns : DINT; (* slots that are planned *)
+    nColumns : DINT; (* unknowns of the plan *)
     nOld : DINT; (* slots of the committed future from there *)
     nIteration : DINT;
+    nEnough : DINT; (* iterations *)
     nWork : DINT; (* floating-point operations of this cycle *)
     nCost : DINT;
     bRoom : BOOL;
@@ -146,6 +150,7 @@ VAR
     fSlackB : LREAL;
     fDelta : LREAL;
     fPath : LREAL;
+    fRest : LREAL; (* sum of the coefficients from the next slot on *)
     nRow : DINT;
     nColumn : DINT;
     nOther : DINT;
@@ -154,13 +159,32 @@ VAR
     nFirst : DINT;
     nLast : DINT;
     nTerm : DINT;
-    nReach : DINT;
-    aOld : ARRAY [0..@last_column] OF LREAL; (* committed shares from the slot of the plan *)
+    bMirror : BOOL; (* from rest to rest: the second half mirrors the first and is not sought *)
+    bUnfolded : BOOL; (* but the last projection seeks both halves *)
+    bDamped : BOOL;
+    nSlots : DINT; (* of the plan *)
+    nTied : DINT; (* the unknown in the middle, which is that of several slots *)
+    nMany : DINT; (* so many *)
+    nGiven : DINT; (* conditions, with the sum *)
+    nAt : DINT; (* first slot of the next chunk *)
+    fWaveRe : LREAL; (* of a mode, at that slot *)
+    fWaveIm : LREAL;
+    fLack : LREAL; (* share of the first slacks' errors that is left *)
+    fPlanShare : LREAL; (* of the way between old future and plan *)
+    fPlanEnd : LREAL; (* m *)
+    fPlanned : LREAL; (* the last two shares *)
+    fPlannedBefore : LREAL;
     aX : ARRAY [0..@last_wide] OF LREAL; (* two committed shares, then those that are sought *)
     aDx : ARRAY [0..@last_wide] OF LREAL;
     aWork : ARRAY [0..@last_wide] OF LREAL;
-    aReach : ARRAY [0..@last_reach] OF LREAL; (* m, from rest in so many slots *)
-    aPlan : ARRAY [0..@last_column] OF LREAL; (* m/s *)
+    aReach : ARRAY [0..@last_reach] OF LREAL; (* sum of shares of motions from rest to rest in cReachSlots *)
+    nReach : DINT; (* which is measured next *)
+    nUnmeasured : DINT; (* how many were measured for another machine *)
+    bMeasured : BOOL;
+    fReached : LREAL; (* greatest of aReach *)
+    bStale : BOOL; (* the live parameters have changed since they were taken over *)
+    fSince : LREAL; (* s, since then *)
+    aPlan : ARRAY [0..@last_future] OF LREAL; (* m/s *)
     aE : ARRAY [0..@last_conditions] OF LREAL; (* conditions: modes and their derivatives; row 0: the sum *)
     aY : ARRAY [0..@last_conditions] OF LREAL;
     aB : ARRAY [0..@last_row] OF LREAL;
@@ -170,6 +194,15 @@ VAR
     aSlackB : ARRAY [0..@last_bounds] OF LREAL; (* lower ones *)
     aPriceA : ARRAY [0..@last_bounds] OF LREAL;
     aPriceB : ARRAY [0..@last_bounds] OF LREAL;
+    aLackA : ARRAY [0..@last_bounds] OF LREAL; (* by how much the first slacks were wrong *)
+    aLackB : ARRAY [0..@last_bounds] OF LREAL;
+    aRatioA : ARRAY [0..@last_bounds] OF LREAL; (* multiplier by slack *)
+    aRatioB : ARRAY [0..@last_bounds] OF LREAL;
+    aTurnA : ARRAY [0..@last_bounds] OF LREAL; (* step of the multipliers *)
+    aTurnB : ARRAY [0..@last_bounds] OF LREAL;
+    aStepA : ARRAY [0..@last_bounds] OF LREAL; (* step of the slacks *)
+    aStepB : ARRAY [0..@last_bounds] OF LREAL;
+    aSteep : ARRAY [0..@last_bounds] OF LREAL; (* inverse of the bound *)
     aWeight : ARRAY [0..@last_bounds] OF LREAL;
     aPush : ARRAY [0..@last_bounds] OF LREAL;
     aH0 : ARRAY [0..@last_wide] OF LREAL; (* five diagonals of the normal matrix, and its factors *)

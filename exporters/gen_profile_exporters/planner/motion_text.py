@@ -10,7 +10,7 @@ FOR nIndex := 0 TO cLives - 1 DO
         bLiveGood := FALSE;
     END_IF;
 END_FOR;
-nWork := 4;
+nWork := 90;
 
 IF nState = 0 THEN
     bFault := FALSE;
@@ -180,12 +180,13 @@ END_IF;
 
 (* A plan takes over where its slot begins. *)
 IF (nJob > 1) AND bPlanned AND (nAhead = 0) AND (bNew OR (nState = 1)) AND (nState < 3) THEN
-    FOR nIndex := 0 TO cColumns - 1 DO
-        aFuture[nIndex + 2] := aPlan[nIndex];
-    END_FOR;
     nFuture := nOld + 2;
-    IF nColumns > nOld THEN nFuture := nColumns + 2; END_IF;
-    fFinal := fPath;
+    IF nSlots > nOld THEN nFuture := nSlots + 2; END_IF;
+    FOR nIndex := 2 TO cFuture - 1 DO
+        aFuture[nIndex] := 0.0;
+        IF nIndex < nFuture THEN aFuture[nIndex] := aPlan[nIndex - 2]; END_IF;
+    END_FOR;
+    fFinal := fPlanEnd;
     bStopPlanned := nJob = 3;
     bPulses := FALSE;
     nJob := 0;
@@ -213,19 +214,17 @@ IF nState = 1 THEN
     IF NOT bEnable THEN
         nState := 0;
         nJob := 0;
-    ELSIF bLiveGood THEN
-        FOR nIndex := 0 TO cLives - 1 DO
-            IF aLive[nIndex] <> aLiveNow[nIndex] THEN bReady := FALSE; END_IF;
-        END_FOR;
-        IF NOT bReady AND (nJob <> 1) THEN
-            nJob := 1;
-            nPhase := 1;
-            bPlanned := FALSE;
-        END_IF;
     END_IF;
 END_IF;
 
 (* At the beginning of a slot: what is added to the future. *)
+IF bNew THEN
+    fRest := 0.0;
+    FOR nIndex := 2 TO nFuture - 1 DO
+        fRest := fRest + aFuture[nIndex];
+    END_FOR;
+    nWork := nWork + nFuture + 20;
+END_IF;
 IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
     fWanted := 0.0;
     bPulse := FALSE;
@@ -234,11 +233,11 @@ IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
             IF bSurrender THEN
                 bPulse := TRUE;
                 fWanted := (fGoal - fFinal) / fSlot;
-            ELSIF nJob = 0 THEN
+            ELSIF (bMeasured OR (ABS(fGoal - fFinal) <= fReached * fTop * fSlot))
+                AND ((nJob = 0) OR (nJob = 4)) THEN
                 nJob := 2;
                 nPhase := 2;
                 bPlanned := FALSE;
-                nColumns := 0;
             END_IF;
         END_IF;
     ELSIF NOT bPulses AND NOT bStopPlanned AND (nState = 2) THEN
@@ -246,7 +245,6 @@ IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
             nJob := 3;
             nPhase := 2;
             bPlanned := FALSE;
-            nColumns := 0;
         ELSIF nJob = 0 THEN
             bStopPlanned := TRUE;
         END_IF;
@@ -254,17 +252,15 @@ IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
         bPulse := TRUE;
         fWanted := fVelocityCommand;
     END_IF;
-    IF bPulse AND (nJob = 0) THEN
+    IF bPulse AND ((nJob = 0) OR (nJob = 4)) THEN
+        nJob := 0;
         IF fWanted > fTop THEN fWanted := fTop; END_IF;
         IF fWanted < -fTop THEN fWanted := -fTop; END_IF;
         (* The greatest share of the pulse that keeps every limit over the whole committed time. *)
         fLow := -1.0E+9;
         fHigh := 1.0E+9;
         fSum := 0.0;
-        fPath := fFinal;
-        FOR nIndex := 2 TO cFuture - 1 DO
-            fPath := fPath - fSlot * aFuture[nIndex];
-        END_FOR;
+        fPath := fFinal - fSlot * fRest;
         FOR nIndex := 0 TO nKernel + 1 DO
             aKernelWide[nIndex + 2] := 0.0;
             IF nIndex < nKernel THEN aKernelWide[nIndex + 2] := aKernel[nIndex]; END_IF;
@@ -306,12 +302,13 @@ IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
         IF fHigh < 0.0 THEN fHigh := 0.0; END_IF;
         IF fWanted > fHigh THEN fWanted := fHigh; END_IF;
         IF fWanted < fLow THEN fWanted := fLow; END_IF;
-        nWork := nWork + 300 + 72 * nKernel;
+        nWork := nWork + 60 + 60 * nKernel;
         IF fWanted <> 0.0 THEN
             FOR nIndex := 0 TO nKernel - 1 DO
                 aFuture[nIndex + 2] := aFuture[nIndex + 2] + fWanted * aKernel[nIndex];
             END_FOR;
             fFinal := fFinal + fSlot * fWanted;
+            fRest := fRest + fWanted;
             IF ABS(fGoal - fFinal) <= 1.0E-9 THEN
                 IF nCommand = 1 THEN fFinal := fGoal; END_IF;
             END_IF;
@@ -320,12 +317,30 @@ IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
         END_IF;
     END_IF;
 END_IF;
+
+(* Where nothing is to be planned: the machine of the live parameters that are now, and what its plans reach. *)
+bStale := FALSE;
+fSince := fSince + cCycle;
+FOR nIndex := 0 TO cLives - 1 DO
+    fDelta := ABS(aLiveNow[nIndex] - aLive[nIndex]);
+    IF fDelta > 0.5 * cLiveDrift[nIndex] THEN bStale := TRUE; END_IF;
+    IF (nState = 2) AND NOT (fDelta <= cLiveDrift[nIndex] + cLiveRate[nIndex] * fSince) THEN
+        bDrifted := TRUE;
+    END_IF;
+END_FOR;
+IF bNew AND ((nState = 1) OR (nState = 2)) AND ((nJob = 0) OR (bMeasured AND (nJob = 4))) THEN
+    IF bLiveGood AND (bStale OR NOT bReady) AND (bMeasured OR (nUnmeasured = 0)) THEN
+        nJob := 1;
+        nPhase := 1;
+        bPlanned := FALSE;
+    ELSIF (nState = 1) AND (nJob = 0) AND (nUnmeasured > 0) THEN
+        nJob := 4;
+        nPhase := 2;
+        bPlanned := FALSE;
+    END_IF;
+END_IF;
 IF (nState = 2) AND bNew THEN
-    fFrom := fFinal - fSlot * (aFuture[0] / 6.0 + 5.0 * aFuture[1] / 6.0);
-    FOR nIndex := 2 TO cFuture - 1 DO
-        fFrom := fFrom - fSlot * aFuture[nIndex];
-    END_FOR;
-    nWork := nWork + 2 * cFuture;
+    fFrom := fFinal - fSlot * (aFuture[0] / 6.0 + 5.0 * aFuture[1] / 6.0 + fRest);
 END_IF;
 """
 
@@ -345,13 +360,7 @@ END_IF;
 bPromise := bReady AND bSettled AND (nState > 0);
 nPromise := 0;
 IF NOT bReady THEN nPromise := 3; END_IF;
-IF bReady AND (nState = 2) THEN
-    FOR nIndex := 0 TO cLives - 1 DO
-        IF NOT (ABS(aLiveNow[nIndex] - aLive[nIndex]) <= cLiveDrift[nIndex]) THEN bDrifted := TRUE; END_IF;
-    END_FOR;
-ELSIF nState = 0 THEN
-    bDrifted := FALSE;
-END_IF;
+IF nState = 0 THEN bDrifted := FALSE; END_IF;
 IF bDrifted THEN
     nPromise := 1;
     bPromise := FALSE;

@@ -10,28 +10,37 @@ PLANNING = """\
 (* Planning: as many steps as the operations of one cycle allow. *)
 bRoom := nJob > 0;
 WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
-    nLast := nColumns;
-    IF nOld > nLast THEN nLast := nOld; END_IF;
+    nOther := cChunk;
+    IF nSlots < nOther THEN nOther := nSlots; END_IF;
+    IF nOld > nOther THEN nOther := cChunk; END_IF;
     CASE nPhase OF
         1: nCost := (cLives + 4 * cModes) * cTerms + 90 * cModes + 30 * cLives;
-        31: nCost := (cLives + 2) * cTerms;
-        2: nCost := 400;
-        3: nCost := 13 * nLast + 100;
-        4: nCost := 2 * nLast;
-        5: nCost := 12 * nColumns;
-        6, 12: nCost := (2 * cConditions + 4) * nColumns;
-        7, 13: nCost := cConditions * cConditions * cConditions / 3 + (2 * cConditions + 8) * nColumns + 200;
-        8: nCost := 34 * (nColumns + 2);
-        9: nCost := 22 * (nColumns + 2);
-        10: nCost := 38 * nColumns;
-        11: nCost := 9 * nColumns;
-        14: nCost := 36 * (nColumns + 2);
-        15: nCost := 40 * (nColumns + 2);
-        16: nCost := 9 * nColumns + 50;
-        19: nCost := 14 * (nColumns + 2);
+        2: nCost := 100 + 6 * (nFuture + cReaches);
+        3: nCost := 25 * nOther + 10;
+        5: nCost := 7 * nColumns + 10;
+        6, 12: nCost := (2 * nGiven + 3) * nColumns;
+        7: nCost := nGiven * nGiven * (nGiven + 6) / 3 + (2 * nGiven + 8) * nColumns + 100;
+        8: nCost := 18 * nColumns + 60;
+        10: nCost := 26 * nColumns;
+        11: nCost := 9 * nColumns + 40;
+        13: nCost := nGiven * nGiven * (nGiven + 4) / 3 + 2 * nGiven * nColumns;
+        14: nCost := 24 * nColumns + 60;
+        15: nCost := 14 * nColumns + 40;
+        16: nCost := 8 * nColumns + 10;
+        17: nCost := 3 * nColumns + 60;
+        18: nCost := 30 * nOther + 80;
+        19: nCost := 22 * nColumns + 60;
     ELSE
-        nCost := 20 * nLast + 30;
+        nCost := 4 * nColumns;
     END_CASE;
+    IF bMirror THEN
+        CASE nPhase OF
+            3: nCost := 16 * nOther + 10;
+            8: nCost := 11 * nColumns + 35;
+            14: nCost := 17 * nColumns + 60;
+            19: nCost := 15 * nColumns + 40;
+        END_CASE;
+    END_IF;
     bRoom := nWork + nCost <= cWork;
     IF bRoom THEN
         nWork := nWork + nCost;
@@ -73,9 +82,13 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                 FOR nMode := 0 TO cModes - 1 DO
                     aFrequency[nMode] := SQRT(aFrequency[nMode]);
                 END_FOR;
-                nSlot := LREAL_TO_DINT(6.283185307179586 / (cSlotsPerPeriod * aFrequency[0] * cCycle));
-                IF nSlot < 1 THEN nSlot := 1; END_IF;
+                IF nState <> 2 THEN
+                    nSlot := LREAL_TO_DINT(6.283185307179586 / (cSlotsPerPeriod * aFrequency[0] * cCycle));
+                    IF nSlot < 1 THEN nSlot := 1; END_IF;
+                END_IF;
+                fSince := 0.0;
                 fSlot := DINT_TO_LREAL(nSlot) * cCycle;
+                bDamped := FALSE;
                 FOR nMode := 0 TO cModes - 1 DO
                     (* Sine and cosine from an eighth of the angle; the growth, too. *)
                     fHalf := 0.125 * aFrequency[nMode] * fSlot;
@@ -88,52 +101,44 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                     fGrowth := 1.0 + fHalf * (1.0 + fHalf / 2.0 * (1.0 + fHalf / 3.0 * (1.0 + fHalf / 4.0
                         * (1.0 + fHalf / 5.0 * (1.0 + fHalf / 6.0 * (1.0 + fHalf / 7.0))))));
                     FOR nIndex := 1 TO 3 DO
+                        aHalfRe[nMode] := fRe;
+                        aHalfIm[nMode] := fIm;
                         fValue := 2.0 * fRe * fIm;
                         fRe := (fRe - fIm) * (fRe + fIm);
                         fIm := fValue;
                         fGrowth := fGrowth * fGrowth;
                     END_FOR;
+                    bDamped := bDamped OR (ABS(aDecay[nMode]) > 1.0E-9 * aFrequency[nMode]);
                     aTurnRe[nMode] := fGrowth * fRe;
                     aTurnIm[nMode] := fGrowth * fIm;
                 END_FOR;
-                nReach := 0;
-                nPart := 0;
-                nPhase := 31;
-            31: (* a guess of how far so many slots lead *)
-                aReach[nPart] := 0.0;
-                FOR nTerm := 0 TO cTerms - 1 DO
-                    fValue := 1.0;
-                    FOR nOther := 0 TO cLives - 1 DO
-                        fValue := fValue * aPower[nOther * cDegrees + cExponent[nOther * cTerms + nTerm]];
-                    END_FOR;
-                    aReach[nPart] := aReach[nPart] + cReach[nPart * cTerms + nTerm] * fValue;
-                END_FOR;
-                nPart := nPart + 1;
-                IF nPart >= cReaches THEN nPhase := 29; END_IF;
+                nPhase := 29;
             29: (* the shortest kernel that is tried *)
-                nColumns := 17;
+                nSlots := cKernelFirst - 1;
+                IF nKernel - 3 > nSlots THEN nSlots := nKernel - 3; END_IF;
                 nOld := 0;
-                nPart := 0;
+                bMirror := FALSE;
                 nPhase := 30;
             30: (* a kernel one slot longer *)
-                nColumns := nColumns + 1;
-                nPart := 0;
-                nPhase := 3;
+                nSlots := nSlots + 1;
+                nPhase := 4;
             2: (* what is planned, from which slot on *)
                 bPlanned := FALSE;
                 nOld := 0;
                 nAhead := 0;
-                IF nState = 2 THEN
-                    nAhead := 2 + 2 * cIterations * cColumnWork * cMost / (cWork * nSlot);
+                bMirror := nState <> 2;
+                bUnfolded := FALSE;
+                IF NOT bMirror THEN
+                    nAhead := 2 + 2 * cWayIterations * cColumnWork * cMost / (cWork * nSlot);
                     nOld := nFuture - nAhead - 2;
                     IF nOld < 0 THEN nOld := 0; END_IF;
-                    IF nOld > cColumns THEN nOld := cColumns; END_IF;
                 END_IF;
                 fScale := fTop;
+                IF nJob = 4 THEN fScale := cVelocity; END_IF;
                 fOldSum := 0.0;
                 fValue := 0.0;
                 fDelta := 0.0;
-                FOR nIndex := 0 TO cFuture - 1 DO
+                FOR nIndex := 0 TO nFuture - 1 DO
                     IF ABS(aFuture[nIndex]) > fScale THEN fScale := ABS(aFuture[nIndex]); END_IF;
                     IF nIndex >= nAhead + 2 THEN
                         fOldSum := fOldSum + aFuture[nIndex];
@@ -158,6 +163,9 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                 IF nJob = 3 THEN
                     fUpper := fValue / fScale;
                     fNeed := 1.0E+9;
+                ELSIF nJob = 4 THEN
+                    fLower := 0.0;
+                    fNeed := 1.0E+9;
                 ELSE
                     fNeed := fSign * (fGoal - fFinal) / (fScale * fSlot);
                     IF fDelta >= -1.0E-9 * fScale THEN fLower := fDelta / fScale; END_IF;
@@ -167,73 +175,129 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                 fCurve := (1.0 - cInside) * cJerk * fSlot * fSlot / fScale;
                 aX[0] := fSign * aFuture[nAhead] / fScale;
                 aX[1] := fSign * aFuture[nAhead + 1] / fScale;
-                FOR nIndex := 0 TO cColumns - 1 DO
-                    aOld[nIndex] := 0.0;
-                    IF nIndex < nOld THEN
-                        aOld[nIndex] := fSign * aFuture[nIndex + nAhead + 2] / fScale;
-                    END_IF;
-                END_FOR;
-                (* A first guess of how many slots it takes: what is known of motions from rest. *)
-                nColumns := nKernel;
+                (* How many slots it takes: from what is known of motions from rest to rest. *)
+                nSlots := nKernel;
+                IF nJob = 4 THEN nSlots := cReachSlots[nReach]; END_IF;
                 IF nJob = 2 THEN
-                    fWanted := fNeed + fOldSum;
-                    IF fWanted < fNeed THEN fWanted := fNeed; END_IF;
-                    nColumns := cReachFirst;
-                    fWanted := fWanted * fScale * fSlot / cReachShare;
-                    FOR nIndex := 0 TO cReaches - 1 DO
-                        IF (aReach[nIndex] >= fWanted) AND (nReach = 0) THEN
-                            nReach := 1;
-                            nColumns := cReachFirst + cReachStep * nIndex;
+                    fWanted := fNeed;
+                    IF fOldSum > 0.0 THEN fWanted := fNeed + fOldSum; END_IF;
+                    nSlots := cLongest;
+                    FOR nTerm := 1 TO cReaches DO
+                        nIndex := cReaches - nTerm;
+                        IF aReach[nIndex] >= fWanted THEN
+                            nSlots := cReachSlots[nIndex];
                             IF nIndex > 0 THEN
-                                fBound := (aReach[nIndex] - fWanted) / (aReach[nIndex] - aReach[nIndex - 1]);
-                                nColumns := nColumns
-                                    - LREAL_TO_DINT(DINT_TO_LREAL(cReachStep) * fBound - 0.499);
+                                IF aReach[nIndex - 1] > 0.0 THEN
+                                    fBound := (fWanted - aReach[nIndex - 1])
+                                        / (aReach[nIndex] - aReach[nIndex - 1]);
+                                    IF fBound > 0.0 THEN
+                                        nOther := cReachSlots[nIndex - 1];
+                                        fBound := fBound * DINT_TO_LREAL(nSlots - nOther) + cSpare + 0.499;
+                                        IF nOther + LREAL_TO_DINT(fBound) < nSlots THEN
+                                            nSlots := nOther + LREAL_TO_DINT(fBound);
+                                        END_IF;
+                                    END_IF;
+                                END_IF;
                             END_IF;
                         END_IF;
                     END_FOR;
-                    IF nReach = 0 THEN nColumns := cMost; END_IF;
-                    nReach := 0;
-                    IF nColumns < nOld THEN nColumns := nOld; END_IF;
+                    IF nSlots < nOld THEN nSlots := nOld; END_IF;
                 END_IF;
-                IF nColumns > cMost THEN nColumns := cMost; END_IF;
-                nPhase := 3;
-                nPart := 0;
-            3: (* conditions of a mode: cosine, sine, both times the slot *)
-                IF nPart = 0 THEN
-                    FOR nIndex := 0 TO nLast - 1 DO
-                        aE[nIndex] := 1.0;
+                nPhase := 4;
+            4: (* which slots are unknowns: those in the middle are one; mirrored, the second half is none *)
+                nGiven := 1 + 4 * cModes;
+                IF bMirror THEN
+                    nGiven := 1 + 2 * cModes;
+                    nColumns := (nSlots + 1) / 2;
+                    IF nColumns > cHalf THEN nColumns := cHalf; END_IF;
+                    nTied := nColumns - 1;
+                    nMany := nSlots - 2 * nTied;
+                ELSE
+                    nColumns := nSlots;
+                    IF (nColumns > cMost) AND (nJob > 1) THEN nColumns := cMost; END_IF;
+                    IF bUnfolded THEN nColumns := 2 * nTied + 1; END_IF;
+                    nTied := nColumns / 2;
+                    nMany := 1 + nSlots - nColumns;
+                END_IF;
+                FOR nRow := 0 TO nGiven - 1 DO
+                    aB[nRow] := 0.0;
+                    FOR nIndex := 0 TO nColumns - 1 DO
+                        aE[nRow * cColumns + nIndex] := 0.0;
                     END_FOR;
-                END_IF;
-                nRow := (4 * nPart + 1) * cColumns;
-                fRe := 1.0;
-                fIm := 0.0;
-                fHalf := 0.5 * DINT_TO_LREAL(nColumns - 1);
-                FOR nIndex := 0 TO nLast - 1 DO
-                    fValue := (DINT_TO_LREAL(nIndex) - fHalf) / fHalf;
-                    aE[nRow + nIndex] := fRe;
-                    aE[nRow + cColumns + nIndex] := fIm;
-                    aE[nRow + 2 * cColumns + nIndex] := fRe * fValue;
-                    aE[nRow + 3 * cColumns + nIndex] := fIm * fValue;
-                    fDelta := fRe * aTurnRe[nPart] - fIm * aTurnIm[nPart];
-                    fIm := fRe * aTurnIm[nPart] + fIm * aTurnRe[nPart];
-                    fRe := fDelta;
                 END_FOR;
-                nPart := nPart + 1;
+                nPart := 0;
+                nAt := 0;
+                nPhase := 3;
+            3: (* conditions of a mode: cosine and sine, both times the slot; what the old future does to them *)
+                fHalf := 0.5 * DINT_TO_LREAL(nSlots - 1);
+                nLast := nSlots;
+                IF nOld > nLast THEN nLast := nOld; END_IF;
+                fRe := aTurnRe[nPart];
+                fIm := aTurnIm[nPart];
+                IF bMirror THEN
+                    nLast := (nSlots + 1) / 2;
+                    fRe := (aHalfRe[nPart] - aHalfIm[nPart]) * (aHalfRe[nPart] + aHalfIm[nPart]);
+                    fIm := 2.0 * aHalfRe[nPart] * aHalfIm[nPart];
+                END_IF;
+                IF nAt = 0 THEN
+                    fWaveRe := 1.0;
+                    fWaveIm := 0.0;
+                    IF bMirror AND (nSlots = 2 * nLast) THEN
+                        fWaveRe := aHalfRe[nPart];
+                        fWaveIm := aHalfIm[nPart];
+                    END_IF;
+                END_IF;
+                nFirst := nAt;
+                nAt := nAt + cChunk;
+                IF nAt > nLast THEN nAt := nLast; END_IF;
+                FOR nIndex := nFirst TO nAt - 1 DO
+                    IF bMirror THEN (* from the middle outwards *)
+                        nColumn := nLast - 1 - nIndex;
+                        IF nColumn > nTied THEN nColumn := nTied; END_IF;
+                        fValue := fHalf - DINT_TO_LREAL(nLast - 1 - nIndex);
+                        fShare := 2.0;
+                        IF fValue < 0.25 THEN fShare := 1.0; END_IF;
+                        nRow := (2 * nPart + 1) * cColumns + nColumn;
+                        aE[nRow] := aE[nRow] + fShare * fWaveRe;
+                        aE[nRow + cColumns] := aE[nRow + cColumns] + fShare * fWaveIm * fValue / fHalf;
+                    ELSE
+                        nColumn := nIndex;
+                        IF nColumn > nTied THEN
+                            nColumn := nTied;
+                            IF nIndex >= nTied + nMany THEN nColumn := nIndex - nMany + 1; END_IF;
+                        END_IF;
+                        fValue := (DINT_TO_LREAL(nIndex) - fHalf) / fHalf;
+                        fShare := 1.0;
+                        nRow := (4 * nPart + 1) * cColumns + nColumn;
+                        IF nIndex < nSlots THEN
+                            aE[nRow] := aE[nRow] + fWaveRe;
+                            aE[nRow + cColumns] := aE[nRow + cColumns] + fWaveIm;
+                            aE[nRow + 2 * cColumns] := aE[nRow + 2 * cColumns] + fWaveRe * fValue;
+                            aE[nRow + 3 * cColumns] := aE[nRow + 3 * cColumns] + fWaveIm * fValue;
+                        END_IF;
+                        IF nIndex < nOld THEN
+                            fDelta := fSign * aFuture[nIndex + nAhead + 2] / fScale;
+                            nRow := 4 * nPart + 1;
+                            aB[nRow] := aB[nRow] + fDelta * fWaveRe;
+                            aB[nRow + 1] := aB[nRow + 1] + fDelta * fWaveIm;
+                            aB[nRow + 2] := aB[nRow + 2] + fDelta * fWaveRe * fValue;
+                            aB[nRow + 3] := aB[nRow + 3] + fDelta * fWaveIm * fValue;
+                        END_IF;
+                    END_IF;
+                    IF (nPart = 0) AND (nIndex < nSlots) THEN aE[nColumn] := aE[nColumn] + fShare; END_IF;
+                    fDelta := fWaveRe * fRe - fWaveIm * fIm;
+                    fWaveIm := fWaveRe * fIm + fWaveIm * fRe;
+                    fWaveRe := fDelta;
+                END_FOR;
+                IF nAt >= nLast THEN
+                    nPart := nPart + 1;
+                    nAt := 0;
+                END_IF;
                 IF nPart >= cModes THEN
-                    nPart := 0;
-                    nPhase := 4;
-                END_IF;
-            4: (* what the committed future already does to the modes *)
-                nRow := nPart * cColumns;
-                aB[nPart] := 0.0;
-                FOR nIndex := 0 TO nOld - 1 DO
-                    aB[nPart] := aB[nPart] + aE[nRow + nIndex] * aOld[nIndex];
-                END_FOR;
-                nPart := nPart + 1;
-                IF nPart >= cConditions THEN
                     nPart := 0;
                     nPhase := 5;
                     IF nJob > 1 THEN nPhase := 16; END_IF;
+                    IF (nJob > 1) AND bUnfolded THEN nPhase := 10; END_IF;
                 END_IF;
             5: (* kernel: the weights of its conditions, a parabola *)
                 fHalf := 0.5 * DINT_TO_LREAL(nColumns - 1);
@@ -246,57 +310,98 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
 @programme
             17: (* the plan: as far as the target is, along the straight line from the old future *)
                 fSum := 0.0;
-                FOR nIndex := 2 TO nColumns + 1 DO
-                    aX[nIndex] := aX[nIndex] + aDx[nIndex];
-                    fSum := fSum + aX[nIndex];
+                FOR nIndex := 0 TO nColumns - 1 DO
+                    aX[nIndex + 2] := aX[nIndex + 2] + aDx[nIndex + 2];
+                    fSum := fSum + aE[nIndex] * aX[nIndex + 2];
                 END_FOR;
                 fSum := fSum - fOldSum;
-                fShare := 1.0;
-                IF fSum > fNeed THEN fShare := fNeed / fSum; END_IF;
+                fPlanShare := 1.0;
+                IF fSum > fNeed THEN fPlanShare := fNeed / fSum; END_IF;
+                bGood := fSum > 1.0E-9;
+                fPlanEnd := fFinal - fSign * fScale * fSlot * fOldSum;
+                fPlanned := aX[1];
+                fPlannedBefore := aX[0];
+                nAt := 0;
                 nPhase := 18;
             18: (* hold it against the limits *)
-                bGood := fSum > 1.0E-9;
-                fPath := fFinal - fSign * fScale * fSlot * fOldSum;
-                fSquare := aX[1];
-                fHalf := aX[0];
-                FOR nIndex := 0 TO cColumns - 1 DO
+                nLast := nSlots;
+                IF nOld > nLast THEN nLast := nOld; END_IF;
+                nFirst := nAt;
+                nAt := nAt + cChunk;
+                IF nAt > nLast + 2 THEN nAt := nLast + 2; END_IF;
+                FOR nIndex := nFirst TO nAt - 1 DO
+                    fDelta := 0.0;
+                    IF nIndex < nOld THEN fDelta := fSign * aFuture[nIndex + nAhead + 2] / fScale; END_IF;
                     fValue := 0.0;
-                    IF nIndex < nColumns THEN fValue := aX[nIndex + 2]; END_IF;
-                    fValue := aOld[nIndex] + fShare * (fValue - aOld[nIndex]);
-                    IF nIndex < nLast + 2 THEN
-                        IF NOT (ABS(fValue) <= cVelocity / fScale) THEN bGood := FALSE; END_IF;
-                        IF NOT (ABS(fValue - fSquare) <= fRate / (1.0 - cInside)) THEN bGood := FALSE; END_IF;
-                        IF NOT (ABS(fValue - 2.0 * fSquare + fHalf) <= fCurve / (1.0 - cInside)) THEN
-                            bGood := FALSE;
+                    IF nIndex < nSlots THEN
+                        nColumn := nIndex;
+                        IF bMirror AND (2 * nIndex >= nSlots) THEN nColumn := nSlots - 1 - nIndex; END_IF;
+                        IF nColumn > nTied THEN
+                            IF bMirror OR (nIndex < nTied + nMany) THEN
+                                nColumn := nTied;
+                            ELSE
+                                nColumn := nIndex - nMany + 1;
+                            END_IF;
                         END_IF;
-                        fPath := fPath + fSign * fScale * fSlot * fValue;
-                        IF NOT (fPath >= cTravelLow - 1.0E-10) OR NOT (fPath <= cTravelHigh + 1.0E-10) THEN
-                            bGood := FALSE;
-                        END_IF;
+                        fValue := aX[nColumn + 2];
+                    END_IF;
+                    fValue := fDelta + fPlanShare * (fValue - fDelta);
+                    IF NOT (ABS(fValue) <= cVelocity / fScale) THEN bGood := FALSE; END_IF;
+                    IF NOT (ABS(fValue - fPlanned) <= fRate / (1.0 - cInside)) THEN bGood := FALSE; END_IF;
+                    IF NOT (ABS(fValue - 2.0 * fPlanned + fPlannedBefore) <= fCurve / (1.0 - cInside)) THEN
+                        bGood := FALSE;
+                    END_IF;
+                    fPlanEnd := fPlanEnd + fSign * fScale * fSlot * fValue;
+                    IF NOT (fPlanEnd >= cTravelLow - 1.0E-10) OR NOT (fPlanEnd <= cTravelHigh + 1.0E-10) THEN
+                        IF nJob <> 4 THEN bGood := FALSE; END_IF;
                     END_IF;
                     aPlan[nIndex] := fSign * fScale * fValue;
-                    fHalf := fSquare;
-                    fSquare := fValue;
+                    fPlannedBefore := fPlanned;
+                    fPlanned := fValue;
                 END_FOR;
-                IF bGood AND ((fSum >= fNeed) OR (nJob = 3) OR (nColumns >= cMost)) THEN
-                    bPlanned := TRUE;
-                    IF (nJob = 2) AND (fSum >= fNeed) THEN fPath := fGoal; END_IF;
-                ELSIF nColumns < cMost THEN
-                    (* One slot more carries no farther than full speed does. *)
-                    nOther := 1;
-                    IF bGood AND (fNeed - fSum < 100.0) AND (nJob = 2) THEN
-                        nOther := LREAL_TO_DINT(fNeed - fSum + 0.499);
+                IF nAt >= nLast + 2 THEN
+                    nAt := 0;
+                    IF bMirror AND NOT bGood AND (nEnough = cIterations) THEN
+                        (* Some more iterations. *)
+                        nEnough := cIterations + cMoreIterations;
+                        FOR nIndex := 2 TO nColumns + 1 DO
+                            aX[nIndex] := aX[nIndex] - aDx[nIndex];
+                            aDx[nIndex] := 0.0;
+                        END_FOR;
+                        nPart := 0;
+                        nPhase := 8;
+                    ELSIF nJob = 4 THEN
+                        aReach[nReach] := 0.0;
+                        IF bGood THEN aReach[nReach] := fSum; END_IF;
+                        IF aReach[nReach] > fReached THEN fReached := aReach[nReach]; END_IF;
+                        nReach := nReach + 1;
+                        IF nReach >= cReaches THEN
+                            nReach := 0;
+                            bMeasured := TRUE;
+                        END_IF;
+                        nUnmeasured := nUnmeasured - 1;
+                        nJob := 0;
+                    ELSIF bGood AND ((fSum >= fNeed) OR (nJob = 3) OR (nSlots >= cLongest)) THEN
+                        bPlanned := TRUE;
+                        IF (nJob = 2) AND (fSum >= fNeed) THEN fPlanEnd := fGoal; END_IF;
+                    ELSIF nSlots < cLongest THEN
+                        (* One slot more carries no farther than full speed does. *)
+                        nOther := 1;
+                        IF bGood AND (fNeed - fSum < 100.0) AND (nJob = 2) THEN
+                            nOther := LREAL_TO_DINT(fNeed - fSum + 0.499);
+                        END_IF;
+                        IF NOT bGood THEN nOther := 3; END_IF;
+                        IF nOther < 1 THEN nOther := 1; END_IF;
+                        nSlots := nSlots + nOther;
+                        IF nSlots > cLongest THEN nSlots := cLongest; END_IF;
+                        bMirror := nState <> 2;
+                        bUnfolded := FALSE;
+                        nPhase := 4;
+                    ELSE
+                        nJob := 0;
+                        bSurrender := TRUE;
+                        bStopPlanned := TRUE;
                     END_IF;
-                    IF NOT bGood THEN nOther := 3; END_IF;
-                    IF nOther < 1 THEN nOther := 1; END_IF;
-                    nColumns := nColumns + nOther;
-                    IF nColumns > cMost THEN nColumns := cMost; END_IF;
-                    nPart := 0;
-                    nPhase := 3;
-                ELSE
-                    nJob := 0;
-                    bSurrender := TRUE;
-                    bStopPlanned := TRUE;
                 END_IF;
         END_CASE;
     END_IF;

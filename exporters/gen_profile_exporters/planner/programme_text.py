@@ -19,7 +19,7 @@ PROGRAMME = """\
                 END_FOR;
                 aMiss[nPart] := 0.0;
                 nPart := nPart + 1;
-                IF nPart >= cConditions THEN
+                IF nPart >= nGiven THEN
                     nPart := 0;
                     aMiss[0] := 1.0;
                     nPhase := 7;
@@ -39,14 +39,14 @@ PROGRAMME = """\
                 END_FOR;
                 aMiss[nPart] := fSum;
                 nPart := nPart + 1;
-                IF nPart >= cConditions THEN
+                IF nPart >= nGiven THEN
                     nPart := 0;
                     nPhase := 13;
                 END_IF;
             7, 13: (* multipliers of the conditions (factors L D L'), and what follows from them *)
                 nFirst := 0;
                 IF nPhase = 13 THEN nFirst := 1; END_IF;
-                FOR nRow := nFirst TO cConditions - 1 DO
+                FOR nRow := nFirst TO nGiven - 1 DO
                     FOR nOther := nFirst TO nRow - 1 DO
                         fSum := aS[nRow * cConditions + nOther];
                         FOR nIndex := nFirst TO nOther - 1 DO
@@ -64,10 +64,10 @@ PROGRAMME = """\
                     END_FOR;
                     aS[nRow * cConditions + nRow] := fSum;
                 END_FOR;
-                FOR nTerm := nFirst TO cConditions - 1 DO
-                    nRow := cConditions - 1 + nFirst - nTerm;
+                FOR nTerm := nFirst TO nGiven - 1 DO
+                    nRow := nGiven - 1 + nFirst - nTerm;
                     aMiss[nRow] := aMiss[nRow] / aS[nRow * cConditions + nRow];
-                    FOR nOther := nRow + 1 TO cConditions - 1 DO
+                    FOR nOther := nRow + 1 TO nGiven - 1 DO
                         aMiss[nRow] := aMiss[nRow] - aS[nOther * cConditions + nRow] * aMiss[nOther];
                     END_FOR;
                 END_FOR;
@@ -77,7 +77,7 @@ PROGRAMME = """\
                     fDelta := 0.0;
                     FOR nIndex := 0 TO nColumns - 1 DO
                         fValue := 0.0;
-                        FOR nOther := 0 TO cConditions - 1 DO
+                        FOR nOther := 0 TO nGiven - 1 DO
                             fValue := fValue + aMiss[nOther] * aY[nOther * cColumns + nIndex];
                         END_FOR;
                         aKernel[nIndex] := fValue;
@@ -91,13 +91,14 @@ PROGRAMME = """\
                         fDelta := fValue;
                     END_FOR;
                     nPhase := 30;
-                    IF bGood OR (nColumns >= cMost) THEN
+                    IF bGood OR (nColumns >= cColumns) THEN
                         nKernel := nColumns;
                         bReady := TRUE;
+                        nUnmeasured := cReaches;
                         nJob := 0;
                     END_IF;
                 ELSE
-                    FOR nOther := 1 TO cConditions - 1 DO
+                    FOR nOther := 1 TO nGiven - 1 DO
                         FOR nIndex := 0 TO nColumns - 1 DO
                             aDx[nIndex + 2] := aDx[nIndex + 2]
                                 - aMiss[nOther] * aY[nOther * cColumns + nIndex];
@@ -106,19 +107,25 @@ PROGRAMME = """\
                     nPhase := 14;
                     fStepX := 1.0;
                     fStepZ := 1.0;
-                    IF nIteration > cIterations THEN nPhase := 17; END_IF;
+                    IF nIteration > nEnough THEN nPhase := 17; END_IF;
                 END_IF;
             16: (* where the search begins *)
-                fHalf := 0.5 * DINT_TO_LREAL(nColumns - 1);
+                fHalf := 0.5 * DINT_TO_LREAL(nSlots - 1);
                 fValue := fRate;
                 IF fCurve < fValue THEN fValue := fCurve; END_IF;
-                fValue := 0.075 * fValue * DINT_TO_LREAL(nColumns + 1);
+                fValue := 0.075 * fValue * DINT_TO_LREAL(nSlots + 1);
                 IF fValue > 0.3 THEN fValue := 0.3; END_IF;
                 FOR nIndex := 0 TO nColumns - 1 DO
-                    aX[nIndex + 2] := aOld[nIndex];
-                    IF nOld = 0 THEN
+                    IF bMirror THEN
                         fDelta := (DINT_TO_LREAL(nIndex) - fHalf) / (fHalf + 1.0);
                         aX[nIndex + 2] := fValue * (1.0 - fDelta * fDelta);
+                    ELSE
+                        nOther := nIndex;
+                        IF nIndex > nTied THEN nOther := nIndex + nMany - 1; END_IF;
+                        aX[nIndex + 2] := 0.0;
+                        IF nOther < nOld THEN
+                            aX[nIndex + 2] := fSign * aFuture[nOther + nAhead + 2] / fScale;
+                        END_IF;
                     END_IF;
                 END_FOR;
                 aX[nColumns + 2] := 0.0;
@@ -126,16 +133,38 @@ PROGRAMME = """\
                 FOR nIndex := 0 TO cWide - 1 DO
                     aDx[nIndex] := 0.0;
                 END_FOR;
+                FOR nIndex := 0 TO 3 * cWide - 1 DO
+                    aWeight[nIndex] := 0.0;
+                    aPush[nIndex] := 0.0;
+                END_FOR;
+                bUnfolded := FALSE;
                 nIteration := 1;
-                IF nOld > 0 THEN nIteration := 1 - cIterations; END_IF;
+                nEnough := cIterations;
+                fLack := 0.0;
+                IF NOT bMirror THEN
+                    nIteration := 1 + cIterations - cWayIterations;
+                    fLack := 1.0;
+                END_IF;
                 nPart := 0;
                 nPhase := 19;
                 fGap := 0.0;
             19: (* first slacks and multipliers of the bounds of a kind *)
-                fHalf := 1.0;
-                IF nPart = 1 THEN fHalf := 1.0 / fRate; END_IF;
-                IF nPart = 2 THEN fHalf := 1.0 / fCurve; END_IF;
-                FOR nIndex := 2 TO nColumns + 1 + nPart DO
+@extent
+                FOR nIndex := 2 TO nLast DO
+                    nColumn := nPart * cWide + nIndex;
+                    fHalf := 1.0;
+                    IF nPart = 1 THEN
+                        fValue := fRate;
+                        IF (nIndex = nTied + 2) AND (bMirror OR (nMany > 1)) THEN
+                            fDelta := fCurve;
+                            IF bMirror AND (nMany = 1) THEN fDelta := 0.5 * fCurve; END_IF;
+                            IF fDelta < fValue THEN fValue := fDelta; END_IF;
+                        END_IF;
+                        IF (nIndex = nTied + 3) AND (nMany > 1) AND (fCurve < fValue) THEN fValue := fCurve; END_IF;
+                        fHalf := 1.0 / fValue;
+                    END_IF;
+                    IF nPart = 2 THEN fHalf := 1.0 / fCurve; END_IF;
+                    aSteep[nColumn] := fHalf;
                     fValue := aX[nIndex];
                     IF nPart = 1 THEN fValue := aX[nIndex] - aX[nIndex - 1]; END_IF;
                     IF nPart = 2 THEN fValue := aX[nIndex] - 2.0 * aX[nIndex - 1] + aX[nIndex - 2]; END_IF;
@@ -145,16 +174,19 @@ PROGRAMME = """\
                         fSlackA := fUpper - fValue;
                         fSlackB := fValue - fLower;
                     END_IF;
-                    IF nOld > 0 THEN
+                    aLackA[nColumn] := fSlackA;
+                    aLackB[nColumn] := fSlackB;
+                    IF NOT bMirror THEN
                         IF fSlackA < 0.3 THEN fSlackA := 0.3; END_IF;
                         IF fSlackB < 0.3 THEN fSlackB := 0.3; END_IF;
                     END_IF;
-                    nColumn := nPart * cWide + nIndex;
+                    aLackA[nColumn] := aLackA[nColumn] - fSlackA;
+                    aLackB[nColumn] := aLackB[nColumn] - fSlackB;
                     aSlackA[nColumn] := fSlackA;
                     aSlackB[nColumn] := fSlackB;
                     aPriceA[nColumn] := 0.1 / DINT_TO_LREAL(nColumns);
                     aPriceB[nColumn] := aPriceA[nColumn];
-                    IF nOld > 0 THEN
+                    IF NOT bMirror THEN
                         aPriceA[nColumn] := aPriceA[nColumn] / fSlackA;
                         aPriceB[nColumn] := aPriceB[nColumn] / fSlackB;
                     END_IF;
@@ -167,17 +199,23 @@ PROGRAMME = """\
                 END_IF;
             8: (* weights of the bounds of a kind *)
                 IF nPart = 0 THEN fGap := cCentre * fGap / DINT_TO_LREAL(6 * nColumns + 6); END_IF;
-                fHalf := 1.0;
-                IF nPart = 1 THEN fHalf := 1.0 / fRate; END_IF;
-                IF nPart = 2 THEN fHalf := 1.0 / fCurve; END_IF;
-                FOR nIndex := 2 TO nColumns + 1 + nPart DO
-@row
-                    fSlackA := fSlackA - aSlackA[nColumn];
-                    fSlackB := fSlackB - aSlackB[nColumn];
-                    aWeight[nColumn] := fHalf * fHalf * (aPriceA[nColumn] / aSlackA[nColumn]
-                        + aPriceB[nColumn] / aSlackB[nColumn]);
-                    aPush[nColumn] := fHalf * ((fGap - aPriceA[nColumn] * fSlackA) / aSlackA[nColumn]
-                        - (fGap - aPriceB[nColumn] * fSlackB) / aSlackB[nColumn]);
+@extent
+                FOR nIndex := 2 TO nLast DO
+                    nColumn := nPart * cWide + nIndex;
+                    fSlackA := 1.0 / aSlackA[nColumn];
+                    fSlackB := 1.0 / aSlackB[nColumn];
+                    aRatioA[nColumn] := aPriceA[nColumn] * fSlackA;
+                    aRatioB[nColumn] := aPriceB[nColumn] * fSlackB;
+                    aTurnA[nColumn] := fGap * fSlackA;
+                    aTurnB[nColumn] := fGap * fSlackB;
+                    fHalf := aSteep[nColumn];
+                    aWeight[nColumn] := fHalf * fHalf * (aRatioA[nColumn] + aRatioB[nColumn]);
+                    fValue := aTurnA[nColumn] - aTurnB[nColumn];
+                    IF fLack > 0.0 THEN
+                        fValue := fValue - fLack
+                            * (aRatioA[nColumn] * aLackA[nColumn] - aRatioB[nColumn] * aLackB[nColumn]);
+                    END_IF;
+                    aPush[nColumn] := fHalf * fValue;
                 END_FOR;
                 nPart := nPart + 1;
                 IF nPart > 2 THEN
@@ -186,9 +224,9 @@ PROGRAMME = """\
                 END_IF;
             10: (* normal matrix of five diagonals, its factors, and the right-hand side *)
                 FOR nIndex := 2 TO nColumns + 1 DO
+                    fValue := aE[nIndex - 2] / DINT_TO_LREAL(nSlots);
                     (* Where the way is longer than a plan, what comes first counts most. *)
-                    fValue := 1.0 / DINT_TO_LREAL(nColumns);
-                    IF nColumns >= cMost THEN
+                    IF (nSlots >= cLongest) AND NOT bMirror THEN
                         fValue := fValue * (1.5 - DINT_TO_LREAL(nIndex) / DINT_TO_LREAL(nColumns));
                     END_IF;
                     nRow := cWide + nIndex;
@@ -211,6 +249,13 @@ PROGRAMME = """\
                         aH0[nIndex] := aH0[nIndex] - fDelta * aH1[nIndex];
                     END_IF;
                 END_FOR;
+                nPart := 0;
+                IF bUnfolded THEN
+                    FOR nIndex := 2 TO nColumns + 1 DO
+                        aDx[nIndex] := 0.0;
+                    END_FOR;
+                    nPart := 1;
+                END_IF;
                 nPhase := 11;
             11: (* solve for the right-hand side, then for each condition *)
                 IF nPart > 0 THEN
@@ -243,27 +288,33 @@ PROGRAMME = """\
                     END_IF;
                 END_FOR;
                 nPart := nPart + 1;
-                IF nPart >= cConditions THEN
+                IF nPart >= nGiven THEN
                     nPart := 1;
                     nPhase := 12;
                 END_IF;
             14: (* how far the step may go *)
-                fHalf := 1.0;
-                IF nPart = 1 THEN fHalf := 1.0 / fRate; END_IF;
-                IF nPart = 2 THEN fHalf := 1.0 / fCurve; END_IF;
-                FOR nIndex := 2 TO nColumns + 1 + nPart DO
-@row
-@step
-                    IF -fSlackA * fStepX > aSlackA[nColumn] THEN
-                        fStepX := -aSlackA[nColumn] / fSlackA;
+@extent
+                FOR nIndex := 2 TO nLast DO
+                    nColumn := nPart * cWide + nIndex;
+                    fDelta := aDx[nIndex];
+                    IF nPart = 1 THEN fDelta := aDx[nIndex] - aDx[nIndex - 1]; END_IF;
+                    IF nPart = 2 THEN fDelta := aDx[nIndex] - 2.0 * aDx[nIndex - 1] + aDx[nIndex - 2]; END_IF;
+                    fSlackB := aSteep[nColumn] * fDelta;
+                    fSlackA := -fSlackB;
+                    IF fLack > 0.0 THEN
+                        fSlackA := fSlackA + fLack * aLackA[nColumn];
+                        fSlackB := fSlackB + fLack * aLackB[nColumn];
                     END_IF;
-                    IF -fSlackB * fStepX > aSlackB[nColumn] THEN
-                        fStepX := -aSlackB[nColumn] / fSlackB;
-                    END_IF;
-                    fDelta := (fGap - aPriceA[nColumn] * (aSlackA[nColumn] + fSlackA)) / aSlackA[nColumn];
+                    aStepA[nColumn] := fSlackA;
+                    aStepB[nColumn] := fSlackB;
+                    IF -fSlackA * fStepX > aSlackA[nColumn] THEN fStepX := -aSlackA[nColumn] / fSlackA; END_IF;
+                    IF -fSlackB * fStepX > aSlackB[nColumn] THEN fStepX := -aSlackB[nColumn] / fSlackB; END_IF;
+                    fDelta := aTurnA[nColumn] - aPriceA[nColumn] - aRatioA[nColumn] * fSlackA;
                     IF -fDelta * fStepZ > aPriceA[nColumn] THEN fStepZ := -aPriceA[nColumn] / fDelta; END_IF;
-                    fDelta := (fGap - aPriceB[nColumn] * (aSlackB[nColumn] + fSlackB)) / aSlackB[nColumn];
+                    aTurnA[nColumn] := fDelta;
+                    fDelta := aTurnB[nColumn] - aPriceB[nColumn] - aRatioB[nColumn] * fSlackB;
                     IF -fDelta * fStepZ > aPriceB[nColumn] THEN fStepZ := -aPriceB[nColumn] / fDelta; END_IF;
+                    aTurnB[nColumn] := fDelta;
                 END_FOR;
                 nPart := nPart + 1;
                 IF nPart > 2 THEN
@@ -271,23 +322,17 @@ PROGRAMME = """\
                     nPhase := 15;
                     fStepX := cStep * fStepX;
                     fStepZ := cStep * fStepZ;
-                    fPeak := 0.0;
+                    fGap := 0.0;
                 END_IF;
             15: (* take it *)
-                fHalf := 1.0;
-                IF nPart = 1 THEN fHalf := 1.0 / fRate; END_IF;
-                IF nPart = 2 THEN fHalf := 1.0 / fCurve; END_IF;
-                FOR nIndex := 2 TO nColumns + 1 + nPart DO
-@row
-@step
-                    fDelta := (fGap - aPriceA[nColumn] * (aSlackA[nColumn] + fSlackA)) / aSlackA[nColumn];
-                    aPriceA[nColumn] := aPriceA[nColumn] + fStepZ * fDelta;
-                    fDelta := (fGap - aPriceB[nColumn] * (aSlackB[nColumn] + fSlackB)) / aSlackB[nColumn];
-                    aPriceB[nColumn] := aPriceB[nColumn] + fStepZ * fDelta;
-                    aSlackA[nColumn] := aSlackA[nColumn] + fStepX * fSlackA;
-                    aSlackB[nColumn] := aSlackB[nColumn] + fStepX * fSlackB;
-                    fPeak := fPeak + aSlackA[nColumn] * aPriceA[nColumn]
-                        + aSlackB[nColumn] * aPriceB[nColumn];
+@extent
+                FOR nIndex := 2 TO nLast DO
+                    nColumn := nPart * cWide + nIndex;
+                    aPriceA[nColumn] := aPriceA[nColumn] + fStepZ * aTurnA[nColumn];
+                    aPriceB[nColumn] := aPriceB[nColumn] + fStepZ * aTurnB[nColumn];
+                    aSlackA[nColumn] := aSlackA[nColumn] + fStepX * aStepA[nColumn];
+                    aSlackB[nColumn] := aSlackB[nColumn] + fStepX * aStepB[nColumn];
+                    fGap := fGap + aSlackA[nColumn] * aPriceA[nColumn] + aSlackB[nColumn] * aPriceB[nColumn];
                 END_FOR;
                 nPart := nPart + 1;
                 IF nPart > 2 THEN
@@ -295,38 +340,32 @@ PROGRAMME = """\
                         aX[nIndex] := aX[nIndex] + fStepX * aDx[nIndex];
                         aDx[nIndex] := 0.0;
                     END_FOR;
-                    fGap := fPeak;
+                    fLack := fLack * (1.0 - fStepX);
                     nIteration := nIteration + 1;
                     nPart := 0;
                     nPhase := 8;
-                    IF nIteration > cIterations THEN
+                    IF nIteration > nEnough THEN
                         nPhase := 12;
                         nPart := 1;
+                        IF bMirror AND bDamped THEN nPhase := 20; END_IF;
                     END_IF;
                 END_IF;
+            20: (* damping tells the halves apart: the last projection takes both *)
+                FOR nRow := 0 TO 2 DO
+                    FOR nIndex := nColumns TO 2 * nTied + nRow DO
+                        nOther := nRow * cWide + 2 * nTied + nRow - nIndex + 2;
+                        nColumn := nRow * cWide + nIndex + 2;
+                        aWeight[nColumn] := aWeight[nOther];
+                        IF (nRow = 2) AND (nIndex = nColumns) THEN aWeight[nColumn] := 0.0; END_IF;
+                        IF nRow = 0 THEN aX[nColumn] := aX[nOther]; END_IF;
+                    END_FOR;
+                END_FOR;
+                bMirror := FALSE;
+                bUnfolded := TRUE;
+                nPhase := 4;
 """
 
-ROW = """\
-nColumn := nPart * cWide + nIndex;
-fValue := aX[nIndex];
-fDelta := aDx[nIndex];
-IF nPart = 1 THEN
-    fValue := aX[nIndex] - aX[nIndex - 1];
-    fDelta := aDx[nIndex] - aDx[nIndex - 1];
-END_IF;
-IF nPart = 2 THEN
-    fValue := aX[nIndex] - 2.0 * aX[nIndex - 1] + aX[nIndex - 2];
-    fDelta := aDx[nIndex] - 2.0 * aDx[nIndex - 1] + aDx[nIndex - 2];
-END_IF;
-fSlackA := 1.0 - fHalf * fValue;
-fSlackB := 1.0 + fHalf * fValue;
-IF nPart = 0 THEN
-    fSlackA := fUpper - fValue;
-    fSlackB := fValue - fLower;
-END_IF;
-"""
-
-STEP = """\
-fSlackA := fSlackA - aSlackA[nColumn] - fHalf * fDelta;
-fSlackB := fSlackB - aSlackB[nColumn] + fHalf * fDelta;
+EXTENT = """\
+nLast := nColumns + 1;
+IF NOT bMirror THEN nLast := nLast + nPart; END_IF;
 """

@@ -9,14 +9,11 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.planner.chebyshev import Array, Interpolant, interpolate
+from gen_profile.planner.chebyshev import Array
 from gen_profile.planner.machine import LiveModes, frequencies, live_modes
-from gen_profile.planner.reach import reach
 from gen_profile.spec.model import Spec
-from gen_profile_exporters.planner.block import MOST, SLOTS_PER_PERIOD, PlannerConstants, block_text
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants, block_text
 
-REACH_DEGREE = 3
-REACH_FIRST, REACH_STEP = 16, 4
 FEWEST_CYCLES = 4  # in a slot
 STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
 QUICK = 2.0  # default deceleration of a quick stop, relative to the limit of the acceleration
@@ -55,7 +52,6 @@ def planner_block(spec: Spec) -> PlannerBlock:
     if 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * spec.export.cycle_time) < FEWEST_CYCLES:
         most = 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * FEWEST_CYCLES)
         raise SpecError(f"export.cycle_time: at most {most:.2g} s for a machine that swings this fast.")
-    reaches = _reaches(found, (velocity, acceleration, jerk))
     interpolant = found.interpolant
     coefficients = interpolant.coefficients
     constants = PlannerConstants(
@@ -74,13 +70,11 @@ def planner_block(spec: Spec) -> PlannerBlock:
         units=tuple(_unit(spec, name) for name in found.live),
         nominal=tuple(_nominal(spec, name) for name in found.live),
         drift=tuple(STEADY * high for _, high in found.live.values()),
+        rates=tuple(spec.planner.live_rate.get(name, 0.0) for name in found.live),
         degrees=int(interpolant.exponents.max(initial=0)) + 1,
         exponents=interpolant.exponents,
         frequencies=coefficients[: found.modes],
         decays=coefficients[found.modes :],
-        reach_first=REACH_FIRST,
-        reach_step=REACH_STEP,
-        reaches=_in_terms_of(reaches, interpolant),
     )
     return PlannerBlock(
         filename=f"{spec.name}.st",
@@ -139,25 +133,3 @@ def _corners(found: LiveModes) -> list[Sequence[float]]:
 def _rates(found: LiveModes, point: Sequence[float]) -> tuple[Array, Array]:
     invariants, decays = np.split(found.interpolant(point), [found.modes])
     return frequencies(invariants), decays
-
-
-def _reaches(found: LiveModes, limits: tuple[float, float, float]) -> Interpolant:
-    """Distances from rest to rest by number of slots, over the live ranges."""
-
-    def distances(point: Sequence[float]) -> Array:
-        rates, decays = _rates(found, point)
-        slot = 2.0 * np.pi / (SLOTS_PER_PERIOD * rates[0])
-        counts = range(REACH_FIRST, MOST + 1, REACH_STEP)
-        return np.array([reach(count, slot, rates, decays, limits) for count in counts])
-
-    return interpolate(distances, len(found.live), REACH_DEGREE if found.live else 0)
-
-
-def _in_terms_of(own: Interpolant, other: Interpolant) -> Array:
-    """Write coefficients in the terms of another interpolant; those that it lacks are left out."""
-    places = {tuple(column): number for number, column in enumerate(own.exponents.T)}
-    table = np.zeros((len(own.coefficients), other.exponents.shape[1]))
-    for number, column in enumerate(other.exponents.T):
-        if tuple(column) in places:
-            table[:, number] = own.coefficients[:, places[tuple(column)]]
-    return table
