@@ -31,6 +31,7 @@ SPARE = 0.3  # slots more than expected
 MORE_ITERATIONS = 3  # where these do not lead to a plan
 WAY_ITERATIONS = 13  # where the axis moves already
 SLOTS_PER_PERIOD = 20.0  # of the slowest mode
+MIRROR_DECAY = 0.2  # over a motion, up to which its halves mirror each other until the last projection
 CENTRE = 0.15  # of an interior-point iteration: the complementarity it aims at, relative to that of now
 STEP = 0.93  # share of the way to the nearest bound that it goes
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
@@ -183,6 +184,7 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cInside": INSIDE,
         "cSpare": SPARE,
+        "cMirrorDecay": MIRROR_DECAY,
         "cCentre": CENTRE,
         "cStep": STEP,
     }

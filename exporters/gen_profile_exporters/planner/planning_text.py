@@ -206,6 +206,9 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                 nPhase := 4;
             4: (* which slots are unknowns: those in the middle are one; mirrored, the second half is none *)
                 nGiven := 1 + 4 * cModes;
+                FOR nMode := 0 TO cModes - 1 DO
+                    IF aDecay[nMode] * fSlot * DINT_TO_LREAL(nSlots) > cMirrorDecay THEN bMirror := FALSE; END_IF;
+                END_FOR;
                 IF bMirror THEN
                     nGiven := 1 + 2 * cModes;
                     nColumns := (nSlots + 1) / 2;
