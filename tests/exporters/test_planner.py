@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 from command_line import run_here
+from counted_block import CountedBlock, compile_counting
 from scipy.integrate import solve_ivp
 from scipy.optimize import linprog
 from st_interpreter import FunctionBlock
@@ -13,6 +14,7 @@ from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.machine import live_modes
 from gen_profile.spec.reading import parse_spec, preset_spec
 
 G = 9.81
@@ -156,15 +158,66 @@ def shortest_is_longer(duration, distance, rates, limits, slots=120):
 
 @pytest.mark.parametrize(
     ("rope", "load", "distance"),
-    [(6.0, 2000.0, 1.0), (6.0, 2000.0, 8.0), (4.3, 700.0, 4.0), (9.0, 1500.0, 4.0)],
+    [(6.0, 2000.0, 1.0), (6.0, 2000.0, 8.0), (4.3, 700.0, 4.0), (9.0, 1500.0, 4.0), (3.0, 2000.0, 36.0)],
 )
 def test_moves_take_little_longer_than_the_shortest(text, rope, load, distance):
-    out = Driver(text, fL1=rope, fm2=load).hold(1.0).hold(25.0, bExecute=1, fTarget=distance).outputs
-    duration = np.argmax(out["bDone"]) * CYCLE - 1.0
+    out = Driver(text, fL1=rope, fm2=load).hold(2.0).hold(50.0, bExecute=1, fTarget=distance).outputs
+    duration = np.argmax(out["bDone"]) * CYCLE - 2.0
     require_limits(out)
     assert out["fPosition"][-1] == distance
     limits = (VELOCITY, ACCELERATION, JERK)
     assert shortest_is_longer(duration / 1.10, distance, frequencies(rope, load), limits)
+
+
+@pytest.fixture(scope="module")
+def counted():
+    return compile_counting(planner_block(parse_spec(BAY, ["export.cycle_time=0.001"])).text)
+
+
+def test_planning_takes_20_cycles_of_3000_operations_at_most(counted):
+    for rope, load in ((3.0, 2000.0), (6.2, 350.0), (9.0, 0.0)):
+        block = CountedBlock(counted, fL1=rope, fm2=load)
+        worst = block.hold(600)["operations"].max()
+        for target in (1.0, 3.0, 8.0, 39.0):
+            out = block.hold(60_000, bExecute=1.0, fTarget=target)
+            assert np.argmax(out["fVelocity"] != 0.0) <= 20
+            assert out["bDone"][-1]
+            worst = max(worst, out["operations"].max())
+        assert worst <= 3000
+
+
+def test_no_cycle_takes_more_operations_on_the_way_either(counted):
+    block = CountedBlock(counted, fL1=5.0)
+    out = [block.hold(300), block.hold(9000, bExecute=1.0, fTarget=39.0)]
+    for _ in range(4):
+        out += [block.hold(3000, bExecute=1.0, fTarget=target) for target in (20.0, 30.0, 3.0)]
+        out += [block.hold(250, bVelocity=1.0, fVelocityCommand=speed) for speed in (1.0, -1.0, 0.3)]
+        out += [block.hold(2500, bVelocity=0.0, fL1=block.inputs["fL1"] + 0.002)]
+    assert max(part["operations"].max() for part in out) <= 3000
+
+
+def test_a_rope_that_never_stands_still_is_taken_over(counted):
+    """Hoisting while the axis stands, and the last digits of an encoder."""
+    block = CountedBlock(counted)
+    for cycle in range(150):
+        block.hold(4, fL1=4.0 + 0.001 * cycle + 1e-6 * (-1) ** cycle)
+    out = block.hold(200, bExecute=1.0, fTarget=0.5)
+    assert out["fVelocity"][-1] > 0.0
+
+
+@pytest.mark.parametrize("distance", [1.0, 4.0, 15.0])
+def test_damped_modes_are_left_at_rest_too(distance):
+    changes = ["plant.c1=100.0", "plant.c2=200.0", "planner.live={}"]
+    spec = parse_spec(BAY, changes)
+    out = Driver(planner_block(spec).text).hold(2.0).hold(30.0, bExecute=1, fTarget=distance).outputs
+    assert out["fPosition"][-1] == distance
+    require_limits(out)
+    modes = live_modes(spec).interpolant([])
+    done = np.argmax(out["bDone"])
+    before = CYCLE * (np.arange(done) - done)
+    for rate, decay in zip(np.sqrt(np.roots([1.0, -modes[0], modes[1]]))[::-1], modes[2:], strict=True):
+        left = np.trapezoid(out["fAcceleration"][:done] * np.exp((decay + 1j * rate) * before), dx=CYCLE)
+        assert np.abs(left) < 1e-4 * VELOCITY  # what sampling leaves
 
 
 def test_played_on_the_nonlinear_crane_it_leaves_a_thousandth_of_the_sway(text):
@@ -239,10 +292,17 @@ def test_a_quick_stop_brakes_at_once_and_gives_no_promise(text):
     assert again["bPromise"][-1]
 
 
-def test_a_rope_that_changes_on_the_way_ends_the_promise(text):
-    driver = Driver(text).hold(0.5).hold(6.0, bExecute=1, fTarget=20.0)
+def test_a_rope_that_changes_faster_than_stated_ends_the_promise():
+    text = planner_block(parse_spec(BAY, ["planner.live_rate={L1=0.1}"])).text
+    driver = Driver(text).hold(2.0).hold(2.0, bExecute=1, fTarget=20.0)
+    for step in range(100):
+        driver.hold(0.04, fL1=6.0 + 0.0039 * step)
     assert driver.outputs["bPromise"][-1]
-    assert driver.hold(0.1, fL1=6.2).outputs["nPromise"][-1] == 1
+    driver.hold(1.0, fL1=5.0)
+    assert driver.outputs["nPromise"][-1] == 1
+    out = driver.hold(30.0).outputs
+    require_limits(out)
+    assert out["fPosition"][-1] == 20.0
 
 
 def test_the_command_line_writes_and_executes_a_block(tmp_path):
@@ -325,6 +385,8 @@ def test_an_error_of_the_block_is_told(text):
         (["limits.jerk=0"], "limits.jerk"),
         (["planner.live={L3=[1.0, 2.0]}"], "planner.live.L3: unknown parameter"),
         (["planner.live={L1=[2.0, 1.0]}"], "planner.live.L1: must be two rising numbers"),
+        (["planner.live_rate={L2=0.1}"], "planner.live_rate.L2: no live parameter"),
+        (["planner.live_rate={L1=-0.1}"], "planner.live_rate.L1: must be a number, 0 or more"),
         (["planner.quick_stop=0.1"], "planner.quick_stop: at least limits.acceleration"),
         (["export.cycle_time=0.2"], "export.cycle_time: at most"),
     ],

@@ -10,7 +10,7 @@ FOR nIndex := 0 TO cLives - 1 DO
         bLiveGood := FALSE;
     END_IF;
 END_FOR;
-nWork := 90;
+nWork := 85;
 
 IF nState = 0 THEN
     bFault := FALSE;

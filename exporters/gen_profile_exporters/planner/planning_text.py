@@ -18,17 +18,17 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
         2: nCost := 100 + 6 * (nFuture + cReaches);
         3: nCost := 25 * nOther + 10;
         5: nCost := 7 * nColumns + 10;
-        6, 12: nCost := (2 * nGiven + 3) * nColumns;
+        6, 12: nCost := (2 * nPart + 5) * nColumns;
         7: nCost := nGiven * nGiven * (nGiven + 6) / 3 + (2 * nGiven + 8) * nColumns + 100;
         8: nCost := 18 * nColumns + 60;
         10: nCost := 26 * nColumns;
-        11: nCost := 9 * nColumns + 40;
+        11: nCost := 9 * nColumns + 10;
         13: nCost := nGiven * nGiven * (nGiven + 4) / 3 + 2 * nGiven * nColumns;
         14: nCost := 24 * nColumns + 60;
         15: nCost := 14 * nColumns + 40;
         16: nCost := 8 * nColumns + 10;
         17: nCost := 3 * nColumns + 60;
-        18: nCost := 30 * nOther + 80;
+        18: nCost := 28 * nOther + 80;
         19: nCost := 22 * nColumns + 60;
     ELSE
         nCost := 4 * nColumns;

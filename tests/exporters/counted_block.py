@@ -1,0 +1,70 @@
+"""A planner block in C that counts its floating-point operations, compiled with little optimisation: quick to build."""
+
+import ctypes
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from gen_profile_exporters.st_to_c import translate
+
+DOUBLES = ctypes.POINTER(ctypes.c_double)
+
+
+def compile_counting(text):
+    """The library of a block, its inputs with their initial values, and its outputs."""
+    translation = translate(text)
+    name = translation.name
+    taken = "".join(f"fb->{v.name} = *in++; " for v in translation.inputs)
+    given = "".join(f"*out++ = fb->{v.name}; " for v in translation.outputs)
+    loop = f"""\
+#define COUNT_OPERATIONS
+#include "{name}.c"
+long size(void) {{ return sizeof({name}); }}
+void begin({name} *fb) {{ {name}_init(fb); }}
+void play({name} *fb, const double *in, long cycles, double *out) {{
+    while (cycles-- > 0) {{
+        {taken}
+        {name}_operations = 0;
+        {name}_step(fb);
+        {given}
+        *out++ = (double){name}_operations;
+    }}
+}}
+"""
+    with tempfile.TemporaryDirectory() as folder:
+        for file, content in (
+            (f"{name}.h", translation.header),
+            (f"{name}.c", translation.source),
+            ("loop.c", loop),
+        ):
+            Path(folder, file).write_text(content)
+        options = ["-std=c99", "-O1", "-ffp-contract=off", "-shared", "-fPIC", "-o", "loop.so"]
+        subprocess.run(["gcc", *options, "loop.c", "-lm"], cwd=folder, check=True)
+        library = ctypes.CDLL(str(Path(folder, "loop.so")))
+    library.size.restype = ctypes.c_long
+    initial = {v.name: float({"true": 1, "false": 0}.get(v.initial[0], v.initial[0])) if v.initial else 0.0
+               for v in translation.inputs}  # fmt: skip
+    return library, initial, [v.name for v in translation.outputs] + ["operations"]
+
+
+class CountedBlock:
+    """An instance of such a library, given inputs by name."""
+
+    def __init__(self, compiled, **inputs):
+        self.library, initial, self.outputs = compiled
+        self.inputs = initial | {"bEnable": 1.0} | inputs
+        self.memory = ctypes.create_string_buffer(self.library.size())
+        self.library.begin(self.memory)
+
+    def hold(self, cycles, **inputs):
+        """Hold inputs, bExecute being an edge, and give the outputs of every cycle by name."""
+        self.inputs |= {"bExecute": 0.0} | inputs
+        rows = np.tile(list(self.inputs.values()), (cycles, 1))
+        rows[1:, list(self.inputs).index("bExecute")] = 0.0
+        issued = np.empty((cycles, len(self.outputs)))
+        self.library.play(
+            self.memory, rows.ctypes.data_as(DOUBLES), ctypes.c_long(cycles), issued.ctypes.data_as(DOUBLES)
+        )
+        return dict(zip(self.outputs, issued.T, strict=True))
