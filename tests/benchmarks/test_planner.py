@@ -1,4 +1,4 @@
-"""The planner block's times from rest to rest beside the shortest motions and ZVD. Printed, and judged by ratios."""
+"""The planner block's times from rest to rest, beside the shortest motions and ZVD."""
 
 import numpy as np
 import pytest
@@ -89,9 +89,11 @@ export = {{ cycle_time = {CYCLE} }}
                 duration = CYCLE * np.argmax(out["bDone"])
                 assert 0.0 < duration < zvd(distance, rates, limits)
                 ratios.append(duration / shortest(distance, rates, limits, duration))
-                most, latest = max(most, out["operations"].max()), max(latest, np.argmax(out["fVelocity"] != 0.0))
+                most = max(most, out["operations"].max())
+                latest = max(latest, np.argmax(out["fVelocity"] != 0.0))
     print(
-        f"{name:6} {min(ratios):.3f} to {max(ratios):.3f} times the shortest, {np.mean(ratios):.3f} on average;"
+        f"{name:6} {min(ratios):.3f} to {max(ratios):.3f} times the shortest, {np.mean(ratios):.3f} on"
+        " average;"
         f" {latest} cycles to begin, {most:.0f} operations"
     )
     assert max(ratios) <= 1.10

@@ -1,4 +1,4 @@
-"""A planner block in C that counts its floating-point operations, compiled with little optimisation: quick to build."""
+"""A planner block in C that counts its floating-point operations, built quickly."""
 
 import ctypes
 import subprocess

@@ -343,7 +343,7 @@ def test_what_means_nothing_for_a_block_is_refused(deployed, options, words):
 
 @pytest.mark.usefixtures("designed")
 def test_a_block_that_sways_too_much_is_not_written(tmp_path):
-    (tmp_path / "bay.toml").write_text(BAY.replace("residual_sway = 0.05", "residual_sway = 0.001"))
+    (tmp_path / "bay.toml").write_text(BAY.replace("residual_sway = 0.05", "residual_sway = 0.00001"))
     options = ("--out", tmp_path / "out", "--histories", 4, "--json")
     failed = run_here("planner", "write", tmp_path / "bay.toml", *options)
     assert failed.code == 4

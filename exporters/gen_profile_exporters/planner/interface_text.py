@@ -119,7 +119,7 @@ VAR
     aKernel : ARRAY [0..@last_column] OF LREAL;
     nKernel : DINT;
 
-    (* Planning, spread over cycles: nJob 0 none, 1 kernel, 2 position, 3 stop, 4 measuring what plans reach. *)
+    (* Planning, spread over cycles: nJob 0 none, 1 kernel, 2 position, 3 stop, 4 measuring the reach. *)
     nJob : DINT;
     nPhase : DINT;
     nPart : DINT;

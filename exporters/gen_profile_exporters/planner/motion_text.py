@@ -318,7 +318,7 @@ IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
     END_IF;
 END_IF;
 
-(* Where nothing is to be planned: the machine of the live parameters that are now, and what its plans reach. *)
+(* Where nothing is to be planned: the machine of the live parameters of now, and what its plans reach. *)
 bStale := FALSE;
 fSince := fSince + cCycle;
 FOR nIndex := 0 TO cLives - 1 DO

@@ -207,7 +207,8 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
             4: (* which slots are unknowns: those in the middle are one; mirrored, the second half is none *)
                 nGiven := 1 + 4 * cModes;
                 FOR nMode := 0 TO cModes - 1 DO
-                    IF aDecay[nMode] * fSlot * DINT_TO_LREAL(nSlots) > cMirrorDecay THEN bMirror := FALSE; END_IF;
+                    fValue := aDecay[nMode] * fSlot * DINT_TO_LREAL(nSlots);
+                    IF fValue > cMirrorDecay THEN bMirror := FALSE; END_IF;
                 END_FOR;
                 IF bMirror THEN
                     nGiven := 1 + 2 * cModes;
@@ -231,7 +232,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                 nPart := 0;
                 nAt := 0;
                 nPhase := 3;
-            3: (* conditions of a mode: cosine and sine, both times the slot; what the old future does to them *)
+            3: (* conditions of a mode: cosine and sine, both times the slot; what the old future does *)
                 fHalf := 0.5 * DINT_TO_LREAL(nSlots - 1);
                 nLast := nSlots;
                 IF nOld > nLast THEN nLast := nOld; END_IF;

@@ -160,7 +160,9 @@ PROGRAMME = """\
                             IF bMirror AND (nMany = 1) THEN fDelta := 0.5 * fCurve; END_IF;
                             IF fDelta < fValue THEN fValue := fDelta; END_IF;
                         END_IF;
-                        IF (nIndex = nTied + 3) AND (nMany > 1) AND (fCurve < fValue) THEN fValue := fCurve; END_IF;
+                        IF (nIndex = nTied + 3) AND (nMany > 1) AND (fCurve < fValue) THEN
+                            fValue := fCurve;
+                        END_IF;
                         fHalf := 1.0 / fValue;
                     END_IF;
                     IF nPart = 2 THEN fHalf := 1.0 / fCurve; END_IF;
@@ -307,8 +309,12 @@ PROGRAMME = """\
                     END_IF;
                     aStepA[nColumn] := fSlackA;
                     aStepB[nColumn] := fSlackB;
-                    IF -fSlackA * fStepX > aSlackA[nColumn] THEN fStepX := -aSlackA[nColumn] / fSlackA; END_IF;
-                    IF -fSlackB * fStepX > aSlackB[nColumn] THEN fStepX := -aSlackB[nColumn] / fSlackB; END_IF;
+                    IF -fSlackA * fStepX > aSlackA[nColumn] THEN
+                        fStepX := -aSlackA[nColumn] / fSlackA;
+                    END_IF;
+                    IF -fSlackB * fStepX > aSlackB[nColumn] THEN
+                        fStepX := -aSlackB[nColumn] / fSlackB;
+                    END_IF;
                     fDelta := aTurnA[nColumn] - aPriceA[nColumn] - aRatioA[nColumn] * fSlackA;
                     IF -fDelta * fStepZ > aPriceA[nColumn] THEN fStepZ := -aPriceA[nColumn] / fDelta; END_IF;
                     aTurnA[nColumn] := fDelta;
