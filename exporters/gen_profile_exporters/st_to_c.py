@@ -92,6 +92,12 @@ class StVariable(NamedTuple):
     length: int
     initial: tuple[str, ...]
 
+    @property
+    def start(self) -> float:
+        """Initial value of a scalar; truth values as 0 and 1."""
+        text = self.initial[0] if self.initial else "0"
+        return {"true": 1.0, "false": 0.0}[text] if text in ("true", "false") else float(text)
+
 
 class Translation(NamedTuple):
     """A function block in C99.

@@ -48,7 +48,7 @@ def planner_model(name: str, text: str, axis: str, live: tuple[str, ...]) -> Mod
     """
     source, block = parse_function_block(text), translate(text)
     table = _variables(source, block, axis, live)
-    cycle = next(float(v.initial[0]) for v in block.inputs if v.name == CYCLE)
+    cycle = next(v.start for v in block.inputs if v.name == CYCLE)
     constants = PLAIN | {"HAS_BLOCK": "1", "CYCLE": repr(cycle)}
     return Model(
         name=name,
@@ -83,7 +83,7 @@ def _variables(source: BlockSource, block: Translation, axis: str, live: tuple[s
             unit=unit if v.type == "LREAL" else "",
             kind=kind,
             type=Type.BOOLEAN if v.type == "BOOL" else Type.REAL,
-            start=_start(v) if kind.has_start else 0.0,
+            start=v.start if kind.has_start else 0.0,
         )
 
     inputs = [
@@ -124,11 +124,6 @@ def _explained(comment: str, *, is_live: bool) -> tuple[str, str]:
     first, _, rest = re.sub(r"([,;]|$)", "\0", comment, count=1).partition("\0")
     unit = re.sub(r"(?<=s)(?=[23]$)", "^", first.strip())
     return (unit, rest.strip(",; ")) if is_live or unit in UNITS else ("", comment)
-
-
-def _start(variable: StVariable) -> float:
-    text = variable.initial[0] if variable.initial else "0"
-    return {"true": 1.0, "false": 0.0}[text] if text in ("true", "false") else float(text)
 
 
 def _outputs(block: Translation) -> list[StVariable]:

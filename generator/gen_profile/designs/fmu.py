@@ -95,7 +95,7 @@ def export_fmu(
         Named after the spec in the working folder if not given.
     version : Version
     input_kind : InputKind
-        What a plant's drives are asked for; nothing else has inputs.
+        What a plant's drives are asked for.
     platforms : tuple of str, optional
         Names of `PLATFORMS`, none for sources only; this computer's by default.
     author : str

@@ -12,7 +12,7 @@ import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile.planner.chebyshev import Array
-from gen_profile_exporters.st_to_c import FAULTS, StVariable, Translation, translate
+from gen_profile_exporters.st_to_c import FAULTS, Translation, translate
 from gen_profile_fmu.building.build import compile_texts
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
@@ -47,7 +47,7 @@ class BlockInstance:
     @property
     def inputs(self) -> dict[str, float]:
         """Initial values of the inputs, by name."""
-        return {v.name: _number(v) for v in self._translation.inputs}
+        return {v.name: v.start for v in self._translation.inputs}
 
     @property
     def outputs(self) -> list[str]:
@@ -103,11 +103,6 @@ def require_sound(fault: int) -> None:
     """
     if fault:
         raise ExportError(f"The function block {FAULTS[fault]}; its text was altered.")
-
-
-def _number(variable: StVariable) -> float:
-    text = variable.initial[0] if variable.initial else "0"
-    return {"true": 1.0, "false": 0.0}[text] if text in ("true", "false") else float(text)
 
 
 def _doubles(array: Array) -> ctypes._Pointer[c_double]:
