@@ -156,6 +156,13 @@ def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypat
     assert len(begun) < len(many)
 
 
+def test_a_block_that_fails_in_every_history_is_told_once(spec, text, monkeypatch):
+    broken = attrs.evolve(GOOD, fault=1, cycles=0, stands=-1)
+    monkeypatch.setattr(ClosedLoop, "run", lambda *_: broken)
+    (reason,) = prove(spec, text, histories=4).reasons()
+    assert reason == ("In history 0 the block goes beyond the end of an array, and likewise in 3 others.")
+
+
 def test_every_history_can_be_had_again_by_its_number(spec, text, proof):
     numbering = Numbering.of(Histories.of(spec), proof.count, proof.seed, proof.parents)
     for number in (0, 20, 39):

@@ -59,7 +59,7 @@ def prove(
             worst = sorted(judged, key=lambda one: _share(spec, one), reverse=True)[:KEPT]
             numbering = numbering.after_round([one.number for one in worst])
             judged += _judge(spec, loop, numbering, numbers, progress)
-        return _verdict(spec, loop, numbering, judged)
+        return _verdict(spec, loop, numbering, judged, progress)
 
 
 def replay(spec: Spec, text: str, numbering: Numbering, number: int, progress: Progress = untold) -> Proof:
@@ -78,7 +78,8 @@ def replay(spec: Spec, text: str, numbering: Numbering, number: int, progress: P
         That judges nothing else, with the history's trace.
     """
     with closed_loop(spec, text, numbering.histories, 1, progress) as loop:
-        return _verdict(spec, loop, numbering, _judge(spec, loop, numbering, [number], progress))
+        judged = _judge(spec, loop, numbering, [number], progress)
+        return _verdict(spec, loop, numbering, judged, progress)
 
 
 def closed_loop(
@@ -109,9 +110,15 @@ def _share(spec: Spec, judged: JudgedHistory) -> float:
     return np.inf if judged.faults else judged.share(spec.check.residual_sway, 0.0)
 
 
-def _verdict(spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequence[JudgedHistory]) -> Proof:
+def _verdict(
+    spec: Spec,
+    loop: ClosedLoop,
+    numbering: Numbering,
+    judged: Sequence[JudgedHistory],
+    progress: Progress,
+) -> Proof:
     """Bound the error at the worst histories, and let FMPy judge these and some others."""
-    sound = [one for one in judged if not one.faults] or list(judged)
+    sound = [one for one in judged if not one.faults]
     worst = sorted(sound, key=lambda one: _share(spec, one), reverse=True)[:KEPT]
     halved = 0.5 * min(loop.max_step, loop.cycle)
     error = ERROR_FLOOR
@@ -122,8 +129,11 @@ def _verdict(spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequenc
         error = max(error, ERROR_FLOOR + float(np.abs(finer - coarse).max() + between))
     chosen = np.random.default_rng(numbering.seed).permutation(len(sound))
     some = [sound[k] for k in chosen[: max(FEWEST_BY_FMPY, len(sound) // BY_FMPY)]]
-    by_fmpy = {one.number: one for one in (worst[0], *some)}
-    apart = max(loop.distance_from_fmpy(one.history, one.cycles) for one in by_fmpy.values())
+    by_fmpy = {one.number: one for one in (*worst[:1], *some)}
+    apart = [0.0]
+    for done, one in enumerate(by_fmpy.values()):
+        progress("co-simulating some by FMPy", done, len(by_fmpy))
+        apart.append(loop.distance_from_fmpy(one.history, one.cycles))
     return Proof(
         limit=dict(spec.check.residual_sway),
         error_bound=error,
@@ -132,6 +142,6 @@ def _verdict(spec: Spec, loop: ClosedLoop, numbering: Numbering, judged: Sequenc
         parents=numbering.parents,
         judged=tuple(judged),
         by_fmpy=tuple(by_fmpy),
-        apart=apart,
+        apart=float(np.max(apart)),
         sway_limit=spec.limits.sway,
     )

@@ -163,7 +163,7 @@ class Proof:
             first = next(fault for fault in those[0].faults if fault.split(" by ")[0] == kind)
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
             sentences.append(f"In history {those[0].number} {first}{others}.")
-        if self.apart > AGREEMENT:
+        if not self.apart <= AGREEMENT:
             sentences.append(
                 f"FMPy co-simulates another sway, by {self.apart:.2g} m; this is an error of gen-profile: "
                 "please report it."
