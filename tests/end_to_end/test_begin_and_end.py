@@ -11,8 +11,11 @@ LAG = ("--set", "actuator={type='first-order', tau=0.05}")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("changes", [SWUNG, ONWARD, (*SWUNG, *ONWARD), (*ONWARD, *LAG)], ids=len)
-@pytest.mark.parametrize("duration", [3.0, 3.0005], ids=["even", "off the grid"])
+@pytest.mark.parametrize(
+    ("changes", "duration"),
+    [(SWUNG, 3.0), (ONWARD, 3.0005), ((*SWUNG, *ONWARD), 3.0005), ((*ONWARD, *LAG), 3.0)],
+    ids=["swing", "speed, off the grid", "both, off the grid", "speed with lag"],
+)
 def test_the_check_begins_and_ends_as_the_spec_says(tmp_path, changes, duration):
     words = (*changes, "--set", f"move.duration={duration}", "--out", tmp_path, "--json")
     outcome = run_here(*words)
