@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import parse_spec
 
-G, CYCLE, MEASURING = 9.81, 0.001, 600
+G, CYCLE, MEASURING = 9.81, 0.001, 900
 MACHINES = {  # hook mass, lower rope, upper ropes, loads, (velocity, acceleration, jerk), distances
     "paper": (0.192, 0.391, (0.3, 0.47, 0.7), (0.1, 0.203), (0.3, 0.7, 20.0), (0.1, 0.3, 0.6, 1.0, 2.0)),
     "bay": (350.0, 1.5, (3.0, 6.0, 7.7), (0.0, 2000.0), (1.0, 0.3, 1.0), (1.0, 2.0, 4.0, 8.0, 15.0)),

@@ -15,7 +15,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
     IF nOld > nOther THEN nOther := cChunk; END_IF;
     CASE nPhase OF
         1: nCost := (cLives + 4 * cModes) * cTerms + 90 * cModes + 30 * cLives;
-        2: nCost := 100 + 6 * (nFuture + cReaches);
+        2: nCost := 120 + 6 * (nFuture + cReaches);
         3: nCost := 25 * nOther + 10;
         5: nCost := 7 * nColumns + 10;
         6, 12: nCost := (2 * nPart + 5) * nColumns;
@@ -192,7 +192,12 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                                         / (aReach[nIndex] - aReach[nIndex - 1]);
                                     IF fBound > 0.0 THEN
                                         nOther := cReachSlots[nIndex - 1];
-                                        fBound := fBound * DINT_TO_LREAL(nSlots - nOther) + cSpare + 0.499;
+                                        fHalf := DINT_TO_LREAL(nSlots - nOther);
+                                        fBound := fBound * fHalf;
+                                        (* Between measured ones, a little more. *)
+                                        fHalf := cSpare * (fHalf - 1.0);
+                                        IF fHalf > 0.8 THEN fHalf := 0.8; END_IF;
+                                        fBound := fBound + fHalf + 0.499;
                                         IF nOther + LREAL_TO_DINT(fBound) < nSlots THEN
                                             nSlots := nOther + LREAL_TO_DINT(fBound);
                                         END_IF;
