@@ -196,6 +196,13 @@ def test_no_cycle_takes_more_operations_on_the_way_either(counted):
     assert max(part["operations"].max() for part in out) <= 3000
 
 
+def test_a_stop_in_a_long_motion_ends_long_before_it(counted):
+    block = CountedBlock(counted)
+    block.hold(600)
+    assert block.hold(6000, bExecute=1.0, fTarget=39.0)["fTimeToGo"][-1] > 30.0
+    assert not block.hold(15_000, bStop=1.0)["bBusy"][-1]
+
+
 def test_a_rope_that_never_stands_still_is_taken_over(counted):
     """Hoisting while the axis stands, and the last digits of an encoder."""
     block = CountedBlock(counted)

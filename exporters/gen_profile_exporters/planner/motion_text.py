@@ -180,12 +180,15 @@ END_IF;
 
 (* A plan takes over where its slot begins. *)
 IF (nJob > 1) AND bPlanned AND (nAhead = 0) AND (bNew OR (nState = 1)) AND (nState < 3) THEN
+    nOther := 2;
     nFuture := nOld + 2;
     IF nSlots > nOld THEN nFuture := nSlots + 2; END_IF;
     FOR nIndex := 2 TO cFuture - 1 DO
         aFuture[nIndex] := 0.0;
         IF nIndex < nFuture THEN aFuture[nIndex] := aPlan[nIndex - 2]; END_IF;
+        IF aFuture[nIndex] <> 0.0 THEN nOther := nIndex + 1; END_IF;
     END_FOR;
+    nFuture := nOther; (* a stop ends before the old future *)
     fFinal := fPlanEnd;
     bStopPlanned := nJob = 3;
     bPulses := FALSE;
