@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from gen_profile.evaluation.scenarios import Scenario, scenarios
+from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.evaluation.simulation import Response
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
@@ -23,17 +25,17 @@ def observation_time(spec: Spec) -> float:
     return max(SHORTEST_WATCH, 2.0 * 2.0 * np.pi / float(slowest))
 
 
-def modal_amplitudes(plant: Plant, machine: Scenario, standing: Response) -> Array:
+def modal_amplitudes(plant: Plant, parameters: Mapping[str, float], standing: Response) -> Array:
     """Sum over the modes of what each adds to the sway of every load, in m, shape (loads,).
 
     Parameters
     ----------
     plant : Plant
-    machine : Scenario
+    parameters : mapping of str to float
     standing : Response
         Of the machine from the standstill of its axes on.
     """
-    linear = linearize(plant, machine.parameters, standing.position[0])
+    linear = linearize(plant, parameters, standing.position[0])
     q_u, dq_u = standing.q_u[0], standing.dq_u[0]
     z, dz = np.linalg.solve(linear.modes, np.stack([q_u, dq_u], axis=1)).T
     amplitudes = np.hypot(z, dz / linear.frequencies)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from itertools import pairwise
 from types import MappingProxyType
 
 import attrs
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853, OdeSolution, solve_ivp
 
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.motion.metrics import length, peak
@@ -25,6 +26,8 @@ from gen_profile.work import spend
 RELATIVE_TOLERANCE = 1e-10
 ABSOLUTE_TOLERANCE = 1e-13
 TRANSIENT_SAMPLES = 4001
+LEAST_STRETCHES, MOST_STRETCHES = 20, 256  # that the integration of a motion is divided into
+SHORTEST_STRETCH = 1e-9  # of a motion's duration: closer times are one
 LONGEST = 1e6  # greatest rate of a machine times its time: some hundred thousand steps, and minutes
 RATE, MACHINE = 4e-5, 2e-6  # s of work to evaluate the equations, and more for each machine
 AT_REST: Mapping[str, float] = MappingProxyType({})
@@ -98,6 +101,7 @@ class PlantSimulation:
         for values in machines:
             _require_pace(plant, values, profile, until)
 
+        start = np.repeat(initial_state(plant, initial).reshape(2, 1, -1), len(machines), axis=1)
         work = RATE + MACHINE * len(machines)
 
         def rate(t: float, state: Array) -> Array:
@@ -106,21 +110,7 @@ class PlantSimulation:
             ddq_u = acceleration(q_u, dq_u, motion(t), p)[:, :, 0]
             return np.concatenate([dq_u.ravel(), ddq_u.ravel()])
 
-        # a move begins so gently that a step-size control left alone would leap over it
-        longest = profile.duration / 20.0
-        integral = solve_ivp(
-            rate,
-            (0.0, until),
-            np.repeat(initial_state(plant, initial).reshape(2, 1, -1), len(machines), axis=1).ravel(),
-            method="DOP853",
-            dense_output=True,
-            rtol=accuracy,
-            atol=ABSOLUTE_TOLERANCE / RELATIVE_TOLERANCE * accuracy,
-            max_step=longest,
-        )
-        if not integral.success:
-            raise CosimulationError(f"The {plant.type}'s motion cannot be integrated: {integral.message}")
-        self._solution = integral.sol
+        self._solution = _integrated(rate, start.ravel(), _stretches(profile, until), accuracy, plant.type)
 
     def at(self, times: Array) -> tuple[Response, ...]:
         """Evaluate every machine at rising times in s."""
@@ -199,6 +189,43 @@ def free_swing(
     seen = np.stack([outputs(q, position, p[None])[:, :, 0] for q, p in zip(q_u, machines, strict=True)])
     loads = len(plant.loads)
     return seen[:, :, :loads], seen[:, :, loads:]
+
+
+def _stretches(profile: Profile, until: float) -> Array:
+    """Choose the times between which a motion is smooth, so that no step of integration meets a kink.
+
+    A move begins so gently that a step-size control left alone would leap over it: there are some, anyway.
+    """
+    times = profile.knots if len(profile.knots) <= MOST_STRETCHES else profile.knots[[0, -1]]
+    if len(times) <= LEAST_STRETCHES:
+        times = np.union1d(times, np.linspace(times[0], times[-1], LEAST_STRETCHES + 1))
+    apart = np.diff(times, prepend=-np.inf) > SHORTEST_STRETCH * profile.duration
+    return np.append(times[apart & (times < until * (1.0 - SHORTEST_STRETCH))], until)
+
+
+def _integrated(
+    rate: Callable[[float, Array], Array], start: Array, stretches: Array, accuracy: float, machine: str
+) -> OdeSolution:
+    """Integrate from time to time, by Runge and Kutta's method of order 8 of Dormand and Prince."""
+    times, pieces, state, step = [float(stretches[0])], [], start, None
+    for begin, end in pairwise(stretches.tolist()):
+        solver = DOP853(
+            rate,
+            begin,
+            state,
+            end,
+            rtol=accuracy,
+            atol=ABSOLUTE_TOLERANCE / RELATIVE_TOLERANCE * accuracy,
+            first_step=None if step is None else min(step, end - begin),
+        )
+        while solver.status == "running":
+            message = solver.step()
+            if solver.status == "failed":
+                raise CosimulationError(f"The {machine}'s motion cannot be integrated: {message}")
+            times.append(solver.t)
+            pieces.append(solver.dense_output())
+        state, step = solver.y, solver.h_abs
+    return OdeSolution(times, pieces)
 
 
 def _require_pace(plant: Plant, parameters: Mapping[str, float], profile: Profile, until: float) -> None:

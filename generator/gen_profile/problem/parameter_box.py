@@ -100,6 +100,26 @@ class Box:
         return [parameter.name for parameter in self.plant.parameters]
 
 
+def box_of(problem: Problem, ranges: Mapping[str, tuple[float, float]]) -> Box | None:
+    """State the box of some ranges, least and greatest values, for a problem's move; none where none is wide.
+
+    Parameters
+    ----------
+    problem : Problem
+    ranges : mapping of str to (float, float)
+    """
+    wide = {name: ends for name, ends in ranges.items() if ends[1] > ends[0]}
+    if not wide:
+        return None
+    return Box(
+        plant=problem.plant,
+        nominal=problem.parameters,
+        ranges=wide,
+        ends=(problem.start, problem.target),
+        duration=problem.duration,
+    )
+
+
 def machines_inside(
     problem: Problem, ranges: Mapping[str, tuple[float, float]], most: int = FEW
 ) -> list[dict[str, float]]:
@@ -113,17 +133,8 @@ def machines_inside(
     most : int
         Of `start`.
     """
-    wide = {name: ends for name, ends in ranges.items() if ends[1] > ends[0]}
-    if not wide:
-        return []
-    box = Box(
-        plant=problem.plant,
-        nominal=problem.parameters,
-        ranges=wide,
-        ends=(problem.start, problem.target),
-        duration=problem.duration,
-    )
-    return box.parameters(start(box.phases, len(wide), most).places)
+    box = box_of(problem, ranges)
+    return [] if box is None else box.parameters(start(box.phases, len(box.ranges), most).places)
 
 
 def start(turned: Phases, ranges: int, most: int = MOST) -> Start:

@@ -170,7 +170,7 @@ def _from(response: Response, since: float) -> Response:
 
 def _finding(spec: Spec, machine: Scenario, response: Response, arrival: float) -> Finding:
     plant, standing = spec.machine(), _from(response, arrival)
-    modal = modal_amplitudes(plant, machine, standing)
+    modal = modal_amplitudes(plant, machine.parameters, standing)
     end_load = length(response.sway[:, plant.end_load])
     return Finding(
         scenario=machine,

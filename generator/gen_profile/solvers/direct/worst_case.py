@@ -1,23 +1,25 @@
 """Robustness over a whole range: the least residual sway of the worst machine.
 
 Zero sway of the nominal machine is let go of, as extra-insensitive shapers do (Singhose et al., 1994), unless
-it is asked for. The machines tried are the nominal one and the corners and ends of the ranges; where the
-worst machine lies between them it is added, until none is worse. Among the motions that are nearly as good as
-the best, the one of least cost is taken.
+it is asked for. The machines tried are the nominal one and the corners and ends of the ranges; the worst ones
+that a search finds between them are added until it finds none that is worse (an exchange method; R. Hettich
+and K. O. Kortanek, Semi-infinite programming, SIAM Rev. 35, 1993). Among the motions that are nearly as good
+as the best, the one of least cost is taken.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
 import attrs
 import numpy as np
 
+from gen_profile.evaluation.residual_sway import modal_amplitudes
 from gen_profile.evaluation.simulation import PlantSimulation
-from gen_profile.motion.metrics import greatest, peak
+from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Array, Profile
-from gen_profile.problem.linearization import linearize
+from gen_profile.problem.parameter_box import FEW, box_of, start, worst_places
 from gen_profile.problem.problem import Problem, WorstCase
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.conic import ConicStatus
@@ -33,17 +35,18 @@ from gen_profile.solvers.direct.solver import (
 from gen_profile.solvers.direct.transient_sway import within_sway
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
+from gen_profile.work import OutOfWork, budget, left, spend
 
 TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case
 MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
 SLACK = 1.003  # what the least cost may give away of the least worst case
 GOOD_ENOUGH = 0.01  # share of a load's limit below which nobody need seek less
 ROUNDS = 8
+EXCHANGING = 0.8  # share of the work that is left, after which the last motion is taken
 CORNERS = 6  # parameters up to which all corners are tried
-GRID = 9  # machines along each range
-DRAWS = 64  # machines within the ranges
+ADDED = 3  # machines at most in one round
 WORSE = 1.01  # how much worse a machine must be than those tried to be added
-WATCH_SAMPLES = 1001
+ACCURACY = 1e-6  # of a machine's integration, relative
 
 Parameters = Mapping[str, float]
 
@@ -107,7 +110,7 @@ def solve_within_limits(problem: Problem) -> Solution:
     """
     worst_case, problem = _taken_apart(problem)
     sway_cost, iterations = resolve_sway_cost(problem)
-    tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
+    tried = ends(problem, worst_case)
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
         goal = CostProgram(
@@ -118,40 +121,57 @@ def solve_within_limits(problem: Problem) -> Solution:
         solution = conclude(found, sway_cost, iterations)
         if solution.optimum is None:
             return solution
-        shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
-        if shares.max() <= 1.0:
+        worse = worse_machines(problem, worst_case, optimal_profile(solution), 1.0)
+        if not worse:
             return solution
-        tried = [*tried, everywhere[int(shares.argmax())]]
+        tried = [*tried, *worse]
     return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
 
 
 def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
+    """Go from round to round as long as there is work left; the last motion is the best."""
+    solutions: list[Solution] = []
+    try:
+        with budget(EXCHANGING * left()):
+            solutions.extend(_rounds(problem, traces))
+    except OutOfWork:
+        spend(0.0)
+        if not solutions:
+            raise
+    return solutions[-1]
+
+
+def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
+    """Solve for a few machines, search for worse ones, and solve again with them, until there are none."""
     worst_case, problem = _taken_apart(problem)
     sway_cost, iterations = resolve_sway_cost(problem)
-    tried, everywhere = ends(problem, worst_case), candidates(problem, worst_case)
+    tried, bound = ends(problem, worst_case), 0.0
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
         goal = CostProgram(
             setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=GOOD_ENOUGH
         )
-        bound, found = 0.0, sequence(setup.transcription.rest(), goal)
-        if found.verdict is not ConicStatus.SOLVED:
+        # the bound only rises with more machines: what was not good enough before is not now
+        found = sequence(setup.transcription.rest(), goal) if bound <= GOOD_ENOUGH else None
+        if found is None or found.verdict is not ConicStatus.SOLVED:
             best = _least_worst(setup, traces)
             iterations += best.iterations
             bound = float(best.solutions[0].x[-1])
             if best.verdict is not ConicStatus.SOLVED:
-                return conclude(best, sway_cost, iterations)
+                yield conclude(best, sway_cost, iterations)
+                return
             goal = attrs.evolve(goal, worst=SLACK * float(best.solutions[-1].x[-1]) + MARGIN)
             found = sequence(best.iterate, goal)
         iterations += found.iterations
         solution = conclude(found, sway_cost, iterations)
+        yield attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
         if solution.optimum is None:
-            return solution
-        shares = residual_shares(problem, worst_case, optimal_profile(solution), everywhere)
-        if goal.worst is not None and shares.max() <= WORSE * goal.worst:
-            break
-        tried = [*tried, everywhere[int(shares.argmax())]]
-    return attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
+            return
+        enough = WORSE * float(goal.worst or 0.0)
+        worse = worse_machines(problem, worst_case, optimal_profile(solution), enough)
+        if not worse:
+            return
+        tried = [*tried, *worse]
 
 
 def _least_worst(setup: Setup, traces: Sequence[float]) -> ProgramSequence:
@@ -178,26 +198,32 @@ def ends(problem: Problem, worst_case: WorstCase) -> list[Parameters]:
     return [_machine(problem, worst_case, place) for place in places]
 
 
-def candidates(problem: Problem, worst_case: WorstCase) -> list[Parameters]:
-    """List machines all over the box: its ends, a grid along every range, and a Latin hypercube."""
-    count = len(worst_case.uncertain)
-    grid = [np.eye(count)[k] * share for k in range(count) for share in np.linspace(-1.0, 1.0, GRID)]
-    random = np.random.default_rng(0)
-    strata = np.array([random.permutation(DRAWS) for _ in range(count)]).T
-    draws = 2.0 * (strata + random.random((DRAWS, count))) / DRAWS - 1.0
-    return ends(problem, worst_case) + [_machine(problem, worst_case, place) for place in (*grid, *draws)]
+def worse_machines(
+    problem: Problem, worst_case: WorstCase, motion: Profile, share: float
+) -> list[Parameters]:
+    """Search the ranges for machines whose loads a motion leaves more than a share of their limits."""
+    low, high = (_machine(problem, worst_case, (end,) * len(worst_case.uncertain)) for end in (-1.0, 1.0))
+    box = box_of(problem, {name: (low[name], high[name]) for name in worst_case.uncertain})
+    if box is None:
+        return []
+
+    def shares(places: Array) -> Array:
+        return residual_shares(problem, worst_case, motion, box.parameters(places))[:, None]
+
+    places, _ = worst_places(shares, start(box.phases, len(box.ranges), FEW), ADDED)
+    return [*box.parameters(places[shares(places)[:, 0] > share])]
 
 
 def residual_shares(
     problem: Problem, worst_case: WorstCase, motion: Profile, machines: Sequence[Parameters]
 ) -> Array:
-    """Find the greatest share of a load's limit that every machine sways by, shape (machines,)."""
-    slowest = min(linearize(problem.plant, p, problem.target).frequencies[0] for p in machines)
-    watch = 2.0 * 2.0 * np.pi / slowest
-    swing = PlantSimulation(problem.plant, motion, machines, motion.duration + watch, problem.initial)
-    after = swing.at(motion.duration + np.linspace(0.0, watch, WATCH_SAMPLES))
-    limits = np.array(worst_case.load_limits)
-    return np.array([(peak(response.sway) / limits).max() for response in after])
+    """Find what share of its limit the load of every machine swings by where its modes meet, (machines,)."""
+    end, limits = np.array([motion.duration]), np.array(worst_case.load_limits)
+    swing = PlantSimulation(
+        problem.plant, motion, machines, motion.duration, problem.initial, accuracy=ACCURACY
+    )
+    found = zip(machines, swing.at(end), strict=True)
+    return np.array([(modal_amplitudes(problem.plant, p, at) / limits).max() for p, at in found])
 
 
 def _machine(problem: Problem, worst_case: WorstCase, place: Sequence[float] | Array) -> Parameters:
