@@ -196,3 +196,20 @@ def test_no_machine_of_a_dense_grid_is_worse_than_what_the_search_found(seed):
     worst = max(max(finding.residual.values()) for finding in check.findings)
     # straight lines between setpoints err by the cycle's square, the integration here by as much again
     assert expected.max() <= 1.01 * worst + 1e-6
+
+
+@pytest.mark.slow
+def test_the_brim_holds_at_every_fill_in_design_and_verdict(tmp_path):
+    words = ("--preset", "slosh-tank", "--json", "--out", tmp_path, "--set")
+    outcome = run_here(*words, "limits.sway=0.014")
+    assert outcome.code == 0, outcome.err
+    figures = outcome.document["figures"]
+    assert 0.0138 < figures["sway_transient_worst_m"] <= 0.014  # and no more held back than needed
+    peaks = [row["sway_peak_m"] for row in outcome.document["check"]["scenarios"]]
+    assert max(peaks) <= 0.01414 and outcome.document["check"]["warnings"] == []
+
+    lower = tmp_path / "lower.toml"
+    lower.write_text(run_here("presets", "slosh-tank").out + "\n[limits]\nsway = 0.0135\n")
+    judged = run_here("check", tmp_path / "slosh-tank.csv", lower)
+    assert judged.code == 4
+    assert "on the way (h " in judged.err and "13.5 mm are allowed (limits.sway" in judged.err

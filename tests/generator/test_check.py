@@ -100,6 +100,21 @@ def test_faults_of_timing_count_only_where_that_is_asked_for():
     assert not check(rows[1]).passed  # asked for alone, it is what is judged
 
 
+def test_sway_on_the_way_counts_on_every_machine():
+    rows = [
+        attrs.evolve(timed(name, 0.0, 0.0, "machines", row), on_the_way=sway)
+        for row, (name, sway) in enumerate({"nominal": 0.03, "longer": 0.0302, "shorter": 0.0304}.items())
+    ]
+    found = attrs.evolve(check(*rows), sway_limit=0.03)
+    assert [found.keeps_limit(row) for row in rows] == [True, True, False]  # 1 % is the search's own error
+    assert not found.passed and found.demand == pytest.approx(0.0304 / 0.0303)
+    (reason,) = found.reasons()
+    assert reason.startswith(
+        "The payload sways by 30.4 mm on the way (shorter), and 30 mm are allowed (limits"
+    )
+    assert attrs.evolve(check(*rows[:2]), sway_limit=0.03).passed
+
+
 def test_each_group_has_its_verdict_worst_row_and_quantiles():
     rows = [timed(f"sample {n}", 0.0, 1e-5 * n, "samples", 1 + n) for n in range(201)]
     found = check(finding("nominal", 0.0, 0.0), *rows)

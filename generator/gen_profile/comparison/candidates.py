@@ -8,6 +8,7 @@ from typing import Any
 
 import attrs
 
+from gen_profile.designs import transient_sway
 from gen_profile.designs.plan import timed
 from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import GenProfileError, InfeasibleProblem, SpecError
@@ -16,7 +17,6 @@ from gen_profile.motion.profile import Profile
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct import worst_case
 from gen_profile.solvers.motion import optimal_profile
@@ -112,7 +112,7 @@ def _other_robustness(spec: Spec) -> dict[str, Mapping[str, Any]]:
 
 
 def _optimal(spec: Spec) -> Profile:
-    return optimal_profile(choice.solve(problem_of(spec), spec.solver.solver))
+    return optimal_profile(transient_sway.solve(spec))
 
 
 def _weighed(timed_spec: Callable[[], Spec], sway_weight: float) -> Profile:

@@ -8,11 +8,12 @@ from functools import partial
 import attrs
 import numpy as np
 
+from gen_profile.designs import transient_sway
 from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import InfeasibleProblem, LimitViolation, SolverDiverged
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, keeps_residual_sway
 from gen_profile.motion.profile import Profile, grid_length, grid_times
-from gen_profile.problem.limits import breaches, rounded_up
+from gen_profile.problem.limits import SWAY_TOLERANCE, breaches, rounded_up
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.progress import Progress, untold
@@ -128,13 +129,15 @@ def _lasting(spec: Spec, duration: float) -> Spec:
 
 def _calms(spec: Spec) -> bool:
     """Whether the optimal motion of a spec leaves little enough sway on every machine."""
-    solution = choice.attempt(problem_of(spec), spec.solver.solver)
+    solution = transient_sway.attempt(spec)
     return solution.optimum is not None and _is_calm(spec, solution)
 
 
 def _is_calm(spec: Spec, solution: Solution) -> bool:
-    """Whether a solution leaves little enough sway on every machine of a spec."""
-    return keeps_residual_sway(spec, evaluate(spec, optimal_profile(solution)), CALM)
+    """Whether a solution leaves every machine of a spec little enough sway, and no more on the way."""
+    evaluation, limit = evaluate(spec, optimal_profile(solution)), solution.problem.limits.sway
+    swings = limit is not None and evaluation.figures["sway_transient_worst_m"] > SWAY_TOLERANCE * limit
+    return not swings and keeps_residual_sway(spec, evaluation, CALM)
 
 
 def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold) -> Plan:
@@ -163,7 +166,8 @@ def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold
         raise
     evaluation = evaluate(spec, motion)
     found = evaluation.figures
-    broken = breaches(spec.limits, evaluation.command, found["sway_transient_peak_m"])
+    swing = max(found["sway_transient_peak_m"], found["sway_transient_worst_m"] / SWAY_TOLERANCE)
+    broken = breaches(spec.limits, evaluation.command, swing)
     if broken:
         sentences = [breach.sentence() for breach in broken]
         progress(EXPLAINING)
@@ -176,7 +180,7 @@ def _designed(spec: Spec, near: Trajectory | None, progress: Progress) -> tuple[
     """Solve a spec that has a duration, or find out what would help; or shape a move for it."""
     if spec.solver.shaper is not None:
         return None, shaped_motion(spec, spec.solver.shaper)
-    attempt = choice.attempt(problem_of(spec), spec.solver.solver, near)
+    attempt = transient_sway.attempt(spec, near, progress)
     if attempt.optimum is None:
         progress(EXPLAINING)
     solution = choice.diagnosed(attempt, spec.solver.solver, partial(_is_calm, spec))

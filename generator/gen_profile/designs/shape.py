@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import attrs
 
+from gen_profile.designs.transient_sway import sways
 from gen_profile.errors import InfeasibleProblem
-from gen_profile.evaluation.simulation import greatest_sway
 from gen_profile.motion.profile import Profile, grid_length, grid_times
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.problem.limits import Breach, breaches, rounded_up
+from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches, rounded_up
 from gen_profile.problem.linearization import linearize
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.shaped_move import ShapedMove, shaped_move
@@ -78,4 +78,5 @@ def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
     broken = breaches(attrs.evolve(spec.limits, sway=None), command, 0.0)
     if broken or spec.limits.sway is None:
         return broken
-    return breaches(spec.limits, command, greatest_sway(spec.machine(), motion, spec.plant.parameters))
+    nominal, worst = sways(spec, motion)
+    return breaches(spec.limits, command, max(nominal, worst / SWAY_TOLERANCE))

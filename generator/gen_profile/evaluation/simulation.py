@@ -135,12 +135,18 @@ class PlantSimulation:
 
 
 def greatest_sway(
-    plant: Plant, motion: Profile, parameters: Mapping[str, float], initial: Mapping[str, float] = AT_REST
-) -> float:
-    """Find the greatest sway of the end load during a motion, in m."""
-    swing = PlantSimulation(plant, motion, [parameters], motion.duration, initial)
-    (response,) = swing.at(np.linspace(0.0, motion.duration, TRANSIENT_SAMPLES))
-    return float(peak(length(response.sway[:, plant.end_load]))[0])
+    plant: Plant,
+    motion: Profile,
+    machines: Sequence[Mapping[str, float]],
+    initial: Mapping[str, float] = AT_REST,
+    *,
+    accuracy: float = RELATIVE_TOLERANCE,
+    samples: int = TRANSIENT_SAMPLES,
+) -> Array:
+    """Find the greatest sway of every machine's end load during a motion, in m, shape (machines,)."""
+    swing = PlantSimulation(plant, motion, machines, motion.duration, initial, accuracy=accuracy)
+    responses = swing.at(np.linspace(0.0, motion.duration, samples))
+    return np.array([float(peak(length(found.sway[:, plant.end_load]))[0]) for found in responses])
 
 
 def free_swing(

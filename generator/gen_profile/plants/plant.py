@@ -158,6 +158,8 @@ class Plant:
         Names of the bodies that `mechanics` tells of.
     mechanics : (q_u, q_a, p) → Mechanics
         For the loads' places and energy, and as a proof of the equations. A motion can be planned without.
+    small_sway : (p) → m, optional
+        Greatest sway of the end load up to which the equations hold, where they are linear ones.
     picture : (pose) → drawings, optional
         What an animation shows; a machine without is drawn from its outputs.
     """
@@ -175,6 +177,7 @@ class Plant:
     outputs: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Outputs]
     bodies: tuple[str, ...] = ()
     mechanics: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Mechanics] = _no_bodies
+    small_sway: Callable[[SimpleNamespace], float] | None = None
     picture: Callable[[Pose], tuple[Drawing, ...]] | None = None
 
     @property

@@ -11,6 +11,7 @@ from gen_profile.motion.metrics import extremes, greatest
 from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import LimitsSpec
 
+SWAY_TOLERANCE = 1.01  # times limits.sway that machines off nominal may sway: searches find the worst so well
 ROUNDING = 1e-6  # share of its width by which travel may be left: a move may begin and end at its edges
 
 

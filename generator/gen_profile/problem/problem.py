@@ -59,6 +59,8 @@ class Problem:
         γ in 1/m; None lets the solver take `AUTO_SWAY` over the peak sway of the same move with β = 0.
     limits : LimitsSpec
         Of the command and of the sway on the way.
+    sway_spread : float
+        How many times the nominal machine's sway on the way the worst one's is, for which the limit holds.
     worst_case : WorstCase or None
     initial : mapping of str to float
         What swings at the start: unactuated coordinates by name, and their rates as ``NAME.rate``. It is what
@@ -79,6 +81,7 @@ class Problem:
     sway_scale: float | None
     order: int = 1
     limits: LimitsSpec = attrs.field(factory=LimitsSpec)
+    sway_spread: float = 1.0
     worst_case: WorstCase | None = None
     initial: Mapping[str, float] = attrs.field(factory=dict)
     final_velocity: tuple[float, ...] = attrs.field()
@@ -91,6 +94,11 @@ class Problem:
     def distance(self) -> tuple[float, ...]:
         """Signed distance of every axis."""
         return tuple(b - a for a, b in zip(self.start, self.target, strict=True))
+
+    @property
+    def nominal_sway(self) -> float | None:
+        """What the limit of sway on the way leaves to the nominal machine, in m; None without a limit."""
+        return None if self.limits.sway is None else self.limits.sway / self.sway_spread
 
 
 # With sway_scale = "auto" β and γ mean for every move what they mean for the paper's: the sway counts in

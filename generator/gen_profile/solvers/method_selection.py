@@ -167,6 +167,6 @@ def keeps_limits(solution: Solution) -> bool:
     problem = solution.problem
     if problem.limits == LimitsSpec():
         return True
-    sway = sway_on_the_way(solution) if problem.limits.sway is not None else 0.0
+    sway = 0.0 if problem.limits.sway is None else problem.sway_spread * sway_on_the_way(solution)
     command = lag_compensated(optimal_profile(solution), problem.tau)
     return not breaches(problem.limits, command, sway)

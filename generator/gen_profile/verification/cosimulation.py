@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -117,8 +118,24 @@ def judge(
         sway_limit=spec.limits.sway,
         directions=spec.machine().directions,
         faults=implausibilities(spec, setpoints),
-        doubts=doubts(spec),
+        doubts=(*doubts(spec), *beyond_equations(spec, machines, found)),
     )
+
+
+def beyond_equations(spec: Spec, machines: Sequence[Scenario], found: Sequence[Response]) -> Iterator[str]:
+    """Warn of the machine that sways farthest beyond what its equations hold for."""
+    plant = spec.machine()
+    if plant.small_sway is None:
+        return
+    small = [plant.small_sway(SimpleNamespace(**machine.parameters)) for machine in machines]
+    swayed = [float(np.abs(response.sway[:, plant.end_load]).max()) for response in found]
+    worst = int(np.argmax(np.divide(swayed, small)))
+    if swayed[worst] > small[worst]:
+        yield (
+            f"The {plant.end_load_name} sways by {1e3 * swayed[worst]:.4g} mm on the way "
+            f"({machines[worst].name}), and the linear equations of a {plant.type} hold up to "
+            f"{1e3 * small[worst]:.4g} mm: what is told of more is rough; allow more time (move.duration)."
+        )
 
 
 def _distance(found: Response, expected: Response) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gen_profile.errors import CheckFailed
 from gen_profile.evaluation.scenarios import GROUPS, SEARCH, TIMING, Scenario
+from gen_profile.problem.limits import SWAY_TOLERANCE
 
 QUANTILES = (0.5, 0.9, 0.99)
 FINE = 1e3  # µm, up to which an error is told in these
@@ -106,14 +107,14 @@ class Check:
             raise CheckFailed("\n".join(self.reasons()))
 
     def keeps_limit(self, finding: Finding) -> bool:
-        """Whether every load keeps its limit in one scenario, the error bound included."""
+        """Whether every load keeps its limits in one scenario, the error bound included."""
         return self._share(finding) <= 1.0
 
     def _share_on_the_way(self, finding: Finding) -> float:
-        """Share of the limit of sway at any time, the error bound included; 0 where there is none."""
+        """Share of what may be swayed at any time, the error bound included; 0 where there is no limit."""
         if self.sway_limit is None or finding.on_the_way is None:
             return 0.0
-        return (finding.on_the_way + self.error_bound) / self.sway_limit
+        return (finding.on_the_way + self.error_bound) / (SWAY_TOLERANCE * self.sway_limit)
 
     @property
     def worst(self) -> tuple[str, Finding]:
@@ -144,30 +145,29 @@ class Check:
         return (*self._sentences(self.judged), *self.faults)
 
     def warnings(self) -> tuple[str, ...]:
-        """Say what is wrong without counting: doubtful values, sway on the way, faults of timing."""
+        """Say what is wrong without counting: doubtful values, faults of timing."""
         timing = () if self.strict else self.groups.get(TIMING, ())
         late = (f"{sentence} It counts with --strict." for sentence in self._sentences(timing))
-        return (*self.doubts, *self._sentences_on_the_way(), *late)
+        return (*self.doubts, *late)
 
     def _sentences(self, findings: Sequence[Finding]) -> Iterator[str]:
-        """Say which limit the worst of some scenarios breaks."""
-        if all(map(self.keeps_limit, findings)):
+        """Say which limits the worst of some scenarios break."""
+        if not findings:
             return
         load, finding = self.worst_of(findings)
-        yield (
-            f"The {load} sways by {1e3 * finding.residual[load]:.4g} mm after the move "
-            f"({finding.scenario.name}), and {1e3 * self.limit[load]:.4g} mm are allowed "
-            f"(check.residual_sway; numerical error up to {self._error()})."
-        )
-
-    def _sentences_on_the_way(self) -> Iterator[str]:
-        """Say which machine sways more on the way than the limits allow."""
-        swaying = max(self.judged, key=self._share_on_the_way)
+        if self._share_after(finding, load) > 1.0:
+            yield (
+                f"The {load} sways by {1e3 * finding.residual[load]:.4g} mm after the move "
+                f"({finding.scenario.name}), and {1e3 * self.limit[load]:.4g} mm are allowed "
+                f"(check.residual_sway; numerical error up to {self._error()})."
+            )
+        swaying = max(findings, key=self._share_on_the_way)
         if self.sway_limit is not None and self._share_on_the_way(swaying) > 1.0:
             yield (
                 f"The {self._end_load_name()} sways by {1e3 * (swaying.on_the_way or 0.0):.4g} mm on the way "
                 f"({swaying.scenario.name}), and {1e3 * self.sway_limit:.4g} mm are allowed "
-                f"(limits.sway; numerical error up to {self._error()})."
+                f"(limits.sway; numerical error up to {self._error()}); "
+                "allow more, take more time, or narrow the ranges."
             )
 
     def _error(self) -> str:
@@ -218,7 +218,8 @@ class Check:
         return tuple(kept)
 
     def _share(self, finding: Finding) -> float:
-        return max(self._share_after(finding, load) for load in self.limit)
+        after = max(self._share_after(finding, load) for load in self.limit)
+        return max(after, self._share_on_the_way(finding))
 
     def _end_load(self, finding: Finding) -> float:
         return max(finding.residual[load] for load in list(self.limit)[-self.directions :])

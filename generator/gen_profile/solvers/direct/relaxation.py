@@ -65,9 +65,9 @@ class LeastShare:
         """Add the limits to a program: P and q."""
         problem, transcription = self.setup.problem, self.setup.transcription
         goals.keep_limits(program, problem, transcription, self.loosened)
-        if problem.limits.sway is not None:
+        if problem.nominal_sway is not None:
             loose = "limits.sway" in self.loosened
-            goals.keep_sway(program, transcription, problem.limits.sway, iterate, maps[0], loosened=loose)
+            goals.keep_sway(program, transcription, problem.nominal_sway, iterate, maps[0], loosened=loose)
         linear = np.zeros(program.variables)
         linear[-1] = 1.0
         program.at_most(-linear[None], np.zeros(1))

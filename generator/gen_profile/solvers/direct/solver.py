@@ -120,7 +120,7 @@ def solve(problem: Problem, near: Iterate | None = None) -> Solution:
         setup, start, iterations = found.setup, found.iterate, iterations + found.iterations
         return conclude(found, sway_cost, iterations)
 
-    return within_sway(problem.limits.sway, attempt)
+    return within_sway(problem.nominal_sway, attempt)
 
 
 def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
@@ -259,7 +259,7 @@ class LeastWorst:
         self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
     ) -> tuple[Matrix, Array]:
         """Add the bounds to a program: P and q."""
-        transcription, sway_limit = self.setup.transcription, self.setup.problem.limits.sway
+        transcription, sway_limit = self.setup.transcription, self.setup.problem.nominal_sway
         goals.keep_limits(program, self.setup.problem, transcription)
         if sway_limit is not None:
             goals.keep_sway(program, transcription, sway_limit, iterate, maps[0])

@@ -15,7 +15,8 @@ SWAY_ROUNDS = 4  # to account for what the sway does between collocation points
 def sway_on_the_way(solution: Solution) -> float:
     """Greatest sway of the nominal machine's end load during the motion of a solution, in m."""
     problem = solution.problem
-    return greatest_sway(problem.plant, optimal_profile(solution), problem.parameters, problem.initial)
+    motion = optimal_profile(solution)
+    return float(greatest_sway(problem.plant, motion, [problem.parameters], problem.initial)[0])
 
 
 def within_sway(limit: float | None, attempt: Callable[[float | None], Solution]) -> Solution:

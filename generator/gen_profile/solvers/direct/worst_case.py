@@ -66,9 +66,10 @@ def solve(problem: Problem) -> Solution:
     """
 
     def attempt(sway_limit: float | None) -> Solution:
-        return _bounded(attrs.evolve(problem, limits=attrs.evolve(problem.limits, sway=sway_limit)))
+        limits = attrs.evolve(problem.limits, sway=sway_limit)
+        return _bounded(attrs.evolve(problem, limits=limits, sway_spread=1.0))
 
-    return attrs.evolve(within_sway(problem.limits.sway, attempt), problem=problem)
+    return attrs.evolve(within_sway(problem.nominal_sway, attempt), problem=problem)
 
 
 def _bounded(problem: Problem) -> Solution:
@@ -114,7 +115,7 @@ def solve_within_limits(problem: Problem) -> Solution:
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
         goal = CostProgram(
-            setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=1.0 - MARGIN
+            setup=setup, sway_cost=sway_cost, sway_limit=problem.nominal_sway, worst=1.0 - MARGIN
         )
         found = sequence(setup.transcription.rest(), goal)
         iterations += found.iterations
@@ -149,7 +150,7 @@ def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
         goal = CostProgram(
-            setup=setup, sway_cost=sway_cost, sway_limit=problem.limits.sway, worst=GOOD_ENOUGH
+            setup=setup, sway_cost=sway_cost, sway_limit=problem.nominal_sway, worst=GOOD_ENOUGH
         )
         # the bound only rises with more machines: what was not good enough before is not now
         found = sequence(setup.transcription.rest(), goal) if bound <= GOOD_ENOUGH else None

@@ -1,0 +1,93 @@
+"""The limit of sway on the way, which holds for every machine of a check's ranges.
+
+Solvers know the nominal machine, so it is allowed so much less as the worst machine sways more. How much that
+is hardly depends on the motion: it is measured on one, and tried on the next.
+"""
+
+from __future__ import annotations
+
+import attrs
+
+from gen_profile.evaluation.scenarios import scenarios
+from gen_profile.evaluation.simulation import greatest_sway
+from gen_profile.motion.profile import Profile
+from gen_profile.problem.parameter_box import machines_inside
+from gen_profile.problem.problem import Problem, problem_of
+from gen_profile.progress import Progress, untold
+from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.collocation import Trajectory
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.solution import Solution
+from gen_profile.spec.model import Spec
+from gen_profile.work import OutOfWork, budget
+
+ROUNDS = 3  # of measuring and solving again
+MARGIN = 1.002  # for what lies between the machines and the times looked at
+ACCURACY = 1e-6  # of the machines' integration, relative
+SAMPLES = 1001
+
+
+def solve(spec: Spec) -> Solution:
+    """Solve a spec so that all machines keep its limits; where that fails, find out what would help."""
+    try:
+        with budget(choice.ANSWER):
+            return choice.diagnosed(attempt(spec), spec.solver.solver)
+    except OutOfWork:
+        return choice.given_up(problem_of(spec))
+
+
+def attempt(spec: Spec, near: Trajectory | None = None, progress: Progress = untold) -> Solution:
+    """Solve a spec so that no machine of its ranges sways more on the way than its limit.
+
+    Parameters
+    ----------
+    spec : Spec
+        With a duration.
+    near : Trajectory, optional
+        Of a similar spec's solution, to begin at.
+    progress : Progress
+
+    Returns
+    -------
+    Solution
+        Without an optimum where there is none; its problem says how much less the nominal machine is allowed.
+    """
+    problem, method, limit = problem_of(spec), spec.solver.solver, spec.limits.sway
+    if limit is None or not spec.checked_ranges():
+        return choice.attempt(problem, method, near)
+    if problem.worst_case is not None:  # the least residual of the worst machine takes longest to find
+        quick = attempt(attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, method="none")))
+        problem = attrs.evolve(problem, sway_spread=quick.problem.sway_spread)
+    solution = choice.attempt(problem, method, near)
+    if solution.optimum is None and problem.sway_spread == 1.0:
+        return attrs.evolve(solution, problem=_with_usual_spread(spec, problem))
+    for _ in range(ROUNDS):
+        if solution.optimum is None:
+            break
+        nominal, worst = sways(spec, optimal_profile(solution))
+        if worst <= max(limit, nominal):
+            break
+        spread = MARGIN * worst / nominal
+        progress("solving", remark=f"for the machine that sways {spread:.3g} times as much on the way")
+        solution = choice.attempt(attrs.evolve(problem, sway_spread=spread), method)
+    return solution
+
+
+def _with_usual_spread(spec: Spec, problem: Problem) -> Problem:
+    """Tell a problem without a motion what spread one without the limit has, for what is named to help."""
+    limits = attrs.evolve(problem.limits, sway=None)
+    free = choice.attempt(attrs.evolve(problem, limits=limits, worst_case=None))
+    if free.optimum is None:
+        return problem
+    nominal, worst = sways(spec, optimal_profile(free))
+    return attrs.evolve(problem, sway_spread=MARGIN * worst / nominal) if nominal > 0.0 else problem
+
+
+def sways(spec: Spec, motion: Profile) -> tuple[float, float]:
+    """Find the greatest sway of the end load during a motion in m: nominal, and of the worst machine."""
+    inside = machines_inside(problem_of(spec), spec.checked_ranges())
+    machines = [*(row.parameters for row in scenarios(spec)), *inside]
+    found = greatest_sway(
+        spec.machine(), motion, machines, spec.move.initial, accuracy=ACCURACY, samples=SAMPLES
+    )
+    return float(found[0]), float(found.max())
