@@ -17,6 +17,7 @@ from gen_profile.problem.linearization import linearize
 CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
 
 
+@pytest.mark.slow
 def test_tape_and_stopwatch_hold_the_machine_in_their_ranges():
     """Read with stated noise, 300 times: the box of the ranges misses the machine in one of a hundred."""
     true = CRANE.nominal() | {"L1": 0.52, "L2": 0.36, "m2": 0.25}
@@ -39,23 +40,24 @@ def test_tape_and_stopwatch_hold_the_machine_in_their_ranges():
 
 @pytest.mark.slow
 def test_a_logged_swing_holds_the_machine_in_its_ranges():
-    """Rope and damping from 25 noisy logs of a crane that is a fifth off, zero error included."""
+    """Rope and damping from 12 noisy logs of a crane that is a fifth off, zero error included."""
     true = HOIST.nominal() | {"L0": 2.3, "c": 300.0}
     machine = SwingingMachine(plant=HOIST, parameters=HOIST.nominal() | {"c": 100.0}, q_a=(0.0, 4.0))
     times = np.arange(0.0, 25.0, 0.1)
     exact = swing(true, times, [0.15, -0.1])
     random, errors, hits = np.random.default_rng(11), [], 0
-    for _ in range(25):
+    for _ in range(12):
         values = exact + 0.03 + random.normal(0.0, 3e-3, len(times))
         log = SwingLog(times=times, values=values, quantity="angle", load="payload")
         found = estimate(machine, ["L0", "c"], [], [log])
         hits += inside(found, true)
         errors.append([(found.values[n] - true[n]) / found.standard_uncertainty[n] for n in ("L0", "c")])
         assert found.noise[0] == pytest.approx(3e-3, rel=0.25)
-    assert hits >= 24
-    np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.35)
+    assert hits >= 11
+    np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.45)
 
 
+@pytest.mark.slow
 def test_a_log_and_a_tape_together_find_both_ropes_of_a_double_pendulum():
     true = CRANE.nominal() | {"L1": 0.52, "L2": 0.36, "c1": 2e-3}
     times = np.sort(np.random.default_rng(3).uniform(0.0, 12.0, 500))  # unevenly spaced

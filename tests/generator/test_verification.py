@@ -8,7 +8,7 @@ from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.evaluation.simulation import Response
 from gen_profile.motion.profile import sample
 from gen_profile.spec.reading import preset_spec
-from gen_profile.verification.cosimulation import judge
+from gen_profile.verification.cosimulation import beyond_equations, judge
 
 SPEC = preset_spec("paper", ["robustness={}", "cost.sway_weight=0"])
 
@@ -42,3 +42,13 @@ def test_the_bound_holds_the_distance_to_the_reference(setpoints):
     check = verdict(setpoints, swaying(times, 0.002, 0.1), swaying(times, 0.0021, 0.1))
     assert check.error_bound == pytest.approx(1e-4, rel=0.01)
     assert check.findings[0].residual["payload"] == pytest.approx(0.002, rel=1e-4)
+
+
+def test_waves_beyond_the_linear_theory_are_warned_of():
+    spec = preset_spec("slosh-tank", ["plant.h=0.2"])  # up to a tenth: 20 mm nominal, 16 mm at the lower fill
+    machines = scenarios(spec)
+    low = [swaying(np.arange(0.0, 4.0, 0.05), rise, 0.0) for rise in (0.0155, 0.0155, 0.0155)]
+    assert list(beyond_equations(spec, machines, low)) == []
+    high = [*low[:2], swaying(np.arange(0.0, 4.0, 0.05), 0.018, 0.0)]
+    (warning,) = beyond_equations(spec, machines, high)
+    assert "(h -20 %)" in warning and "hold up to 16 mm" in warning

@@ -29,6 +29,7 @@ SLOW = 5.0  # periods of the slowest mode, which are time enough where no durati
 CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
 EXPLAINING = "looking for what would do"
 SEARCHING = 14.0  # s of work to find the shortest duration
+SPREADS = 2  # times that it is measured how much more than the nominal machine others sway on the way
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
@@ -96,6 +97,14 @@ def timed(spec: Spec, progress: Progress = untold) -> Spec:
 def _shortest(spec: Spec, progress: Progress) -> Spec:
     problem = problem_of(spec)
     shortest = choice.minimum_time(problem, progress)
+    for _ in range(SPREADS):
+        if shortest is None:
+            break
+        more = transient_sway.measured_spread(_lasting(spec, shortest), problem.sway_spread)
+        if more <= problem.sway_spread:
+            break
+        problem = attrs.evolve(problem, sway_spread=more)
+        shortest = choice.minimum_time(problem, progress)
     if shortest is None:
         slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
         slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * 2.0 * np.pi / slowest)))
@@ -104,12 +113,12 @@ def _shortest(spec: Spec, progress: Progress) -> Spec:
             f"move.duration: no duration keeps the limits and brings the load to rest. {cure}"
         )
     quickest = _lasting(spec, shortest)
-    if _calms(quickest):
+    if _calms(quickest, problem.sway_spread):
         return quickest
 
     def calms(duration: float) -> bool:
         progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
-        return _calms(_lasting(spec, duration))
+        return _calms(_lasting(spec, duration), problem.sway_spread)
 
     calm = least_beyond(calms, shortest, LONGEST * shortest)
     if calm is None:
@@ -127,9 +136,9 @@ def _lasting(spec: Spec, duration: float) -> Spec:
     return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=whole, shortest=False))
 
 
-def _calms(spec: Spec) -> bool:
+def _calms(spec: Spec, spread: float) -> bool:
     """Whether the optimal motion of a spec leaves little enough sway on every machine."""
-    solution = transient_sway.attempt(spec)
+    solution = transient_sway.attempt(spec, spread=spread)
     return solution.optimum is not None and _is_calm(spec, solution)
 
 

@@ -22,6 +22,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.work import OutOfWork, budget
 
 ROUNDS = 3  # of measuring and solving again
+ENOUGH = 1.005  # times the limit that the worst machine may sway
 MARGIN = 1.002  # for what lies between the machines and the times looked at
 ACCURACY = 1e-6  # of the machines' integration, relative
 SAMPLES = 1001
@@ -36,7 +37,27 @@ def solve(spec: Spec) -> Solution:
         return choice.given_up(problem_of(spec))
 
 
-def attempt(spec: Spec, near: Trajectory | None = None, progress: Progress = untold) -> Solution:
+def measured_spread(spec: Spec, spread: float) -> float:
+    """Tell how many times as much as the nominal machine the worst one sways, where that breaks the limit.
+
+    Returns
+    -------
+    float
+        The spread that was supposed where all keep the limit with it, and where nothing is known.
+    """
+    limit = spec.limits.sway
+    if limit is None or not spec.checked_ranges():
+        return spread
+    solution = choice.attempt(attrs.evolve(problem_of(spec), sway_spread=spread), spec.solver.solver)
+    if solution.optimum is None:
+        return spread
+    nominal, worst = sways(spec, optimal_profile(solution))
+    return spread if worst <= max(ENOUGH * limit, nominal) else MARGIN * worst / nominal
+
+
+def attempt(
+    spec: Spec, near: Trajectory | None = None, progress: Progress = untold, spread: float = 1.0
+) -> Solution:
     """Solve a spec so that no machine of its ranges sways more on the way than its limit.
 
     Parameters
@@ -46,6 +67,8 @@ def attempt(spec: Spec, near: Trajectory | None = None, progress: Progress = unt
     near : Trajectory, optional
         Of a similar spec's solution, to begin at.
     progress : Progress
+    spread : float
+        How many times as much as the nominal machine the worst one sways, as far as that is known.
 
     Returns
     -------
@@ -57,7 +80,8 @@ def attempt(spec: Spec, near: Trajectory | None = None, progress: Progress = unt
         return choice.attempt(problem, method, near)
     if problem.worst_case is not None:  # the least residual of the worst machine takes longest to find
         quick = attempt(attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, method="none")))
-        problem = attrs.evolve(problem, sway_spread=quick.problem.sway_spread)
+        spread = max(spread, quick.problem.sway_spread)
+    problem = attrs.evolve(problem, sway_spread=spread)
     solution = choice.attempt(problem, method, near)
     if solution.optimum is None and problem.sway_spread == 1.0:
         return attrs.evolve(solution, problem=_with_usual_spread(spec, problem))
@@ -65,7 +89,7 @@ def attempt(spec: Spec, near: Trajectory | None = None, progress: Progress = unt
         if solution.optimum is None:
             break
         nominal, worst = sways(spec, optimal_profile(solution))
-        if worst <= max(limit, nominal):
+        if worst <= max(ENOUGH * limit, nominal):
             break
         spread = MARGIN * worst / nominal
         progress("solving", remark=f"for the machine that sways {spread:.3g} times as much on the way")
