@@ -10,9 +10,10 @@ FIGURES = {
     "velocity": "velocity_max_m_per_s",
     "acceleration": "acceleration_max_m_per_s2",
     "jerk": "jerk_max_m_per_s3",
-    "sway": "sway_transient_peak_m",
+    "sway": "sway_transient_worst_m",
 }
-TIGHT = {"velocity": 0.15, "acceleration": 0.4, "jerk": 8.0, "sway": 0.015}  # all below what is best without
+TIGHT = {"velocity": 0.15, "acceleration": 0.4, "jerk": 8.0, "sway": 0.018}  # all below what is best without
+WITHIN = {"sway": 1.01}  # times a limit: of the worst machine, which a search finds; else rounding
 IMPOSSIBLE = [
     ("velocity", 0.09, ()),
     ("acceleration", 0.1, LAG),
@@ -32,7 +33,7 @@ def test_a_limit_that_can_be_kept_is_kept(tmp_path, free, name, limit):
     outcome = run_here("--set", f"limits.{name}={limit}", "--out", tmp_path, "--json")
     assert outcome.code == 0, outcome.err
     assert free[FIGURES[name]] > limit
-    assert outcome.document["figures"][FIGURES[name]] <= limit * (1.0 + 1e-6)
+    assert outcome.document["figures"][FIGURES[name]] <= limit * WITHIN.get(name, 1.0 + 1e-6)
     assert outcome.document["check"]["passed"]
 
 
@@ -51,7 +52,7 @@ def test_an_impossible_limit_is_named_with_a_cure_that_works(tmp_path, name, lim
     for cure, allowed in ((f"move.duration={least}", limit), (f"limits.{name}={wider}", float(wider))):
         cured = run_here(*words, "--no-check", "--set", cure)
         assert cured.code == 0, cured.err
-        assert cured.document["figures"][figure] <= allowed * (1.0 + 1e-6)
+        assert cured.document["figures"][figure] <= allowed * WITHIN.get(name, 1.0 + 1e-6)
     assert float(least) > 3.0
     assert float(wider) > limit
 
