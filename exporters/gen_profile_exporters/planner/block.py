@@ -58,8 +58,6 @@ class PlannerConstants:
         Their values where the controller gives none.
     drift : tuple of float
         By how much each may change before it is taken over anew.
-    rates : tuple of float
-        How fast each may change on the way, in its unit per s; faster, the promise is lost.
     degrees : int
         Chebyshev polynomials per live parameter.
     exponents : (parameters, terms) array of int
@@ -83,7 +81,6 @@ class PlannerConstants:
     units: tuple[str, ...]
     nominal: tuple[float, ...]
     drift: tuple[float, ...]
-    rates: tuple[float, ...]
     degrees: int
     exponents: NDArray[np.int64]
     frequencies: Array
@@ -140,8 +137,6 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "quick_deceleration": f"{c.quick_deceleration:g}",
         "quick_jerk": f"{c.quick_jerk:g}",
         "live_lines": "\n    ".join(ranges) or "No live parameters.",
-        "live_rates": ", ".join(f"{name} at {rate:g}/s" for name, rate in zip(c.live, c.rates, strict=True))
-        or "at all",
         "live_inputs": "\n".join(inputs),
         "take_live": "\n".join(f"aLiveNow[{k}] := f{name};" for k, name in enumerate(lives)),
         "constants": _constants(c, terms, conditions),
@@ -194,7 +189,6 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveDrift": c.drift or (0.0,),
-        "cLiveRate": c.rates or (0.0,),
         "cFrequency": c.frequencies.ravel(),
         "cDecay": c.decays.ravel(),
     }

@@ -15,8 +15,7 @@ HEADER = """\
     axis follows fVelocityCommand (a stick). bStop stops without sway, as does dropping bVelocity or bEnable.
     bQuickStop brakes at once, with @quick_deceleration m/s2 and @quick_jerk m/s3: the load swings then.
     rOverride (above 0, to 1) and fVelocityLimit (0: none) slow down what is planned from then on.
-    The live parameters may change at any time; on the way bPromise drops where they change faster than
-    @live_rates.
+    The live parameters may change at any time. Where they do on the way, bPromise drops until bEnable does.
 
     nErrorId: 0 none
               1 fCycleTime is not the cycle time of this block
@@ -99,7 +98,8 @@ VAR
 
     (* Modes of the machine. *)
     aPower : ARRAY [0..@last_power] OF LREAL; (* Chebyshev polynomials of the live parameters *)
-    aLive : ARRAY [0..@last_live] OF LREAL;
+    aLive : ARRAY [0..@last_live] OF LREAL; (* as taken over *)
+    aLiveStood : ARRAY [0..@last_live] OF LREAL; (* as taken over when the axis stood last *)
     aLiveNow : ARRAY [0..@last_live] OF LREAL;
     aFrequency : ARRAY [0..@last_mode] OF LREAL; (* rad/s *)
     aDecay : ARRAY [0..@last_mode] OF LREAL; (* 1/s *)
@@ -183,7 +183,6 @@ VAR
     bMeasured : BOOL;
     fReached : LREAL; (* greatest of aReach *)
     bStale : BOOL; (* the live parameters have changed since they were taken over *)
-    fSince : LREAL; (* s, since then *)
     aPlan : ARRAY [0..@last_future] OF LREAL; (* m/s *)
     aE : ARRAY [0..@last_conditions] OF LREAL; (* conditions: modes and their derivatives; row 0: the sum *)
     aY : ARRAY [0..@last_conditions] OF LREAL;

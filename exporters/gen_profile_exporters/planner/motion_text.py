@@ -323,11 +323,10 @@ END_IF;
 
 (* Where nothing is to be planned: the machine of the live parameters of now, and what its plans reach. *)
 bStale := FALSE;
-fSince := fSince + cCycle;
 FOR nIndex := 0 TO cLives - 1 DO
     fDelta := ABS(aLiveNow[nIndex] - aLive[nIndex]);
     IF fDelta > 0.5 * cLiveDrift[nIndex] THEN bStale := TRUE; END_IF;
-    IF (nState = 2) AND NOT (fDelta <= cLiveDrift[nIndex] + cLiveRate[nIndex] * fSince) THEN
+    IF (nState = 2) AND NOT (ABS(aLiveNow[nIndex] - aLiveStood[nIndex]) <= cLiveDrift[nIndex]) THEN
         bDrifted := TRUE;
     END_IF;
 END_FOR;

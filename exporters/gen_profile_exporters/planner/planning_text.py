@@ -48,6 +48,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
             1: (* frequencies of the live parameters *)
                 FOR nIndex := 0 TO cLives - 1 DO
                     aLive[nIndex] := aLiveNow[nIndex];
+                    IF nState <> 2 THEN aLiveStood[nIndex] := aLive[nIndex]; END_IF;
                     fValue := (2.0 * aLive[nIndex] - cLiveLow[nIndex] - cLiveHigh[nIndex])
                         / (cLiveHigh[nIndex] - cLiveLow[nIndex]);
                     nFirst := nIndex * cDegrees;
@@ -86,7 +87,6 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                     nSlot := LREAL_TO_DINT(6.283185307179586 / (cSlotsPerPeriod * aFrequency[0] * cCycle));
                     IF nSlot < 1 THEN nSlot := 1; END_IF;
                 END_IF;
-                fSince := 0.0;
                 fSlot := DINT_TO_LREAL(nSlot) * cCycle;
                 bDamped := FALSE;
                 FOR nMode := 0 TO cModes - 1 DO

@@ -70,7 +70,6 @@ def planner_block(spec: Spec) -> PlannerBlock:
         units=tuple(_unit(spec, name) for name in found.live),
         nominal=tuple(_nominal(spec, name) for name in found.live),
         drift=tuple(STEADY * high for _, high in found.live.values()),
-        rates=tuple(spec.planner.live_rate.get(name, 0.0) for name in found.live),
         degrees=int(interpolant.exponents.max(initial=0)) + 1,
         exponents=interpolant.exponents,
         frequencies=coefficients[: found.modes],

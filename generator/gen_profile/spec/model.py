@@ -340,8 +340,6 @@ class PlannerSpec:
     ----------
     live : mapping of str to (float, float)
         Ranges of the machine's parameters, or places of its hoist, that the controller knows.
-    live_rate : mapping of str to float
-        How fast they may change while the axis moves, in their units per s; 0 where it is not said.
     quick_stop : float or None
         Deceleration of a stop that lets the load swing, in m/s²; None takes twice the limit.
     quick_stop_jerk : float or None
@@ -349,7 +347,6 @@ class PlannerSpec:
     """
 
     live: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=frozen_mapping)
-    live_rate: Mapping[str, float] = attrs.field(factory=dict, converter=frozen_mapping)
     quick_stop: Positive | None = None
     quick_stop_jerk: Positive | None = None
 

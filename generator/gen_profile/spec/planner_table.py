@@ -14,9 +14,9 @@ def planner_table(table: Table, plant: Plant | None, faults: Faults) -> Table:
     live = table.get("live", {})
     if not isinstance(live, Mapping):
         faults.add("planner.live", f"must be a table such as {{ L1 = [3.0, 9.0] }}, found {found(live)}")
-        return {**table, "live": {}, "live_rate": {}}
+        return {**table, "live": {}}
     if plant is None:
-        return {**table, "live": {}, "live_rate": {}}
+        return {**table, "live": {}}
     known: dict[str, Parameter | Coordinate] = {
         **{p.name: p for p in plant.parameters},
         **{axis.name: axis for axis in plant.actuated[1:]},
@@ -36,20 +36,4 @@ def planner_table(table: Table, plant: Plant | None, faults: Faults) -> Table:
             faults.add(where, f"begins below the least that the machine takes, {least:g}")
         else:
             ranges[name] = (low, high)
-    return {**table, "live": ranges, "live_rate": _rates(table.get("live_rate", {}), live, faults)}
-
-
-def _rates(given: object, live: Mapping[str, object], faults: Faults) -> Table:
-    if not isinstance(given, Mapping):
-        faults.add("planner.live_rate", f"must be a table such as {{ L1 = 0.3 }}, found {found(given)}")
-        return {}
-    rates: Table = {}
-    for name, value in given.items():
-        where, rate = place("planner.live_rate", name), finite(value)
-        if name not in live:
-            faults.add(where, f"no live parameter{suggestion(name, live)}")
-        elif rate is None or rate < 0.0:
-            faults.add(where, f"must be a number, 0 or more, found {found(value)}")
-        else:
-            rates[name] = rate
-    return rates
+    return {**table, "live": ranges}
