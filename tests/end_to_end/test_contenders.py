@@ -11,7 +11,7 @@ from gen_profile.comparison.compare import compare
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.evaluation.motion_evaluation import evaluate
 from gen_profile.problem.actuator import lag_compensated
-from gen_profile.problem.limits import breaches
+from gen_profile.problem.limits import SWAY_TOLERANCE, breaches
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.spec.model import CheckSpec, LimitsSpec, RobustnessSpec
@@ -64,7 +64,7 @@ def test_the_sway_on_the_way_is_a_limit_too():
     (needed,) = re.findall(r"at least ([\d.]+) s", str(refusal.value))
     spec = limited(limits, duration=float(needed))
     found = evaluate(spec, designs(spec)["zv"]()).figures
-    assert 0.0299 < found["sway_transient_peak_m"] <= 0.03
+    assert 0.0299 < found["sway_transient_worst_m"] <= 0.03 * SWAY_TOLERANCE
 
 
 def test_travel_that_no_duration_keeps():
@@ -96,11 +96,11 @@ def test_variants_are_what_the_spec_does_not_ask_for_itself():
 def test_the_spec_s_own_motion_is_designed_once(monkeypatch):
     calls = []
 
-    def solve(problem, method):
-        calls.append(method)
+    def solve(spec):
+        calls.append(spec)
         raise InfeasibleProblem("limits.velocity: too little.")
 
-    monkeypatch.setattr("gen_profile.comparison.candidates.choice.solve", solve)
+    monkeypatch.setattr("gen_profile.comparison.candidates.transient_sway.solve", solve)
     loads = CheckSpec(residual_sway={"hook": 0.01, "payload": 0.003})
     found = compare(attrs.evolve(PAPER, robustness=RobustnessSpec(), check=loads))
     assert len(calls) == 1  # what is impossible for β = 0 is so for any β
