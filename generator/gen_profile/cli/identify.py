@@ -120,11 +120,11 @@ def identify(
             raise SpecError("--plot: draws a log and what is left of it: name one (--swing).")
     measurements: list[Measurement] = [*map(parse_reading, readings), *map(parse_period, periods)]
     with progress() as tell:
-        tell("identifying")
         if log is not None:
             time, comma, value = columns.partition(",")
             if not comma:
                 raise SpecError(f"--columns {columns!r}: write TIME,VALUE, such as 1,2 or time,angle.")
+            tell("reading the log")
             read = read_swing(
                 log,
                 spec,
@@ -135,8 +135,9 @@ def identify(
                 after=after,
             )
             measurements.append(read)
-        found = run(spec, measurements, free, None if at is None else _positions(at))
+        found = run(spec, measurements, free, None if at is None else _positions(at), tell)
         if picture is not None:
+            tell("drawing")
             draw(found, picture)
         write_spec(found.spec, out, changed_text(text, overrides, spec, found.spec, folder))
     print_outcome({**found.to_dict(), "path": str(out)}, words.identification(found, out), as_json)

@@ -138,12 +138,14 @@ def library(folder: Path, path: Path, as_json: bool) -> None:
     An input of the block selects the profile.
     """
     from gen_profile.cli import words as tables
+    from gen_profile.cli.progress import progress
     from gen_profile.sweep.plan import require_libraries
 
     require_libraries()
     from gen_profile.sweep.library import write_library
 
-    written = write_library(folder, path)
+    with progress() as tell:
+        written = write_library(folder, path, tell)
     print_outcome(written.to_dict(), tables.library(written), as_json)
 
 

@@ -19,6 +19,7 @@ from gen_profile.identification.misfit import Misfit, explanation, misfits
 from gen_profile.identification.swing_model import swing_model
 from gen_profile.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.motion.profile import Array
+from gen_profile.progress import Progress, untold
 
 CONFIDENCE = 0.99
 UNREST = 2.0  # times farther off at first, from which on the axes may still have moved then
@@ -73,6 +74,7 @@ def estimate(
     names: Sequence[str],
     readings: Sequence[DirectReading | Period],
     logs: Sequence[SwingLog] = (),
+    progress: Progress = untold,
 ) -> Estimate:
     """Identify parameters.
 
@@ -84,6 +86,8 @@ def estimate(
         Parameters to identify.
     readings : sequence of DirectReading or Period
     logs : sequence of SwingLog
+    progress : callable
+        Told what is being done.
 
     Raises
     ------
@@ -92,9 +96,12 @@ def estimate(
     """
     models = [swing_model(machine.plant, machine.parameters, machine.q_a, log) for log in logs]
     fit = fit_of(machine, names, readings, models)
+    progress("fitting")
     unknowns, noise = fit.solve()
+    progress("looking at what the fit leaves")
     around, found = uncertainty(fit, unknowns, noise), misfits(fit, unknowns)
     if any(found):
+        progress("looking for parameters that explain it")
         _require_unexplained(fit, found)
     effective = [
         sigma if one is None else one.widened(sigma, len(model.log.times))
@@ -103,6 +110,7 @@ def estimate(
     if any(found):
         around = uncertainty(fit, unknowns, np.array(effective))
     factor = float(norm.ppf((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
+    progress("finding the ranges")
     half_ranges = around.half_ranges(factor)
 
     def by_name(relative: Array) -> dict[str, float]:

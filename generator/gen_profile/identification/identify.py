@@ -26,6 +26,7 @@ from gen_profile.identification.measurements import (
 )
 from gen_profile.identification.uncertainty import WIDEST
 from gen_profile.plants.plant import Plant
+from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
 from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
@@ -185,6 +186,7 @@ def identify(
     measurements: Sequence[Measurement],
     free: Sequence[str] = (),
     q_a: Sequence[float] | None = None,
+    progress: Progress = untold,
 ) -> Identification:
     """Identify parameters of a spec's machine, and put them and their ranges into the spec.
 
@@ -197,6 +199,8 @@ def identify(
         Parameters to identify, beside those that were read directly.
     q_a : (m,) sequence of float, optional
         Where the axes stood while periods and swings were measured; the target of the move by default.
+    progress : callable
+        Told what is being done.
 
     Raises
     ------
@@ -221,6 +225,7 @@ def identify(
         [q.name for q in plant.parameters if q.name in asked],
         readings,
         logs,
+        progress,
     )
     return Identification(
         given=spec,

@@ -12,6 +12,7 @@ from gen_profile.artefacts.manifest import FILENAME, parse_manifest, sha256
 from gen_profile.artefacts.writing import staged
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.evaluation.phrases import named
+from gen_profile.progress import Progress, untold
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.store import grid_of, read_swept
@@ -63,7 +64,7 @@ class Library:
         }
 
 
-def write_library(folder: Path | str, path: Path | str) -> Library:
+def write_library(folder: Path | str, path: Path | str, progress: Progress = untold) -> Library:
     """Put the PLC blocks of all cases that passed into one, and make sure that it issues the same.
 
     Parameters
@@ -73,6 +74,8 @@ def write_library(folder: Path | str, path: Path | str) -> Library:
     path : Path or str
         File to write, such as ``crane.st``; the function block is named after it, and its suffix tells the
         format, which need not be the sweep's.
+    progress : callable
+        Told what is being done.
 
     Raises
     ------
@@ -90,7 +93,9 @@ def write_library(folder: Path | str, path: Path | str) -> Library:
     keys = [axis.key for axis in grid.axes]
     profiles: list[dict[str, Any]] = []
     entries, target = [], None
-    for row in _passed(read_table(folder, grid)):
+    passed = _passed(read_table(folder, grid))
+    for done, row in enumerate(passed):
+        progress("reading profiles", done, len(passed))
         artefact = _block_of(row)
         content = read_swept(folder / row["folder"] / artefact["path"], artefact["sha256"])
         target = target or _target(folder / row["folder"], stem.removeprefix("FB_"))
@@ -111,6 +116,7 @@ def write_library(folder: Path | str, path: Path | str) -> Library:
         raise SpecError(
             f"No case of the sweep in {folder} passed, so there is nothing to put into a library."
         )
+    progress("writing the library and reading it back")
     library = library_source(entries, target)
     first, *others = container.wrap(library, target)
     index = path.with_name(f"{stem}.json")
