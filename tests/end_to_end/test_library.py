@@ -46,6 +46,8 @@ def library(swept, tmp_path_factory):
     path = tmp_path_factory.mktemp("library") / "bay 3.st"
     outcome = run_here("library", swept, "--out", path, "--json")
     assert outcome.code == 0, outcome.err
+    stages = [line for line in outcome.err.splitlines() if not line.startswith("reading profiles, ")]
+    assert stages == ["writing the library and reading it back …"]
     return path, outcome.document
 
 

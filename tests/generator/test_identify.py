@@ -223,6 +223,8 @@ def test_a_log_is_read_and_told_of(tmp_path):
         "--at", "12,2", "--out", tmp_path / "new.toml",
     )  # fmt: skip
     assert (found.code, found.errors) == (0, [])
+    stages = ["reading the log", "fitting", "looking at what the fit leaves", "finding the ranges"]
+    assert [line.removesuffix(" …") for line in found.err.splitlines()] == stages
     assert "log of payload" in found.out
     assert "200 samples of its angle" in found.out
     assert read_spec(tmp_path / "new.toml").plant.parameters["L0"] == pytest.approx(3.0, abs=0.02)
