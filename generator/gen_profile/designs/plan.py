@@ -108,7 +108,7 @@ def _shortest(spec: Spec, progress: Progress) -> Spec:
     if shortest is None:
         slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
         slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * 2.0 * np.pi / slowest)))
-        cure = choice.requirements(slow) or "Widen the limits."
+        cure = choice.requirements(transient_sway.with_usual_spread(spec, slow)) or "Widen the limits."
         raise InfeasibleProblem(
             f"move.duration: no duration keeps the limits and brings the load to rest. {cure}"
         )

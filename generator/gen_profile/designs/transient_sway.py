@@ -84,7 +84,7 @@ def attempt(
     problem = attrs.evolve(problem, sway_spread=spread)
     solution = choice.attempt(problem, method, near)
     if solution.optimum is None and problem.sway_spread == 1.0:
-        return attrs.evolve(solution, problem=_with_usual_spread(spec, problem))
+        return attrs.evolve(solution, problem=with_usual_spread(spec, problem))
     for _ in range(ROUNDS):
         if solution.optimum is None:
             break
@@ -97,8 +97,10 @@ def attempt(
     return solution
 
 
-def _with_usual_spread(spec: Spec, problem: Problem) -> Problem:
+def with_usual_spread(spec: Spec, problem: Problem) -> Problem:
     """Tell a problem without a motion what spread one without the limit has, for what is named to help."""
+    if spec.limits.sway is None or not spec.checked_ranges():
+        return problem
     limits = attrs.evolve(problem.limits, sway=None)
     free = choice.attempt(attrs.evolve(problem, limits=limits, worst_case=None))
     if free.optimum is None:
