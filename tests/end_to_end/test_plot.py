@@ -16,6 +16,7 @@ from matplotlib import image, pyplot
 
 import gen_profile as gp
 from gen_profile.charts.comparison import draw
+from gen_profile.charts.figure import LIMIT
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.errors import OutputError
@@ -174,6 +175,21 @@ def test_every_bar_is_told_beside_it_and_not_on_it(drawn):
 
 
 @pytest.mark.slow
+def test_limits_are_drawn_where_curves_come_near(tmp_path):
+    limits = {"velocity": 0.5, "acceleration": 90.0, "sway": 0.2}
+    figures = []
+    comparison = compare(preset_spec("paper", FEW[1::2], limits=limits))
+    with patch("gen_profile.charts.comparison.picture", partial(kept, figures)):
+        draw(comparison, tmp_path / "picture.png")
+    drawn = [
+        sorted({line.get_ydata()[0] for line in axis.get_lines() if line.get_color() == LIMIT})
+        for axis in figures[0].axes
+    ]
+    pyplot.close(figures[0])
+    assert drawn[2] == [0.5] and figures[0].axes[2].get_ylim()[1] > 0.5  # no motion goes back
+    assert drawn[4] == drawn[5] == []  # far off: of the acceleration, and of the sway
+
+
 def test_numerical_error_is_no_figure_of_a_bar(plain, tmp_path):
     draw(plain, tmp_path / "picture.svg")
     assert not re.search(r"<!-- +[\d.]+e-", (tmp_path / "picture.svg").read_text("utf-8"))

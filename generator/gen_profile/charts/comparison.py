@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gen_profile.charts.curves import end_load_sway
-from gen_profile.charts.figure import HEADROOM, Style
+from gen_profile.charts.curves import end_load_sway, near_limits
+from gen_profile.charts.figure import HEADROOM, LIMIT, Style
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.charts.picture import in_ink, picture
 from gen_profile.comparison.compare import ComparedMethod, Comparison
@@ -23,6 +24,7 @@ SAMPLES = 1500
 AFTERMATH = 0.5  # of the move's duration, shown after its end
 FREQUENCIES = 600
 ORDERS = ("position ({})", "velocity ({}/s)", "acceleration ({}/s²)", "jerk ({}/s³)")
+NEAR, ROOM = 2.0, 1.05  # times what curves take up, up to which a limit is drawn; what is shown beyond it
 OUTLYING = 10.0  # times the middle peak, beyond which a curve may leave its axes, lest it flatten the others
 
 Styles = Mapping[str, Style]
@@ -76,6 +78,7 @@ def _reference(axes: Sequence[Any], comparison: Comparison, styles: Styles) -> N
             axis.plot(times, values, label=row.method, **in_ink(styles[row.method]))
         axis.set(ylabel=f"{first.name} " + label.format(first.unit), xlabel="time (s)")
         _dress(axis)
+        _mark(axis, [level.value for level in near_limits(comparison.spec, 0, order, inf)])
 
 
 def _spectrum(axis: Any, comparison: Comparison, styles: Styles) -> None:
@@ -119,6 +122,8 @@ def _sway(axes: Sequence[Any], comparison: Comparison, styles: Styles) -> None:
         axis.set(ylabel=f"{spec.machine().end_load_name} sway (mm)", xlabel="time (s)")
         axis.set_title(who, fontsize="medium")
         _dress(axis)
+        if spec.limits.sway is not None:
+            _mark(axis, [1e3 * spec.limits.sway, -1e3 * spec.limits.sway])
 
 
 def _residuals(axis: Any, comparison: Comparison, styles: Styles) -> None:
@@ -147,3 +152,13 @@ def _dress(axis: Any) -> None:
         end = OUTLYING * float(np.median(peaks))
         low, high = axis.get_ylim()
         axis.set_ylim(max(low, -end), min(high, end))
+
+
+def _mark(axis: Any, limits: Iterable[float]) -> None:
+    """Draw limits that curves come near on their side, and make room for them."""
+    low, high = axis.get_ylim()
+    for limit in limits:
+        if NEAR * low <= limit <= NEAR * high:
+            axis.axhline(limit, color=LIMIT, linewidth=1.0, linestyle="--", zorder=1)
+            low, high = min(low, ROOM * limit), max(high, ROOM * limit)
+    axis.set_ylim(low, high)

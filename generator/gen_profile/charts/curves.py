@@ -72,7 +72,7 @@ def motion_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
             if lagging:
                 lines.append(_derivative("motion of the axis", evaluation.motion, order, column, FOLLOWED))
             greatest = max(float(np.abs(line.y).max()) for line in lines)
-            levels = tuple(_limits(spec, column, order, NEAR * greatest))
+            levels = tuple(near_limits(spec, column, order, NEAR * greatest))
             if order == 0:
                 lines = [attrs.evolve(line, y=factor * line.y) for line in lines]
                 levels = tuple(attrs.evolve(level, value=factor * level.value) for level in levels)
@@ -233,7 +233,7 @@ def _derivative(  # noqa: PLR0917  # name, then what, then how
     return Line(name=name, x=times, y=values[:, column], style=style)
 
 
-def _limits(spec: Spec, column: int, order: int, near: float) -> Iterator[Level]:
+def near_limits(spec: Spec, column: int, order: int, near: float) -> Iterator[Level]:
     """List the limits of one quantity of one axis that are not too far away to be drawn."""
     allowed = getattr(spec.limits.of(column), LIMITED[order])
     if allowed is None:

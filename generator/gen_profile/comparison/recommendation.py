@@ -71,7 +71,8 @@ def recommend(
         speed = Recommendation(
             method=fastest[0],
             reason=f"{together}asks for the least acceleration {fastest[1]}: "
-            "it leaves the drive the most room to make the move in less time.",
+            "it leaves the drive the most room to make the move in less time "
+            '(with move.duration = "minimum" each method takes its own shortest time).',
         )
     gentlest = _least(safe, "sway_transient_peak_m", 1e3, "mm", optimal)
     calm = Recommendation(
