@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from command_line import COMMANDS
+from command_line import COMMANDS, cli
 
 from gen_profile.cli.group import DefaultGroup
 from gen_profile.plants.registry import find_plant, plant_types
@@ -31,7 +31,8 @@ def commands_on(page):
 def test_options_are_those_of_the_command(page):
     wrong = []
     for words in commands_on(page):
-        names = (words[0], " ".join(words[:2]), DefaultGroup.default)
+        own = getattr(cli.commands.get(words[0]), "default", "")
+        names = (words[0], " ".join(words[:2]), f"{words[0]} {own}", DefaultGroup.default)
         command = next(COMMANDS[name] for name in names if name in COMMANDS)
         known = {option for parameter in command.params for option in parameter.opts} | OF_THE_GROUP
         asked = {word.partition("=")[0] for word in words if re.match(r"--[a-z-]+(=|$)", word)}
