@@ -27,5 +27,6 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("GEN_PROFILE_CACHE", str(folder))
+        environment.setenv("ZIG_GLOBAL_CACHE_DIR", str(folder / "zig"))  # which takes HOME else
         environment.delenv("GEN_PROFILE_CC", raising=False)
         yield folder
