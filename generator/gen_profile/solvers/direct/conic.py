@@ -83,13 +83,22 @@ class ConicProgram:
         """Require ``matrix x ≤ side``, or ``side + give (s − 1)`` with the last variable s."""
         self._add(*self._giving(matrix, side, np.full(len(side), give)), clarabel.NonnegativeConeT(len(side)))
 
-    def within_cone(self, matrix: Matrix, side: Array, give: float = 0.0) -> None:
+    def within_cones(self, matrix: Matrix, sides: Array, give: float = 0.0) -> None:
         """Require that ``side − matrix x`` has a first entry no smaller than the length of the rest.
 
         The first entry is greater by ``give (s − 1)`` with the last variable s.
+
+        Parameters
+        ----------
+        matrix : (cones * size, variables) sparse matrix
+            Of all cones, below one another.
+        sides : (cones, size) array
+        give : float
         """
-        gives = np.pad([give], (0, len(side) - 1))
-        self._add(*self._giving(matrix, side, gives), clarabel.SecondOrderConeT(len(side)))
+        gives = np.zeros_like(sides)
+        gives[:, 0] = give
+        cones = (clarabel.SecondOrderConeT(sides.shape[1]) for _ in sides)
+        self._add(*self._giving(matrix, sides.ravel(), gives.ravel()), *cones)
 
     def solve(self, quadratic: Matrix, linear: Array) -> ConicSolution:
         """Solve for a cost, P given whole and symmetric; it should be of the order of 1 or more.
@@ -141,10 +150,10 @@ class ConicProgram:
         )
         return matrix - column, side - gives
 
-    def _add(self, matrix: Matrix, side: Array, cone: Any) -> None:
+    def _add(self, matrix: Matrix, side: Array, *cones: Any) -> None:
         self._rows.append(sparse.csc_matrix(matrix, shape=(len(side), self.variables)))
         self._sides.append(np.asarray(side, dtype=np.float64))
-        self._cones.append(cone)
+        self._cones.extend(cones)
 
 
 def place(blocks: Array, columns: NDArray[Any], width: int) -> Matrix:

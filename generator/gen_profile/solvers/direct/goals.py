@@ -194,14 +194,12 @@ def keep_sway(
         program.at_most(matrix / limit, 1.0 - offset / limit, give)
         program.at_most(-matrix / limit, 1.0 + offset / limit, give)
         return
-    rows = matrix.tocsr()
-    for point in range(points):
-        here = slice(point * directions, (point + 1) * directions)
-        program.within_cone(
-            sparse.vstack([sparse.csr_matrix((1, program.variables)), -rows[here] / limit]),
-            np.concatenate([[1.0], offset[here] / limit]),
-            give,
-        )
+    entries = sparse.coo_matrix(matrix)
+    below = entries.row + entries.row // directions + 1  # the first row of each cone is empty
+    shape = (points * (directions + 1), program.variables)
+    rows = sparse.csc_matrix((-entries.data / limit, (below, entries.col)), shape=shape)
+    sides = np.column_stack([np.ones(points), offset.reshape(points, directions) / limit])
+    program.within_cones(rows, sides, give)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -253,7 +251,7 @@ def bound_worst(program: ConicProgram, transcription: Transcription, tried: Sequ
         for mode, rows in zip(modes, machine.rows, strict=True):
             quadratures = place(-rows[None], end, program.variables)
             radius = place(-np.ones((1, 1, 1)), np.array([mode]), program.variables)
-            program.within_cone(sparse.vstack([radius, quadratures]), np.zeros(3))
+            program.within_cones(sparse.vstack([radius, quadratures]), np.zeros((1, 3)))
         sums = place(machine.shares[None], modes[:1], program.variables)
         most = place(np.ones((1, len(machine.shares), 1)), np.array([worst]), program.variables)
         program.at_most(sums - most, np.zeros(len(machine.shares)))
