@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from exporters.counted_block import CountedBlock, compile_counting
-from scipy.optimize import linprog
+from exporters.farthest_motion import farthest
 
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import parse_spec
@@ -21,29 +21,6 @@ def frequencies(hook, lower, rope, load):
     mass = np.array([[(hook + load) * rope**2, load * rope * lower], [load * rope * lower, load * lower**2]])
     stiffness = np.diag([(hook + load) * G * rope, load * G * lower])
     return np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)
-
-
-def farthest(duration, rates, limits, pieces=120):
-    """Linear program: piecewise constant jerk, each mode and its derivative by frequency at rest."""
-    step = duration / pieces
-    middle = step * (np.arange(pieces) + 0.5) - duration / 2
-    below = np.tri(pieces)
-    accelerations = step * below
-    velocities = step * (below @ accelerations) - 0.5 * step**2 * below
-    ends = [np.ones(pieces), duration / 2 - middle]
-    for rate in rates:
-        for factor in (1.0, middle / duration):
-            ends += [factor * np.cos(rate * middle), factor * np.sin(rate * middle)]
-    velocity, acceleration, jerk = limits
-    found = linprog(
-        -(((duration / 2 - middle) ** 2) / 2 * step + step**3 / 24),
-        A_ub=np.vstack([velocities, -velocities, accelerations, -accelerations]),
-        b_ub=np.repeat([velocity, acceleration], 2 * pieces),
-        A_eq=np.array(ends),
-        b_eq=np.zeros(len(ends)),
-        bounds=(-jerk, jerk),
-    )
-    return -found.fun if found.status == 0 else 0.0
 
 
 def shortest(distance, rates, limits, longest):

@@ -18,7 +18,7 @@ from gen_profile.errors import SpecError
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.forms import block_files, read_block
+from gen_profile.planner.forms import block_files, read_block, require_forms
 from gen_profile.spec.reading import parse_spec
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
@@ -86,6 +86,7 @@ def test_exported_c_issues_the_same_bits_without_a_warning(block, program, tmp_p
     for path, file in zip(files, block_files(block, SPEC, ["c"]), strict=True):
         path.write_bytes(file.content)
     assert [path.name for path in files] == ["bay 3.c", "bay 3.h"]
+    assert not [line for line in files[1].read_text("ascii").splitlines() if line != line.rstrip()]
     strict = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror"]
     clang = [sys.executable, "-m", "ziglang", "cc"]
     subprocess.run([*clang, *strict, "-c", files[0], "-o", tmp_path / "bay.o"], check=True)
@@ -183,6 +184,8 @@ class TestInPython:
 def test_a_format_without_blocks_is_refused(block):
     with pytest.raises(SpecError, match=r"csv carries no playback block; .* are .*siemens-scl"):
         block_files(block, SPEC, ["csv"])
+    with pytest.raises(SpecError, match=r"a planner block has no form 'csv' \(known: codesys, .*, c\)"):
+        require_forms(["c", "csv"])
 
 
 def test_the_command_line_plays_any_of_them(tmp_path, monkeypatch):

@@ -139,7 +139,7 @@ def c_files(text: str, file: str) -> tuple[File, File]:
     header = HEADER.format(
         **names,
         kilobytes=sum(map(_bytes, by_section["VAR"])) / 1000.0,
-        words=indent(_words(source), " * ", lambda line: True),
+        words="\n".join(f" * {line}".rstrip() for line in _words(source).splitlines()),
         inputs=_members(by_section["VAR_INPUT"], source),
         outputs=_members(by_section["VAR_OUTPUT"], source),
         memory="\n".join(f"    {c_member(v)};" for v in by_section["VAR"]),

@@ -9,10 +9,11 @@ from gen_profile.errors import ExportError, OutputError, SpecError
 from gen_profile.planner.design import PlannerBlock
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import ExportSpec, Spec
+from gen_profile.suggestion import suggestion
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.exporter import File, Target, target_of
 from gen_profile_exporters.planner.c_source import c_files
-from gen_profile_exporters.registry import container_of, find_container, format_named
+from gen_profile_exporters.registry import container_of, containers, find_container, format_named
 
 PORTABLE = "plc"
 C = "c"
@@ -25,9 +26,10 @@ def require_forms(formats: Iterable[str]) -> None:
     ------
     SpecError
     """
+    known = (*containers(), C)
     for name in formats:
-        if name != C:
-            find_container(name)
+        if format_named(name) not in known:
+            raise SpecError(f"--export: a planner block has no form {name!r}{suggestion(name, known)}")
 
 
 def is_c(filename: str) -> bool:
