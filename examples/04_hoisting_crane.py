@@ -9,11 +9,10 @@ swing on. The optimal motion follows the equations, and uses the hoist as a seco
 import numpy as np
 
 import gen_profile as gp
-from gen_profile.problem.linearization import linearize
 
 spec = gp.preset_spec("single-pendulum-crane")
 for word, q_a in (("start", spec.move.start), ("target", spec.move.target)):
-    (frequency,) = linearize(spec.machine(), spec.plant.parameters, q_a).frequencies
+    (frequency,) = gp.linearize(spec.machine(), spec.plant.parameters, q_a).frequencies
     rope = spec.plant.parameters["L0"] + q_a[1]
     print(f"{word:6}  rope {rope:4.1f} m, period {2.0 * np.pi / frequency:.2f} s")
 

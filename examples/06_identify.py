@@ -5,27 +5,33 @@ Here the measurements come from a simulated crane with noise; on site they come 
     python examples/06_identify.py
 """
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 import numpy as np
 
 import gen_profile as gp
-from gen_profile.evaluation.simulation import free_swing
-from gen_profile.identification.measurements import SwingLog, parse_period, parse_reading
 
 spec = gp.preset_spec("single-pendulum-crane")  # where the search starts: L0 = 3 m, c = 200 N m s/rad
 stood = (0.0, 4.0)  # the hoist had paid out 4 m while periods and swings were measured
 true = {**spec.plant.parameters, "L0": 3.25, "c": 350.0}
 
-times = np.arange(0.0, 40.0, 0.05)
-_, angle = free_swing(
-    spec.machine(), np.array([list(true.values())]), q_a=stood, starts=np.array([[0.12, 0.0]]), times=times
-)
-noisy = angle[0, :, 0] + np.random.default_rng(1).normal(0.0, 2e-3, len(times))
-log = SwingLog(times=times, values=noisy, quantity="angle", load="payload")
+swinging = gp.evolve_spec(spec, move={"start": stood, "initial": {"phi": 0.12}})
+still = gp.SampledProfile(cycle_time=0.05, position=np.tile(stood, (800, 1)))
+swing = gp.cosimulate(swinging, still, true)
+noisy = swing.angle[:, 0] + np.random.default_rng(1).normal(0.0, 2e-3, len(swing.times))
+
+with TemporaryDirectory() as folder:
+    log = Path(folder) / "swing.csv"
+    np.savetxt(
+        log, np.stack([swing.times, noisy], axis=1), delimiter=",", header="time_s,angle_rad", comments=""
+    )
+    logged = gp.read_swing(log, spec, columns=("time_s", "angle_rad"))
 
 CAMPAIGNS = {
-    "tape": ([parse_reading("L0=3.2±0.05")], []),
-    "tape and stopwatch": ([parse_reading("L0=3.2±0.05"), parse_period("54.0±0.3/10")], []),
-    "logged swing": ([log], ["L0", "c"]),
+    "tape": ([gp.parse_reading("L0=3.2±0.05")], []),
+    "tape and stopwatch": ([gp.parse_reading("L0=3.2±0.05"), gp.parse_period("54.0±0.3/10")], []),
+    "logged swing": ([logged], ["L0", "c"]),
 }
 for name, (measurements, free) in CAMPAIGNS.items():
     found = gp.identify(spec, measurements, free, stood)

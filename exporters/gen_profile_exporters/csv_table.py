@@ -140,7 +140,7 @@ def _dialect(target: Target) -> CsvDialect:
     if not dialect.header and (len(target.axes) > 1 or len(target.export.csv_columns) > 1):
         raise ExportError(
             f"export.csv_dialect: {target.export.csv_dialect} holds one quantity of one axis; set "
-            'export.csv_columns = ["position"] (or --csv-columns position), and take another dialect for '
+            'export.csv_columns = ["position"], and take another dialect for '
             "several axes."
         )
     return dialect

@@ -130,9 +130,7 @@ GROUP = "gen_profile.exporters"
 
 def formats() -> dict[str, Format]:
     """Every known format by name, sorted; the project's own win over others of the same name."""
-    known = {
-        entry.name: load_plugin(entry, Format, "--export: format") for entry in entry_points(group=GROUP)
-    }
+    known = {entry.name: load_plugin(entry, Format, "export: format") for entry in entry_points(group=GROUP)}
     return dict(sorted((known | BUILT_IN).items()))
 
 
@@ -152,7 +150,7 @@ def find_exporter(name: str) -> Exporter:
     listed = format_named(name)
     known = BUILT_IN if listed in BUILT_IN else formats()
     if listed not in known:
-        raise SpecError(f"--export: unknown format {name!r}{suggestion(name, known)}")
+        raise SpecError(f"export: unknown format {name!r}{suggestion(name, known)}")
     return cast("Exporter", import_module(known[listed].module))
 
 

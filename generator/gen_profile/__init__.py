@@ -29,10 +29,13 @@ if TYPE_CHECKING:
     from gen_profile.evaluation.motion_evaluation import evaluate as evaluate
     from gen_profile.identification.identify import identify as identify
     from gen_profile.identification.identify import read_swing as read_swing
+    from gen_profile.identification.measurements import parse_period as parse_period
+    from gen_profile.identification.measurements import parse_reading as parse_reading
     from gen_profile.motion.profile import Profile as Profile
     from gen_profile.motion.profile import SampledProfile as SampledProfile
     from gen_profile.motion.profile import sample as sample
     from gen_profile.planner.planner import Planner as Planner
+    from gen_profile.problem.linearization import linearize as linearize
     from gen_profile.spec.model import Spec as Spec
     from gen_profile.spec.reading import evolve_spec as evolve_spec
     from gen_profile.spec.reading import make_spec as make_spec
@@ -44,6 +47,8 @@ if TYPE_CHECKING:
     from gen_profile.sweep.library import write_library as write_library
     from gen_profile.sweep.lookup import lookup as lookup
     from gen_profile.verification.check import check_artefact as check_artefact
+    from gen_profile.verification.from_python import cosimulate as cosimulate
+    from gen_profile.verification.from_python import residual_sways as residual_sways
 
 _HOMES = {
     "CheckFailed": "errors",
@@ -62,13 +67,17 @@ _HOMES = {
     "SpecError": "errors",
     "check_artefact": "verification.check",
     "compare": "comparison.compare",
+    "cosimulate": "verification.from_python",
     "design": "designs.design",
     "evaluate": "evaluation.motion_evaluation",
     "evolve_spec": "spec.reading",
     "export_fmu": "designs.fmu",
     "identify": "identification.identify",
-    "make_spec": "spec.reading",
+    "linearize": "problem.linearization",
     "lookup": "sweep.lookup",
+    "make_spec": "spec.reading",
+    "parse_period": "identification.measurements",
+    "parse_reading": "identification.measurements",
     "parse_spec": "spec.reading",
     "plan": "designs.plan",
     "plot": "charts.plot",
@@ -76,6 +85,7 @@ _HOMES = {
     "presets": "spec.reading",
     "read_spec": "spec.reading",
     "read_swing": "identification.identify",
+    "residual_sways": "verification.from_python",
     "robustness": "comparison.robustness",
     "run_sweep": "sweep.from_python",
     "sample": "motion.profile",

@@ -177,7 +177,7 @@ def test_a_design_that_fails_its_check_is_reported_as_failed(tmp_path):
     outcome, content, text = report(tmp_path, *QUICK, "--set", "check.residual_sway=0.001")
     assert outcome.code == 4
     assert outcome.errors[0].startswith("Check failed: The payload sways by ")
-    assert "with --keep-failed only: the check failed." in text
+    assert "where it may keep what failed its check: this did." in text
     assert "Failed. The payload sways by" in text and 'class="failed"' in content
 
 

@@ -87,7 +87,7 @@ def test_errors_stay_within_the_bounds_of_the_machine_and_hold_zero():
         (("--parameter", "L3"), "--parameter L3: unknown parameter"),
         (("--parameter", "c1"), "--parameter c1: its value is 0"),
         (("--parameter", "L1", "--parameter", "L2", "--parameter", "m1"), "--parameter: at most two"),
-        (("--set", "robustness={}"), "--parameter: name one"),
+        (("--set", "robustness={}"), "parameter: name one"),
         (("--method", "zvx"), "--method zvx: unknown method; did you mean"),
         (("--plot", "picture.xyz"), "--plot picture.xyz: name a file"),
     ],

@@ -163,7 +163,7 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path):
 
 def test_a_scheduler_that_nobody_runs_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(workflow, "ANSWER_TIME", "200ms")
-    with pytest.raises(SpecError, match=r"--scheduler tcp://127.0.0.1:9: no worker answers"):
+    with pytest.raises(SpecError, match=r"scheduler tcp://127.0.0.1:9: no worker answers"):
         workflow.sweep(prepared(tmp_path, "move.duration=3,4"), scheduler="tcp://127.0.0.1:9")
 
 

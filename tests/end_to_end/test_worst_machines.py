@@ -119,7 +119,7 @@ def test_what_passes_at_nominal_and_ends_and_fails_between_is_refused(
     assert not judged.passed and judged.worst[1].scenario.name == worst["name"]
     again = check_artefact(artefact, row=worst["row"]).check
     assert [finding.residual for finding in again.findings] == [judged.worst[1].residual]
-    with pytest.raises(SpecError, match=f"--scenario 99: .* from 0 to {len(rows) - 1}"):
+    with pytest.raises(SpecError, match=f"scenario 99: .* from 0 to {len(rows) - 1}"):
         check_artefact(artefact, row=99)
     spec = preset_spec(preset, overrides)
     nominal = spec.plant.parameters[name]

@@ -67,9 +67,9 @@ def test_suffixes_ignore_case():
 
 
 def test_unknown_formats_are_refused_with_a_suggestion():
-    with pytest.raises(SpecError, match=r"^--export: unknown format 'cvs'; did you mean 'csv'\?"):
+    with pytest.raises(SpecError, match=r"^export: unknown format 'cvs'; did you mean 'csv'\?"):
         find_exporter("cvs")
-    with pytest.raises(SpecError, match=r"--export: unknown format 'xyz' \(known: can, codesys, csv, "):
+    with pytest.raises(SpecError, match=r"export: unknown format 'xyz' \(known: can, codesys, csv, "):
         find_exporter("xyz")
 
 

@@ -101,11 +101,27 @@ def test_a_verdict_that_failed_raises():
         design.check.raise_for_failure()
 
 
+def test_chosen_machines_follow_setpoints_as_in_the_check(tmp_path):
+    spec = gp.preset_spec("paper", export={"cycle_time": 0.01})
+    check = gp.design(spec, ["csv"], tmp_path).check
+    setpoints = gp.sample(gp.plan(spec).command, cycle_time=0.01)
+    machines = [finding.scenario.parameters for finding in check.judged[:3]]
+    together = gp.residual_sways(spec, setpoints, {name: [m[name] for m in machines] for name in machines[0]})
+    for finding, machine, sway in zip(check.judged, machines, together, strict=False):
+        response = gp.cosimulate(spec, setpoints, machine)
+        alone = abs(response.sway[response.times >= spec.move.duration]).max(axis=0)
+        np.testing.assert_allclose(alone, list(finding.residual.values()), rtol=1e-3, atol=1e-6)
+        np.testing.assert_allclose(sway, alone, rtol=1e-3, atol=1e-6)
+
+
 def straight(axes, method):
     """A motion that stands still for 3 s."""
     return Profile(
         knots=[0.0, 3.0], coefficients=np.zeros((1, 1, axes)), target=np.zeros(axes), method=method
     )
+
+
+STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
 
 
 @pytest.mark.parametrize(
@@ -117,6 +133,11 @@ def straight(axes, method):
         ),
         (lambda spec: gp.compare(spec, own=[straight(1, "zvd")]), "Two motions are called 'zvd'"),
         (lambda spec: gp.export_fmu(spec, "plnt"), "no FMU of the kind 'plnt'; did you mean 'plant'"),
+        (lambda spec: gp.cosimulate(spec, STANDING, {"L3": 1.0}), "machine has no 'L3'"),
+        (
+            lambda spec: gp.residual_sways(spec, STANDING, {"L1": [0.4, 0.5], "L2": [1, 2, 3]}),
+            "as many of all",
+        ),
         (lambda spec: gp.design(spec, "plcc", "unused"), "unknown format 'plcc'; did you mean 'plc'"),
     ],
 )

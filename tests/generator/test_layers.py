@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -136,6 +137,15 @@ def test_no_name_of_a_class_has_two_meanings():
                 if isinstance(node, ast.ClassDef):
                     homes[node.name].add(str(file.relative_to(root)))
     assert {name: files for name, files in homes.items() if len(files) > 1} == {}
+
+
+def test_only_the_command_line_names_flags_in_errors():
+    for package, root in PACKAGES.items():
+        for file in set((root / package).rglob("*.py")) - set((root / package / "cli").rglob("*.py")):
+            nodes = ast.walk(ast.parse(file.read_text("utf-8")))
+            raised = [part for node in nodes if isinstance(node, ast.Raise) for part in ast.walk(node)]
+            texts = [str(part.value) for part in raised if isinstance(part, ast.Constant)]
+            assert not [text for text in texts if re.search(r"(^|[ (])--[a-z]", text)], file
 
 
 @pytest.mark.parametrize("package", PACKAGES)

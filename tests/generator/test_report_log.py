@@ -105,11 +105,11 @@ def test_what_is_no_such_table_is_refused_with_a_sentence(text, complaint):
     with pytest.raises(OutputError) as raised:
         parse_log(text, "log.csv", paper())
     message = str(raised.value)
-    assert message.startswith("--measured log.csv") and complaint in message and message.endswith(".")
+    assert message.startswith("measured log.csv") and complaint in message and message.endswith(".")
 
 
 def test_a_file_that_cannot_be_read_is_refused_with_a_sentence(tmp_path):
-    with pytest.raises(OutputError, match=r"--measured: cannot read the log .*log\.csv: "):
+    with pytest.raises(OutputError, match=r"measured: cannot read the log .*log\.csv: "):
         read_log(tmp_path / "log.csv", paper())
     (tmp_path / "log.csv").write_bytes(b"time_s,sway\n\xff\xfe,1\n")
     with pytest.raises(OutputError, match="row 2: time_s holds 'ÿþ', which is no number"):

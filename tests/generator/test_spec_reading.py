@@ -201,10 +201,10 @@ def test_a_move_stated_otherwise_replaces_the_files_way():
 @pytest.mark.parametrize(
     ("override", "sentence"),
     [
-        ("plant.L1", r"--set 'plant\.L1': write KEY=VALUE, such as"),
-        ("=3", r"--set '=3': write KEY=VALUE"),
-        ("plant..L1=3", r"--set 'plant\.\.L1=3': write KEY=VALUE"),
-        ("name.first=3", r"--set 'name\.first=3': 'name' is a value, not a table"),
+        ("plant.L1", r"set 'plant\.L1': write KEY=VALUE, such as"),
+        ("=3", r"set '=3': write KEY=VALUE"),
+        ("plant..L1=3", r"set 'plant\.\.L1=3': write KEY=VALUE"),
+        ("name.first=3", r"set 'name\.first=3': 'name' is a value, not a table"),
         ("plant.L1=", r"plant\.L1: must be a number .*, found text ''"),
         ("plant.L1=half a metre", r"plant\.L1: must be a number .*, found text 'half a metre'"),
         ("name=bay\nfoo = 3", r"name: must be 1 to 64 letters"),

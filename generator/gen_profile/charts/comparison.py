@@ -39,7 +39,7 @@ def draw(comparison: Comparison, path: Path) -> None:
         The file cannot be written, or no method has a motion.
     """
     if not comparison.rows:
-        raise OutputError("--plot: no method has a motion for this move; compare without --plot to see why.")
+        raise OutputError("plot: no method has a motion for this move; compare without a picture to see why.")
     advised = {advice.method for advice in comparison.recommended.values()}
     styles = method_styles([row.method for row in comparison.rows], thick=advised)
     with picture(path, comparison.spec.name, (15.0, 19.0)) as figure:

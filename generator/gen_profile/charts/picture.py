@@ -27,9 +27,9 @@ def require_drawable(path: Path) -> None:
         Matplotlib is not installed, the file's suffix is none of a picture, or it cannot be written.
     """
     if path.suffix.lower() not in METADATA:
-        raise OutputError(f"--plot {path}: name a file that ends in {', '.join(METADATA)}.")
+        raise OutputError(f"plot {path}: name a file that ends in {', '.join(METADATA)}.")
     if find_spec("matplotlib") is None:
-        raise OutputError("--plot needs Matplotlib: pip install 'gen-profile[plot]'.")
+        raise OutputError("plot needs Matplotlib: pip install 'gen-profile[plot]'.")
     require_place(path)
 
 

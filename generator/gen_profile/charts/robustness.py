@@ -27,7 +27,7 @@ def draw(found: Robustness, path: Path) -> None:
         The file cannot be written, or no method has a motion.
     """
     if not found.residual:
-        raise OutputError("--plot: no method has a motion for this move; leave --plot out to see why.")
+        raise OutputError("plot: no method has a motion for this move; ask for no picture to see why.")
     if len(found.errors) == 1:
         with picture(path, found.spec.name, (9.0, 6.0)) as figure:
             _curves(figure.subplots(), found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import sys
 from collections.abc import Iterable, Sequence
@@ -63,7 +64,7 @@ def print_error(error: Exception, as_json: bool) -> int:
     """Tell an error in sentences, and in JSON where that was asked for; return its exit code."""
     match error:
         case GenProfileError():
-            code, message = error.exit_code, str(error)
+            code, message = error.exit_code, _as_typed(str(error))
         case click.ClickException():
             code, message = error.exit_code, error.format_message()
         case click.Abort():
@@ -80,3 +81,14 @@ def print_error(error: Exception, as_json: bool) -> int:
         for line in message.splitlines():
             click.echo(f"Error: {line}", err=True)
     return code
+
+
+def _as_typed(message: str) -> str:
+    """Name an argument that a sentence begins with as it was typed: ``vary: …`` becomes ``--vary: …``."""
+    typed = {word.partition("=")[0] for word in sys.argv if word.startswith("--")}
+
+    def flag(found: re.Match[str]) -> str:
+        option = f"--{found[0].replace('_', '-')}"
+        return option if option in typed else found[0]
+
+    return re.sub(r"^[a-z_]+(?=[: ,])", flag, message, flags=re.MULTILINE)

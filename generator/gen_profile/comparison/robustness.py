@@ -160,7 +160,7 @@ def robustness(
     listed = {candidate.method: candidate for candidate in candidates(spec, own)}
     for method in methods:
         if method not in listed:
-            raise SpecError(f"--method {method[:60]}: unknown method{suggestion(method, list(listed))}")
+            raise SpecError(f"method {method[:60]}: unknown method{suggestion(method, list(listed))}")
     chosen = [*methods, *(motion.method for motion in own)] if methods else list(listed)
     for done, method in enumerate(chosen):
         progress("designing", done, len(chosen), method)
@@ -190,16 +190,16 @@ def error_grid(
     plant, nominal, ranges = spec.machine(), spec.plant.parameters, spec.robustness.uncertain
     names = tuple(dict.fromkeys(parameters)) or tuple(ranges)[:1]
     if not names:
-        raise SpecError("--parameter: name one, such as --parameter L1; the spec states no uncertain ones.")
+        raise SpecError("parameter: name one, such as L1; the spec states no uncertain ones.")
     if len(names) > 2:
-        raise SpecError("--parameter: at most two, of which a map is drawn.")
+        raise SpecError("parameter: at most two, of which a map is drawn.")
     bounds = {parameter.name: (parameter.lower, parameter.upper) for parameter in plant.parameters}
     grid: dict[str, Array] = {}
     for name in names:
         if name not in nominal:
-            raise SpecError(f"--parameter {name[:60]}: unknown parameter{suggestion(name, list(nominal))}")
+            raise SpecError(f"parameter {name[:60]}: unknown parameter{suggestion(name, list(nominal))}")
         if nominal[name] == 0.0:
-            raise SpecError(f"--parameter {name}: its value is 0, so a relative error means nothing.")
+            raise SpecError(f"parameter {name}: its value is 0, so a relative error means nothing.")
         widest = min(BEYOND * ranges[name] if name in ranges else USUAL_RANGE, WIDEST)
         half = (points or POINTS[len(names)]) // 2
         errors = np.array([(half_range or widest) * k / half for k in range(-half, half + 1)])

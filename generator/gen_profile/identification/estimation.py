@@ -149,18 +149,18 @@ def _require_unexplained(fit: Fit, found: Sequence[Misfit | None]) -> None:
     model, left = next((m, one) for m, one in zip(fit.models, found, strict=True) if one is not None)
     units = {q.name: q.unit for q in fit.machine.plant.parameters}
     values = ", ".join(f"{name} {value:.4g} {units[name]}" for name, value in explained.values.items())
-    flags = " ".join(f"--free {name}" for name in explained.freed)
-    cure = f"add {flags}, or measure {'it' if len(explained.freed) == 1 else 'them'} (--measured)"
+    freed = " and ".join(explained.freed)
+    cure = f"free {freed}, too, or measure {'it' if len(explained.freed) == 1 else 'them'} directly"
     if explained.instead:
         others = " or ".join(explained.instead)
         cure = (
-            f"another {others} would do as well: measure one of them (--measured), or free the one that is "
-            f"known least ({flags})"
+            f"another {others} would do as well: measure one of them directly, or free the one that is "
+            f"known least, such as {freed}"
         )
     raise InfeasibleProblem(
         f"The log of {model.log.load} is not of this machine: a swing of {left.rms:.2g} {model.log.unit} "
         f"RMS, {left.rms / left.noise:.2g} times the noise, is left of it, strongest at "
-        f"{left.frequency:.3g} rad/s. Nothing is left with another {' and '.join(explained.freed)} than the "
+        f"{left.frequency:.3g} rad/s. Nothing is left with another {freed} than the "
         f"spec's ({values}); {cure}."
     )
 

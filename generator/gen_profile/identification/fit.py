@@ -152,8 +152,8 @@ class Fit:
         if solution.status == 0:
             raise InfeasibleProblem(
                 f"The search for {' and '.join(self.names)} does not come to rest: no such machine swings "
-                "like the measurements; look for a wrong unit or signal, or start nearer, by --set "
-                "plant.NAME=VALUE."
+                "like the measurements; look for a wrong unit or signal, or start from a nearer "
+                "value of the spec."
             )
         return np.asarray(solution.x)
 

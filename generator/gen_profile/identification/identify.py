@@ -110,10 +110,10 @@ def read_swing(
     spec: Spec,
     *,
     columns: tuple[str, str],
-    signal: str,
-    unit: str | None,
-    time_unit: str,
-    after: float,
+    signal: str = "angle",
+    unit: str | None = None,
+    time_unit: str = "s",
+    after: float = 0.0,
 ) -> SwingLog:
     """Read a logged swing of a spec's machine.
 
@@ -144,12 +144,12 @@ def read_swing(
     load = named or loads[0]
     si_units = {"angle": "rad", "sway": "m"}
     if quantity not in si_units:
-        raise SpecError(f"--signal: unknown signal {quantity!r}{suggestion(quantity, si_units)}")
+        raise SpecError(f"signal: unknown signal {quantity!r}{suggestion(quantity, si_units)}")
     if load not in loads:
-        raise SpecError(f"--signal: unknown load {load!r}{suggestion(load, loads)}")
+        raise SpecError(f"signal: unknown load {load!r}{suggestion(load, loads)}")
     per_unit = _per_unit(unit or si_units[quantity], quantity, si_units[quantity])
     log = parse_swing(
-        read_text(path, "--swing"),
+        read_text(path, "swing"),
         str(path),
         columns=columns,
         per_second=TIME_UNITS[time_unit],
@@ -160,7 +160,7 @@ def read_swing(
     )
     if quantity == "angle" and (span := float(np.ptp(log.values))) > math.pi:
         raise SpecError(
-            f"--unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?"
+            f"unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?"
         )
     return log
 
@@ -171,13 +171,13 @@ def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
     size = unit.rstrip().removesuffix(name).strip()
     fitting = [known for known, (si, _) in UNITS.items() if si == si_unit]
     if name not in fitting:
-        raise SpecError(f"--unit: {unit!r} does not measure {quantity}{suggestion(name, fitting)}")
+        raise SpecError(f"unit: {unit!r} does not measure {quantity}{suggestion(name, fitting)}")
     try:
         step = float(size or 1.0)
     except ValueError:
         step = 0.0
     if step <= 0.0:
-        raise SpecError(f"--unit: {unit!r} shall begin with the size of a count, as in 0.0879 {name}.")
+        raise SpecError(f"unit: {unit!r} shall begin with the size of a count, as in 0.0879 {name}.")
     return UNITS[name][1] / step
 
 
@@ -217,9 +217,9 @@ def identify(
     _require_known(plant, readings, asked)
     stood = tuple(spec.move.target if q_a is None else q_a)
     if len(stood) != len(plant.actuated):
-        raise SpecError(f"--at: must hold one position per axis ({len(plant.actuated)}), found {len(stood)}.")
+        raise SpecError(f"at: must hold one position per axis ({len(plant.actuated)}), found {len(stood)}.")
     if not all(abs(place) <= GREATEST for place in stood):
-        raise SpecError(f"--at: must be places in m or rad, found {', '.join(f'{x:g}' for x in stood)}.")
+        raise SpecError(f"at: must be places in m or rad, found {', '.join(f'{x:g}' for x in stood)}.")
     found = estimate(
         SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
         [q.name for q in plant.parameters if q.name in asked],
@@ -265,18 +265,18 @@ def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], ask
         parameter = known.get(reading.parameter)
         if parameter and not parameter.lower <= reading.value <= parameter.upper:
             faults.append(
-                f"--measured {parameter.name}: must be from {parameter.lower:g} to {parameter.upper:g} "
+                f"measured {parameter.name}: must be from {parameter.lower:g} to {parameter.upper:g} "
                 f"{parameter.unit}, found {reading.value:g}."
             )
     modes = len(plant.unactuated)
     faults += [
-        f"--period: the machine has {modes} modes, found mode {reading.mode}."
+        f"period: the machine has {modes} modes, found mode {reading.mode}."
         for reading in readings
         if isinstance(reading, Period) and reading.mode > modes
     ]
     if not asked:
         faults.append(
-            "Name what to identify: --free NAME, or read it directly, --measured NAME=VALUE±UNCERTAINTY."
+            "Name what to identify: parameters to free, or a direct reading, NAME=VALUE±UNCERTAINTY."
         )
     if faults:
         raise SpecError(*faults)

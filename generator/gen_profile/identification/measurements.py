@@ -93,13 +93,13 @@ def parse_reading(text: str) -> DirectReading:
     if found is None:
         comma = _decimal_points(text)
         raise SpecError(
-            f"--measured {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-){comma}."
+            f"measured {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-){comma}."
         )
     name, value, uncertainty = found.groups()
     return DirectReading(
         parameter=name,
         value=float(value),
-        uncertainty=_spread(f"--measured {text!r}", float(value), float(uncertainty)),
+        uncertainty=_spread(f"measured {text!r}", float(value), float(uncertainty)),
     )
 
 
@@ -113,11 +113,11 @@ def parse_period(text: str) -> Period:
     found = re.fullmatch(rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", text)
     if found is None:
         raise SpecError(
-            f"--period {text!r}: write SECONDS±UNCERTAINTY, such as 1.73±0.02, or 17.3±0.2/10 for ten "
+            f"period {text!r}: write SECONDS±UNCERTAINTY, such as 1.73±0.02, or 17.3±0.2/10 for ten "
             f"swings, or 2:0.70±0.01 for the second mode (+- will do for ±){_decimal_points(text)}."
         )
     mode, seconds, uncertainty, swings = found.groups()
-    where, total = f"--period {text!r}", float(seconds)
+    where, total = f"period {text!r}", float(seconds)
     count = _positive(where, "number of swings", float(swings or 1))
     return Period(
         mode=int(_positive(where, "mode", float(mode or 1))),

@@ -157,13 +157,13 @@ def _require_swing(
     swing = float(np.ptp(log.values)) / 2.0
     if swing < STILL:
         raise InfeasibleProblem(
-            f"The log's {log.quantity} does not swing; look at its columns (--columns), and at --after."
+            f"The log's {log.quantity} does not swing; look at its columns, and at when it begins (after)."
         )
     angle = swing * abs(angles[mode] / seen[mode]) if seen[mode] else 0.0
     if angle > WIDEST_SWING:
         raise InfeasibleProblem(
             f"The log's {log.quantity} goes {swing:.3g} {log.unit} to either side, a swing of "
-            f"{math.degrees(angle):.0f}°: look at its unit (--unit), and at what it is of (--signal)."
+            f"{math.degrees(angle):.0f}°: look at its unit, and at what it is of (signal)."
         )
 
 

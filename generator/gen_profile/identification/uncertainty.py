@@ -207,7 +207,7 @@ def _require_determined(names: Sequence[str], slopes: Array) -> None:
         blind = [name for name, share in zip(names, worst, strict=True) if share > 0.1]
     raise InfeasibleProblem(
         f"The measurements do not determine {' and '.join(blind)}; measure "
-        f"{'it' if len(blind) == 1 else 'one of them'} directly (--measured), or another mode's period."
+        f"{'it' if len(blind) == 1 else 'one of them'} directly, or another mode's period."
     )
 
 

@@ -29,7 +29,7 @@ def require_forms(formats: Iterable[str]) -> None:
     known = (*containers(), C)
     for name in formats:
         if format_named(name) not in known:
-            raise SpecError(f"--export: a planner block has no form {name!r}{suggestion(name, known)}")
+            raise SpecError(f"export: a planner block has no form {name!r}{suggestion(name, known)}")
 
 
 def is_c(filename: str) -> bool:

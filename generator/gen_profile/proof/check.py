@@ -121,7 +121,7 @@ def check_block(
     known = _record(manifest) if standing != "none" else {}
     count = histories or known.get("histories", HISTORIES)
     if history is not None and not 0 <= history < count:
-        raise SpecError(f"--history {history}: the histories are numbered from 0 to {count - 1}.")
+        raise SpecError(f"history {history}: the histories are numbered from 0 to {count - 1}.")
     if history is None:
         found = prove(spec, text, histories=count, progress=progress)
     else:

@@ -96,7 +96,7 @@ def read_log(path: Path, spec: Spec, columns: str | None = None) -> MeasuredLog:
     OutputError
         The file cannot be read, or is no such table.
     """
-    return parse_log(read_text(path, "--measured"), path.name, spec, columns)
+    return parse_log(read_text(path, "measured"), path.name, spec, columns)
 
 
 def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) -> MeasuredLog:
@@ -116,7 +116,7 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
     OutputError
         It is no such table.
     """
-    table = read_table(text, f"--measured {source}")
+    table = read_table(text, f"measured {source}")
     head = _head(table, spec, source, {} if columns is None else _chosen(columns))
     names = list(table.rows[head])
     if columns is None:
@@ -129,20 +129,20 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
         chosen = _chosen(columns)
         known = {meaning: _required(meaning, spec, source) for meaning in chosen}
         _require(known, list(chosen), spec, source)
-        places = [table.place(head, column, f"--measured {source}") for column in chosen.values()]
+        places = [table.place(head, column, f"measured {source}") for column in chosen.values()]
     order = sorted(range(len(places)), key=lambda place: list(known.values())[place].quantity != "time")
-    numbers = table.numbers(head, [places[place] for place in order], f"--measured {source}")
+    numbers = table.numbers(head, [places[place] for place in order], f"measured {source}")
     signals = {
         (column.quantity, column.owner): numbers[:, order.index(place)] / column.divisor
         for place, column in enumerate(known.values())
     }
     times = signals.pop(("time", ""))
     if len(times) < LEAST_SAMPLES:
-        raise OutputError(f"--measured {source}: needs at least {LEAST_SAMPLES} samples, found {len(times)}.")
+        raise OutputError(f"measured {source}: needs at least {LEAST_SAMPLES} samples, found {len(times)}.")
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
         raise OutputError(
-            f"--measured {source}: the times must rise from row to row, and do not after "
+            f"measured {source}: the times must rise from row to row, and do not after "
             f"{times[back[0]]:.6g} s."
         )
     by_quantity: dict[str, dict[str, Array]] = {"position": {}, "sway": {}, "angle": {}}
@@ -163,7 +163,7 @@ def _chosen(columns: str) -> dict[str, str]:
     pairs = [part.partition("=") for part in columns.split(",")]
     if not all(meaning.strip() and column.strip() for meaning, _, column in pairs):
         raise OutputError(
-            f"--columns {columns!r}: write MEANING=COLUMN for each, such as time_ms=Zeit,payload_sway_mm=4."
+            f"columns {columns!r}: write MEANING=COLUMN for each, such as time_ms=Zeit,payload_sway_mm=4."
         )
     return {meaning.strip(): column.strip() for meaning, _, column in pairs}
 
@@ -173,7 +173,7 @@ def _required(meaning: str, spec: Spec, source: str) -> _Column:
     if found is None:
         plant = spec.machine()
         raise OutputError(
-            f"--columns: {meaning!r} is nothing of this machine; write time_s, "
+            f"columns: {meaning!r} is nothing of this machine; write time_s, "
             f"{plant.actuated[0].name}_position, "
             f"{plant.loads[-1]}_sway or {plant.loads[-1]}_angle, with a unit behind such as _mm or _deg."
         )
@@ -232,7 +232,7 @@ def _column(name: str, spec: Spec, source: str) -> _Column | None:
     si = plant.actuated[owners.index(owner)].unit if quantity == "position" else _SI[quantity]
     divisor = _divisor(spec, owner if quantity == "position" else "", unit or "", si)
     if divisor is None:
-        raise OutputError(f"--measured {source}: column {name!r} is in {unit}, which does not measure it.")
+        raise OutputError(f"measured {source}: column {name!r} is in {unit}, which does not measure it.")
     return _Column(quantity=quantity, owner=owner, divisor=divisor)
 
 
@@ -257,22 +257,20 @@ def _require(known: Mapping[str, _Column], names: Sequence[str], spec: Spec, sou
     """Hold the columns to what a comparison needs: a time, and something that was measured, each once."""
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise OutputError(f"--measured {source}: two columns are called {twice!r}; rename one.")
+        raise OutputError(f"measured {source}: two columns are called {twice!r}; rename one.")
     held = [(column.quantity, column.owner) for column in known.values()]
     for name, column in known.items():
         if held.count((column.quantity, column.owner)) > 1:
-            raise OutputError(
-                f"--measured {source}: column {name!r} is there twice, in two units; remove one."
-            )
+            raise OutputError(f"measured {source}: column {name!r} is there twice, in two units; remove one.")
     plant = spec.machine()
     examples = f"{plant.actuated[0].name}_position, {plant.loads[-1]}_sway, {plant.loads[-1]}_angle"
     if ("time", "") not in held:
         raise OutputError(
-            f"--measured {source}: there is no column time_s (or time_ms); found {', '.join(names)[:200]}; "
-            "name the column of times, as --columns time_s=1 does."
+            f"measured {source}: there is no column time_s (or time_ms); found {', '.join(names)[:200]}; "
+            "name the column of times, as columns time_s=1 does."
         )
     if len(held) < 2:
         raise OutputError(
-            f"--measured {source}: there is no column of this machine ({examples}, with units behind "
+            f"measured {source}: there is no column of this machine ({examples}, with units behind "
             f"such as _mm or _deg); found {', '.join(names)[:200]}."
         )

@@ -212,8 +212,8 @@ def _the_move(evaluation: MotionEvaluation, log: MeasuredLog, start: float) -> M
     kept = (log.times >= start) & (log.times <= start + until)
     if kept.sum() < 2 or log.times[kept][-1] < start + evaluation.motion.duration:
         raise OutputError(
-            f"--measured {log.source}: the log ends before the move that begins at {start:.4g} s in it does; "
-            "log on until the load is at rest, or state the start with --measured-start."
+            f"measured {log.source}: the log ends before the move that begins at {start:.4g} s in it does; "
+            "log on until the load is at rest, or state when it starts (measured_start)."
         )
 
     def cut(signals: Mapping[str, Array]) -> dict[str, Array]:

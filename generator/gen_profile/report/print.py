@@ -51,7 +51,7 @@ def require_browser() -> str:
     found = next((place for name in BROWSERS if (place := shutil.which(name))), None)
     if found is None:
         raise OutputError(
-            "--out: printing to PDF needs Chromium, Chrome or Edge, and none was found; install one, or "
+            "out: printing to PDF needs Chromium, Chrome or Edge, and none was found; install one, or "
             "write a .html and print it from a browser."
         )
     return found
@@ -81,10 +81,8 @@ def printed(page: bytes) -> bytes:
                 env={**os.environ, "HOME": name},
             )
         except (OSError, subprocess.TimeoutExpired) as error:
-            raise OutputError(
-                f"--out: {browser} does not print the page ({error}); write a .html."
-            ) from error
+            raise OutputError(f"out: {browser} does not print the page ({error}); write a .html.") from error
         if not paper.exists():
             said = done.stderr.decode("utf-8", errors="replace").strip().splitlines()[-1:]
-            raise OutputError(f"--out: {browser} printed nothing ({' '.join(said)}); write a .html.")
+            raise OutputError(f"out: {browser} printed nothing ({' '.join(said)}); write a .html.")
         return CLOCK.sub(rb"/\1 (D:20000101000000", paper.read_bytes())

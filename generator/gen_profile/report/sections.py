@@ -317,7 +317,7 @@ def _files(outcome: Design) -> Section:
         title="Files",
         words=(
             "gen-profile writes these very bytes for this spec in these formats"
-            + ("." if outcome.passed else ", with --keep-failed only: the check failed."),
+            + ("." if outcome.passed else ", where it may keep what failed its check: this did."),
         ),
         blocks=[
             table,

@@ -178,7 +178,7 @@ def preset_text(name: str) -> str:
         There is no such preset.
     """
     if name not in presets():
-        raise SpecError(f"--preset: unknown preset {name!r}{suggestion(name, presets())}")
+        raise SpecError(f"preset: unknown preset {name!r}{suggestion(name, presets())}")
     return (files("gen_profile") / "presets" / f"{name}.toml").read_text("utf-8")
 
 
@@ -232,13 +232,13 @@ def _override(document: Table, override: str) -> None:
     key, equals, text = override.partition("=")
     path = [part.strip() for part in key.split(".")]
     if not equals or not all(path):
-        raise SpecError(f"--set {override!r}: write KEY=VALUE, such as --set plant.L1=0.5.")
+        raise SpecError(f"set {override!r}: write KEY=VALUE, such as plant.L1=0.5.")
     table = document
     for depth, part in enumerate(path[:-1]):
         inner = table.setdefault(part, {})
         if not isinstance(inner, dict):
             taken = ".".join(path[: depth + 1])
-            raise SpecError(f"--set {override!r}: {taken!r} is a value, not a table.")
+            raise SpecError(f"set {override!r}: {taken!r} is a value, not a table.")
         table = inner
     _set(table, path, _override_value(text))
 

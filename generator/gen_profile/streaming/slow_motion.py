@@ -118,7 +118,7 @@ def _distances(stated: Sequence[str], axes: Sequence[str]) -> Mapping[str, float
     for text in stated:
         name, _, number = text.partition("=")
         if name not in axes:
-            raise SpecError(f"--jog {text}: unknown axis{suggestion(name, axes)}")
+            raise SpecError(f"jog {text}: unknown axis{suggestion(name, axes)}")
         found[name] = _metres(text, number)
     return found
 
@@ -130,7 +130,5 @@ def _metres(text: str, number: str) -> float:
         distance = math.nan
     if not math.isfinite(distance):
         name = text.partition("=")[0]
-        raise SpecError(
-            f"--jog {text}: state the distance as a number of metres (or rad), as --jog {name}=0.05."
-        )
+        raise SpecError(f"jog {text}: state the distance as a number of metres (or rad), as {name}=0.05.")
     return distance

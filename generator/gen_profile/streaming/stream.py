@@ -82,13 +82,13 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
         It is damaged.
     """
     if format_of(path) != "can":
-        raise SpecError(f"{path}: only the log of the format can is streamed; export with --export can.")
+        raise SpecError(f"{path}: only the log of the format can is streamed; export that.")
     content, beside = read_artefact(path), path.parent / FILENAME
     manifest = manifest_beside(path, content)
     if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == "can"}:
         raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
     if manifest.check is None and not accept_unverified:
-        raise SpecError(f"{path} is unverified: export it with its check, or say --accept-unverified.")
+        raise SpecError(f"{path} is unverified: export it with its check, or accept it as it is.")
     if manifest.check is not None and not manifest.check.get("passed"):
         raise SpecError(f"{path} failed its check, as {beside} tells; it is not streamed.")
     spec = spec_from_dict(manifest.spec, path.parent)

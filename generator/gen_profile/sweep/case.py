@@ -138,7 +138,7 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes 
     """
     if versions() != recipe.versions:
         raise SpecError(
-            f"--scheduler: a worker has {_listed(versions())}, and this sweep needs "
+            f"scheduler: a worker has {_listed(versions())}, and this sweep needs "
             f"{_listed(recipe.versions)}; install the same there."
         )
     try:

@@ -92,12 +92,12 @@ def parse_grid(texts: Sequence[str]) -> Grid:
     """
     axes = tuple(_parse_axis(text) for text in texts)
     if not axes:
-        raise SpecError("--vary: name what to vary, such as --vary move.distance=0.1:2:20.")
+        raise SpecError("vary: name what to vary, such as move.distance=0.1:2:20.")
     keys = [axis.key for axis in axes]
     for key in keys:
         if keys.count(key) > 1:
-            raise SpecError(f"--vary {key}: a key is varied once.")
-    return _grid(axes, "--vary")
+            raise SpecError(f"vary {key}: a key is varied once.")
+    return _grid(axes, "vary")
 
 
 def grid_of_values(vary: Mapping[str, Sequence[Any]]) -> Grid:
@@ -130,11 +130,11 @@ def overrides(values: Mapping[str, Any]) -> tuple[str, ...]:
 def _parse_axis(text: str) -> GridAxis:
     key, equals, stated = (part.strip() for part in text.partition("="))
     if not equals or not stated or not all(step.strip() for step in key.split(".")):
-        raise SpecError(f"--vary {text!r}: write KEY=LO:HI:N or KEY=VALUE,VALUE,…")
+        raise SpecError(f"vary {text!r}: write KEY=LO:HI:N or KEY=VALUE,VALUE,…")
     parts = stated.split(":")
     numbers = len(parts) > 1 and all(_is_number(part.replace(",", ".")) for part in parts)
     values = _range(text, parts) if numbers or len(parts) == 3 else _listed(stated)
-    return _axis(f"--vary {text!r}", key, values)
+    return _axis(f"vary {text!r}", key, values)
 
 
 def _axis(where: str, key: str, values: Sequence[Any]) -> GridAxis:
@@ -149,17 +149,17 @@ def _axis(where: str, key: str, values: Sequence[Any]) -> GridAxis:
 
 def _range(text: str, parts: Sequence[str]) -> list[float]:
     if len(parts) < 3:
-        raise SpecError(f"--vary {text!r}: say how many values to take, as LO:HI:N, such as {text}:5.")
+        raise SpecError(f"vary {text!r}: say how many values to take, as LO:HI:N, such as {text}:5.")
     try:
         first, last, number = parts
         low, high, count = float(first), float(last), int(number)
     except ValueError as error:
         point = next(filter(None, map(number_meant, parts)), "")
         raise SpecError(
-            f"--vary {text!r}: LO:HI:N are two numbers and how many values to take{point}."
+            f"vary {text!r}: LO:HI:N are two numbers and how many values to take{point}."
         ) from error
     if not 2 <= count <= MOST_CASES or not (math.isfinite(low) and math.isfinite(high)):
-        raise SpecError(f"--vary {text!r}: take two values or more, from one finite number to another.")
+        raise SpecError(f"vary {text!r}: take two values or more, from one finite number to another.")
     inner = [float(f"{value:.{DIGITS}g}") for value in np.linspace(low, high, count)[1:-1]]
     return [low, *inner, high]
 

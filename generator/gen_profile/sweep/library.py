@@ -154,7 +154,7 @@ def _block_of(row: dict[str, Any]) -> dict[str, Any]:
     known, artefacts = formats(), row["artefacts"]
     found: list[dict[str, Any]] = [item for item in artefacts if known[item["format"]].holds_block]
     if not found:
-        raise SpecError("A library needs the cases' PLC blocks: sweep again with --export plc.")
+        raise SpecError("A library needs the cases' PLC blocks: sweep again with the format plc.")
     return found[0]
 
 

@@ -184,7 +184,7 @@ def _outcome(future: Future, case: int, values: Mapping[str, Any]) -> CaseOutcom
         return failed(case, values, CRASHED, reason)
     except Exception as error:
         raise SpecError(
-            f"--scheduler: the workers cannot go on ({type(error).__name__}: {error}); they must have the "
+            f"scheduler: the workers cannot go on ({type(error).__name__}: {error}); they must have the "
             "same gen-profile. What is finished is kept: sweep again."
         ) from error
 
@@ -207,7 +207,7 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
             client = stack.enter_context(Client(cluster, timeout=ANSWER_TIME, set_as_default=False))
             client.wait_for_workers(1, timeout=ANSWER_TIME)
         except (OSError, ValueError) as error:
-            raise SpecError(f"--scheduler {scheduler}: no worker answers ({error}).") from error
+            raise SpecError(f"scheduler {scheduler}: no worker answers ({error}).") from error
         if scheduler is None:
             client.run(_ignore_interrupts)  # a terminal sends Ctrl-C to them, too; this process ends them
         yield client

@@ -168,7 +168,7 @@ def opened(store: Store) -> Iterator[None]:
         if found != asked:
             other = ", ".join(key for key in asked if found.get(key) != asked[key])
             raise OutputError(
-                f"{store.folder} holds another sweep (its {other} differ); choose another folder with --out."
+                f"{store.folder} holds another sweep (its {other} differ); choose another folder."
             )
         yield
 

@@ -141,9 +141,7 @@ def _rows(
     if row is None:
         return rows, worst.tried
     if not 0 <= row < len(rows):
-        raise SpecError(
-            f"--scenario {row}: the scenarios of this spec are numbered from 0 to {len(rows) - 1}."
-        )
+        raise SpecError(f"scenario {row}: the scenarios of this spec are numbered from 0 to {len(rows) - 1}.")
     return (rows[row],), worst.tried
 
 

@@ -58,14 +58,14 @@ def parse_variant(
     SpecError
     """
     axes = list(spec.axis)
-    factors = dict(_entry("--scale", text, axes) for text in scale)
+    factors = dict(_entry("scale", text, axes) for text in scale)
     for name, value in factors.items():
         if not 0.0 <= value <= 1.0:
-            raise SpecError(f"--scale {name}={value:g}: a playback block takes 0 to 1.")
+            raise SpecError(f"scale {name}={value:g}: a playback block takes 0 to 1.")
     return MotionVariant(
         scale=factors,
-        mirror=tuple(_axis("--mirror", name, axes) for name in mirror),
-        offset=dict(_entry("--offset", text, axes) for text in offset),
+        mirror=tuple(_axis("mirror", name, axes) for name in mirror),
+        offset=dict(_entry("offset", text, axes) for text in offset),
     )
 
 
@@ -96,7 +96,7 @@ def varied(spec: Spec, setpoints: SampledProfile, variant: MotionVariant) -> tup
 def _entry(option: str, text: str, axes: Sequence[str]) -> tuple[str, float]:
     name, equals, number = text.rpartition("=")
     if not equals and len(axes) > 1:
-        raise SpecError(f"{option} {text}: say of which axis, {option} {axes[0]}={text} ({', '.join(axes)}).")
+        raise SpecError(f"{option} {text}: say of which axis, as {axes[0]}={text} ({', '.join(axes)}).")
     try:
         value = float(number)
     except ValueError:

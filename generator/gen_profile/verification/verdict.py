@@ -147,7 +147,7 @@ class Check:
     def warnings(self) -> tuple[str, ...]:
         """Say what is wrong without counting: doubtful values, faults of timing."""
         timing = () if self.strict else self.groups.get(TIMING, ())
-        late = (f"{sentence} It counts with --strict." for sentence in self._sentences(timing))
+        late = (f"{sentence} It counts where the check is strict." for sentence in self._sentences(timing))
         return (*self.doubts, *late)
 
     def _sentences(self, findings: Sequence[Finding]) -> Iterator[str]:

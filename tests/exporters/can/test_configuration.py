@@ -77,7 +77,7 @@ def test_a_device_of_another_kind():
 @pytest.mark.parametrize(
     ("state", "cure"),
     [
-        (State.FAULT, "or by --reset-fault"),
+        (State.FAULT, "or ask for it [(]reset_fault[)]"),
         (State.ENABLED, r"switched off there \(controlword 6040h = 0\)"),
         (State.QUICK_STOP, r"switched off there \(controlword 6040h = 0\)"),
     ],
@@ -122,7 +122,7 @@ class TestFaultReset:
         with Bench(reset_fault=True) as bench:
             in_fault(bench)
             bench.drive._obey = lambda word: None
-            refused(bench, r"in the state 'fault'; .* or by --reset-fault")
+            refused(bench, r"in the state 'fault'; .* or ask for it [(]reset_fault[)]")
 
     def test_a_drive_that_is_not_in_fault_is_left_alone(self):
         with Bench(reset_fault=True) as bench:

@@ -41,7 +41,7 @@ class Port:
         # python-can's kvaser raises a NameError where its library is missing
         except (can.CanError, OSError, ValueError, ImportError, NotImplementedError, NameError) as error:
             raise SpecError(
-                f"--interface {self.interface} --channel {self.channel}: cannot be opened "
+                f"interface {self.interface}, channel {self.channel}: cannot be opened "
                 f"({str(error).rstrip('.')}); {self._cure()}."
             ) from error
 

@@ -225,7 +225,7 @@ def _require_rest(link: Link, node: Node) -> None:
     if state in FAULTS:
         raise StreamAborted(
             f"axis {node.name}: the drive is in the state {state.words!r}; find out why, and reset it there "
-            "or by --reset-fault."
+            "or ask for it (reset_fault)."
         )
     if state in MOVING:
         raise StreamAborted(
