@@ -308,8 +308,9 @@ class Streamer:
         step = np.abs(self._plan.motion.position[after] - self._plan.motion.position[before])
         if missed > 1 or (step > steps).any():
             raise StreamAborted(
-                f"This machine was {missed * self._pacer.period / 1e6:g} ms late at cycle {cycle}; relieve it, "
-                "permit real-time priority, or choose a longer can.sync_period (the self-test measures it)."
+                f"This machine was {missed * self._pacer.period / 1e6:g} ms late at cycle {cycle}; relieve "
+                "it, permit real-time priority, or choose a longer can.sync_period (the self-test measures "
+                "it)."
             )
 
     def _record(self, phase: Phase, reason: str) -> Record:
