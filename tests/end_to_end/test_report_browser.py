@@ -9,14 +9,14 @@ import pytest
 from command_line import run_here
 from headless import browser as start
 
-from gen_profile.charts.figure import Figure, Line, Map, Panel
+from gen_profile.charts.figure import INK, Bars, Figure, Line, Map, Panel
 from gen_profile.report.content import Listing, Page, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.page import render
 from gen_profile.spec.reading import presets
 
 pytestmark = pytest.mark.slow
 
-DRAWN = "path.js-line[d]"
+DRAWN = "path.js-line[d], .barlayer .point path"
 CURVES = f"""
     return [...document.querySelectorAll('.plot')].map((plot) => plot.querySelectorAll('{DRAWN}').length)"""
 TITLES = "return [...document.querySelectorAll('.panel h4')].map((title) => title.textContent)"
@@ -88,7 +88,7 @@ def test_it_shows_the_paper_s_figures_2_to_5(browser, paper):
     left_out = fifth.replace("+", "−")
     shown = browser.run(
         """
-        return Object.fromEntries([...document.querySelectorAll('.panel')].slice(-9).map((panel) => [
+        return Object.fromEntries([...document.querySelectorAll('.panel')].slice(-10).map((panel) => [
             panel.querySelector('h4').textContent,
             panel.querySelector('.plot').data.filter((curve) => curve.visible).map((curve) => curve.meta),
         ]))"""
@@ -110,7 +110,7 @@ def test_it_shows_the_paper_s_figures_2_to_5(browser, paper):
 def test_no_axis_counts_in_prefixes_beside_its_unit(browser, paper):
     """“20n” of a share, or “6µ” in metres, is no figure of a plot's label."""
     browser.open(paper)
-    every = "[...document.querySelectorAll('.plot .ytick text')]"
+    every = "[...document.querySelectorAll('.plot:not(:has(.barlayer .trace)) .ytick text')]"
     ticks = browser.run(f"return {every}.map((tick) => tick.textContent)")
     assert any("×10" in tick for tick in ticks)  # the Hamiltonian's
     assert [tick for tick in ticks if re.search("[a-zA-Zµμ]", tick)] == []
@@ -312,7 +312,10 @@ HOSTILE = (
     '<a href="javascript:window.bitten=5" style="position:fixed;inset:0">click</a>',
     "{{ 7 * 7 }}{% raw %}\u2028\u2029\x00",
 )
-TAGS = """return [...document.querySelectorAll('*')].map((element) => element.tagName).join(' ')"""
+TICKS = ".xaxislayer-above, .gridlayer, .ticks"  # as many as there is room for beside names of bars
+TAGS = f"""
+    const elements = [...document.querySelectorAll('*')].filter((element) => !element.closest('{TICKS}'));
+    return elements.map((element) => element.tagName).join(' ')"""
 
 
 def section(text):
@@ -321,10 +324,12 @@ def section(text):
     panel = Panel(title=text, x_label=text, y_label=text, lines=lines)
     grid = {"x": np.arange(3.0), "y": np.arange(3.0), "values": np.eye(3), "limit": 0.5, "frame": (1.0, 1.0)}
     coloured = Map(title=text, x_label=text, y_label=text, unit=text, **grid)
+    rows = {"values": np.ones(2), "names": (text, f"{text} again"), "texts": (text, text), "limit": 1.0}
+    bars = Bars(title=text, x_label=text, colours=(INK, INK), **rows)
     blocks = [
         Terms(rows=[(text, text)]),
         Table(head=(text, text), rows=[TableRow(cells=(text, Share(0.5)), mark="own")], code=True),
-        Figure(caption=text, panels=[panel, coloured]),
+        Figure(caption=text, panels=[panel, coloured, bars]),
         Listing(title=text, text=text),
     ]
     return Section(title=text, words=(text,), blocks=blocks)

@@ -1,4 +1,4 @@
-"""The curves of a report: the motion, the loads, and other methods beside them."""
+"""Curves of a design: the motion, its spectrum, and the loads."""
 
 from __future__ import annotations
 
@@ -8,13 +8,9 @@ import attrs
 import numpy as np
 
 from gen_profile.charts.figure import PALETTE, PLAIN, Band, Figure, Level, Line, Panel, Style
-from gen_profile.charts.method_styles import method_styles
-from gen_profile.comparison.candidates import own_method
-from gen_profile.comparison.compare import ComparedMethod, Comparison
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import machine, place_unit
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES
-from gen_profile.evaluation.scenarios import extremes
 from gen_profile.evaluation.simulation import Response
 from gen_profile.evaluation.spectrum import DECADES, natural_frequencies, spectrum
 from gen_profile.motion.metrics import length, peak
@@ -22,13 +18,11 @@ from gen_profile.motion.profile import Array, Profile
 from gen_profile.spec.model import Spec
 
 SAMPLES = 800
-COMPARED = 500  # samples of each curve where there are many methods
 FREQUENCIES = 500
 TWINS = 7  # machines beside the nominal one whose sway is drawn
-NEAR = 2.5  # times a curve's peak within which a limit is drawn; beyond, it would flatten the curve
+NEAR = 2.5  # times what is shown, up to which a limit is drawn; beyond, it would flatten the curves
 ORDERS = (("Position", "{}"), ("Velocity", "{}/s"), ("Acceleration", "{}/s²"), ("Jerk", "{}/s³"))
 LIMITED = ("travel", "velocity", "acceleration", "jerk")
-PAPERS = ("nzv", "zvd")  # the shapers that the paper compares with
 TIME = "time (s)"
 FOLLOWED = Style(colour=PALETTE[1], dash="dash")
 
@@ -68,11 +62,12 @@ def motion_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
     for column, axis in enumerate(spec.machine().actuated):
         place, factor = place_unit(spec, column)
         for order, (quantity, unit) in enumerate(ORDERS):
-            lines = [_derivative("command", evaluation.command, order, column)]
+            lines = [derivative_line("command", evaluation.command, order, column)]
             if lagging:
-                lines.append(_derivative("motion of the axis", evaluation.motion, order, column, FOLLOWED))
-            greatest = max(float(np.abs(line.y).max()) for line in lines)
-            levels = tuple(near_limits(spec, column, order, NEAR * greatest))
+                lines.append(
+                    derivative_line("motion of the axis", evaluation.motion, order, column, FOLLOWED)
+                )
+            levels = tuple(near_limits(spec, column, order, extent(lines)))
             if order == 0:
                 lines = [attrs.evolve(line, y=factor * line.y) for line in lines]
                 levels = tuple(attrs.evolve(level, value=factor * level.value) for level in levels)
@@ -103,7 +98,7 @@ def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
         meaning = "The less the motion holds there, the less the loads swing on."
     return Figure(
         caption=f"Dotted: natural frequencies of the nominal machine; shaded: those of the others. {meaning}",
-        panels=[_spectrum(spec, evaluation, {"motion": evaluation.motion}, {"motion": PLAIN})],
+        panels=[spectrum_panel(spec, evaluation, {"motion": evaluation.motion}, {"motion": PLAIN})],
     )
 
 
@@ -132,62 +127,6 @@ def sway_figure(spec: Spec, evaluation: MotionEvaluation, shown: Sequence[Shown]
             for number, load in enumerate(spec.machine().loads)
         ],
     )
-
-
-def other_methods(comparison: Comparison) -> Figure:
-    """Draw all methods: the motion, its spectrum, and the end load's sway (the paper's figures 2 to 5)."""
-    spec, rows = comparison.spec, comparison.rows
-    styles = compared_styles(comparison)
-    first = spec.machine().actuated[0]
-    panels = [
-        Panel(
-            title=f"{quantity} of {first.name}",
-            x_label=TIME,
-            y_label=f"{quantity.lower()} ({unit.format(first.unit)})",
-            lines=[
-                _derivative(row.method, row.evaluation.motion, order, 0, styles[row.method], COMPARED)
-                for row in rows
-            ],
-        )
-        for order, (quantity, unit) in enumerate(ORDERS)
-    ]
-    motions = {row.method: row.evaluation.motion for row in rows}
-    panels.append(_spectrum(spec, rows[0].evaluation, motions, styles))
-    return Figure(
-        caption=(
-            "Optimal motions solid, shapers dashed, extra-insensitive ones dotted. "
-            "Click on a method's name to show or hide its curves."
-        ),
-        panels=[*panels, *_sways(comparison, styles)],
-    )
-
-
-def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Panel]:
-    """Draw the end load under every method, on the nominal machine and on those with all parameters off."""
-    spec, rows = comparison.spec, comparison.rows
-    plant, last = spec.machine(), max(row.evaluation.motion.duration for row in rows)
-    seen = {row.method: row.evaluation.swing.at(_until(row)) for row in rows}
-    allowed = 1e3 * spec.check.residual_sway[plant.loads[-1]]
-    signs = (1.0, -1.0) if plant.directions == 1 else (1.0,)  # the sway in two directions is a length
-    for index in extremes(spec):
-        lines = [
-            Line(
-                name=method,
-                x=responses[index].times,
-                y=1e3 * end_load_sway(spec, responses[index]),
-                style=styles[method],
-            )
-            for method, responses in seen.items()
-        ]
-        end = max(float(line.x[-1]) for line in lines)
-        yield Panel(
-            title=f"Sway of the {plant.end_load_name}, {machine(rows[0].evaluation.machines[index].name)}",
-            x_label=TIME,
-            y_label="sway (mm)",
-            lines=lines,
-            levels=[Level(value=sign * allowed, between=(last, end)) for sign in signs],
-            bands=[Band(low=last, high=last)],
-        )
 
 
 def hamiltonian_figure(times: Array, hamiltonian: Array) -> Figure:
@@ -225,27 +164,35 @@ def end_load_sway(spec: Spec, response: Response) -> Array:
     return length(response.sway[:, spec.machine().end_load])[:, 0]
 
 
-def _derivative(  # noqa: PLR0917  # name, then what, then how
+def derivative_line(  # noqa: PLR0917  # name, then what, then how
     name: str, profile: Profile, order: int, column: int, style: Style = PLAIN, samples: int = SAMPLES
 ) -> Line:
+    """Draw a derivative of one axis, its jumps between segments included."""
     points = max(2, samples // (len(profile.knots) - 1))
     times, values = profile.within_segments(points, order)
     return Line(name=name, x=times, y=values[:, column], style=style)
 
 
-def near_limits(spec: Spec, column: int, order: int, near: float) -> Iterator[Level]:
-    """List the limits of one quantity of one axis that are not too far away to be drawn."""
+def extent(lines: Sequence[Line]) -> tuple[float, float]:
+    """Find the least and the greatest value of some curves."""
+    return min(float(np.nanmin(line.y)) for line in lines), max(float(np.nanmax(line.y)) for line in lines)
+
+
+def near_limits(spec: Spec, column: int, order: int, shown: tuple[float, float]) -> Iterator[Level]:
+    """List the limits of one quantity of one axis that are near enough to what is shown to be drawn."""
     allowed = getattr(spec.limits.of(column), LIMITED[order])
     if allowed is None:
         return
+    low, high = shown if order else (-max(map(abs, shown)), max(map(abs, shown)))
     for value in allowed if order == 0 else (allowed, -allowed):
-        if abs(value) <= near:
+        if NEAR * low <= value <= NEAR * high:
             yield Level(value=value)
 
 
-def _spectrum(
+def spectrum_panel(
     spec: Spec, evaluation: MotionEvaluation, motions: Mapping[str, Profile], styles: Mapping[str, Style]
 ) -> Panel:
+    """Draw spectra of the first axis's acceleration over the natural frequencies of all machines."""
     first, natural = spec.machine().actuated[0], natural_frequencies(spec, evaluation.machines)
     frequencies = natural.span(FREQUENCIES)
     ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
@@ -263,22 +210,3 @@ def _spectrum(
         ],
         decades=DECADES,
     )
-
-
-def compared_styles(comparison: Comparison) -> dict[str, Style]:
-    """Draw the spec's own method thick, and show the most telling ones."""
-    own = own_method(comparison.spec)
-    methods = [row.method for row in comparison.rows]
-    shown = {
-        own,
-        *(advice.method for advice in comparison.recommended.values()),
-        *PAPERS,
-        *(method for method in methods if method == "optimal" or method.startswith("optimal-beta")),
-    }
-    styles = method_styles(methods, thick={own})
-    return {method: attrs.evolve(style, shown=method in shown) for method, style in styles.items()}
-
-
-def _until(row: ComparedMethod) -> Array:
-    duration = row.evaluation.motion.duration
-    return np.linspace(0.0, duration + row.evaluation.watch, COMPARED)

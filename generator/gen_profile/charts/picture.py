@@ -1,21 +1,39 @@
-"""Pictures on disk, by Matplotlib, which is an extra."""
+"""Figures in files, drawn by Matplotlib, which is an extra."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
+import numpy as np
+
 from gen_profile.artefacts.writing import deliver, require_place
-from gen_profile.charts.figure import Dash, Style
+from gen_profile.charts.figure import (
+    FRAME,
+    INK,
+    LIMIT,
+    PAPER,
+    SHADES,
+    Bars,
+    Dash,
+    Figure,
+    Level,
+    Map,
+    Panel,
+    Style,
+)
 from gen_profile.errors import OutputError
 
 # suffix → metadata that keeps the clock out of the file
 METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-DASHES: dict[Dash, str] = {"solid": "-", "dash": "--", "dot": ":"}
+DASHES: dict[Dash, str] = {"solid": "-", "dash": "--", "dot": ":", "points": "none"}
+WIDE, HIGH = (9.0, 7.5, 5.2, 3.9), (6.0, 3.8, 3.8, 3.4)  # inches of a panel, by columns from 1
+BESIDE = 5.5  # inches of a figure beside another one
+LETTERS = 13  # of a caption, in an inch
 
 
 def require_drawable(path: Path) -> None:
@@ -33,17 +51,17 @@ def require_drawable(path: Path) -> None:
     require_place(path)
 
 
-@contextmanager
-def picture(path: Path, salt: str, size: tuple[float, float]) -> Iterator[Any]:
-    """Give an empty figure, and write it when all is drawn.
+def save(figures: Sequence[Figure], path: Path, salt: str, title: str) -> None:
+    """Draw figures side by side in one file.
 
     Parameters
     ----------
+    figures : sequence of Figure
+        The first one is the widest.
     path : Path
     salt : str
         What ids inside an SVG are made from; they would be random otherwise.
-    size : (float, float)
-        Width and height in inches.
+    title : str
 
     Raises
     ------
@@ -55,17 +73,131 @@ def picture(path: Path, salt: str, size: tuple[float, float]) -> Iterator[Any]:
     matplotlib.use("Agg")
     from matplotlib import pyplot  # noqa: PLC0415
 
-    figure = pyplot.figure(figsize=size, layout="constrained")
+    picture = drawn(figures, title)
     try:
-        yield figure
-        suffix, drawn = path.suffix.lower(), BytesIO()
+        suffix, content = path.suffix.lower(), BytesIO()
         with matplotlib.rc_context({"svg.hashsalt": salt}):
-            figure.savefig(drawn, format=suffix[1:], dpi=110, metadata=METADATA[suffix])
+            picture.savefig(content, format=suffix[1:], dpi=110, metadata=METADATA[suffix])
     finally:
-        pyplot.close(figure)
-    deliver(path, drawn.getvalue())
+        pyplot.close(picture)
+    deliver(path, content.getvalue())
 
 
-def in_ink(style: Style) -> dict[str, Any]:
+def drawn(figures: Sequence[Figure], title: str) -> Any:
+    """Draw figures side by side, as a figure of Matplotlib's."""
+    from matplotlib import pyplot  # noqa: PLC0415
+
+    columns = _columns(figures[0])
+    rows = -(-len(figures[0].panels) // columns)
+    widths = [columns * WIDE[columns - 1], *[BESIDE] * (len(figures) - 1)]
+    height = max(6.0, 1.0 + rows * (2.4 if rows > 2 and columns == 1 else HIGH[columns - 1]))
+    picture = pyplot.figure(figsize=(sum(widths), height), layout="constrained")
+    parts = picture.subfigures(1, len(figures), width_ratios=widths, squeeze=False)[0]
+    for part, figure, width in zip(parts, figures, widths, strict=True):
+        _draw(part, figure, width)
+    picture.suptitle(title)
+    return picture
+
+
+def _draw(part: Any, figure: Figure, width: float) -> None:
+    """Draw panels row by row; bars take what is left of their row."""
+    columns, names = _columns(figure), [str(number) for number in range(len(figure.panels))]
+    filling = names[-1] if isinstance(figure.panels[-1], Bars) else "."
+    mosaic = np.reshape([*names, *[filling] * (-len(names) % columns)], (-1, columns))
+    axes = part.subplot_mosaic(mosaic.tolist())
+    for name, panel in zip(names, figure.panels, strict=False):
+        match panel:
+            case Panel():
+                _curves(axes[name], panel)
+            case Bars():
+                _bars(axes[name], panel)
+            case Map():
+                _map(part, axes[name], panel)
+        axes[name].set_title(panel.title, fontsize="medium")
+    handles: Mapping[str, Any] = {
+        label: handle
+        for axis in axes.values()
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
+    caption = fill(figure.caption, round(LETTERS * width))
+    if len(handles) < 2:
+        part.supxlabel(caption, fontsize="small")
+        return
+    part.legend(
+        handles.values(),
+        handles.keys(),
+        title=caption,
+        title_fontsize="small",
+        loc="outside lower center",
+        ncols=max(1, int(width / 2.1)),
+        handlelength=3.5,
+    )
+
+
+def _columns(figure: Figure) -> int:
+    return min(figure.columns, len(figure.panels))
+
+
+def _curves(axis: Any, panel: Panel) -> None:
+    for line in panel.lines:
+        axis.plot(line.x, line.y, label=line.name, **_ink(line.style))
+    for band in panel.bands:
+        if band.high > band.low:
+            axis.axvspan(band.low, band.high, color=FRAME, alpha=0.2, linewidth=0.0, zorder=0)
+        else:
+            axis.axvline(band.low, color=FRAME, linewidth=0.9, linestyle=":", zorder=1)
+    for level in panel.levels:
+        _level(axis, level)
+    axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    axis.set_xlim(
+        min(float(line.x.min()) for line in panel.lines), max(float(line.x.max()) for line in panel.lines)
+    )
+    axis.grid(alpha=0.3)
+    if panel.decades is not None:
+        greatest = max(float(line.y.max()) for line in panel.lines)
+        axis.set(yscale="log", ylim=(greatest * 10.0**-panel.decades, 1.5 * greatest))
+    elif panel.span is not None:
+        axis.set_ylim(panel.span)
+
+
+def _level(axis: Any, level: Level) -> None:
+    look = {"color": LIMIT, "linewidth": 1.0, "linestyle": "--", "zorder": 1}
+    if level.between is None:
+        axis.axhline(level.value, **look)
+    else:
+        axis.plot(level.between, [level.value] * 2, **look)
+
+
+def _bars(axis: Any, panel: Bars) -> None:
+    """Draw bars, and their texts beside them; what the axis cannot hold has an arrow."""
+    axis.barh(list(panel.names), panel.values, color=list(panel.colours))
+    for place, (value, text) in enumerate(zip(panel.values, panel.texts, strict=True)):
+        arrow = "" if value <= panel.end else "▸ "
+        axis.text(min(value, panel.end), place, f" {arrow}{text}", va="center", fontsize="small")
+    axis.axvline(panel.limit, color=LIMIT, linewidth=1.0, linestyle="--")
+    axis.invert_yaxis()
+    axis.set(xlabel=panel.x_label, xlim=(0.0, panel.end))
+
+
+def _map(part: Any, axis: Any, panel: Map) -> None:
+    end = panel.headroom * panel.limit
+    if panel.cells:
+        coloured = axis.pcolormesh(panel.x, panel.y, panel.values, cmap="viridis_r", vmin=0.0, vmax=end)
+    else:
+        levels = np.linspace(0.0, end, SHADES + 1)
+        coloured = axis.contourf(panel.x, panel.y, panel.values, levels, cmap="viridis_r", extend="max")
+        if panel.values.min() < panel.limit < panel.values.max():
+            axis.contour(panel.x, panel.y, panel.values, [panel.limit], colors=INK, linewidths=2.2)
+    if panel.frame is not None:
+        width, height = panel.frame
+        for colour, dash in ((PAPER, "-"), (INK, ":")):
+            corners = ([-width, width, width, -width, -width], [-height, -height, height, height, -height])
+            axis.plot(*corners, color=colour, linestyle=dash, linewidth=1.2)
+    axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    part.colorbar(coloured, ax=axis, label=panel.unit)
+
+
+def _ink(style: Style) -> dict[str, Any]:
     """Say in Matplotlib's words how a curve looks."""
-    return {"color": style.colour, "linestyle": DASHES[style.dash], "linewidth": style.width}
+    points = {"marker": ".", "markersize": 3.0} if style.dash == "points" else {}
+    return {"color": style.colour, "linestyle": DASHES[style.dash], "linewidth": style.width, **points}

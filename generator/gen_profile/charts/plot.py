@@ -7,8 +7,10 @@ from tempfile import TemporaryDirectory
 
 import attrs
 
-from gen_profile.charts import comparison, identification, robustness
-from gen_profile.charts.picture import require_drawable
+from gen_profile.charts.comparison import comparison_figure
+from gen_profile.charts.identification import identification_figure
+from gen_profile.charts.picture import require_drawable, save
+from gen_profile.charts.robustness import robustness_figure
 from gen_profile.comparison.compare import Comparison
 from gen_profile.comparison.robustness import Robustness
 from gen_profile.identification.identify import Identification
@@ -46,12 +48,16 @@ def plot(result: Comparison | Robustness | Identification, path: Path | str | No
     path = Path(path)
     require_drawable(path)
     match result:
-        case Comparison():
-            comparison.draw(result, path)
-        case Robustness():
-            robustness.draw(result, path)
-        case Identification():
-            identification.draw(result, path)
+        case Comparison(spec=spec):
+            figure, title = comparison_figure(result), f"{spec.name}: {spec.plant.type}"
+        case Robustness(spec=spec):
+            load = spec.machine().end_load_name
+            title = f"{spec.name}: residual sway of the {load} on machines that are not as specified"
+            figure = robustness_figure(result)
+        case Identification(spec=spec):
+            names = ", ".join(result.estimate.values)
+            figure, title = identification_figure(result), f"{spec.name}: {names} identified"
         case _:
             raise TypeError(f"There is no picture of a {type(result).__name__}.")
+    save([figure], path, spec.name, title)
     return None

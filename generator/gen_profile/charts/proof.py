@@ -1,14 +1,16 @@
-"""The proof of a planner block as a picture: one history in full, and the worst over the live parameters."""
+"""The proof of a planner block: one history in full, and the worst over the live parameters."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from gen_profile.charts.figure import FRAME, INK, LIMIT, PALETTE
-from gen_profile.charts.picture import picture
+from gen_profile.charts.curves import TIME
+from gen_profile.charts.figure import INK, PALETTE, Band, Figure, Level, Line, Map, Panel, Style
+from gen_profile.charts.picture import save
+from gen_profile.motion.profile import Array
 from gen_profile.progress import Progress, untold
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.trace import Trace, trace
@@ -16,6 +18,9 @@ from gen_profile.proof.verdict import JudgedHistory, Proof
 from gen_profile.spec.model import Spec
 
 CELLS = 8  # of the map along each live parameter
+SAMPLES = 4000  # of a curve, at most
+COMMAND = Style(colour=PALETTE[1], dash="dash")
+SETPOINT = Style(colour=PALETTE[0])
 
 
 def draw(spec: Spec, text: str, proof: Proof, path: Path, progress: Progress = untold) -> None:
@@ -41,96 +46,145 @@ def draw(spec: Spec, text: str, proof: Proof, path: Path, progress: Progress = u
     """
     followed = trace(spec, text, Histories.of(spec), proof.worst.history, progress)
     progress("drawing")
-    mapped = len(proof.judged) > 1
-    with picture(path, spec.name, (12.0 if mapped else 8.0, 9.0)) as figure:
-        left, right = figure.subfigures(1, 2, width_ratios=(2, 1)) if mapped else (figure, None)
-        _history(left.subplots(4, 1, sharex=True), spec, proof, followed)
-        if right is not None:
-            _map(right, spec, proof)
-        figure.suptitle(f"{spec.name}: history {proof.worst.number} of {proof.count}")
+    figures = [history_figure(spec, proof, followed)]
+    if len(proof.judged) > 1:
+        figures.append(map_figure(spec, proof))
+    save(figures, path, spec.name, f"{spec.name}: history {proof.worst.number} of {proof.count}")
 
 
-def _history(axes: Any, spec: Spec, proof: Proof, found: Trace) -> None:
+def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
     """Draw place, velocity, acceleration and sway over time, and shade what is not promised."""
-    own, times, issued = spec.limits.of(0), found.times, found.issued
+    own, issued = spec.limits.of(0), found.issued
     assert own.velocity and own.acceleration and own.travel
-    place, velocity, acceleration, sway = axes
-    place.plot(times, issued["fPosition"], color=PALETTE[0])
-    velocity.plot(times, issued["fVelocity"], color=PALETTE[0])
-    acceleration.plot(times, issued["fAcceleration"], color=PALETTE[0])
-    _commands(place, velocity, found)
-    limits = (own.travel, (-own.velocity, own.velocity), (-own.acceleration, own.acceleration))
-    for axis, levels in zip(axes, limits, strict=False):
-        for level in levels:
-            axis.axhline(level, color=LIMIT, linewidth=0.8)
-    for number, (name, values) in enumerate(found.sway.items()):
-        colour = INK if number == 0 else PALETTE[(number - 1) % len(PALETTE)]
-        sway.plot(times, 1e3 * values, color=colour, linewidth=1.4 if number == 0 else 0.9, label=name)
-    for sign in (-1.0, 1.0):
-        sway.axhline(sign * 1e3 * list(proof.limit.values())[-1], color=LIMIT, linewidth=0.8)
-    unkept = (issued["bPromise"] == 0.0) & (issued["bBusy"] != 0.0)
-    for axis in axes:
-        axis.fill_between(
-            times, 0, 1, where=unkept, transform=axis.get_xaxis_transform(), color=FRAME, alpha=0.25
+    few = slice(None, None, -(-len(found.times) // SAMPLES))
+    times, limit = found.times[few], 1e3 * list(proof.limit.values())[-1]
+    drawn = (
+        ("Position", "m", "fPosition", own.travel, "position"),
+        ("Velocity", "m/s", "fVelocity", (-own.velocity, own.velocity), "velocity"),
+        ("Acceleration", "m/s²", "fAcceleration", (-own.acceleration, own.acceleration), ""),
+    )
+    signs = (1.0, -1.0) if spec.machine().directions == 1 else (1.0,)
+    bands = [*_unpromised(found)]
+    stops = [Band(low=time, high=time) for time in _stops(found)]
+    panels = [
+        Panel(
+            title=title,
+            x_label=TIME,
+            y_label=f"{title.lower()} ({unit})",
+            lines=[
+                Line(name="setpoint", x=times, y=issued[output][few], style=SETPOINT),
+                *_commanded(found, command),
+            ],
+            levels=[Level(value=level) for level in levels],
+            bands=[*bands, *stops],
         )
-        axis.grid(alpha=0.3)
-    sway.legend(fontsize="small", ncols=6, loc="upper center", bbox_to_anchor=(0.5, -0.3))
-    sway.set_xlabel("time (s); grey: not promised")
-    labels = ("position (m)", "velocity (m/s)", "acceleration (m/s²)", "sway (mm)")
-    for axis, label in zip(axes, labels, strict=True):
-        axis.set_ylabel(label)
+        for title, unit, output, levels, command in drawn
+    ]
+    styles = [Style(colour=INK, width=2.0), *(Style(colour=colour, width=1.2) for colour in PALETTE[2:])]
+    panels.append(
+        Panel(
+            title=f"Sway of the {spec.machine().end_load_name}",
+            x_label=TIME,
+            y_label="sway (mm)",
+            lines=[
+                Line(name=name, x=times, y=1e3 * sway[few], style=style)
+                for (name, sway), style in zip(found.sway.items(), styles, strict=False)
+            ],
+            levels=[Level(value=sign * limit) for sign in signs],
+            bands=bands,
+        )
+    )
+    return Figure(
+        caption="Dotted: stops. Shaded: not promised. Dashed in red: limits; of the sway, of what remains.",
+        panels=panels,
+        columns=1,
+    )
 
 
-def _commands(place: Any, velocity: Any, found: Trace) -> None:
-    """Mark targets in the place, the stick in the velocity, and stops in both."""
+def map_figure(spec: Spec, proof: Proof) -> Figure:
+    """Draw the worst share of the limit in cells of two live parameters, or of every history over one."""
+    live = spec.planner.live
+    shares = 100.0 * np.array([proof.share(one) for one in proof.judged])
+    title = "Worst residual sway"
+    if len(live) == 2:
+        (x, across), (y, upwards) = live.items()
+        panel: Panel | Map = Map(
+            title=title,
+            x_label=_labelled(spec, x),
+            y_label=_labelled(spec, y),
+            unit="% of limit",
+            x=_centres(across),
+            y=_centres(upwards),
+            values=_cells(proof.judged, shares, (across, upwards), (x, y)).T,
+            limit=100.0,
+            cells=True,
+            headroom=1.0,
+        )
+    else:
+        name = next(iter(live), "")
+        places = np.array([one.history.live.get(name, one.number) for one in proof.judged])
+        order = np.argsort(places, kind="stable")
+        panel = Panel(
+            title=title,
+            x_label=_labelled(spec, name) if name else "history",
+            y_label="share of its limit (%)",
+            lines=[Line(name="history", x=places[order], y=shares[order], style=Style(dash="points"))],
+            levels=[Level(value=100.0)],
+        )
+    return Figure(
+        caption="Over what the block is told; white: no history there.",
+        panels=[panel],
+        columns=1,
+    )
+
+
+def _labelled(spec: Spec, name: str) -> str:
+    (unit,) = (known.unit for known in spec.machine().parameters if known.name == name)
+    return f"{name} ({unit})"
+
+
+def _unpromised(found: Trace) -> Iterator[Band]:
+    """Find when the block is busy and does not promise."""
+    unkept = (found.issued["bPromise"] == 0.0) & (found.issued["bBusy"] != 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], unkept, [False]])))
+    last = len(found.times) - 1
+    for begin, end in edges.reshape(-1, 2):
+        yield Band(low=float(found.times[begin]), high=float(found.times[min(end, last)]))
+
+
+def _stops(found: Trace) -> list[float]:
+    return [one.time for one in found.history.commands if one.command not in {"position", "velocity"}]
+
+
+def _commanded(found: Trace, kind: str) -> list[Line]:
+    """Draw targets or the stick while they hold, with gaps between."""
     commands = found.history.commands
     ends = [*[command.time for command in commands[1:]], float(found.times[-1])]
-    for command, end in zip(commands, ends, strict=True):
-        span = [command.time, end]
-        if command.command == "position":
-            place.plot(span, [command.value] * 2, color=PALETTE[1], linestyle="--")
-        elif command.command == "velocity":
-            velocity.plot(span, [command.value] * 2, color=PALETTE[1], linestyle="--")
-        else:
-            for axis in (place, velocity):
-                axis.axvline(command.time, color=PALETTE[1], linestyle=":")
+    held = [(one, end) for one, end in zip(commands, ends, strict=True) if one.command == kind]
+    if not held:
+        return []
+    x = np.array([[one.time, end, end] for one, end in held]).ravel()
+    y = np.array([[one.value, one.value, np.nan] for one, _ in held]).ravel()
+    return [Line(name="command", x=x, y=y, style=COMMAND)]
 
 
-def _map(figure: Any, spec: Spec, proof: Proof) -> None:
-    """Draw the worst share of the limit in cells of two live parameters, or over one."""
-    axis = figure.subplots()
-    live = spec.planner.live
-    shares = np.array([proof.share(one) for one in proof.judged])
-    title = "worst residual sway (share of its limit)"
-    if len(live) == 2:
-        worst = _cells(proof.judged, shares, live)
-        (x, across), (y, upwards) = live.items()
-        drawn = axis.imshow(
-            worst.T,
-            origin="lower",
-            aspect="auto",
-            extent=(*across, *upwards),
-            cmap="viridis_r",
-            vmin=0.0,
-            vmax=max(1.0, float(np.nanmax(worst))),
-        )
-        figure.colorbar(drawn, ax=axis, location="bottom", label=title)
-        axis.set(xlabel=x, ylabel=y)
-        return
-    name = next(iter(live), "number")
-    values = [one.history.live.get(name, one.number) for one in proof.judged]
-    axis.plot(values, shares, ".", color=PALETTE[0], markersize=3)
-    axis.axhline(1.0, color=LIMIT, linewidth=0.8)
-    axis.set(xlabel=name if live else "history", ylabel=title)
+def _centres(ends: tuple[float, float]) -> Array:
+    low, high = ends
+    return low + (high - low) * (np.arange(CELLS) + 0.5) / CELLS
 
 
-def _cells(judged: tuple[JudgedHistory, ...], shares: Any, live: Any) -> Any:
+def _cells(
+    judged: Sequence[JudgedHistory],
+    shares: Array,
+    ranges: Sequence[tuple[float, float]],
+    names: Sequence[str],
+) -> Array:
     """Find the greatest share in each cell; where no history was, not a number."""
     worst = np.full((CELLS, CELLS), np.nan)
     for one, share in zip(judged, shares, strict=True):
         cell = tuple(
             min(CELLS - 1, int(CELLS * (one.history.live[name] - low) / (high - low)))
-            for name, (low, high) in live.items()
+            for name, (low, high) in zip(names, ranges, strict=True)
         )
         worst[cell] = np.fmax(worst[cell], share)
     return worst

@@ -131,15 +131,15 @@ def compare(
     from gen_profile.comparison.compare import compare as run
 
     if picture is not None:
-        from gen_profile.charts.comparison import draw
         from gen_profile.charts.picture import require_drawable
+        from gen_profile.charts.plot import plot
 
         require_drawable(picture)
     with progress() as tell:
         comparison = run(spec, tell)
         if picture is not None:
             tell("drawing")
-            draw(comparison, picture)
+            plot(comparison, picture)
     print_outcome(comparison.to_dict(), words.comparison(comparison), as_json)
 
 

@@ -103,7 +103,8 @@ def identify(
     as_json: bool,
 ) -> None:
     """Find parameters from measurements on site, and write a spec."""
-    from gen_profile.charts.identification import draw, require_drawable
+    from gen_profile.charts.picture import require_drawable
+    from gen_profile.charts.plot import plot
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
     from gen_profile.identification.identify import identify as run
@@ -138,7 +139,7 @@ def identify(
         found = run(spec, measurements, free, None if at is None else _positions(at), tell)
         if picture is not None:
             tell("drawing")
-            draw(found, picture)
+            plot(found, picture)
         write_spec(found.spec, out, changed_text(text, overrides, spec, found.spec, folder))
     print_outcome({**found.to_dict(), "path": str(out)}, words.identification(found, out), as_json)
 

@@ -80,10 +80,10 @@ def robustness(
     with progress() as tell:
         found = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
         if picture is not None:
-            from gen_profile.charts.robustness import draw
+            from gen_profile.charts.plot import plot
 
             tell("drawing")
-            draw(found, picture)
+            plot(found, picture)
         if path is not None:
             deliver(path, table(found).encode("utf-8"))
     print_outcome(found.to_dict(), words.robustness(found), as_json)

@@ -106,7 +106,7 @@ class Identification:
 
 
 def read_swing(
-    path: Path,
+    path: Path | str,
     spec: Spec,
     *,
     columns: tuple[str, str],
@@ -119,7 +119,7 @@ def read_swing(
 
     Parameters
     ----------
-    path : Path
+    path : Path or str
         Table with a column of times and one of values.
     columns : (str, str)
         Their names, or their numbers from 1.
@@ -149,7 +149,7 @@ def read_swing(
         raise SpecError(f"signal: unknown load {load!r}{suggestion(load, loads)}")
     per_unit = _per_unit(unit or si_units[quantity], quantity, si_units[quantity])
     log = parse_swing(
-        read_text(path, "swing"),
+        read_text(Path(path), "swing"),
         str(path),
         columns=columns,
         per_second=TIME_UNITS[time_unit],

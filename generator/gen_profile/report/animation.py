@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.charts.figure import rounded
+from gen_profile.charts.plotly_json import rounded
 from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing
 

@@ -9,6 +9,7 @@ from importlib.resources import files
 from importlib.util import find_spec
 from typing import Any
 
+from gen_profile.charts.plotly_json import figure_json
 from gen_profile.errors import OutputError
 from gen_profile.report.content import Page
 
@@ -57,7 +58,7 @@ def render(page: Page) -> bytes:
 
 def _data(page: Page) -> str:
     document = {
-        "figures": [block.to_json() for block in page.figures],
+        "figures": [figure_json(block) for block in page.figures],
         "animations": [block.to_json() for block in page.animations],
     }
     return _json(document)

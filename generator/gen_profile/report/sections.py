@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import attrs
 import tomli_w
 
+from gen_profile.charts.comparison import compared_styles, comparison_figure
 from gen_profile.charts.curves import (
-    compared_styles,
     hamiltonian_figure,
     motion_figure,
-    other_methods,
     select_machines,
     spectrum_figure,
     sway_figure,
@@ -251,7 +251,9 @@ def _methods(comparison: Comparison) -> Section:
     ]
     blocks: list[Block] = [table]
     if comparison.rows:
-        blocks.append(other_methods(comparison))
+        figure = comparison_figure(comparison)
+        more = " Click on a method's name to show or hide its curves."
+        blocks.append(attrs.evolve(figure, caption=figure.caption + more))
     if comparison.left_out:
         blocks.append(left_out)
     return Section(

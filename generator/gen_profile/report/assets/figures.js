@@ -121,7 +121,9 @@
           for (const key of ["gridcolor", "zerolinecolor", "linecolor", "tickcolor"]) change[`${name}.${key}`] = lines[key];
         }
         Plotly.relayout(plot, change);
-        shaded(panel.data).forEach((trace, curve) => Plotly.restyle(plot, { "line.color": trace.line.color }, [curve]));
+        shaded(panel.data).forEach((trace, curve) => {
+          if (trace.line?.color) Plotly.restyle(plot, { "line.color": trace.line.color }, [curve]);
+        });
       }
     }
   }

@@ -1,0 +1,188 @@
+"""Figures as the JSON that Plotly draws; Plotly takes texts for markup, so they are escaped."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from gen_profile.charts.figure import (
+    FRAME,
+    INK,
+    LIMIT,
+    PAPER,
+    SHADES,
+    Band,
+    Bars,
+    Dash,
+    Figure,
+    Level,
+    Line,
+    Map,
+    Panel,
+)
+from gen_profile.motion.profile import Array
+
+EVEN = 1e-12  # of the last time, by which even steps may differ
+DIGITS = 6  # of a curve's largest value: finer than any screen, and a third of the bytes
+SHADE = "rgba(120,130,140,0.16)"
+
+
+def figure_json(figure: Figure) -> dict[str, Any]:
+    """Nest plain values for a page's script: the legend's entries, and data and layout of every panel."""
+    return {
+        "legend": [
+            {"name": name, "colour": style.colour, "dash": style.dash, "shown": style.shown}
+            for name, style in figure.styles.items()
+        ],
+        "panels": [_panel(panel) for panel in figure.panels],
+    }
+
+
+def _panel(panel: Panel | Bars | Map) -> dict[str, Any]:
+    match panel:
+        case Panel():
+            return _curves(panel)
+        case Bars():
+            return _bars(panel)
+        case Map():
+            return _map(panel)
+
+
+def _curves(panel: Panel) -> dict[str, Any]:
+    layout = _labels(panel.x_label, panel.y_label)
+    layout["shapes"] = [*map(_band, panel.bands), *map(_level, panel.levels)]
+    if panel.decades is not None:
+        greatest = math.log10(max(float(line.y.max()) for line in panel.lines))
+        layout["yaxis"] |= {
+            "type": "log",
+            "range": [greatest - panel.decades, greatest + 0.2],
+            "dtick": 1,
+            "exponentformat": "power",
+        }
+    elif panel.span is not None:
+        layout["yaxis"] |= {"range": list(panel.span)}
+    return {"data": [_trace(line) for line in panel.lines], "layout": layout}
+
+
+def _bars(panel: Bars) -> dict[str, Any]:
+    shown = np.minimum(panel.values, panel.end)
+    layout = _labels(panel.x_label, "")
+    layout["xaxis"] |= {"range": [0, panel.end]}
+    layout["yaxis"] |= {"autorange": "reversed"}
+    limit = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": panel.limit, "x1": panel.limit}
+    layout["shapes"] = [{**limit, "line": {"color": LIMIT, "dash": "dash", "width": 1.2}}]
+    bars = {
+        "type": "bar",
+        "orientation": "h",
+        "x": rounded(shown),
+        "y": [escape(name) for name in panel.names],
+        "text": [escape(text) for text in panel.texts],
+        "textposition": "auto",
+        "hoverinfo": "y+text",
+        "marker": {"color": list(panel.colours)},
+    }
+    return {"data": [bars], "layout": {**layout, "hovermode": "closest"}}
+
+
+def _map(panel: Map) -> dict[str, Any]:
+    grid = {"x": rounded(panel.x), "y": rounded(panel.y), "z": [rounded(row) for row in panel.values]}
+    end = panel.headroom * panel.limit
+    bar = {"title": {"text": escape(panel.unit)}, "thickness": 12, "outlinewidth": 0, "dtick": panel.limit}
+    colours = {"zmin": 0.0, "zmax": end, "colorscale": "Viridis", "reversescale": True, "colorbar": bar}
+    if panel.cells:
+        data = [{"type": "heatmap", **grid, **colours}]
+    else:
+        step = {"start": 0.0, "end": end, "size": end / SHADES}
+        limit = {"start": panel.limit, "end": panel.limit, "size": end, "coloring": "none"}
+        ink = {"line": {"color": INK, "width": 2.2}, "showscale": False, "hoverinfo": "skip"}
+        data = [
+            {"type": "contour", **grid, "contours": step, "line": {"width": 0}, **colours},
+            {"type": "contour", **grid, "contours": limit, **ink},
+        ]
+    layout = {**_labels(panel.x_label, panel.y_label), "hovermode": "closest"}
+    if panel.frame is not None:
+        layout["shapes"] = [_frame(panel.frame, PAPER, "solid"), _frame(panel.frame, INK, "dot")]
+    return {"data": data, "layout": layout}
+
+
+def _labels(x: str, y: str) -> dict[str, Any]:
+    return {"xaxis": {"title": {"text": escape(x)}}, "yaxis": {"title": {"text": escape(y)}}}
+
+
+def rounded(values: Array) -> list[float | None]:
+    """Round to `DIGITS` of the largest value; negative zeros become zeros, and what is no number None."""
+    largest = float(np.nanmax(np.abs(values), initial=0.0))
+    decimals = DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
+    numbers: list[float] = (np.round(values, decimals) + 0.0).tolist()
+    return [None if math.isnan(number) else number for number in numbers]
+
+
+def _trace(line: Line) -> dict[str, Any]:
+    points = line.style.dash == "points"
+    look = {"color": line.style.colour, "width": line.style.width}
+    return {
+        "type": "scatter",
+        "mode": "markers" if points else "lines",
+        "name": escape(line.name),
+        "meta": line.name,
+        **_abscissa(line.x),
+        "y": rounded(line.y),
+        **(
+            {"marker": {"color": line.style.colour, "size": 3}}
+            if points
+            else {"line": {**look, "dash": line.style.dash}}
+        ),
+        "visible": line.style.shown,
+    }
+
+
+def _abscissa(x: Array) -> dict[str, Any]:
+    """Write even steps as such: most curves have them, and the page is half as large."""
+    steps = np.diff(x)
+    if np.ptp(steps) <= EVEN * np.abs(x).max():
+        return {"x0": float(x[0]), "dx": float(x[-1] - x[0]) / (len(x) - 1)}
+    return {"x": rounded(x)}
+
+
+def _band(band: Band) -> dict[str, Any]:
+    edge = {"width": 1, "color": FRAME, "dash": "dot"} if band.low == band.high else {"width": 0}
+    return {
+        "type": "rect",
+        "layer": "below",
+        "x0": band.low,
+        "x1": band.high,
+        "yref": "paper",
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": SHADE,
+        "line": edge,
+    }
+
+
+def _frame(frame: tuple[float, float], colour: str, dash: Dash) -> dict[str, Any]:
+    width, height = frame
+    return {
+        "type": "rect",
+        "x0": -width,
+        "x1": width,
+        "y0": -height,
+        "y1": height,
+        "line": {"width": 1.2, "color": colour, "dash": dash},
+    }
+
+
+def _level(level: Level) -> dict[str, Any]:
+    left, right = level.between or (0, 1)
+    return {
+        "type": "line",
+        "xref": "paper" if level.between is None else "x",
+        "x0": left,
+        "x1": right,
+        "y0": level.value,
+        "y1": level.value,
+        "line": {"color": LIMIT, "dash": "dash", "width": 1.2},
+        "label": {"text": escape(level.name), "textposition": "end", "font": {"size": 11, "color": LIMIT}},
+    }
