@@ -61,6 +61,45 @@ class Setpoints:
         return np.concatenate([self.position[:1], self.position[:-1]])
 
 
+@attrs.frozen(kw_only=True)
+class Demand:
+    """What a motion, or every motion of a planner, asks of each axis, in counts and s.
+
+    Attributes
+    ----------
+    start : tuple of int or None
+        Where the motion begins; None where it begins wherever the axes stand.
+    ends : tuple of (int, int)
+        Least and greatest position.
+    velocity, acceleration : tuple of float
+        Greatest magnitudes.
+    quick_stop : tuple of int
+        Deceleration 6085h of the drive's quick stop.
+    """
+
+    start: tuple[int, ...] | None
+    ends: tuple[tuple[int, int], ...]
+    velocity: tuple[float, ...]
+    acceleration: tuple[float, ...]
+    quick_stop: tuple[int, ...]
+
+
+def demand_of(motion: Setpoints, target: Target) -> Demand:
+    """Find what a motion asks of the drives."""
+    columns = motion.position.T
+    accelerations = tuple(_greatest_acceleration(position, motion.period) for position in columns)
+    return Demand(
+        start=tuple(map(int, motion.position[0])),
+        ends=tuple((int(position.min()), int(position.max())) for position in columns),
+        velocity=tuple(float(np.abs(np.diff(position)).max()) / motion.period for position in columns),
+        acceleration=accelerations,
+        quick_stop=tuple(
+            quick_stop_deceleration(DECELERATION_MARGIN * acceleration, target.can, axis)
+            for acceleration, axis in zip(accelerations, target.axes, strict=True)
+        ),
+    )
+
+
 def exact(value: float) -> Fraction:
     """Read a double as the shortest decimal number that means it, as a spec states it."""
     return Fraction(Decimal(repr(float(value))))
@@ -128,19 +167,14 @@ def magnitude_counts(value: float, axis: AxisScale) -> int:
     return max(1, int(exact_counts(np.array([value]), abs(exact(axis.counts_per_si)))[0]))
 
 
-def quick_stop_deceleration(position: Integers, period: float, can: CanSpec, axis: AxisScale) -> int:
-    """Deceleration 6085h in counts/s²: the spec's, else twice the motion's own greatest acceleration."""
+def quick_stop_deceleration(unstated: float, can: CanSpec, axis: AxisScale) -> int:
+    """Deceleration 6085h in counts/s²: the spec's, else the one given."""
     if can.quick_stop is not None:
         return magnitude_counts(can.quick_stop, axis)
-    return max(1, min(INT32.max, round(DECELERATION_MARGIN * greatest_acceleration(position, period))))
+    return max(1, min(INT32.max, round(unstated)))
 
 
-def greatest_velocity(position: Integers, period: float) -> float:
-    """Greatest speed of one axis, in counts/s."""
-    return float(np.abs(np.diff(position)).max()) / period
-
-
-def greatest_acceleration(position: Integers, period: float) -> float:
+def _greatest_acceleration(position: Integers, period: float) -> float:
     """Greatest acceleration of one axis, in counts/s²."""
     velocity = np.diff(position) / period
     apart = max(1, round(DIFFERENCE / period))

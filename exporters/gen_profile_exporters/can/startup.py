@@ -24,9 +24,8 @@ from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import MODES
 from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.can.scaling import (
-    Setpoints,
+    Demand,
     magnitude_counts,
-    quick_stop_deceleration,
     travel_counts,
 )
 from gen_profile_exporters.exporter import Target
@@ -112,11 +111,11 @@ def heartbeat_ms(can: CanSpec) -> int:
     return min(SLOWEST_HEARTBEAT, timeout_ms(can))
 
 
-def startup_lists(motion: Setpoints, target: Target) -> dict[int, tuple[Entry, ...]]:
+def startup_lists(demand: Demand, target: Target) -> dict[int, tuple[Entry, ...]]:
     """List by node what its drive must be set to, in the order in which it must be set."""
     drives = zip(frames.nodes(target), frames.cob_ids(target), strict=True)
     return {
-        node: tuple(_entries(node, column, own, motion, target)) for column, (node, own) in enumerate(drives)
+        node: tuple(_entries(node, column, own, demand, target)) for column, (node, own) in enumerate(drives)
     }
 
 
@@ -146,7 +145,7 @@ def _number(entry: Entry) -> str:
 
 
 def _entries(
-    node: int, column: int, own: Mapping[int, int], motion: Setpoints, target: Target
+    node: int, column: int, own: Mapping[int, int], demand: Demand, target: Target
 ) -> Iterator[Entry]:
     can, axis = target.can, target.axes[column]
     yield from _monitoring(can)
@@ -157,8 +156,7 @@ def _entries(
     yield Entry(0x6060, 0, 8, MODES[can.mode], f"mode of operation: {can.mode}")
     yield Entry(0x6007, 0, 16, QUICK_STOP_ON_LOST_CONNECTION, "connection lost: quick stop")
     yield Entry(0x605A, 0, 16, RAMP_THEN_DISABLE, "quick stop: brake on its ramp and disable")
-    deceleration = quick_stop_deceleration(motion.position[:, column], motion.period, can, axis)
-    yield Entry(0x6085, 0, 32, deceleration, "deceleration of a quick stop (counts/s²)")
+    yield Entry(0x6085, 0, 32, demand.quick_stop[column], "deceleration of a quick stop (counts/s²)")
     yield from _limits(axis, can)
     for index, pair, meaning in (
         (0x608F, can.encoder, "encoder: increments per motor revolutions"),

@@ -362,10 +362,10 @@ def _at_start(source: Source) -> tuple[dict[str, Any], str]:
 
 def _self_test(source: Source, tell: Progress) -> str:
     """Measure this machine, and say before anything moves what came of it."""
-    from gen_profile.streaming.stream import self_test
+    from gen_profile.streaming.stream import rehearsed_cycles, self_test
 
-    motion = source.plan.motion
-    tell(f"measuring this machine for {len(motion.position) * motion.period:.3g} s, as the motion lasts")
+    seconds = rehearsed_cycles(source) * source.spec.can.sync_period
+    tell(f"measuring this machine for {seconds:.3g} s")
     found = f"Self-test: {_lateness_words(self_test(source))}."
     tell(found)
     return found
@@ -385,7 +385,7 @@ def _port(interface: str | None, channel: str | None, simulated: bool, can: CanS
 
 
 def _units(source: Source) -> list[str]:
-    return [axis.unit for axis in source.spec.machine().actuated]
+    return [axis.unit for axis in source.axes]
 
 
 def _plan_words(plan: dict[str, Any], units: Sequence[str]) -> str:

@@ -105,7 +105,7 @@ def watched(source: Source, show: Show) -> Iterator[Book]:
         is over. It must be importable.
     """
     context = multiprocessing.get_context("spawn")
-    cycles, axes = source.plan.motion.position.shape
+    cycles, axes = source.plan.at_sync.shape
     memory = context.RawArray("b", Book.size(cycles, axes))
     viewer = context.Process(target=_look, args=(memory, _view(source), show), daemon=True)
     viewer.start()
@@ -135,13 +135,13 @@ def _look(memory: Any, view: View, show: Show) -> None:
 
 
 def _view(source: Source) -> View:
-    motion, machine = source.plan.motion, source.spec.machine()
+    axes = source.axes
     scale = np.array([axis.counts_per_si for axis in source.plan.target.axes])
     return View(
         name=source.spec.name,
-        axes=tuple(axis.name for axis in machine.actuated),
-        units=tuple(axis.unit for axis in machine.actuated),
-        period=motion.period,
-        planned=motion.at_sync / scale,
+        axes=tuple(axis.name for axis in axes),
+        units=tuple(axis.unit for axis in axes),
+        period=source.spec.can.sync_period,
+        planned=source.plan.at_sync / scale,
         scale=scale,
     )

@@ -6,20 +6,35 @@ from typing import Any
 
 import attrs
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from gen_profile.motion.profile import Array, grid_times
+from gen_profile.plants.plant import Coordinate
 from gen_profile.spec.model import Spec
+from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.streaming.following import Standstill, standstills
-from gen_profile_exporters.can.streaming.plan import StreamPlan
+from gen_profile_exporters.can.streaming.plan import SetpointSource
 from gen_profile_exporters.can.streaming.record import Record
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Source:
-    """A verified motion and the spec that it was designed for."""
+    """A verified motion, or planner, and the spec that it was designed for."""
 
     spec: Spec
-    plan: StreamPlan
+    plan: SetpointSource
+
+    @property
+    def axes(self) -> tuple[Coordinate, ...]:
+        """The axes that are streamed to."""
+        names = [axis.name for axis in self.plan.target.axes]
+        return tuple(axis for axis in self.spec.machine().actuated if axis.name in names)
+
+    def si(self, counts: ArrayLike) -> list[float]:
+        """Turn one position per axis from counts into m (or rad)."""
+        scale = np.array([axis.counts_per_si for axis in self.plan.target.axes])
+        found: list[float] = (np.asarray(counts) / scale).tolist()
+        return found
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -49,26 +64,26 @@ class StreamOutcome:
     @property
     def planned(self) -> Array:
         """Position that each axis is led to by the instant of each SYNC, in m, shape (cycles, axes)."""
-        return self._si(self.source.plan.motion.at_sync)
+        return self._si(self.source.plan.at_sync)
 
     @property
     def actual(self) -> Array:
         """Position that each drive told at each SYNC, in m; not a number where none was told."""
-        return np.where(self.record.told[:, None], self._si(self.record.actual), np.nan)
+        return np.where(self._told[:, None], self._si(self._actual), np.nan)
 
     @property
     def standstills(self) -> tuple[Standstill, ...]:
         """Axes that stood still while their setpoints went on."""
-        motion = self.source.plan.motion
-        return standstills(motion.at_sync, self.record.actual, self.record.told, motion.period)
+        period = self.source.plan.target.can.sync_period
+        return standstills(self.source.plan.at_sync, self._actual, self._told, period)
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        told = self.record.told
+        told, goal = self._told, self.source.plan.goal
         apart = np.abs(self.actual - self.planned)[told]
-        target = self._si(self.source.plan.motion.position[-1])
+        final = np.array(self.record.final)
         drive = {
-            "position_error_m": float(np.abs(self._si(np.array(self.record.final)) - target).max()),
+            "position_error_m": float(np.abs(self._si(final - (final if goal is None else goal))).max()),
             "following_error_max_m": float(apart.max()) if told.any() else None,
             "sway_residual_peak_m": self.sway,
             "cycles_unanswered": self.record.sent - int(told.sum()),
@@ -77,7 +92,7 @@ class StreamOutcome:
         return {
             "state": self.record.phase.value,
             "cycles_sent": self.record.sent,
-            "cycles_planned": len(self.source.plan.cycles),
+            "cycles_planned": self.source.plan.planned,
             "lateness_us": self.record.lateness.to_dict(),
             "drift_s": self.record.lateness.drift,
             "drive": drive if told.any() else None,
@@ -87,10 +102,12 @@ class StreamOutcome:
 
     def table(self) -> bytes:
         """Render plan and reality side by side (RFC 4180)."""
-        axes = self.source.spec.machine().actuated
+        axes, further = self.source.axes, self.source.plan.columns
         heads = [f"{axis.name}_{what}_{axis.unit}" for axis in axes for what in ("planned", "actual")]
-        times = grid_times(len(self.planned) - 1, self.source.plan.motion.period)
-        columns = np.stack([self.planned, self.actual], axis=2).reshape(len(times), -1)
+        times = grid_times(len(self.planned) - 1, self.source.plan.target.can.sync_period)
+        places = np.stack([self.planned, self.actual], axis=2).reshape(len(times), -1)
+        columns = np.column_stack([places, *further.values()])
+        heads += further
         rows = [
             ",".join([f"{time:.9g}", *("" if np.isnan(cell) else f"{cell:.9g}" for cell in row)])
             for time, row in zip(times, columns, strict=True)
@@ -99,12 +116,21 @@ class StreamOutcome:
 
     def _standstill_words(self, found: Standstill) -> str:
         axis, many = self.source.plan.target.axes[found.column], len(found.cycles)
-        unit = self.source.spec.machine().actuated[found.column].unit
+        unit = self.source.axes[found.column].unit
         return (
             f"axis {axis.name}: it stood still in {many} {'cycles' if many > 1 else 'cycle'} of the motion, "
             f"from cycle {found.cycles[0]} on, and came {1e3 * found.apart / abs(axis.counts_per_si):.3g} "
             f"m{unit} off it: its drive left setpoints out."
         )
+
+    @property
+    def _told(self) -> NDArray[np.bool_]:
+        """For which cycles there is a position; the record may have room for more of them."""
+        return self.record.told[: len(self.source.plan.at_sync)]
+
+    @property
+    def _actual(self) -> Integers:
+        return self.record.actual[: len(self.source.plan.at_sync)]
 
     def _si(self, counts: Any) -> Array:
         scale = np.array([axis.counts_per_si for axis in self.source.plan.target.axes])

@@ -19,7 +19,6 @@ from gen_profile.streaming.outcome import Source
 from gen_profile.streaming.stream import designed, standing
 from gen_profile.suggestion import suggestion
 from gen_profile_exporters.can.host.port import Port
-from gen_profile_exporters.can.scaling import greatest_acceleration, greatest_velocity
 from gen_profile_exporters.can.streaming.approach import CREEP, SHARE
 
 # room for the shape of a motion: its peaks over those at even speed, or with even acceleration
@@ -77,12 +76,12 @@ def slow(source: Source, start: Sequence[float], target: Sequence[float]) -> Spe
     Spec
         With limits on every axis, and a duration that leaves room below them.
     """
-    spec, motion = source.spec, source.plan.motion
+    spec, demand = source.spec, source.plan.demand
     durations, limits = [SETTLE * observation_time(spec)], {}
     for column, (name, axis) in enumerate(spec.axis.items()):
-        position, scale = motion.position[:, column], abs(axis.counts_per_metre)
-        velocity = SHARE * greatest_velocity(position, motion.period) / scale or CREEP
-        acceleration = SHARE * greatest_acceleration(position, motion.period) / scale or CREEP
+        scale = abs(axis.counts_per_metre)
+        velocity = SHARE * demand.velocity[column] / scale or CREEP
+        acceleration = SHARE * demand.acceleration[column] / scale or CREEP
         distance = abs(target[column] - start[column])
         durations += [
             PEAK_VELOCITY * distance / velocity,

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from gen_profile_exporters.can.streaming.record import Book, Record
 
 Tell = Callable[[str], None]
+SELF_TEST = 20.0  # s
 SPIN = 200_000  # ns before each cycle, where a processor can be spared for it
 
 
@@ -135,38 +136,43 @@ def standing(source: Source, port: Port, tell: Tell) -> tuple[float, ...]:
     with opened(port, target) as bus:
         link = Link(bus, SystemClock())
         listen(link)
-        counts = positions(link, target, source.plan.motion)
+        counts = positions(link, target, source.plan.demand)
     return tuple(at / axis.counts_per_si for at, axis in zip(counts, target.axes, strict=True))
 
 
 def summary(source: Source) -> dict[str, Any]:
     """List what a stream will do, without doing it."""
-    target, motion = source.plan.target, source.plan.motion
+    plan, target, period = source.plan, source.plan.target, source.spec.can.sync_period
+    none = [None] * len(target.axes)
+    starts = none if plan.demand.start is None else source.si(plan.demand.start)
+    goals = none if plan.goal is None else source.si(plan.goal)
     return {
         "state": "planned",
         "cycles_sent": 0,
-        "cycles_planned": len(source.plan.cycles),
-        "period_s": motion.period,
-        "bus_load": frames.cycle_bits(target) / target.can.bitrate / motion.period,
+        "cycles_planned": plan.planned,
+        "period_s": period,
+        "bus_load": frames.cycle_bits(target) / target.can.bitrate / period,
         "axes": [
-            {
-                "name": axis.name,
-                "node": node,
-                "start_m": float(motion.position[0, column] / axis.counts_per_si),
-                "target_m": float(motion.position[-1, column] / axis.counts_per_si),
-            }
-            for column, (axis, node) in enumerate(zip(target.axes, frames.nodes(target), strict=True))
+            {"name": axis.name, "node": node, "start_m": start, "target_m": goal}
+            for axis, node, start, goal in zip(target.axes, frames.nodes(target), starts, goals, strict=True)
         ],
         "startup": [
             {"node": node, "object": f"{e.index:04X}h:{e.sub:02X}", "value": e.value, "meaning": e.meaning}
-            for node, entries in startup_lists(motion, target).items()
+            for node, entries in startup_lists(plan.demand, target).items()
             for e in entries
         ],
     }
 
 
+def rehearsed_cycles(source: Source) -> int:
+    """Count the cycles of a self-test."""
+    return source.plan.planned or round(SELF_TEST / source.spec.can.sync_period)
+
+
 def self_test(source: Source) -> Lateness:
     """Keep the cycle without a bus for as long as the motion lasts, and refuse what this machine cannot hold.
+
+    Where nobody knows how long that is, for `SELF_TEST`.
 
     Raises
     ------
@@ -174,7 +180,7 @@ def self_test(source: Source) -> Lateness:
     """
     period = frames.period_microseconds(source.spec.can) * 1000
     with real_time() as refused:
-        found = rehearse(_clock(refused), period, len(source.plan.cycles))
+        found = rehearse(_clock(refused), period, rehearsed_cycles(source))
     if found.percentile(100) * 1e3 >= period / 2:
         raise StreamAborted(
             f"This machine cannot hold a cycle of {period / 1e6:g} ms: it was late by up to "
@@ -230,13 +236,14 @@ def stream(
         clock = _clock(refused) if simulation is None else simulation.clock
         streamer = Streamer(bus, clock, source.plan, aside, reset_fault=reset_fault, book=book)
         stack.enter_context(stopped_by_signals(streamer.ask_to_stop))
+        stack.enter_context(source.plan.operated())
         before = 0 if simulation is None else simulation.clock.catch_up()
         record = streamer.run()
     if simulation is None:
         sway, remarks = None, port.remarks(record.launched, _several_buses(source))
     else:
         sway, remarks = simulation.sway, _stalls(simulation.clock.stalled - before)
-    said = (*notes, *refused, *remarks, *_afterwards(record))
+    said = (*notes, *refused, *remarks, *source.plan.remarks, *_afterwards(record))
     return StreamOutcome(source=source, record=record, notes=said, sway=sway)
 
 
@@ -319,7 +326,7 @@ def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
     period = frames.period_microseconds(source.spec.can) * 1000
     with (
         CraneLoad(source.spec, lambda: tell("compiling the plant's FMU, once")) as load,
-        opened(port, source.plan.target) as bus,
+        opened(port, target_of(source.spec)) as bus,
     ):
         clock = SharedClock(longest=period // 4)
         clock.work = drive_bank(source.spec, bus, load, DriveVariant(), clock).poll

@@ -8,7 +8,7 @@ import pytest
 from exporters.can.bench import Bench, RigidLoad
 from motions import quintic
 
-from gen_profile.streaming.outcome import StreamOutcome
+from gen_profile.streaming.outcome import Source, StreamOutcome
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
 from gen_profile_exporters.can.streaming.following import standstills
 
@@ -42,8 +42,8 @@ def test_setpoints_that_a_drive_leaves_out(many, goal):
     assert abs(stood.cycles[0] - 121) <= 1
     step = np.abs(np.diff(bench.plan.motion.position[:, 0])).max()
     assert stood.apart == pytest.approx(many * step, rel=0.02)
-    machine = SimpleNamespace(actuated=[SimpleNamespace(unit="m")])
-    source = SimpleNamespace(plan=bench.plan, spec=SimpleNamespace(machine=lambda: machine))
+    machine = SimpleNamespace(actuated=[SimpleNamespace(name="cart", unit="m")])
+    source = Source(plan=bench.plan, spec=SimpleNamespace(machine=lambda: machine))
     told = StreamOutcome(source=source, record=record, notes=("first",)).to_dict()
     assert (told["drive"]["cycles_standing"], told["drive"]["cycles_unanswered"]) == (many, 0)
     cycles = "1 cycle" if many == 1 else f"{many} cycles"

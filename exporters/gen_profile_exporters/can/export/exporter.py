@@ -19,7 +19,7 @@ from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.export import candump, database, traces
 from gen_profile_exporters.can.export.candump import Frame
 from gen_profile_exporters.can.frames import MICROSECONDS, SYNC, SetpointFrame
-from gen_profile_exporters.can.scaling import Setpoints, setpoints, travelled
+from gen_profile_exporters.can.scaling import Setpoints, demand_of, setpoints, travelled
 from gen_profile_exporters.exporter import File, Target
 from gen_profile_exporters.setpoints import in_si, plausible_cycle_time, sampled
 
@@ -37,7 +37,7 @@ def encode(profile: Profile, target: Target) -> tuple[File, ...]:
     frames.require_load(target)
     motion = setpoints(sampled(profile, target, target.can.sync_period, "can.sync_period"), target)
     cycles = tuple(cyclic_frames(motion, target))
-    lists = startup.startup_lists(motion, target)
+    lists = startup.startup_lists(demand_of(motion, target), target)
     contents = {
         ".log": candump.write(cycles),
         ".asc": traces.asc(cycles),

@@ -13,13 +13,9 @@ from math import ceil
 
 import numpy as np
 
+from gen_profile_exporters.can import pdos
 from gen_profile_exporters.can.frames import Integers
-from gen_profile_exporters.can.scaling import (
-    Setpoints,
-    greatest_acceleration,
-    greatest_velocity,
-    magnitude_counts,
-)
+from gen_profile_exporters.can.scaling import Demand, Setpoints, magnitude_counts
 from gen_profile_exporters.exporter import Target
 
 SHARE = 0.1  # of the motion's greatest velocity and acceleration
@@ -27,40 +23,42 @@ CREEP = 0.001  # m/s and m/s² (or rad) of an axis that the motion leaves at res
 PEAK_VELOCITY, PEAK_ACCELERATION = 15 / 8, 10 / 3**0.5  # of the polynomial, for unit distance and time
 
 
-def approach(standing: Sequence[int], motion: Setpoints, target: Target) -> Setpoints:
+def approach(standing: Sequence[int], demand: Demand, target: Target) -> Setpoints:
     """Lead all axes to the first setpoint, to arrive there together.
 
     Parameters
     ----------
     standing : sequence of int
         Where the axes stand, in counts.
-    motion : Setpoints
+    demand : Demand
+        Of the motion.
     target : Target
 
     Returns
     -------
     Setpoints
-        Of no cycle, where the axes stand at the first setpoint already.
+        Of no cycle, where the axes stand at the first setpoint already, or the motion begins anywhere.
     """
-    distance = motion.position[0] - np.array(standing)
-    cycles = ceil(max(_durations(distance, motion, target)) / motion.period)
+    period = target.can.sync_period
+    distance = np.array(standing if demand.start is None else demand.start) - np.array(standing)
+    cycles = ceil(max(_durations(distance, demand, target)) / period)
     share = np.arange(cycles + 1)[:, None] / max(1, cycles)
     position = np.rint(standing + distance * share**3 * (10 - 15 * share + 6 * share**2)).astype(np.int64)
-    rest = np.zeros((cycles, len(standing), motion.offsets.shape[2]), dtype=np.int64)
-    if motion.velocity is None:
-        return Setpoints(period=motion.period, position=position[1:], offsets=rest)
-    velocity = np.diff(np.rint(position / motion.period), axis=0).astype(np.int64)  # rounding adds nothing up
-    return Setpoints(period=motion.period, position=position[:-1], offsets=rest, velocity=velocity)
+    offsets = len(pdos.setpoint_fields(target.can)) - 1
+    rest = np.zeros((cycles, len(standing), offsets), dtype=np.int64)
+    if target.can.mode != "csv":
+        return Setpoints(period=period, position=position[1:], offsets=rest)
+    velocity = np.diff(np.rint(position / period), axis=0).astype(np.int64)  # rounding adds nothing up
+    return Setpoints(period=period, position=position[:-1], offsets=rest, velocity=velocity)
 
 
-def _durations(distance: Integers, motion: Setpoints, target: Target) -> list[float]:
+def _durations(distance: Integers, demand: Demand, target: Target) -> list[float]:
     """Shortest time in s in which each axis goes a distance in counts within its limits."""
     found = []
     for column, axis in enumerate(target.axes):
-        position, far = motion.position[:, column], abs(int(distance[column]))
-        creep = magnitude_counts(CREEP, axis)
-        velocity = SHARE * greatest_velocity(position, motion.period) or creep
-        acceleration = SHARE * greatest_acceleration(position, motion.period) or creep
+        far, creep = abs(int(distance[column])), magnitude_counts(CREEP, axis)
+        velocity = SHARE * demand.velocity[column] or creep
+        acceleration = SHARE * demand.acceleration[column] or creep
         by_velocity = PEAK_VELOCITY * far / velocity
         found.append(max(by_velocity, (PEAK_ACCELERATION * far / acceleration) ** 0.5))
     return found

@@ -18,10 +18,11 @@ from canopen import SdoAbortedError
 from canopen.sdo.exceptions import SdoError
 
 from gen_profile.errors import StreamAborted
+from gen_profile.units import AxisScale
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS
-from gen_profile_exporters.can.scaling import Setpoints, magnitude_counts
+from gen_profile_exporters.can.scaling import Demand, magnitude_counts
 from gen_profile_exporters.can.startup import AT_ONCE, PDO_PARAMETERS, Entry, startup_lists
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.restoration import (
@@ -56,7 +57,7 @@ class Node:
 def configure(
     link: Link,
     target: Target,
-    motion: Setpoints,
+    demand: Demand,
     found: Restoration,
     meanwhile: Callable[[], None],
     *,
@@ -71,7 +72,7 @@ def configure(
     ----------
     link : Link
     target : Target
-    motion : Setpoints
+    demand : Demand
     found : Restoration
         Remembers what the drives were set to, as far as that is changed.
     meanwhile : callable
@@ -89,7 +90,7 @@ def configure(
     StreamAborted
         A drive is another one, in fault, cannot be set up, watches nothing, or stands elsewhere.
     """
-    lists = startup_lists(motion, target)
+    lists = startup_lists(demand, target)
     for node in (nodes := _nodes(target)):
         link.send(nmt(PRE_OPERATIONAL, node.number))
         _require_identity(link, node, target)
@@ -101,10 +102,10 @@ def configure(
     link.meanwhile = meanwhile
     for node in nodes:
         _set(link, node, lists[node.number], found)
-    return tuple(_require_fit(link, node, target, motion) for node in nodes)
+    return tuple(_require_fit(link, node, target, demand) for node in nodes)
 
 
-def positions(link: Link, target: Target, motion: Setpoints) -> tuple[int, ...]:
+def positions(link: Link, target: Target, demand: Demand) -> tuple[int, ...]:
     """Ask the drives where their axes stand, in counts; changes nothing.
 
     Raises
@@ -112,7 +113,7 @@ def positions(link: Link, target: Target, motion: Setpoints) -> tuple[int, ...]:
     StreamAborted
         A drive is another one, or counts in other units than the spec says.
     """
-    lists = startup_lists(motion, target)
+    lists = startup_lists(demand, target)
     for node in (nodes := _nodes(target)):
         _require_identity(link, node, target)
         for entry in lists[node.number]:
@@ -162,16 +163,16 @@ def _nodes(target: Target) -> list[Node]:
     ]
 
 
-def _require_fit(link: Link, node: Node, target: Target, motion: Setpoints) -> int:
+def _require_fit(link: Link, node: Node, target: Target, demand: Demand) -> int:
     """Find a drive that was set up fit to follow; return where its axis stands."""
     mode = MODES[target.can.mode]
     if (shown := _read(link, node, 0x6061, bits=8)) != mode:
         raise StreamAborted(f"axis {node.name}: the drive shows mode {shown} (6061h) instead of {mode}.")
     if target.can.mode != "csv":  # in which the streamer watches, not the drive
         _require_window(link, node)
-    _require_travel(link, node, motion)
+    _require_travel(link, node, demand)
     _require_homed(link, node, target)
-    return _require_start(link, node, target, motion)
+    return _require_start(link, node, target, demand)
 
 
 def _require_identity(link: Link, node: Node, target: Target) -> None:
@@ -309,15 +310,15 @@ def _require_window(link: Link, node: Node) -> None:
         )
 
 
-def _require_travel(link: Link, node: Node, motion: Setpoints) -> None:
+def _require_travel(link: Link, node: Node, demand: Demand) -> None:
     ends = [_upload(link, node, 0x607D, sub, optional=True) for sub in (1, 2)]
     if ends[0] is None or ends[1] is None:
         return
     low, high = (int.from_bytes(end, "little", signed=True) for end in ends if end is not None)
-    column = motion.position[:, node.column]
-    if low < high and not (low <= column.min() and column.max() <= high):
+    least, greatest = demand.ends[node.column]
+    if low < high and not (low <= least and greatest <= high):
         raise StreamAborted(
-            f"axis {node.name}: the motion from {column.min()} to {column.max()} counts leaves the drive's "
+            f"axis {node.name}: the motion from {least} to {greatest} counts leaves the drive's "
             f"travel of {low} to {high} counts (607Dh)."
         )
 
@@ -333,10 +334,13 @@ def _require_homed(link: Link, node: Node, target: Target) -> None:
         )
 
 
-def _require_start(link: Link, node: Node, target: Target, motion: Setpoints) -> int:
+def _require_start(link: Link, node: Node, target: Target, demand: Demand) -> int:
     actual = _signed(_read(link, node, 0x6064))
-    first = int(motion.position[0, node.column])
     axis = target.axes[node.column]
+    if demand.start is None:
+        _require_inside(actual, node, axis, demand)
+        return actual
+    first = demand.start[node.column]
     allowed = magnitude_counts(target.can.start_tolerance, axis)
     if abs(actual - first) > allowed:
         raise StreamAborted(
@@ -345,6 +349,16 @@ def _require_start(link: Link, node: Node, target: Target, motion: Setpoints) ->
             "can.start_tolerance); home it, or move it there."
         )
     return actual
+
+
+def _require_inside(actual: int, node: Node, axis: AxisScale, demand: Demand) -> None:
+    least, greatest = demand.ends[node.column]
+    if not least <= actual <= greatest:
+        ends = sorted(end / axis.counts_per_si for end in (least, greatest))
+        raise StreamAborted(
+            f"axis {node.name}: it stands at {actual / axis.counts_per_si:.6g}, outside the planner's travel "
+            f"of {ends[0]:.6g} to {ends[1]:.6g}; move it there by other means."
+        )
 
 
 def _read(link: Link, node: Node, index: int, sub: int = 0, bits: int = 32) -> int:

@@ -1,8 +1,11 @@
-"""What a stream will send: read from the artefact, encoded before the first cycle."""
+"""What a stream sends cycle by cycle: the setpoints of a log, or of any other source."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from functools import cached_property
+from typing import Protocol
 
 import attrs
 import can
@@ -13,15 +16,95 @@ from gen_profile.motion.profile import SampledProfile
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.export.exporter import read_setpoints, replay
 from gen_profile_exporters.can.frames import Integers, SetpointFrame, message
-from gen_profile_exporters.can.scaling import Setpoints
+from gen_profile_exporters.can.scaling import Demand, Setpoints, demand_of
 from gen_profile_exporters.exporter import Target
 
 Cycle = tuple[can.Message, ...]
 
 
 @attrs.frozen(kw_only=True, eq=False)
+class Step:
+    """The setpoints of one cycle.
+
+    Attributes
+    ----------
+    messages : tuple of can.Message
+        Axis by axis; SYNC follows them.
+    position, at_sync : (axes,) integer array
+        Where they lead the axes, and where these are to be by the instant of SYNC, in counts.
+    words : str
+        What there is to tell.
+    """
+
+    messages: Cycle
+    position: Integers
+    at_sync: Integers
+    words: str = ""
+
+
+class SetpointSource(Protocol):
+    """Where setpoints come from: a log that was written beforehand, or a planner that issues them now."""
+
+    @property
+    def target(self) -> Target:
+        """The drives."""
+        ...
+
+    @property
+    def demand(self) -> Demand:
+        """What is asked of them."""
+        ...
+
+    @property
+    def planned(self) -> int | None:
+        """How many cycles there will be, where that is known beforehand."""
+        ...
+
+    @property
+    def most(self) -> int:
+        """How many cycles there can be."""
+        ...
+
+    @property
+    def at_sync(self) -> Integers:
+        """Where the axes are led to by each SYNC, as far as known, in counts, shape (cycles, axes)."""
+        ...
+
+    @property
+    def goal(self) -> Integers | None:
+        """Where they are led to at last, as far as known, in counts, shape (axes,)."""
+        ...
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What there is to say afterwards, a sentence each."""
+        ...
+
+    @property
+    def columns(self) -> Mapping[str, Integers]:
+        """What else is known of every cycle, by name."""
+        ...
+
+    def operated(self) -> AbstractContextManager[object]:
+        """Hold what commands are taken from, as long as axes may move."""
+        ...
+
+    def begin(self, standing: Sequence[int]) -> Step:
+        """Begin where the axes stand, in counts; return the first cycle's setpoints."""
+        ...
+
+    def step(self, cycle: int) -> Step | None:
+        """Give the setpoints of a cycle, or None where the motion is over; the numbers never fall."""
+        ...
+
+    def end(self) -> bool:
+        """End the motion early without sway, if that is possible."""
+        ...
+
+
+@attrs.frozen(kw_only=True, eq=False)
 class StreamPlan:
-    """A motion in frames.
+    """A motion in frames: a `SetpointSource` that is known beforehand.
 
     Attributes
     ----------
@@ -34,12 +117,59 @@ class StreamPlan:
     target: Target
     motion: Setpoints
     cycles: tuple[Cycle, ...]
+    remarks: tuple[str, ...] = ()
+    columns: Mapping[str, Integers] = attrs.field(factory=dict)
 
-    def preload(self, position: Sequence[int]) -> Cycle:
-        """Make setpoints at which the axes stand still where they are."""
-        rest = [0] * len(pdos.setpoint_fields(self.target.can))
-        held = [rest if self.motion.velocity is not None else [at, *rest[1:]] for at in position]
-        return _cycle(frames.setpoint_frames(self.target), held)
+    @cached_property
+    def demand(self) -> Demand:
+        """What the motion asks of the drives."""
+        return demand_of(self.motion, self.target)
+
+    @property
+    def planned(self) -> int:
+        """How many cycles there are."""
+        return len(self.cycles)
+
+    most = planned
+
+    @cached_property
+    def at_sync(self) -> Integers:
+        """Where the axes are led to by each SYNC, in counts."""
+        return self.motion.at_sync
+
+    @property
+    def goal(self) -> Integers:
+        """Where they are led to at last, in counts."""
+        return np.asarray(self.motion.position[-1])
+
+    def operated(self) -> AbstractContextManager[object]:
+        """Nobody commands it."""
+        return nullcontext()
+
+    def begin(self, standing: Sequence[int]) -> Step:
+        """Begin where the motion does; the axes were led there."""
+        del standing
+        return self._step(0)
+
+    def step(self, cycle: int) -> Step | None:
+        """Give the setpoints of a cycle, or None behind the last."""
+        return self._step(cycle) if cycle < len(self.cycles) else None
+
+    def end(self) -> bool:
+        """End nowhere but at its own end."""
+        return False
+
+    def _step(self, cycle: int) -> Step:
+        return Step(
+            messages=self.cycles[cycle], position=self.motion.position[cycle], at_sync=self.at_sync[cycle]
+        )
+
+
+def preload(target: Target, position: Sequence[int]) -> Cycle:
+    """Make setpoints at which the axes stand still where they are, in counts."""
+    rest = [0] * len(pdos.setpoint_fields(target.can))
+    held = [rest if target.can.mode == "csv" else [at, *rest[1:]] for at in position]
+    return cycle_of(frames.setpoint_frames(target), held)
 
 
 def plan_of(content: bytes, target: Target) -> StreamPlan:
@@ -64,10 +194,11 @@ def plan_of(content: bytes, target: Target) -> StreamPlan:
 def cycles_of(motion: Setpoints, target: Target) -> tuple[Cycle, ...]:
     """Encode every cycle of a motion."""
     layout = frames.setpoint_frames(target)
-    return tuple(_cycle(layout, values) for values in motion.sent.tolist())
+    return tuple(cycle_of(layout, values) for values in motion.sent.tolist())
 
 
-def _cycle(layout: Sequence[SetpointFrame], setpoints: Sequence[Sequence[int]]) -> Cycle:
+def cycle_of(layout: Sequence[SetpointFrame], setpoints: Sequence[Sequence[int]]) -> Cycle:
+    """Encode one cycle: what each axis is sent."""
     return tuple(message(frame.cob_id, frame.pack(setpoints)) for frame in layout)
 
 

@@ -2,10 +2,12 @@
 
 Before each cycle the drives' answers to the one before are judged. Whatever is wrong ends in a quick stop
 (`gen_profile_exporters.can.streaming.stopping`) before anything is said about it, and no setpoint follows.
+Only who asks for a stop while all is well gets one without sway first, where the setpoints' source plans it.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
@@ -17,16 +19,12 @@ from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.cia402 import FOLLOWS, Controlword, State
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
-from gen_profile_exporters.can.scaling import (
-    greatest_velocity,
-    magnitude_counts,
-    quick_stop_deceleration,
-)
+from gen_profile_exporters.can.scaling import magnitude_counts
 from gen_profile_exporters.can.streaming import configuration
 from gen_profile_exporters.can.streaming.approach import approach
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.pacer import Pacer
-from gen_profile_exporters.can.streaming.plan import Cycle, StreamPlan, cycles_of
+from gen_profile_exporters.can.streaming.plan import Cycle, SetpointSource, Step, cycles_of, preload
 from gen_profile_exporters.can.streaming.record import Book, Phase, Record, Recorder
 from gen_profile_exporters.can.streaming.restoration import Restoration
 from gen_profile_exporters.can.streaming.stopping import quick_stop
@@ -47,7 +45,7 @@ class Streamer:
     bus : can.BusABC
         Opened; it stays the caller's.
     clock : Clock
-    plan : StreamPlan
+    source : SetpointSource
     tell : callable, optional
         Told each phase as it begins. While it works the drives get nothing.
     reset_fault : bool
@@ -60,44 +58,50 @@ class Streamer:
         self,
         bus: can.BusABC,
         clock: Clock,
-        plan: StreamPlan,
+        source: SetpointSource,
         tell: Callable[[str], None] = lambda _: None,
         *,
         reset_fault: bool = False,
         book: Book | None = None,
     ) -> None:
-        self._plan, self._clock, self._tell = plan, clock, tell
+        self._source, self._clock, self._tell = source, clock, tell
+        self._target = target = source.target
         self._reset_fault = reset_fault
         self._link = Link(bus, clock)
-        self._pacer = Pacer(self._link, plan.target)
-        layout = pdos.layout(plan.target.can)
+        self._pacer = Pacer(self._link, target)
+        layout = pdos.layout(target.can)
         self._watch = Watch(
             [
                 WatchedAxis(axis.name, node, own[layout.feedback])
                 for axis, node, own in zip(
-                    plan.target.axes, frames.nodes(plan.target), frames.cob_ids(plan.target), strict=True
+                    target.axes, frames.nodes(target), frames.cob_ids(target), strict=True
                 )
             ],
             clock,
             period=self._pacer.period,
-            heartbeat=startup.heartbeat_ms(plan.target.can) * NANOSECONDS // 1000,
+            heartbeat=startup.heartbeat_ms(target.can) * NANOSECONDS // 1000,
             timeout=self._pacer.timeout,
             told=layout.told,
-            ours=frames.commanding_cob_ids(plan.target),
+            ours=frames.commanding_cob_ids(target),
         )
         self._link.subscribe(self._watch.take)
-        self._recorder = Recorder(book or Book.blank(len(plan.cycles), len(plan.target.axes)))
+        self._recorder = Recorder(book or Book.blank(source.most, len(target.axes)))
         self._found = Restoration()
         self._left: tuple[str, ...] = ()  # of the settings found, what could not be put back
-        self._stop_asked = ""
+        self._stops_asked = deque[str]()
+        self._can_end = False  # whether the source issues setpoints now
+        self._ended = ""  # why it was asked to end
         self._commanded = False
         self._led: Integers | None = None  # where the axes are to be by the latest SYNC
         self._answers_for = -1  # cycle whose answers are still to come
         self._sent_at = 0
 
     def ask_to_stop(self, reason: str) -> None:
-        """Have the stream aborted before its next cycle; may be called from a signal handler."""
-        self._stop_asked = reason
+        """Have the axes stopped from the next cycle on; may be called from a signal handler.
+
+        Without sway, where the source plans such a stop, unless it was asked for before.
+        """
+        self._stops_asked.append(reason)
 
     @property
     def cycles_sent(self) -> int:
@@ -112,20 +116,25 @@ class Streamer:
             self._align(standing)
             self._enable()
             self._approach(standing)
-            self._stream()
-            self._hold()
-            self._disable()
+            last = self._stream(standing)
+            self._hold(last)
+            self._disable(last.messages)
         except StreamAborted as error:
             return self._record(Phase.ABORTED, f"{error} {self._stop()}".rstrip())
         except BaseException:  # a bug, maybe, but the axes must not run on
             self._stop()
             raise
+        if self._ended:
+            return self._record(Phase.ABORTED, f"{self._ended} The axes were stopped without sway.")
         return self._record(Phase.DONE, "")
 
     def _begin(self, phase: Phase) -> None:
         self._recorder.begin(phase)
+        self._say(phase.value)
+
+    def _say(self, words: str) -> None:
         with suppress(OSError, ValueError):  # whoever is told may be gone
-            self._tell(phase.value)
+            self._tell(words)
 
     def _listen(self) -> None:
         """Hear whether someone else is in command, before anything is sent."""
@@ -139,9 +148,13 @@ class Streamer:
     def _configure(self) -> tuple[int, ...]:
         """Set the drives up; find out where they stand, in counts."""
         self._watch.raise_alert(SupervisionLevel.CONFIGURING)
-        plan = self._plan
         standing = configuration.configure(
-            self._link, plan.target, plan.motion, self._found, self._attend, reset_fault=self._reset_fault
+            self._link,
+            self._target,
+            self._source.demand,
+            self._found,
+            self._attend,
+            reset_fault=self._reset_fault,
         )
         self._require_well()
         return standing
@@ -155,9 +168,9 @@ class Streamer:
         """Make the drives' setpoints equal to where they stand, before power goes on."""
         self._begin(Phase.ALIGN)
         self._commanded = True
-        self._pacer.standing = self._preload = self._plan.preload(standing)
+        self._pacer.standing = self._preload = preload(self._target, standing)
         self._led = np.array(standing)
-        configuration.start(self._link, self._plan.target)
+        configuration.start(self._link, self._target)
         self._pacer.begin()
         for _ in range(ALIGN_CYCLES):
             self._cycle(self._pacer.within(Controlword.DISABLE_VOLTAGE, self._preload))
@@ -167,55 +180,62 @@ class Streamer:
         self._begin(Phase.ENABLE)
         self._command(Controlword.SHUTDOWN, State.READY, self._preload)
         self._command(Controlword.SWITCH_ON, State.SWITCHED_ON, self._preload)
-        self._command(pdos.enabling(self._plan.target.can), State.ENABLED, self._preload, bits=FOLLOWS)
+        self._command(pdos.enabling(self._target.can), State.ENABLED, self._preload, bits=FOLLOWS)
         self._watch.raise_alert(SupervisionLevel.FOLLOWING)
 
     def _approach(self, standing: Sequence[int]) -> None:
         """Lead axes that stand off the first setpoint to it, slowly."""
-        way = approach(standing, self._plan.motion, self._plan.target)
+        way = approach(standing, self._source.demand, self._target)
         if len(way.position):
             self._begin(Phase.APPROACH)
-        for messages, led in zip(cycles_of(way, self._plan.target), way.at_sync, strict=True):
+        for messages, led in zip(cycles_of(way, self._target), way.at_sync, strict=True):
             self._cycle(messages)
             self._led = led
 
-    def _stream(self) -> None:
-        """Send every cycle at its instant."""
+    def _stream(self, standing: Sequence[int]) -> Step:
+        """Send every cycle at its instant; return the last."""
         self._begin(Phase.STREAM)
-        pacer, cycle = self._pacer, 0
-        start, led = pacer.due, self._plan.motion.at_sync
-        while cycle < len(self._plan.cycles):
+        source, pacer, cycle = self._source, self._pacer, 0
+        sent = step = source.begin(standing)
+        start, self._can_end = pacer.due, True
+        while True:
             pacer.due = start + cycle * pacer.period
             self._judge()
+            if (due := source.step(cycle)) is None:
+                break
+            step = due
             if missed := pacer.missed():
-                self._require_skippable(cycle, missed)
+                self._require_skippable(sent, source.step(cycle + missed) or step, cycle, missed)
                 cycle += missed
                 continue
-            pacer.send(self._plan.cycles[cycle])
+            pacer.send(step.messages)
             self._sent_at = self._clock.now()
             self._recorder.take_sent(cycle, self._sent_at - pacer.due)
-            self._led, self._answers_for = led[cycle], cycle
-            cycle += 1
-        pacer.due = start + cycle * pacer.period
+            self._led, self._answers_for = step.at_sync, cycle
+            sent, cycle = step, cycle + 1
+            if step.words:
+                self._say(step.words)
+        self._can_end = False
+        return step
 
-    def _hold(self) -> None:
+    def _hold(self, last: Step) -> None:
         """Repeat the last setpoint until the axes stand at it."""
         self._begin(Phase.HOLD)
-        last, target = self._plan.cycles[-1], self._plan.motion.position[-1]
-        allowed = [magnitude_counts(self._plan.target.can.start_tolerance, a) for a in self._plan.target.axes]
+        allowed = [magnitude_counts(self._target.can.start_tolerance, axis) for axis in self._target.axes]
         settled, deadline = 0, self._clock.now() + PATIENCE
         while settled < SETTLED_CYCLES:
-            self._cycle(last)
-            self._led = target
-            apart = [abs(axis.position - int(at)) for axis, at in zip(self._watch.axes, target, strict=True)]
+            self._cycle(last.messages)
+            self._led = last.position
+            apart = [
+                abs(axis.position - int(at)) for axis, at in zip(self._watch.axes, last.position, strict=True)
+            ]
             settled = settled + 1 if all(a <= b for a, b in zip(apart, allowed, strict=True)) else 0
             if self._clock.now() > deadline:
                 raise StreamAborted(f"The axes do not settle at the target; they stand {apart} counts off.")
 
-    def _disable(self) -> None:
+    def _disable(self, last: Cycle) -> None:
         self._begin(Phase.DISABLE)
         self._watch.raise_alert(SupervisionLevel.CYCLIC)
-        last = self._plan.cycles[-1]
         self._command(Controlword.SWITCH_ON, State.SWITCHED_ON, last)
         self._command(Controlword.SHUTDOWN, State.READY, last)
         self._command(Controlword.DISABLE_VOLTAGE, State.SWITCH_ON_DISABLED, last)
@@ -224,7 +244,7 @@ class Streamer:
     def _release(self) -> None:
         """Leave drives alone that are switched off, as they were found, our heartbeat going on meanwhile."""
         self._link.meanwhile = self._pacer.beat
-        self._left = configuration.release(self._link, self._plan.target, self._found)
+        self._left = configuration.release(self._link, self._target, self._found)
 
     def _stop(self) -> str:
         """Stop what may move, leave the drives alone, and then say what became of it."""
@@ -241,12 +261,8 @@ class Streamer:
 
     def _stopping_time(self) -> int:
         """Time in ns in which every axis comes to rest on its ramp from its greatest velocity."""
-        motion, can = self._plan.motion, self._plan.target.can
-        ramps = [
-            greatest_velocity(position, motion.period)
-            / quick_stop_deceleration(position, motion.period, can, axis)
-            for position, axis in zip(motion.position.T, self._plan.target.axes, strict=True)
-        ]
+        demand = self._source.demand
+        ramps = [v / braking for v, braking in zip(demand.velocity, demand.quick_stop, strict=True)]
         return STOP_MARGIN + 10 * self._pacer.period + int(max(ramps) * NANOSECONDS)
 
     def _command(self, word: int, state: State, setpoints: Cycle, *, bits: int = 0) -> None:
@@ -276,24 +292,24 @@ class Streamer:
         told = all(axis.heard >= self._sent_at for axis in self._watch.axes)
         if told and self._answers_for >= 0:
             self._recorder.take_answer(self._answers_for, [axis.position for axis in self._watch.axes])
-        if (
-            told
-            and self._watch.alert is SupervisionLevel.FOLLOWING
-            and self._plan.motion.velocity is not None
-        ):
+        following = self._watch.alert is SupervisionLevel.FOLLOWING
+        if told and following and self._target.can.mode == "csv":
             self._require_following()
         self._answers_for = -1
 
     def _require_well(self) -> None:
-        if self._stop_asked:
-            raise StreamAborted(self._stop_asked)
         self._watch.require_well()
+        if self._stops_asked:
+            asked = self._stops_asked.popleft()
+            if self._ended or not self._can_end or not self._source.end():
+                raise StreamAborted(asked)
+            self._ended = asked
 
     def _require_following(self) -> None:
         """Hold the axes to the motion where no drive does: in csv it controls its velocity only."""
-        can = self._plan.target.can
+        can = self._target.can
         assert self._led is not None  # drives are told where to be before they are enabled
-        for axis, scale, at in zip(self._watch.axes, self._plan.target.axes, self._led, strict=True):
+        for axis, scale, at in zip(self._watch.axes, self._target.axes, self._led, strict=True):
             apart = abs(axis.position - int(at))
             if apart > magnitude_counts(can.following_error or can.start_tolerance, scale):
                 raise StreamAborted(
@@ -301,12 +317,12 @@ class Streamer:
                     "than can.following_error; check the drive's scaling, or whether the axis is blocked."
                 )
 
-    def _require_skippable(self, cycle: int, missed: int) -> None:
+    def _require_skippable(self, sent: Step, following: Step, cycle: int, missed: int) -> None:
         """Pass over one setpoint that is too late, if the next one is no greater a step than any other."""
-        steps = np.abs(np.diff(self._plan.motion.position, axis=0)).max(axis=0)
-        before, after = max(cycle - 1, 0), min(cycle + missed, len(self._plan.cycles) - 1)
-        step = np.abs(self._plan.motion.position[after] - self._plan.motion.position[before])
-        if missed > 1 or (step > steps).any():
+        greatest = self._source.demand.velocity
+        apart = abs(following.position - sent.position)
+        steps = [velocity * self._pacer.period / NANOSECONDS for velocity in greatest]
+        if missed > 1 or any(far > step + 0.5 for far, step in zip(apart, steps, strict=True)):
             raise StreamAborted(
                 f"This machine was {missed * self._pacer.period / 1e6:g} ms late at cycle {cycle}; relieve "
                 "it, permit real-time priority, or choose a longer can.sync_period (the self-test measures "
