@@ -1,8 +1,13 @@
-"""The commands that write planner blocks and execute them."""
+"""The commands that write planner blocks and execute them, and what `stream` takes of them."""
 
 from __future__ import annotations
 
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -19,6 +24,11 @@ from gen_profile.cli.options import (
 )
 from gen_profile.cli.outcome import fail, print_outcome, warn
 from gen_profile.errors import OutputError, SpecError
+
+if TYPE_CHECKING:
+    from gen_profile.streaming.outcome import Source
+
+CLEARED = "\r\x1b[K"  # the line, of a terminal
 
 
 class PlannerGroup(DefaultGroup):
@@ -170,3 +180,118 @@ def _read(path: Path) -> str:
         raise OutputError(f"Cannot read the commands {path}: {error.strerror}.") from error
     except UnicodeDecodeError as error:
         raise OutputError(f"Cannot read the commands {path}: it is no UTF-8 text.") from error
+
+
+def planner_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add what tells of a planner and its commands."""
+    for decorate in (
+        click.option(
+            "--live-parameter",
+            "live_parameters",
+            metavar="NAME=VALUE",
+            multiple=True,
+            help="What a live parameter of --planner is from the start. Repeatable.",
+        ),
+        click.option(
+            "--commands",
+            "commands_path",
+            metavar="FILE",
+            type=click.Path(path_type=Path),
+            help="CSV of commands for --planner, as of planner play; without it, the keyboard.",
+        ),
+        click.option(
+            "--planner",
+            "block",
+            metavar="BLOCK",
+            type=click.Path(path_type=Path),
+            help="Stream what this written planner block issues.",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+def require_no_others(given: Mapping[str, object]) -> None:
+    """Refuse options that do not go with others that were given.
+
+    Raises
+    ------
+    SpecError
+    """
+    for option, value in given.items():
+        if value:
+            raise SpecError(f"{option}: not with --planner; leave one of them out.")
+
+
+def require_planner(commands_path: Path | None, live_parameters: tuple[str, ...]) -> None:
+    """Refuse what only a planner takes.
+
+    Raises
+    ------
+    SpecError
+    """
+    for option, value in (("--commands", commands_path), ("--live-parameter", live_parameters)):
+        if value:
+            raise SpecError(f"{option}: commands a planner block; name it by --planner.")
+
+
+def planned(
+    block_path: Path,
+    commands_path: Path | None,
+    live_parameters: tuple[str, ...],
+    *,
+    accept_unverified: bool,
+) -> Source:
+    """Take a written block, and the commands of a file or of the keyboard.
+
+    Raises
+    ------
+    GenProfileError
+        As `gen_profile.streaming.stream.verified_block` and
+        `gen_profile.streaming.planned_motion.PlannedMotion`; or there is no terminal.
+    """
+    from gen_profile.planner.commands import live_inputs, read_commands
+    from gen_profile.streaming.keyboard import HELP, Keyboard
+    from gen_profile.streaming.outcome import Source
+    from gen_profile.streaming.planned_motion import CommandList, Operator, PlannedMotion
+    from gen_profile.streaming.stream import verified_block
+
+    operator: Operator
+    if commands_path is None and not sys.stderr.isatty():
+        raise SpecError("--planner: standard error is no terminal to show the axis on; give --commands.")
+    spec, block = verified_block(block_path, accept_unverified=accept_unverified)
+    cycle = block.inputs["fCycleTime"]
+    if commands_path is None:
+        greatest = spec.limits.of(0).velocity
+        assert greatest is not None  # or there would be no block
+        operator = Keyboard(sys.stdin.fileno(), greatest, cycle)
+        click.echo(HELP, err=True)
+    else:
+        commands = read_commands(_read(commands_path), tuple(live_inputs(block.inputs)))
+        operator = CommandList(commands, cycle)
+    return Source(spec=spec, plan=PlannedMotion(spec, block, operator, _numbers(live_parameters)))
+
+
+@contextmanager
+def status_line() -> Iterator[Callable[[str], None]]:
+    """Keep one line of the terminal for what is said."""
+
+    def tell(words: str) -> None:
+        width = shutil.get_terminal_size().columns - 1
+        click.echo(f"{CLEARED}{words[:width]}", err=True, nl=False)
+
+    try:
+        yield tell
+    finally:
+        click.echo(CLEARED, err=True, nl=False)
+
+
+def _numbers(live_parameters: tuple[str, ...]) -> dict[str, float]:
+    found = {}
+    for text in live_parameters:
+        name, _, number = text.partition("=")
+        try:
+            found[name] = float(number)
+        except ValueError:
+            raise SpecError(f"--live-parameter {text}: state a number, as {name}=5.5.") from None
+    return found

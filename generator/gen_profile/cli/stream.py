@@ -21,6 +21,13 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.planner import (
+    planned,
+    planner_options,
+    require_no_others,
+    require_planner,
+    status_line,
+)
 from gen_profile.cli.progress import progress
 from gen_profile.errors import OutputError, SpecError, StreamAborted
 
@@ -53,6 +60,7 @@ def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @cli.command(epilog="Example: gen-profile stream deploy/paper.log --interface socketcan --channel can0")
 @spec_options
 @_bus_options
+@planner_options
 @click.option("--mode", type=click.Choice(["csp", "ip", "csv"]), help="Mode of the drives, for a spec.")
 @click.option("--node", metavar="N", type=int, help="CANopen node of the first axis, for a spec.")
 @click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
@@ -91,6 +99,9 @@ def stream(
     overrides: tuple[str, ...],
     interface: str | None,
     channel: str | None,
+    block: Path | None,
+    commands_path: Path | None,
+    live_parameters: tuple[str, ...],
     mode: str | None,
     node: int | None,
     simulate_drive: bool,
@@ -106,8 +117,9 @@ def stream(
 ) -> None:
     """Stream setpoints to CiA 402 drives, and stop them safely.
 
-    Takes the log that --export can wrote, with its manifest beside it, or a spec, which is designed and
-    checked first. No safety function: emergency stop and STO stay in hardware.
+    Takes the log that --export can wrote, with its manifest beside it, a spec, which is designed and checked
+    first, or a planner block, which plans under commands. No safety function: emergency stop and STO stay in
+    hardware.
     """
     from gen_profile.artefacts.writing import require_place
     from gen_profile.streaming import stream as run
@@ -116,9 +128,12 @@ def stream(
     run.require_extra()
     if live == "terminal":
         _require_terminal()
+    overrides += as_overrides({"can.mode": mode, "can.node": node})
+    if block is not None:
+        specs = {"A spec or log": spec_path, "--preset": preset, "--set, --mode or --node": overrides}
+        require_no_others({**specs, "--to-start": to_start, "--jog": jog, "--live": live})
     from gen_profile_exporters.can.streaming import joint_bus
 
-    overrides += as_overrides({"can.mode": mode, "can.node": node})
     with progress() as tell:
 
         def port_of(can: CanSpec) -> Port:
@@ -128,14 +143,18 @@ def stream(
             if not dry_run:
                 joint_bus.opened(port_of(target.can), target).shutdown()
 
-        source = _source(
-            spec_path,
-            preset,
-            overrides,
-            accept_unverified=accept_unverified,
-            require_bus=require_bus,
-            tell=tell,
-        )
+        if block is not None:
+            source = planned(block, commands_path, live_parameters, accept_unverified=accept_unverified)
+        else:
+            require_planner(commands_path, live_parameters)
+            source = _source(
+                spec_path,
+                preset,
+                overrides,
+                accept_unverified=accept_unverified,
+                require_bus=require_bus,
+                tell=tell,
+            )
         if to_start or jog:
             _require_moving_alone(to_start, jog, dry_run)
             port = port_of(source.spec.can)
@@ -154,7 +173,8 @@ def stream(
         notes: tuple[str, ...] = ()
         if self_test:
             notes = (_self_test(source, tell),)
-    with _shown(source, live) as (tell_phase, book):
+    by_hand = block is not None and commands_path is None
+    with _shown(source, live, by_hand=by_hand) as (tell_phase, book):
         outcome = run.stream(
             source,
             port,
@@ -309,8 +329,14 @@ def _source(
 
 
 @contextmanager
-def _shown(source: Source, live: str | None) -> Iterator[tuple[Callable[[str], None], Book | None]]:
+def _shown(
+    source: Source, live: str | None, *, by_hand: bool
+) -> Iterator[tuple[Callable[[str], None], Book | None]]:
     """Show a stream: by its phases, and by curves, which need the terminal for themselves."""
+    if by_hand:
+        with status_line() as tell:
+            yield tell, None
+        return
     if live is None:
         with progress() as tell:
             yield tell, None
@@ -390,18 +416,22 @@ def _units(source: Source) -> list[str]:
 
 def _plan_words(plan: dict[str, Any], units: Sequence[str]) -> str:
     axes = [
-        f"  {axis['name']}: node {axis['node']}, from {axis['start_m']:g} to {axis['target_m']:g} {unit}"
+        f"  {axis['name']}: node {axis['node']}, {_way_words(axis, unit)}"
         for axis, unit in zip(plan["axes"], units, strict=True)
     ]
     objects = [
         f"  node {entry['node']}  {entry['object']} = {_value_words(entry)}  {entry['meaning']}"
         for entry in plan["startup"]
     ]
-    head = (
-        f"{plan['cycles_planned']} cycles of {1e3 * plan['period_s']:g} ms, bus load at most "
-        f"{plan['bus_load']:.0%}"
-    )
+    many = "" if plan["cycles_planned"] is None else f"{plan['cycles_planned']} "
+    head = f"{many}cycles of {1e3 * plan['period_s']:g} ms, bus load at most {plan['bus_load']:.0%}"
     return "\n".join([head, *axes, "Before anything moves, each drive is set to, and must hold:", *objects])
+
+
+def _way_words(axis: dict[str, Any], unit: str) -> str:
+    if axis["start_m"] is None:
+        return "from where it stands"
+    return f"from {axis['start_m']:g} to {axis['target_m']:g} {unit}"
 
 
 def _value_words(entry: dict[str, Any]) -> str:
@@ -419,7 +449,8 @@ def _outcome_words(outcome: StreamOutcome) -> str:
     from gen_profile.evaluation.phrases import mm, number
 
     told, late = outcome.to_dict(), outcome.record.lateness
-    lines = [f"{told['state']}: {told['cycles_sent']} of {told['cycles_planned']} setpoints sent"]
+    of_all = "" if told["cycles_planned"] is None else f" of {told['cycles_planned']}"
+    lines = [f"{told['state']}: {told['cycles_sent']}{of_all} setpoints sent"]
     if told["cycles_sent"]:
         lines.append(f"lateness: {_lateness_words(late)}; drift {number(1e6 * late.drift)} µs")
     lines += told["notes"]

@@ -39,8 +39,12 @@ class Command:
 
     time: float
     command: str
-    value: float
-    live: Mapping[str, float]
+    value: float = 0.0
+    live: Mapping[str, float] = attrs.field(factory=dict)
+
+    def begin(self, cycle: float) -> int:
+        """Tell in which cycle, of so many seconds, it begins."""
+        return math.ceil(self.time / cycle - 1e-9)
 
 
 def read_commands(text: str, live: tuple[str, ...]) -> tuple[Command, ...]:
@@ -189,19 +193,24 @@ def input_rows(
     values = dict(values)
     rows = {0: list(values.values())}
     for command in commands:
-        values |= {f"f{name}": value for name, value in command.live.items()}
-        values |= {
-            "bVelocity": float(command.command == "velocity"),
-            "bStop": float(command.command == "stop"),
-            "bQuickStop": float(command.command == "quick-stop"),
-            "bExecute": float(command.command == "position"),
-        }
-        values["fTarget" if command.command == "position" else "fVelocityCommand"] = command.value
-        begin = math.ceil(command.time / cycle - 1e-9)
+        values |= inputs_of(command)
+        begin = command.begin(cycle)
         rows[begin] = list(values.values())
         values["bExecute"] = 0.0  # an edge, so that the next command makes another
         rows[begin + 1] = list(values.values())
     return list(rows), np.array(list(rows.values()), dtype=np.float64)
+
+
+def inputs_of(command: Command) -> dict[str, float]:
+    """Turn a command into the inputs that it changes, by name; bExecute is an edge, for one cycle only."""
+    return {
+        **{f"f{name}": value for name, value in command.live.items()},
+        "bVelocity": float(command.command == "velocity"),
+        "bStop": float(command.command == "stop"),
+        "bQuickStop": float(command.command == "quick-stop"),
+        "bExecute": float(command.command == "position"),
+        "fTarget" if command.command == "position" else "fVelocityCommand": command.value,
+    }
 
 
 def _issued(block: BlockInstance, commands: tuple[Command, ...], cycle: float) -> Iterator[Array]:

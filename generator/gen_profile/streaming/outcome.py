@@ -96,6 +96,7 @@ class StreamOutcome:
             "lateness_us": self.record.lateness.to_dict(),
             "drift_s": self.record.lateness.drift,
             "drive": drive if told.any() else None,
+            "planner": self._planner(),
             "reason": self.record.reason,
             "notes": [*self.notes, *map(self._standstill_words, self.standstills)],
         }
@@ -113,6 +114,17 @@ class StreamOutcome:
             for time, row in zip(times, columns, strict=True)
         ]
         return ("\n".join([",".join(["time_s", *heads]), *rows]) + "\n").encode("ascii")
+
+    def _planner(self) -> dict[str, Any] | None:
+        """Say what a planner block showed; None of a log."""
+        columns = self.source.plan.columns
+        if not columns:
+            return None
+        promise, errors = columns["promise"].tolist(), columns["error_id"].tolist()
+        return {
+            "promise": bool(promise and promise[-1]),
+            "error_ids": [error for error in dict.fromkeys(errors) if error],
+        }
 
     def _standstill_words(self, found: Standstill) -> str:
         axis, many = self.source.plan.target.axes[found.column], len(found.cycles)

@@ -35,6 +35,7 @@ from gen_profile_exporters.registry import format_of
 if TYPE_CHECKING:
     import can
 
+    from gen_profile.planner.execution import BlockInstance
     from gen_profile.streaming.load import CraneLoad
     from gen_profile_exporters.can.simulation.drive_bank import DriveBank
     from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
@@ -84,17 +85,45 @@ def verified(path: Path, *, accept_unverified: bool = False) -> Source:
     """
     if format_of(path) != "can":
         raise SpecError(f"{path}: only the log of the format can is streamed; export that.")
-    content, beside = read_artefact(path), path.parent / FILENAME
-    manifest = manifest_beside(path, content)
-    if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == "can"}:
+    content = read_artefact(path)
+    spec = _vouched_spec(path, content, "can", accept_unverified)
+    require_rest(spec)
+    return Source(spec=spec, plan=plan_of(content, target_of(spec)))
+
+
+def verified_block(path: Path, *, accept_unverified: bool = False) -> tuple[Spec, BlockInstance]:
+    """Read a planner block, and require that its manifest vouches for it.
+
+    Raises
+    ------
+    OutputError
+        It or its manifest cannot be read.
+    SpecError
+        It is no planner block, was altered, failed its proof or never had one.
+    ExportError, CosimulationError
+        It cannot be executed.
+    """
+    from gen_profile.planner.execution import BlockInstance  # noqa: PLC0415  # FMPy
+    from gen_profile.planner.forms import block_in  # noqa: PLC0415
+    from gen_profile.proof.check import FORMAT, is_planner_block  # noqa: PLC0415
+
+    if not is_planner_block(path):
+        raise SpecError(f"{path}: it holds no planner block that can be executed; C cannot be.")
+    content = read_artefact(path)
+    spec = _vouched_spec(path, content, FORMAT, accept_unverified)
+    return spec, BlockInstance(block_in(path, content))
+
+
+def _vouched_spec(path: Path, content: bytes, format_: str, accept_unverified: bool) -> Spec:
+    """Take the spec of an artefact that its manifest vouches for."""
+    manifest, beside = manifest_beside(path, content), path.parent / FILENAME
+    if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == format_}:
         raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
     if manifest.check is None and not accept_unverified:
         raise SpecError(f"{path} is unverified: export it with its check, or accept it as it is.")
     if manifest.check is not None and not manifest.check.get("passed"):
         raise SpecError(f"{path} failed its check, as {beside} tells; it is not streamed.")
-    spec = spec_from_dict(manifest.spec, path.parent)
-    require_rest(spec)
-    return Source(spec=spec, plan=plan_of(content, target_of(spec)))
+    return spec_from_dict(manifest.spec, path.parent)
 
 
 def designed(spec: Spec, tell: Progress) -> Source:

@@ -168,12 +168,14 @@ class Bench:
         sluggish=False,
         reset_fault=False,
         kind=SimulatedDrive,
+        source=None,
         **options,
     ):
         self.clock = FakeClock(step)
-        self.target = target(*names, **options)
-        files = exporter.encode(profile or quintic((0.1, 0.4)), self.target)
-        self.plan = plan_of(files[0].content, self.target)
+        self.target = target(*names, **options) if source is None else source.target
+        self.plan = source or plan_of(
+            exporter.encode(profile or quintic((0.1, 0.4)), self.target)[0].content, self.target
+        )
         port = Port(interface="virtual", channel=f"bench-{next(_channels)}")
         self._buses = [opened(port, self.target) for _ in range(3)]
         self.witness = self._buses[0]
@@ -214,10 +216,19 @@ class Bench:
     def at_cycle(self, cycle, act):
         """Do something once so many setpoints have been streamed, and note when."""
 
+        def note():
+            self.fault_at = self.now
+            act()
+
+        self.then_at_cycle(cycle, note)
+
+    def then_at_cycle(self, cycle, act):
+        """Do something once so many setpoints have been streamed."""
+        due = [act]
+
         def look():
-            if self.fault_at is None and self.streamer.cycles_sent >= cycle:
-                self.fault_at = self.now
-                act()
+            if due and self.streamer.cycles_sent >= cycle:
+                due.pop()()
 
         self.clock.actors.insert(0, look)
 

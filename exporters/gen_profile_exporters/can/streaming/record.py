@@ -113,15 +113,16 @@ class Recorder:
     ----------
     book : Book
         To be written; nothing here waits for those who read it.
+
+    Attributes
+    ----------
+    sent : int
+        How many cycles were sent.
     """
 
     def __init__(self, book: Book) -> None:
         self._book = book
-
-    @property
-    def sent(self) -> int:
-        """How many cycles were sent."""
-        return int(np.count_nonzero(self._book.late))
+        self.sent = 0
 
     def begin(self, phase: Phase) -> None:
         """Take down where the streamer is."""
@@ -130,6 +131,7 @@ class Recorder:
     def take_sent(self, cycle: int, late: int) -> None:
         """Take down that a cycle was sent, and how late, in ns."""
         self._book.late[cycle] = 1 + max(0, late)
+        self.sent += 1
 
     def take_answer(self, cycle: int, position: Sequence[int]) -> None:
         """Take down where the drives were at a cycle's SYNC."""

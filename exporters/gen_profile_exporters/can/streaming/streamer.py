@@ -196,27 +196,30 @@ class Streamer:
         """Send every cycle at its instant; return the last."""
         self._begin(Phase.STREAM)
         source, pacer, cycle = self._source, self._pacer, 0
-        sent = step = source.begin(standing)
+        due: Step | None = source.begin(standing)
         start, self._can_end = pacer.due, True
-        while True:
+        assert due is not None  # a motion has a first cycle
+        last = sent = due
+        while due is not None:
+            last = due
             pacer.due = start + cycle * pacer.period
             self._judge()
-            if (due := source.step(cycle)) is None:
-                break
-            step = due
             if missed := pacer.missed():
-                self._require_skippable(sent, source.step(cycle + missed) or step, cycle, missed)
+                due = source.step(cycle + missed)
+                self._require_skippable(sent, due or last, cycle, missed)
                 cycle += missed
                 continue
-            pacer.send(step.messages)
+            pacer.send(last.messages)
             self._sent_at = self._clock.now()
             self._recorder.take_sent(cycle, self._sent_at - pacer.due)
-            self._led, self._answers_for = step.at_sync, cycle
-            sent, cycle = step, cycle + 1
-            if step.words:
-                self._say(step.words)
+            self._led, self._answers_for = last.at_sync, cycle
+            sent, cycle = last, cycle + 1
+            due = source.step(cycle)  # now, while there is time
+            if last.words:
+                self._say(last.words)
+        pacer.due = start + cycle * pacer.period
         self._can_end = False
-        return step
+        return last
 
     def _hold(self, last: Step) -> None:
         """Repeat the last setpoint until the axes stand at it."""

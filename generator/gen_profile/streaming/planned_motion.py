@@ -1,0 +1,294 @@
+"""Setpoints that a written planner block issues while they are streamed, called cycle by cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, Protocol
+
+import attrs
+import numpy as np
+
+from gen_profile.errors import GenProfileError, SpecError, StreamAborted
+from gen_profile.motion.profile import SampledProfile
+from gen_profile.planner.commands import STILL, Command, inputs_of, live_inputs
+from gen_profile.planner.design import quick_limits
+from gen_profile.planner.execution import BlockInstance
+from gen_profile.spec.model import Spec
+from gen_profile.suggestion import suggestion
+from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.frames import Integers
+from gen_profile_exporters.can.scaling import (
+    Demand,
+    exact,
+    exact_counts,
+    magnitude_counts,
+    quick_stop_deceleration,
+    setpoints,
+    travel_counts,
+)
+from gen_profile_exporters.can.streaming.plan import Step, cycle_of
+from gen_profile_exporters.exporter import Target, target_of
+from gen_profile_exporters.setpoints import INT32, TOO_FAR, require_within
+
+LONGEST = 900_000  # cycles after which the axis is stopped without sway: an hour at 4 ms
+MARGIN = 100_000  # cycles for that stop
+ROUNDING = 1e-9  # relative, of a period counted in the block's cycles
+LOST = {1: "a live parameter changed on the way", 2: "there was a quick stop"}  # promises, by nPromise
+
+
+class Operator(Protocol):
+    """Who commands a planner."""
+
+    @property
+    def over(self) -> bool:
+        """Whether no further command will come."""
+        ...
+
+    def operated(self) -> AbstractContextManager[object]:
+        """Hold what commands are taken from."""
+        ...
+
+    def due(self, cycle: int) -> Iterable[Command]:
+        """Give the commands that begin in a cycle of the block, or began since the one before."""
+        ...
+
+    def words(self, cycle: int, issued: Mapping[str, float]) -> str:
+        """Say how it is, where there is anything new to say; given the block's cycle and outputs."""
+        ...
+
+
+class CommandList:
+    """Commands that are known beforehand: an `Operator`.
+
+    Parameters
+    ----------
+    commands : sequence of Command
+    cycle : float
+        The block's, in s.
+    """
+
+    def __init__(self, commands: Sequence[Command], cycle: float) -> None:
+        self._cycle, self._left = cycle, list(commands)
+
+    @property
+    def over(self) -> bool:
+        """Whether no further command will come."""
+        return not self._left
+
+    def operated(self) -> AbstractContextManager[object]:
+        """Nobody else is needed."""
+        return nullcontext()
+
+    def due(self, cycle: int) -> Iterable[Command]:
+        """Give the commands that begin in a cycle of the block."""
+        while self._left and self._left[0].begin(self._cycle) <= cycle:
+            yield self._left.pop(0)
+
+    def words(self, cycle: int, issued: Mapping[str, float]) -> str:
+        """Say nothing: who wrote the commands knows them."""
+        del cycle, issued
+        return ""
+
+
+class PlannedMotion:
+    """A planner block that drives its axis: a `gen_profile_exporters.can.streaming.plan.SetpointSource`.
+
+    Parameters
+    ----------
+    spec : Spec
+        The block's.
+    block : BlockInstance
+        Of the written text.
+    operator : Operator
+    live : mapping of str to float
+        Live parameters by name that differ from what the block takes them for.
+
+    Raises
+    ------
+    SpecError
+        The block's cycle does not fit that of SYNC, its travel leaves the drive's, or there is no such
+        parameter.
+    ExportError
+        The bus is too slow, or a position does not fit 32 bits.
+    """
+
+    def __init__(
+        self, spec: Spec, block: BlockInstance, operator: Operator, live: Mapping[str, float]
+    ) -> None:
+        everything = target_of(spec)
+        self.target = attrs.evolve(everything, axes=everything.axes[:1], start=everything.start[:1])
+        frames.period_digits(spec.can)
+        frames.require_load(self.target)
+        self.demand = _demand(spec, self.target)
+        self.planned: int | None = None
+        self.most = LONGEST + MARGIN
+        self._block, self._operator = block, operator
+        self._values = block.inputs | {"bEnable": 1.0} | _live_values(block, live)
+        self._calls = _calls(spec, self._values["fCycleTime"])
+        self._still_enough = round(STILL / spec.can.sync_period)
+        self._frames = frames.setpoint_frames(self.target)
+        self._outputs = {name: place for place, name in enumerate(block.outputs)}
+        self._rows: list[Any] = []  # outputs at the start, one cycle ago, and now
+        self._log = np.zeros((self.most, 3), dtype=np.int64)  # where the axis is led to, promise, error
+        self._lost: set[int] = set()
+        self._called = self._cycle = -1  # latest cycle of the block, and of the bus
+        self._still = 0
+        self._ends: str | None = None
+        self._step: Step | None = None
+
+    @property
+    def at_sync(self) -> Integers:
+        """Where the axis was led to by each SYNC so far, in counts."""
+        return self._log[: self._cycle + 1, :1]
+
+    @property
+    def goal(self) -> Integers | None:
+        """Where the latest setpoint leads it."""
+        return None if self._step is None else self._step.position
+
+    @property
+    def columns(self) -> Mapping[str, Integers]:
+        """Promise and error of every cycle so far."""
+        _, promise, error = self._log[: self._cycle + 1].T
+        return {"promise": promise, "error_id": error}
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the block showed beside setpoints."""
+        remarks = [self._ends] if self._ends else []
+        if shown := [str(number) for number in dict.fromkeys(self.columns["error_id"].tolist()) if number]:
+            remarks.append(f"The block showed error {', '.join(shown)}, which its header explains.")
+        if lost := [LOST[number] for number in sorted(self._lost)]:
+            remarks.append(f"The load may sway, because {' and '.join(lost)}.")
+        return tuple(remarks)
+
+    def operated(self) -> AbstractContextManager[object]:
+        """Hold what commands are taken from."""
+        return self._operator.operated()
+
+    def begin(self, standing: Sequence[int]) -> Step:
+        """Enable the block where the axis stands, in counts."""
+        self._values["fActPosition"] = standing[0] / self.target.axes[0].counts_per_si
+        first = self.step(0)
+        assert first is not None  # an axis stands for a while before a motion is over
+        return first
+
+    def step(self, cycle: int) -> Step | None:
+        """Call the block up to a cycle of the bus; None once it stands and nothing more is asked of it.
+
+        Raises
+        ------
+        StreamAborted
+            The block did what none of ours does.
+        """
+        while self._cycle < cycle:
+            if self._still >= self._still_enough:
+                return None
+            try:
+                self._advance()
+            except GenProfileError as error:
+                raise StreamAborted(str(error)) from error
+        return self._step
+
+    def end(self) -> bool:
+        """Stop without sway, whatever the operator wants."""
+        self._values |= inputs_of(Command(time=0.0, command="stop"))
+        self._ends = self._ends or ""
+        return True
+
+    def _advance(self) -> None:
+        """Call the block for one period of SYNC; its latest call is that of the next cycle."""
+        if self._cycle + 1 == LONGEST:
+            self.end()
+            self._ends = f"A stream lasts {LONGEST} cycles at most; then the axis was stopped without sway."
+        calls = self._calls if self._rows else 1
+        issued = self._block.call(np.array([self._inputs() for _ in range(calls)]))[-1]
+        first, before = (self._rows[0], self._rows[-1]) if self._rows else (issued, issued)
+        self._rows = [first, before, issued]
+        self._cycle += 1
+        if self._cycle == self.most:
+            raise StreamAborted("The stop without sway took too long.")
+        number = int(self._of("nPromise"))
+        self._lost |= {number} & LOST.keys()
+        self._scale()
+
+    def _inputs(self) -> list[float]:
+        """Give the inputs of the block's next cycle."""
+        self._called += 1
+        self._values["bExecute"] = 0.0
+        for command in () if self._ends is not None else self._operator.due(self._called):
+            self._values |= inputs_of(command)
+            self._still = 0
+        return list(self._values.values())
+
+    def _of(self, output: str) -> float:
+        return float(self._rows[-1][self._outputs[output]])
+
+    def _scale(self) -> None:
+        """Scale what was issued, and count for how long the axis stands."""
+        columns = [
+            np.array([[row[self._outputs[name]]] for row in self._rows])
+            for name in ("fPosition", "fVelocity", "fAcceleration")
+        ]
+        period, csv = self.target.can.sync_period, self.target.can.mode == "csv"
+        sampled = SampledProfile(
+            cycle_time=period, position=columns[0], velocity=columns[1], acceleration=columns[2]
+        )
+        scaled = setpoints(sampled, self.target)
+        row = 1 if csv else 2  # a velocity leads from one position to the next
+        at_sync = scaled.position[1]
+        over = self._ends is not None or self._operator.over
+        moves = self._of("bBusy") > 0.0 or self._of("fVelocity") != 0.0
+        self._still = self._still + 1 if over and not moves else 0
+        self._log[self._cycle] = at_sync[0], self._of("bPromise"), self._of("nErrorId")
+        outputs = dict(zip(self._outputs, self._rows[-1], strict=True))
+        self._step = Step(
+            messages=cycle_of(self._frames, scaled.sent[row].tolist()),
+            position=scaled.position[2],
+            at_sync=at_sync,
+            words=self._operator.words(self._called, outputs),
+        )
+
+
+def _demand(spec: Spec, target: Target) -> Demand:
+    """Find what the planner may ask of its axis."""
+    limits, axis, can = spec.limits.of(0), target.axes[0], target.can
+    assert limits.travel and limits.velocity and limits.acceleration  # or there would be no block
+    ends = exact_counts(np.array(limits.travel), exact(axis.counts_per_si))
+    require_within(INT32, ends, f"axis {axis.name}", TOO_FAR, can.sync_period)
+    least, greatest = int(ends.min()), int(ends.max())
+    drive = travel_counts(axis, can)
+    if drive is not None and not (drive[0] <= least and greatest <= drive[1]):
+        raise SpecError(
+            f"can.travel.{axis.name}: it must hold the planner's travel of {limits.travel[0]:g} to "
+            f"{limits.travel[1]:g}; narrow limits.travel, and write the block again."
+        )
+    braking = magnitude_counts(quick_limits(spec)[0], axis)
+    return Demand(
+        start=None,
+        ends=((least, greatest),),
+        velocity=(float(magnitude_counts(limits.velocity, axis)),),
+        acceleration=(float(magnitude_counts(limits.acceleration, axis)),),
+        quick_stop=(quick_stop_deceleration(braking, can, axis),),
+    )
+
+
+def _calls(spec: Spec, cycle: float) -> int:
+    """Count the block's cycles in one of SYNC."""
+    period = spec.can.sync_period
+    calls = round(period / cycle)
+    if calls < 1 or abs(calls * cycle - period) > ROUNDING * period:
+        raise SpecError(
+            f"can.sync_period: {period:g} s are no whole number of the block's cycles of {cycle:g} s; "
+            "adapt export.cycle_time, and write the block again."
+        )
+    return calls
+
+
+def _live_values(block: BlockInstance, live: Mapping[str, float]) -> dict[str, float]:
+    known = live_inputs(block.inputs)
+    for name in live:
+        if name not in known:
+            raise SpecError(f"planner.live: the block has no parameter {name!r}{suggestion(name, known)}")
+    return {known[name]: value for name, value in live.items()}

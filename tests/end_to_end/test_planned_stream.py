@@ -1,0 +1,96 @@
+"""`gen-profile stream --planner` as a user calls it: which blocks are taken, and what is reported."""
+
+import csv
+
+import pytest
+from command_line import run_here
+from exporters.can.bench import HastyClock
+from fmu.kinds import PLANNED, planner_text
+
+from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, sha256
+from gen_profile.planner.commands import play
+from gen_profile.streaming import stream as workflow
+
+KNOWING = "time_s,command,value,L1\n0,stop,,0.42\n0.1,velocity,0.3,\n2,stop,,\n"  # as --live-parameter does
+SCRIPT = ("--planner", "paper.st", "--commands", "commands.csv")
+COMMANDS = "time_s,command,value\n0.1,velocity,0.3\n2,stop,\n"
+
+
+def deployed(folder, check, text=None):
+    """A block and its manifest, which says what came of the proof."""
+    content = planner_text().encode("ascii")
+    (folder / "paper.st").write_bytes(content if text is None else text.encode("ascii"))
+    known = Artefact(format="planner", path="paper.st", sha256=sha256(content), bytes=len(content))
+    spec = PLANNED.to_dict() | {"can": {"sync_period": PLANNED.export.cycle_time, "timeout": 0.5}}
+    manifest = Manifest(
+        name="paper",
+        spec=spec,
+        spec_sha256=PLANNED.sha256(),
+        profile_sha256="",
+        versions={},
+        artefacts=(known,),
+        check=check,
+    )
+    (folder / FILENAME).write_bytes(manifest.to_json())
+    (folder / "commands.csv").write_text(COMMANDS)
+    return ("--planner", folder / "paper.st", "--commands", folder / "commands.csv")
+
+
+def test_a_script_drives_simulated_drives(tmp_path, monkeypatch):
+    monkeypatch.setattr(workflow, "SharedClock", HastyClock)
+    table = tmp_path / "driven.csv"
+    options = (*deployed(tmp_path, {"passed": True}), "--simulate-drive", "--log", table)
+    outcome = run_here("stream", *options, "--live-parameter", "L1=0.42", "--json")
+    told = outcome.document
+    assert (outcome.code, told["state"], told["cycles_planned"]) == (0, "done", None)
+    assert told["planner"] == {"promise": True, "error_ids": []}
+    assert 0.0 < told["drive"]["sway_residual_peak_m"] < 0.01  # the machine's rope is longer than the block's
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert list(rows[0]) == ["time_s", "cart_planned_m", "cart_actual_m", "promise", "error_id"]
+    due = list(csv.DictReader(play(planner_text(), KNOWING).table.splitlines()))
+    assert len(rows) == told["cycles_sent"] == len(due)
+    for now, before in zip(rows[1:], due, strict=False):  # a drive is where it was led to by the cycle before
+        assert float(now["cart_planned_m"]) == pytest.approx(float(before["position_m"]), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("check", "text", "words"),
+    [
+        (None, None, "is unverified"),
+        ({"passed": False}, None, "failed its check"),
+        ({"passed": True}, "altered", "is not the file that"),
+    ],
+)
+def test_unproved_blocks_are_refused(tmp_path, check, text, words):
+    altered = planner_text().replace("1.0", "1.5", 1) if text else None
+    outcome = run_here("stream", *deployed(tmp_path, check, altered), "--simulate-drive")
+    assert outcome.code == 2
+    assert words in outcome.err
+    if check is None:
+        options = (*deployed(tmp_path, None), "--accept-unverified", "--dry-run")
+        assert "cart: node 1, from where it stands" in run_here("stream", *options).out
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--commands", "commands.csv"), "name it by --planner"),
+        (("--planner", "paper.st", "--jog", "cart=1"), "--jog: not with --planner"),
+        (("--planner", "paper.st"), "standard error is no terminal"),
+        (("--planner", "manifest.json", "--commands", "commands.csv"), "holds no planner block"),
+        (
+            ("--planner", "paper.st", "--commands", "commands.csv", "--live-parameter", "L1=x"),
+            "state a number",
+        ),
+        (
+            ("--planner", "paper.st", "--commands", "commands.csv", "--live-parameter", "L3=1"),
+            "no parameter 'L3'",
+        ),
+    ],
+)
+def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, options, words):
+    deployed(tmp_path, {"passed": True})
+    monkeypatch.chdir(tmp_path)
+    outcome = run_here("stream", *options, "--simulate-drive")
+    assert outcome.code == 2
+    assert words in outcome.err

@@ -1,0 +1,221 @@
+"""A planner block that drives its axis: the bus carries what the block issues, and every stop works."""
+
+import csv
+import os
+import pty
+import struct
+import termios
+from contextlib import suppress
+
+import attrs
+import numpy as np
+import pytest
+from exporters.can.bench import MS, QUICK_STOP, Bench, RigidLoad
+from fmu.kinds import PLANNED, planner_text
+
+from gen_profile.errors import SpecError
+from gen_profile.planner.commands import play, read_commands
+from gen_profile.planner.execution import BlockInstance
+from gen_profile.spec.can import CanSpec
+from gen_profile.streaming.keyboard import Keyboard, Keys
+from gen_profile.streaming.planned_motion import CommandList, PlannedMotion
+from gen_profile_exporters.can.streaming.record import Phase
+
+COUNTS = 1_000_000
+CYCLE = PLANNED.export.cycle_time
+COMMANDS = "time_s,command,value,L1\n0.1,position,0.2,0.48\n0.7,velocity,-0.3,\n1.2,stop,,\n"
+LONG = "time_s,command,value\n0.1,velocity,0.4\n"
+
+
+def spec_of(**can):
+    return attrs.evolve(PLANNED, can=CanSpec(**{"sync_period": CYCLE, "timeout": 0.5} | can))
+
+
+def source_of(spec, commands=COMMANDS, **live):
+    operator = commands
+    if isinstance(commands, str):
+        operator = CommandList(read_commands(commands, ("L1",)), CYCLE)
+    return PlannedMotion(spec, BlockInstance(planner_text()), operator, live)
+
+
+def bench_of(source, stand=0, **options):
+    load = RigidLoad([stand / COUNTS])
+    return Bench(source=source, step=MS, stand=[stand], load=load, **options)
+
+
+def played(commands=COMMANDS, calls=1):
+    """What `planner play` writes, at every SYNC."""
+    rows = list(csv.DictReader(play(planner_text(), commands).table.splitlines()))
+    return {name: np.array([float(row[name]) for row in rows])[::calls] for name in rows[0]}
+
+
+@pytest.mark.parametrize(
+    ("calls", "can"),
+    [
+        (1, {}),
+        (2, {"feed_forward": "velocity"}),
+        (1, {"mode": "csv", "following_error": 0.01}),
+    ],
+)
+def test_the_bus_carries_what_the_block_issues(calls, can):
+    period = calls * CYCLE
+    source = source_of(spec_of(sync_period=period, **can))
+    with bench_of(source) as bench:
+        record = bench.run()
+    assert (record.phase, record.reason) == (Phase.DONE, "")
+    assert "approach" not in bench.phases
+    due = played(calls=calls)
+    many = min(len(due["position_m"]), record.sent)  # standing at the end is counted by SYNC
+    assert abs(len(due["position_m"]) - record.sent) <= 1
+    counts = np.rint(due["position_m"][:many] * COUNTS).astype(int)
+    sent = np.array([struct.unpack_from("<i", frame.data)[0] for frame in bench.of(0x301)])
+    moves = np.flatnonzero(counts)[0]
+    if can.get("mode") == "csv":
+        moves = np.flatnonzero(np.rint(due["position_m"] * COUNTS / period))[0]
+        led = np.cumsum(sent[np.flatnonzero(sent)[0] :]) * period
+        np.testing.assert_allclose(led[: many - moves], counts[moves:], atol=1.0)
+    else:
+        begin = np.flatnonzero(sent)[0] - moves
+        np.testing.assert_array_equal(sent[begin : begin + many], counts)
+    assert record.final == (counts[-1],)
+    np.testing.assert_array_equal(source.at_sync[1:many, 0], counts[: many - 1])
+    np.testing.assert_array_equal(source.columns["promise"][:many], due["promise"][:many])
+    assert not source.columns["error_id"].any()
+
+
+def test_who_interrupts_gets_a_stop_without_sway():
+    """The same as a command to stop in that cycle, and the drives are switched off in order."""
+    source = source_of(spec_of(), LONG)
+    with bench_of(source) as bench:
+        bench.at_cycle(80, lambda: bench.streamer.ask_to_stop("Stopped by SIGINT."))
+        record = bench.run()
+    words = "Stopped by SIGINT. The axes were stopped without sway."
+    assert (record.phase, record.reason) == (Phase.ABORTED, words)
+    assert QUICK_STOP not in [frame.data for frame in bench.of(0x201)]
+    assert bench.phases[-3:] == ["hold", "disable", "aborted"]
+    due = [np.rint(played(f"{LONG}{CYCLE * at:.3f},stop,\n")["position_m"] * COUNTS) for at in (80, 81, 82)]
+    assert any(np.array_equal(source.at_sync[1:, 0], one[: record.sent - 1]) for one in due)
+
+
+@pytest.mark.parametrize("what", ["asked twice", "fault", "silent"])
+def test_what_is_wrong_or_urgent_stops_at_once(what):
+    def act():
+        if what == "asked twice":
+            bench.streamer.ask_to_stop("Stopped by SIGINT.")
+            bench.streamer.ask_to_stop("Stopped by SIGTERM.")
+        elif what == "fault":
+            bench.say(0x081, bytes([0x10, 0x23, 0, 0, 0, 0, 0, 0]))
+        else:
+            bench.drives_alive = False
+
+    with bench_of(source_of(spec_of(timeout=0.04), LONG)) as bench:
+        bench.at_cycle(80, act)
+        record = bench.run()
+    assert record.phase is Phase.ABORTED
+    reasons = {"asked twice": "Stopped by SIGTERM", "fault": "emergency 2310h", "silent": "no feedback"}
+    assert reasons[what] in record.reason
+    stops = [frame.at for frame in bench.of(0x201) if frame.data == QUICK_STOP]
+    allowed = 3 * 10 + (40 if what == "silent" else 0)
+    assert stops[0] - bench.fault_at <= allowed
+    assert max(frame.at for frame in bench.of(0x301)) <= stops[0]
+
+
+def test_the_axis_begins_where_it_stands_and_only_within_the_travel():
+    with bench_of(source_of(spec_of()), stand=150_000) as bench:
+        record = bench.run()
+    assert record.reason == ""
+    assert record.actual[0, 0] == 150_000
+    with bench_of(source_of(spec_of()), stand=1_000_100) as bench:
+        record = bench.run()
+    assert "stands at 1.0001, outside the planner's travel of -1 to 1" in record.reason
+    assert not bench.of(0x301)
+
+
+def test_a_setpoint_that_comes_too_late_is_left_out():
+    """The block goes on meanwhile, so that the axis is where it would be."""
+    source = source_of(spec_of(), LONG.replace("0.4", "0.2") + "0.8,stop,\n")
+    with bench_of(source) as bench:
+        bench.at_cycle(40, lambda: bench.clock.stall(17 * MS))
+        record = bench.run()
+    assert record.reason == ""
+    assert record.sent == len(source.at_sync) - 1
+
+
+def test_errors_and_lost_promises_are_told():
+    commands = "time_s,command,value,L1\n0.1,velocity,0.3,0.48\n1.0,position,7.0,0.42\n"
+    source = source_of(spec_of(), commands, L1=0.44)
+    with bench_of(source) as bench:
+        bench.run()
+    assert source.remarks == (
+        "The block showed error 3, which its header explains.",
+        "The load may sway, because a live parameter changed on the way.",
+    )
+
+
+def test_a_block_that_does_not_fit_the_bus_is_refused():
+    with pytest.raises(SpecError, match=r"can\.sync_period: 0\.015 s are no whole number"):
+        source_of(spec_of(sync_period=0.015))
+    with pytest.raises(SpecError, match=r"can\.travel\.cart: it must hold"):
+        source_of(spec_of(travel={"cart": (-0.5, 1.0)}))
+    with pytest.raises(SpecError, match=r"no parameter 'L2'"):
+        source_of(spec_of(), L2=0.3)
+
+
+def test_keys_are_a_stick_and_buttons():
+    keys = Keys(2.0)
+    sent = (b"\x1b[C\x1b", b"[C", b"\x1bOD", b" 1.5", b"\x7f25\r", b"\x1b[D", b"q", b"..\r", b"x")
+    told = [(one.command, round(one.value, 9)) for some in sent for one in keys.take(some)]
+    stick = [("velocity", 0.2), ("velocity", 0.4), ("velocity", 0.2)]
+    then = [("stop", 0.0), ("position", 1.25), ("velocity", -0.2), ("quick-stop", 0.0), ("stop", 0.0)]
+    assert told == [*stick, *then]
+    assert keys.over
+
+
+@pytest.fixture
+def terminal(monkeypatch):
+    ours, theirs = pty.openpty()
+    monkeypatch.setattr(os, "tcgetpgrp", lambda _: os.getpgrp())
+    yield ours, theirs
+    for end in (ours, theirs):
+        with suppress(OSError):  # closed already
+            os.close(end)
+
+
+def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
+    ours, theirs = terminal
+    before = termios.tcgetattr(theirs)
+    keyboard = Keyboard(theirs, 0.5, CYCLE)
+    source = source_of(spec_of(), keyboard)
+    with keyboard.operated(), bench_of(source) as bench:
+        os.write(ours, b"\x1b[D")  # before the motion begins
+        bench.at_cycle(10, lambda: os.write(ours, 3 * b"\x1b[C"))
+        bench.then_at_cycle(250, lambda: os.write(ours, b"x"))
+        record = bench.run()
+        assert termios.tcgetattr(theirs) != before
+    assert termios.tcgetattr(theirs) == before
+    assert record.reason == ""
+    steps = np.diff(source.at_sync[:, 0])
+    assert steps.min() == 0
+    assert steps.max() == pytest.approx(0.15 * COUNTS * CYCLE, rel=0.01)
+    assert any("stick at 0.15 m/s" in words for words in bench.phases)
+
+
+def test_a_terminal_that_is_gone_stops_the_axis(terminal):
+    ours, theirs = terminal
+    keyboard = Keyboard(theirs, 0.5, CYCLE)
+    source = source_of(spec_of(), keyboard)
+    with keyboard.operated(), bench_of(source) as bench:
+        bench.at_cycle(10, lambda: os.write(ours, b"\x1b[C"))
+        bench.then_at_cycle(80, lambda: os.close(ours))
+        record = bench.run()
+    assert record.reason == ""
+    assert 0 < record.final[0] < 100_000
+    assert record.sent < 400
+
+
+def test_what_is_no_terminal_is_refused():
+    reading, writing = os.pipe()
+    with pytest.raises(SpecError, match="standard input is no terminal"):
+        Keyboard(reading, 0.5, 0.004)
+    os.close(reading)
+    os.close(writing)
