@@ -468,7 +468,7 @@ class TestSeveralBuses:
 
     def test_a_channel_that_is_not_there(self):
         outcome = run_here("drive-sim", *self.SPEC, "--interface", "socketcan")
-        assert (outcome.code, "--interface socketcan --channel left: cannot be opened" in outcome.err) == (
+        assert (outcome.code, "interface socketcan, channel left: cannot be opened" in outcome.err) == (
             2,
             True,
         )
