@@ -334,6 +334,30 @@ def test_check_replays_one_history(deployed):
     assert "passed" in run_here("check", folder / "bay 3.st", "--history", 0).out
 
 
+def test_a_page_tells_of_the_proof(deployed, tmp_path):
+    """Its charts, its data and its words hold what the proof found."""
+    folder = deployed[0]
+    proof = json.loads((folder / "manifest.json").read_text())["check"]
+    page = tmp_path / "bay.html"
+    told = run_here(
+        "report", folder / "bay 3.st", "--out", page, "--field", "Customer=ACME", "--json"
+    ).document
+    assert told["proof"] == proof
+    text = page.read_text("utf-8")
+    worst = proof["worst"]
+    assert f"history {worst['number']} of {proof['histories']}, drawn with the seed {proof['seed']}" in text
+    assert "ACME" in text
+    assert told["report"]["bytes"] == page.stat().st_size
+    data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', text, re.DOTALL)[1])
+    history, mapped = data["figures"]
+    assert [entry["name"] for entry in history["legend"]][:3] == ["setpoint", "command", "this history"]
+    position = history["panels"][0]["data"][0]["y"]
+    assert position[0] == pytest.approx(worst["start_m"], abs=1e-4)
+    (cells,) = mapped["panels"][0]["data"]
+    found = [share for row in cells["z"] for share in row if share is not None]
+    assert max(found) == pytest.approx(100.0 * proof["share"], rel=1e-4)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -346,6 +370,12 @@ def test_what_means_nothing_for_a_block_is_refused(deployed, options, words):
     refused = run_here("check", deployed[0] / "bay 3.st", *options)
     assert refused.code == 2
     assert words in refused.err
+
+
+def test_what_only_a_design_has_is_refused_in_a_report(deployed):
+    refused = run_here("report", deployed[0] / "bay 3.st", "--no-compare")
+    assert refused.code == 2
+    assert "--no-compare: is for a design" in refused.err
 
 
 @pytest.mark.usefixtures("designed")

@@ -139,8 +139,11 @@ def map_figure(spec: Spec, proof: Proof) -> Figure:
 
 
 def _labelled(spec: Spec, name: str) -> str:
-    (unit,) = (known.unit for known in spec.machine().parameters if known.name == name)
-    return f"{name} ({unit})"
+    """Name a live parameter, which may be another axis's position, with its unit."""
+    machine = spec.machine()
+    units = {axis.name: axis.unit for axis in machine.actuated}
+    units |= {known.name: known.unit for known in machine.parameters}
+    return f"{name} ({units[name]})"
 
 
 def _unpromised(found: Trace) -> Iterator[Band]:

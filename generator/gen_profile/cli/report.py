@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import click
@@ -17,7 +20,10 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome
-from gen_profile.errors import OutputError
+from gen_profile.errors import OutputError, SpecError
+
+if TYPE_CHECKING:
+    from gen_profile.spec.model import Spec
 
 
 @cli.command(epilog="Example: gen-profile report crane.toml --out crane.html")
@@ -73,38 +79,80 @@ def report(
     no_compare: bool,
     as_json: bool,
 ) -> None:
-    """Write everything about a design into one HTML file."""
+    """Write everything about a design, or about a planner block and its proof, into one HTML file."""
     from gen_profile.artefacts.writing import deliver, require_place
-    from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.report.build import report as run
     from gen_profile.report.print import printed, require_browser
 
-    spec = chosen_spec(spec_path, preset, overrides)
-    out = path or Path(f"{spec.name}.html")
+    made_of = (
+        _of_block(spec_path)
+        if spec_path is not None and _holds_block(spec_path)
+        else _of_design(
+            chosen_spec(spec_path, preset, overrides),
+            formats,
+            log=log,
+            log_start=log_start,
+            log_columns=log_columns,
+            compared=not no_compare,
+        )
+    )
+    out = path or Path(f"{made_of.name}.html")
     on_paper = out.suffix.lower() == ".pdf"
     if not on_paper and out.suffix.lower() not in {".html", ".htm"}:
         raise OutputError(f"--out {out}: name a file that ends in .html or .pdf.")
     if on_paper:
         require_browser()
     require_place(out)
+    parted = [one.partition("=") for one in fields]
     with progress() as tell:
-        made = run(
-            spec,
-            formats,
-            log=log,
-            log_start=log_start,
-            log_columns=log_columns,
-            compared=not no_compare,
-            fields=[
-                (name.strip(), value.strip()) for name, _, value in (one.partition("=") for one in fields)
-            ],
-            progress=tell,
+        made = made_of.make(
+            fields=[(name.strip(), value.strip()) for name, _, value in parted], progress=tell
         )
         if on_paper:
             tell("printing")
             made = attrs.evolve(made, content=printed(made.content))
         deliver(out, made.content)
-    print_outcome(made.to_dict(out), words.report(made, out), as_json)
+    print_outcome(made.to_dict(out), made_of.words(made, out), as_json)
     if faults := made.faults():
         fail(faults)
+
+
+for parameter in report.params:
+    if parameter.name == "spec_path":
+        parameter.metavar = "[SPEC.toml|BLOCK]"
+
+
+@attrs.frozen(kw_only=True)
+class _Subject:
+    """What a report is about: its name, and how a page is made and told of."""
+
+    name: str
+    make: Callable[..., Any]
+    words: Callable[[Any, Path], str]
+
+
+def _of_design(spec: Spec, formats: tuple[str, ...], **options: Any) -> _Subject:
+    from gen_profile.cli import words
+    from gen_profile.report.build import report as run
+
+    return _Subject(name=spec.name, make=partial(run, spec, formats, **options), words=words.report)
+
+
+def _of_block(path: Path) -> _Subject:
+    """Refuse what only a design has, and make a report of a planner block."""
+    from gen_profile.cli import words
+    from gen_profile.report.planner import planner_report
+
+    context, taken = click.get_current_context(), {"spec_path", "path", "fields", "as_json", "debug"}
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name or "")
+        if parameter.name not in taken and source is click.core.ParameterSource.COMMANDLINE:
+            raise SpecError(f"{parameter.opts[0]}: is for a design, and {path} holds a planner block.")
+    return _Subject(name=path.stem, make=partial(planner_report, path), words=words.planner_report)
+
+
+def _holds_block(path: Path) -> bool:
+    """Tell specs from planner blocks; what cannot be read is taken for a spec, whose reader says so."""
+    from gen_profile.proof.check import is_planner_block
+
+    return path.suffix.lower() != ".toml" and path.is_file() and is_planner_block(path)

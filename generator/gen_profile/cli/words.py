@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from gen_profile.proof.check import BlockJudgement
     from gen_profile.proof.verdict import Proof
     from gen_profile.report.build import Report
+    from gen_profile.report.planner import PlannerReport
     from gen_profile.spec.model import Spec
     from gen_profile.sweep.library import Library
     from gen_profile.sweep.lookup import LookupResult
@@ -342,6 +343,13 @@ def report(made: Report, path: Path) -> str:
     rows += [("measured", sentence) for sentence in made.observed()]
     rows.append(("wrote", str(path)))
     return _block(made.design.spec.name, rows)
+
+
+def planner_report(made: PlannerReport, path: Path) -> str:
+    """Tell how the planner block was judged, and where the page lies."""
+    found = made.judgement
+    rows = [("manifest", MANIFEST_WORDS[found.manifest]), *_proof(found.check), ("wrote", str(path))]
+    return _block(str(found.path), rows)
 
 
 def _cost_of_lag(figures: Mapping[str, float], effort: str) -> list[tuple[str, str]]:

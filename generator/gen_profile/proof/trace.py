@@ -30,8 +30,8 @@ class Trace:
     issued : mapping of str to (cycles,) array
         By names of the block's outputs.
     sway : mapping of str to (cycles,) array
-        Magnitude of the end load's sway in m, by machines: that of the history, the one that the block is
-        told of, and some at corners of the uncertain ranges.
+        Of the end load in m (its magnitude where it has two directions), by machines: that of the history,
+        the one that the block is told of, and some at corners of the uncertain ranges.
     """
 
     history: History
@@ -61,7 +61,7 @@ def trace(
             kept = loop.run(attrs.evolve(history, parameters=parameters), rows=cycles).trace
             assert kept is not None
             outputs = len(loop.outputs)
-            sways[name] = length(kept[:, outputs:][:, end_load])
+            sways[name] = length(kept[:, outputs:][:, end_load])[:, 0]
             if name == "this history":
                 issued = dict(zip(loop.outputs, kept.T, strict=False))
         times = np.arange(cycles, dtype=np.float64) * loop.cycle

@@ -1,0 +1,224 @@
+"""The proof of a planner block as a page: the worst history in full, and where it sways most."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import attrs
+import tomli_w
+
+from gen_profile.artefacts.manifest import sha256
+from gen_profile.artefacts.reading import read_artefact
+from gen_profile.charts.proof import history_figure, map_figure
+from gen_profile.designs.design import LIBRARIES
+from gen_profile.evaluation.phrases import mm, number
+from gen_profile.progress import Progress, untold
+from gen_profile.proof.check import BlockJudgement, check_block
+from gen_profile.proof.histories import Histories, History
+from gen_profile.proof.trace import Trace, trace
+from gen_profile.proof.verdict import LISTED, JudgedHistory, Proof
+from gen_profile.report.content import Listing, Page, Section, Share, Table, TableRow, Terms, Verdict
+from gen_profile.report.page import render, require_pages
+from gen_profile.spec.model import Spec
+
+MANIFEST = {
+    "matches": "the file is the one that its manifest vouches for",
+    "differs": "the file is not the one that its manifest vouches for",
+    "none": "no manifest of this spec",
+}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class PlannerReport:
+    """A page, and the proof that it tells of."""
+
+    judgement: BlockJudgement
+    content: bytes
+
+    def faults(self) -> tuple[str, ...]:
+        """Say why the proof failed; a sentence each."""
+        return self.judgement.check.reasons()
+
+    def to_dict(self, path: Path) -> dict[str, Any]:
+        """Nest plain values for JSON."""
+        page = {"path": str(path), "sha256": sha256(self.content), "bytes": len(self.content)}
+        return {**self.judgement.to_dict(), "report": page}
+
+
+def planner_report(
+    path: Path, *, fields: Sequence[tuple[str, str]] = (), progress: Progress = untold
+) -> PlannerReport:
+    """Prove a written planner block again, and put what was found on one page.
+
+    Parameters
+    ----------
+    path : Path
+        The block, with its manifest beside it.
+    fields : sequence of (str, str)
+        As of `gen_profile.report.build.report`.
+    progress : callable
+        Told what is being done.
+
+    Raises
+    ------
+    GenProfileError
+        As `gen_profile.proof.check.check_block`; or a library is not installed.
+    """
+    require_pages()
+    judgement = check_block(path, progress=progress)
+    spec, worst = judgement.spec, judgement.check.worst
+    followed = trace(spec, judgement.text, Histories.of(spec), worst.history, progress)
+    progress("writing the report")
+    page = attrs.evolve(
+        _page(judgement, followed),
+        papers=[(name, value) for name, value in fields if value],
+        signatures=[name for name, value in fields if not value],
+    )
+    return PlannerReport(judgement=judgement, content=render(page))
+
+
+def _page(judgement: BlockJudgement, followed: Trace) -> Page:
+    spec, proof = judgement.spec, judgement.check
+    live = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in spec.planner.live.items())
+    libraries = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
+    return Page(
+        title=spec.name,
+        subtitle=f"{spec.machine().summary}: planner block; live parameters: {live or 'none'}",
+        verdicts=[_verdict(proof, judgement.path)],
+        facts=_facts(proof),
+        sections=[*_sections(judgement, followed)],
+        colophon=f"Made by {libraries}.",
+    )
+
+
+def _verdict(proof: Proof, path: Path) -> Verdict:
+    """Say first whether the block may be deployed, and how to see the worst history again."""
+    again = f"gen-profile check {path.name} --history {proof.worst.number} runs the worst history again."
+    if not proof.passed:
+        return Verdict(word="Failed.", passed=False, sentences=[*proof.reasons(), again])
+    load = _worst_load(proof)
+    return Verdict(
+        word="Passed.",
+        passed=True,
+        sentences=[
+            f"After the last command the {load} sways by {mm(proof.worst.residual[load])} at most (history "
+            f"{proof.worst.number} of {proof.count}, drawn with the seed {proof.seed}), and "
+            f"{mm(proof.limit[load])} are allowed.",
+            "Every history kept velocity, acceleration, jerk and travel in every cycle, and came to rest.",
+            again,
+            *(f"Beware: {sentence}" for sentence in proof.warnings()),
+        ],
+    )
+
+
+def _facts(proof: Proof) -> list[tuple[str, str]]:
+    load, worst = _worst_load(proof), proof.worst
+    swaying = max(one.on_the_way[load] for one in proof.judged)
+    resting = max(one.rests_after or 0.0 for one in proof.judged)
+    return [
+        ("Histories", f"{len(proof.judged)}"),
+        (f"Residual sway of the {load}, worst", mm(worst.residual[load])),
+        ("Share of its limit", Share(proof.share(worst)).percent),
+        ("Sway on the way, worst", mm(swaying)),
+        ("Standstill after the last command", f"{number(resting)} s at most"),
+    ]
+
+
+def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
+    """Put the page in the order in which an engineer asks."""
+    spec, proof = judgement.spec, judgement.check
+    worst = proof.worst
+    told = ", ".join(f"{name} = {number(value)}" for name, value in worst.history.live.items())
+    commands = len(worst.history.commands)
+    yield Section(
+        title="The worst history",
+        words=(
+            f"History {worst.number}: {commands} commands from {number(worst.history.places[0])} m on"
+            + (f"; the block is told {told}." if told else "."),
+        ),
+        blocks=[
+            history_figure(spec, proof, followed),
+            Listing(title="Its commands", text=_commands(worst.history)),
+        ],
+    )
+    if len(proof.judged) > 1:
+        yield Section(title="Where it sways most", blocks=[map_figure(spec, proof), _ranking(proof)])
+    yield Section(title="Limits and margins", blocks=[_limits(spec, proof)])
+    yield Section(title="How it was proved", blocks=[_groups(proof), Terms(rows=[*_proved(proof)])])
+    digest = sha256(read_artefact(judgement.path))
+    yield Section(
+        title="Files",
+        blocks=[
+            Terms(
+                rows=[
+                    (f"{judgement.path.name}, SHA-256", digest),
+                    ("Manifest", MANIFEST[judgement.manifest]),
+                    ("Spec, SHA-256", spec.sha256()),
+                ]
+            ),
+            Listing(title="The whole spec", text=tomli_w.dumps(spec.to_dict())),
+        ],
+    )
+
+
+def _worst_load(proof: Proof) -> str:
+    """Name the load that takes up the greatest share of its limit in the worst history."""
+    return max(proof.limit, key=lambda load: proof.worst.residual[load] / proof.limit[load])
+
+
+def _commands(history: History) -> str:
+    """Write a history's commands as the table that `planner play` reads."""
+    rows = [
+        f"{command.time:.6g},{command.command},"
+        + (f"{command.value:.6g}" if command.command in ("position", "velocity") else "")
+        for command in history.commands
+    ]
+    return "\n".join(["time_s,command,value", *rows])
+
+
+def _ranking(proof: Proof) -> Table:
+    ranked = sorted(proof.judged, key=proof.share, reverse=True)[:LISTED]
+    load = _worst_load(proof)
+    live = list(ranked[0].history.live)
+
+    def row(one: JudgedHistory) -> TableRow:
+        values = [number(one.history.live[name]) for name in live]
+        residual = mm(one.residual[load])
+        cells: list[str | Share] = [f"{one.number}", one.group, *values, residual, Share(proof.share(one))]
+        return TableRow(cells=cells, mark="failed" if proof.share(one) > 1.0 else "")
+
+    head = ("history", "group", *live, f"residual sway of the {load}", "share of its limit")
+    return Table(head=head, rows=[row(one) for one in ranked], words=2)
+
+
+def _limits(spec: Spec, proof: Proof) -> Table:
+    """Hold every limit against what all histories together take of it."""
+    own = spec.limits.of(0)
+    rows = []
+    for name, unit in (("velocity", "m/s"), ("acceleration", "m/s²"), ("jerk", "m/s³")):
+        share, limit = max(one.limits[name] for one in proof.judged), getattr(own, name)
+        cells = (name, f"{number(share * limit)} {unit}", f"{number(limit)} {unit}", Share(share))
+        rows.append(TableRow(cells=cells, mark="passed" if share <= 1.0 + 1e-9 else "failed"))
+    for load, limit in proof.limit.items():
+        worst = max(one.residual[load] for one in proof.judged if one.promise) + proof.error_bound
+        cells = (f"residual sway of the {load}, error included", mm(worst), mm(limit), Share(worst / limit))
+        rows.append(TableRow(cells=cells, mark="passed" if worst <= limit else "failed"))
+    return Table(head=("", "takes", "allowed", "share"), rows=rows)
+
+
+def _groups(proof: Proof) -> Table:
+    rows = []
+    for group in proof.to_dict()["groups"]:
+        quantiles = [Share(share).percent for share in group["quantiles"].values()]
+        cells = [group["what"], f"{group['histories']}", *quantiles, Share(group["worst_share"])]
+        rows.append(TableRow(cells=cells))
+    return Table(head=("histories", "how many", "median", "90 %", "99 %", "worst"), rows=rows)
+
+
+def _proved(proof: Proof) -> Iterator[tuple[str, str]]:
+    yield "Seed", f"{proof.seed}, which makes every history again"
+    yield "Co-simulated by FMPy, too", f"{len(proof.by_fmpy)} histories, apart by {proof.apart:.1e} m at most"
+    yield "Numerical error", f"below {mm(proof.error_bound)}, counted against the margin"
