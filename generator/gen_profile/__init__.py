@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from gen_profile.designs.design import design as design
     from gen_profile.designs.fmu import export_fmu as export_fmu
     from gen_profile.designs.plan import plan as plan
+    from gen_profile.designs.planner import deploy_planner as deploy_planner
     from gen_profile.errors import CheckFailed as CheckFailed
     from gen_profile.errors import CosimulationError as CosimulationError
     from gen_profile.errors import ExportError as ExportError
@@ -68,6 +69,7 @@ _HOMES = {
     "check_artefact": "verification.check",
     "compare": "comparison.compare",
     "cosimulate": "verification.from_python",
+    "deploy_planner": "designs.planner",
     "design": "designs.design",
     "evaluate": "evaluation.motion_evaluation",
     "evolve_spec": "spec.reading",

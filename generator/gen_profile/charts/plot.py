@@ -10,9 +10,12 @@ import attrs
 from gen_profile.charts.comparison import comparison_figure
 from gen_profile.charts.identification import identification_figure
 from gen_profile.charts.picture import require_drawable, save
+from gen_profile.charts.proof import draw
 from gen_profile.charts.robustness import robustness_figure
 from gen_profile.comparison.compare import Comparison
 from gen_profile.comparison.robustness import Robustness
+from gen_profile.designs.planner import Deployment
+from gen_profile.errors import OutputError
 from gen_profile.identification.identify import Identification
 
 
@@ -26,12 +29,14 @@ class Picture:
         return self.svg
 
 
-def plot(result: Comparison | Robustness | Identification, path: Path | str | None = None) -> Picture | None:
-    """Draw a comparison, robustness curves, or a fitted swing.
+def plot(
+    result: Comparison | Robustness | Identification | Deployment, path: Path | str | None = None
+) -> Picture | None:
+    """Draw a comparison, robustness curves, a fitted swing, or the proof of a planner block.
 
     Parameters
     ----------
-    result : Comparison, Robustness or Identification
+    result : Comparison, Robustness, Identification or Deployment
     path : Path or str, optional
         Of a PNG, SVG or PDF file. Without one the picture is returned, for a notebook to show.
 
@@ -57,6 +62,11 @@ def plot(result: Comparison | Robustness | Identification, path: Path | str | No
         case Identification(spec=spec):
             names = ", ".join(result.estimate.values)
             figure, title = identification_figure(result), f"{spec.name}: {names} identified"
+        case Deployment(spec=spec, block=block, proof=proof):
+            if proof is None:
+                raise OutputError("There is nothing to draw: the block was not proved.")
+            draw(spec, block.text, proof, path)
+            return None
         case _:
             raise TypeError(f"There is no picture of a {type(result).__name__}.")
     save([figure], path, spec.name, title)

@@ -100,7 +100,7 @@ def write(
     from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
-    from gen_profile.designs.planner import deploy
+    from gen_profile.designs.planner import deploy_planner
     from gen_profile.planner.forms import require_forms
     from gen_profile.proof.prove import HISTORIES
 
@@ -112,7 +112,7 @@ def write(
 
         require_drawable(picture)
     with progress() as tell:
-        outcome = deploy(
+        outcome = deploy_planner(
             spec,
             formats,
             folder,

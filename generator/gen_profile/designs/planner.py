@@ -62,7 +62,7 @@ class Deployment:
         }
 
 
-def deploy(
+def deploy_planner(
     spec: Spec,
     formats: Sequence[str],
     folder: Path | str,
