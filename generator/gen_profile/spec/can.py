@@ -7,16 +7,19 @@ from typing import Annotated, Literal
 
 import attrs
 
-from gen_profile.spec.values import Bounds, CycleTime, Distance, Positive, frozen_mapping
+from gen_profile.spec.structure import Checked
+from gen_profile.spec.values import NONE, AxisName, Bounds, CycleTime, Distance, Pattern, Positive, example
 
 Unsigned32 = Annotated[int, Bounds(least=1, most=0xFFFF_FFFF)]
 NodeId = Annotated[int, Bounds(least=1, most=127)]
 # what CiA 301 leaves to PDOs: EMCY lies below, SDOs above
 PdoCobId = Annotated[int, Bounds(least=0x181, most=0x57F, meaning="(181h to 57Fh)")]
+# candump separates its name from the rest by a space
+Channel = Annotated[str, Pattern(r"[!-~]{1,60}", "the name of a channel, such as 'can0'")]
 
 
 @attrs.frozen(kw_only=True)
-class CobIdsSpec:
+class CobIdsSpec(Checked, table="can.cob_ids"):
     """COB-IDs of one drive's PDOs; None for those of the predefined connection set of CiA 301.
 
     Attributes
@@ -41,7 +44,7 @@ Mapped = tuple[Unsigned32, ...]
 
 
 @attrs.frozen(kw_only=True)
-class FixedPdosSpec:
+class FixedPdosSpec(Checked, table="can.fixed_pdos"):
     """PDOs of drives that cannot be mapped anew, as their manual states them.
 
     Attributes
@@ -78,7 +81,7 @@ class FixedPdosSpec:
 
 
 @attrs.frozen(kw_only=True)
-class CanSpec:
+class CanSpec(Checked, table="can"):
     """The drives on the CAN bus, and how they are to be fed, watched and stopped.
 
     Attributes
@@ -128,10 +131,10 @@ class CanSpec:
     """
 
     node: NodeId = 1
-    nodes: Mapping[str, NodeId] = attrs.field(factory=dict, converter=frozen_mapping)
-    channels: Mapping[str, str] = attrs.field(factory=dict, converter=frozen_mapping)
-    cob_ids: Mapping[str, CobIdsSpec] = attrs.field(factory=dict, converter=frozen_mapping)
-    fixed_pdos: FixedPdosSpec = attrs.field(factory=FixedPdosSpec)
+    nodes: Annotated[Mapping[AxisName, NodeId], example("bridge = 5, trolley = 9")] = NONE
+    channels: Annotated[Mapping[AxisName, Channel], example('bridge = "can0", trolley = "can1"')] = NONE
+    cob_ids: Annotated[Mapping[AxisName, CobIdsSpec], example("cart = { setpoint = 0x321 }")] = NONE
+    fixed_pdos: FixedPdosSpec = FixedPdosSpec()
     bitrate: Annotated[int, Bounds(least=10_000, most=1_000_000)] = 500_000
     mode: Literal["csp", "ip", "csv"] = "csp"
     sync_period: CycleTime = 0.004
@@ -141,11 +144,11 @@ class CanSpec:
     start_tolerance: Positive = 0.001
     following_error: Positive | None = None
     quick_stop: Positive | None = None
-    travel: Mapping[str, tuple[Distance, Distance]] = attrs.field(factory=dict, converter=frozen_mapping)
+    travel: Annotated[Mapping[AxisName, tuple[Distance, Distance]], example("cart = [0.0, 0.5]")] = NONE
     encoder: tuple[Unsigned32, Unsigned32] | None = None
     gear: tuple[Unsigned32, Unsigned32] | None = None
     feed: tuple[Unsigned32, Unsigned32] | None = None
     vendor: Unsigned32 | None = None
     product: Unsigned32 | None = None
-    serial: Mapping[str, Unsigned32] = attrs.field(factory=dict, converter=frozen_mapping)
+    serial: Annotated[Mapping[AxisName, Unsigned32], example("cart = 0x12345678")] = NONE
     homed: tuple[Unsigned32, Annotated[int, Bounds(least=0, most=255)], Unsigned32] | None = None

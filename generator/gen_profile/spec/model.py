@@ -1,7 +1,7 @@
 """A motion task as frozen values: machine, move, robustness, cost, limits, check and target.
 
-Every number is in SI units. What a TOML file may say is exactly the attributes here;
-`gen_profile.spec.reading` turns text into them and gathers its faults.
+Every number is in SI units. What a TOML file may say is exactly the attributes here. Their annotations say
+what each may hold, however it is made; `gen_profile.spec.rules` holds them to one another.
 """
 
 from __future__ import annotations
@@ -18,38 +18,54 @@ from gen_profile.plants.machine_file import MachineFile, plant_of_file
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.registry import find_plant
 from gen_profile.spec.can import CanSpec
+from gen_profile.spec.structure import Checked, kinds_of
 from gen_profile.spec.values import (
+    NONE,
+    AxisName,
     Bounds,
     Column,
     CycleTime,
     Distance,
     Duration,
+    LoadName,
     Name,
+    Named,
     NotNegative,
+    ParameterName,
     Positive,
     RelativeRange,
+    Rising,
     ShaperName,
     SolverName,
-    frozen_mapping,
+    Travel,
+    Words,
+    example,
 )
 from gen_profile.units import AxisScale, axis_factor
 
 DEFAULT_COUNTS_PER_SI = 1e6
 RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longest axis move
 
+ParameterSpan = Annotated[str, Named("parameter", of="span")]
+LiveParameter = Annotated[str, Named("parameter", of="live")]
+Span = Annotated[tuple[float, float], Rising()]
+SwingState = Annotated[str, Named("coordinate")]
+Shares = Annotated[Mapping[ParameterName, RelativeRange], example("L1 = 0.2")]
+Sway = Annotated[float, Bounds(above=0.0), Words("must be a finite number greater than 0, found FOUND")]
+
 
 @attrs.frozen(kw_only=True)
-class PlantSpec:
+class PlantSpec(Checked, table="plant"):
     """Which machine, with the value of every parameter, and the file that a user wrote it in."""
 
     type: str
     file: MachineFile | None = None
-    parameters: Mapping[str, float] = attrs.field(factory=dict, converter=frozen_mapping)
+    parameters: Mapping[ParameterName, float] = NONE
     defaults: tuple[str, ...] = attrs.field(default=(), eq=False)  # parameters the spec left to the type
 
 
 @attrs.frozen(kw_only=True)
-class MoveSpec:
+class MoveSpec(Checked, table="move"):
     """Start and target of every axis in m (or rad), duration in s; from standstill, to standstill or a speed.
 
     Attributes
@@ -66,7 +82,7 @@ class MoveSpec:
     target: tuple[Distance, ...]
     duration: Duration
     shortest: bool = False
-    initial: Mapping[str, float] = attrs.field(factory=dict, converter=frozen_mapping)
+    initial: Annotated[Mapping[SwingState, float], example("theta1 = 0.05")] = NONE
     final_velocity: tuple[Distance, ...] = attrs.field()
 
     @final_velocity.default
@@ -78,6 +94,11 @@ class MoveSpec:
         """Signed distance of every axis."""
         return tuple(b - a for a, b in zip(self.start, self.target, strict=True))
 
+    def longest(self, plant: Plant) -> float:
+        """Longest distance of the axes that move in m; 0 where none does."""
+        axes = zip(plant.actuated, self.distance, strict=True)
+        return max((abs(way) for axis, way in axes if axis.unit == "m"), default=0.0)
+
     @property
     def stops(self) -> bool:
         """Whether the axes stand still at the end."""
@@ -85,7 +106,7 @@ class MoveSpec:
 
 
 @attrs.frozen(kw_only=True)
-class ActuatorSpec:
+class ActuatorSpec(Checked, table="actuator"):
     """How the drive follows: perfectly, or with a first-order lag of time constant tau in s (eq. 6)."""
 
     type: Literal["ideal", "first-order"] = "ideal"
@@ -93,17 +114,17 @@ class ActuatorSpec:
 
 
 @attrs.frozen(kw_only=True)
-class RobustnessSpec:
+class RobustnessSpec(Checked, table="robustness"):
     """Uncertain parameters with their relative half-ranges, and what the design does about them."""
 
     method: Literal["none", "sensitivity", "range"] = "none"
     order: Literal[1, 2] = 1
     nominal_zero: bool = False  # with method "range": the nominal machine comes to rest exactly all the same
-    uncertain: Mapping[str, RelativeRange] = attrs.field(factory=dict, converter=frozen_mapping)
+    uncertain: Shares = NONE
 
 
 @attrs.frozen(kw_only=True)
-class CostSpec:
+class CostSpec(Checked, table="cost"):
     """The cost (26): which effort, the sway's weight β and its scale γ in 1/m (None: automatic)."""
 
     effort: Literal["jerk", "snap", "reference"] = "jerk"
@@ -112,7 +133,7 @@ class CostSpec:
 
 
 @attrs.frozen(kw_only=True)
-class SolverSpec:
+class SolverSpec(Checked, table="solver"):
     """Which solver, or which shaper and the move that it is fed with.
 
     "auto" takes the indirect solver where no limit binds.
@@ -133,17 +154,17 @@ class SolverSpec:
 
 
 @attrs.frozen(kw_only=True)
-class AxisLimitsSpec:
+class AxisLimitsSpec(Checked, table="limits.axis"):
     """Greatest magnitudes of one axis' command in SI units, and its travel."""
 
     velocity: Positive | None = None
     acceleration: Positive | None = None
     jerk: Positive | None = None
-    travel: tuple[Distance, Distance] | None = None
+    travel: Travel | None = None
 
 
 @attrs.frozen(kw_only=True)
-class LimitsSpec:
+class LimitsSpec(Checked, table="limits"):
     """Limits of all axes' commands, and the end load's transient sway in m.
 
     `axis` holds what is different for single axes: all axes by name in the plant's order, or none.
@@ -153,8 +174,8 @@ class LimitsSpec:
     acceleration: Positive | None = None
     jerk: Positive | None = None
     sway: Positive | None = None
-    travel: tuple[Distance, Distance] | None = None
-    axis: Mapping[str, AxisLimitsSpec] = attrs.field(factory=dict, converter=frozen_mapping)
+    travel: Travel | None = None
+    axis: Annotated[Mapping[AxisName, AxisLimitsSpec], Words("must be a table by axis, found FOUND")] = NONE
 
     def own(self, column: int) -> tuple[str, AxisLimitsSpec]:
         """Name of an axis that has limits of its own, and those."""
@@ -163,7 +184,7 @@ class LimitsSpec:
     def of(self, column: int) -> AxisLimitsSpec:
         """Limits of one axis: its own, and where it has none, those of all."""
         _, own = self.own(column)
-        names = [field.name for field in attrs.fields(AxisLimitsSpec)]
+        names = kinds_of(AxisLimitsSpec)
         stated = {name: getattr(own, name) for name in names if getattr(own, name) is not None}
         return AxisLimitsSpec(**{name: getattr(self, name) for name in names} | stated)
 
@@ -178,13 +199,11 @@ class LimitsSpec:
             "limits": self,
             **{f"limits.axis.{axis}": own for axis, own in self.axis.items()},
         }
-        values = {
-            f"{table}.{field.name}": getattr(own, field.name)
-            for table, own in tables.items()
-            for field in attrs.fields(type(own))
-        }
         return {
-            place: value for place, value in values.items() if value is not None and place != "limits.axis"
+            f"{table}.{name}": value
+            for table, own in tables.items()
+            for name in kinds_of(LimitsSpec)
+            if name != "axis" and (value := getattr(own, name, None)) is not None
         }
 
     def changed(self, values: Mapping[str, Any]) -> LimitsSpec:
@@ -199,7 +218,7 @@ class LimitsSpec:
 
 
 @attrs.frozen(kw_only=True)
-class ExternalFmu:
+class ExternalFmu(Checked, table="check"):
     """Somebody else's FMU that judges in place of ours.
 
     Attributes
@@ -226,9 +245,9 @@ class ExternalFmu:
     sha256: str
     input: str
     inputs: tuple[str, ...]
-    sway: Mapping[str, str] = attrs.field(converter=frozen_mapping)
-    parameters: Mapping[str, str] = attrs.field(converter=frozen_mapping)
-    time_limit: float
+    sway: Mapping[LoadName, str]
+    parameters: Annotated[Mapping[ParameterName, str], example('L1 = "rope"')]
+    time_limit: Annotated[float, Bounds(above=0.0), Words("must be a positive time in s, found FOUND")]
 
     def to_dict(self) -> dict[str, Any]:
         """Write the keys of ``[check]``."""
@@ -243,7 +262,7 @@ class ExternalFmu:
 
 
 @attrs.frozen(kw_only=True)
-class PathSpec:
+class PathSpec(Checked, table="check.path"):
     """The way of a setpoint from the artefact to the axis.
 
     Attributes
@@ -264,7 +283,7 @@ class PathSpec:
 
     quantum: NotNegative = 0.0
     between: Literal["linear", "hold"] = "linear"
-    lag: tuple[NotNegative, NotNegative] | None = None
+    lag: Annotated[tuple[NotNegative, NotNegative], Rising("times in s")] | None = None
     latency: Annotated[float, Bounds(least=0.0, most=10.0)] = 0.0
     jitter: Annotated[float, Bounds(least=0.0, most=1.0)] = 0.0
     lost: Annotated[float, Bounds(least=0.0, most=0.5)] = 0.0
@@ -281,7 +300,7 @@ class PathSpec:
 
 
 @attrs.frozen(kw_only=True)
-class CheckSpec:
+class CheckSpec(Checked, table="check"):
     """What may remain of the sway, on which machines, and who is to judge.
 
     Attributes
@@ -301,20 +320,18 @@ class CheckSpec:
         Somebody else's FMU that judges in place of ours.
     """
 
-    residual_sway: Mapping[str, Positive] = attrs.field(converter=frozen_mapping)
-    uncertain: Mapping[str, RelativeRange] | None = attrs.field(
-        default=None, converter=attrs.converters.optional(frozen_mapping)
-    )
-    spans: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=frozen_mapping)
+    residual_sway: Mapping[LoadName, Sway]
+    uncertain: Shares | None = None
+    spans: Annotated[Mapping[ParameterSpan, Span], example("c2 = [0.0, 0.02]")] = NONE
     samples: Annotated[int, Bounds(least=0, most=1_000_000)] = 0
     seed: Annotated[int, Bounds(least=0, most=0xFFFF_FFFF)] = 0
-    path: PathSpec = attrs.field(factory=PathSpec)
+    path: PathSpec = PathSpec()
     foreign: ExternalFmu | None = None
     default: bool = attrs.field(default=False, eq=False)  # the limit was not stated
 
 
 @attrs.frozen(kw_only=True)
-class AxisSpec:
+class AxisSpec(Checked, table="axis"):
     """What the target's axis counts in."""
 
     unit: Literal["m", "mm", "um", "deg", "rad", "counts"]
@@ -323,17 +340,19 @@ class AxisSpec:
 
 
 @attrs.frozen(kw_only=True)
-class ExportSpec:
+class ExportSpec(Checked, table="export"):
     """The controller's cycle in s, and what the formats leave to choose."""
 
     cycle_time: CycleTime = 0.001
     plc_layout: Literal["segments", "samples", "counts"] = "segments"
     csv_dialect: Literal["rfc4180", "excel-de", "sew", "kollmorgen", "lenze"] = "rfc4180"
-    csv_columns: tuple[Column, ...] = ("position", "velocity", "acceleration", "jerk")
+    csv_columns: Annotated[
+        tuple[Column, ...], Words('must be a list such as ["position", "velocity"], found FOUND')
+    ] = ("position", "velocity", "acceleration", "jerk")
 
 
 @attrs.frozen(kw_only=True)
-class PlannerSpec:
+class PlannerSpec(Checked, table="planner"):
     """What a planner block is told at run time, and how it brakes at once.
 
     Attributes
@@ -346,28 +365,28 @@ class PlannerSpec:
         m/s³; None takes four times the limit.
     """
 
-    live: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=frozen_mapping)
+    live: Annotated[Mapping[LiveParameter, Span], example("L1 = [3.0, 9.0]")] = NONE
     quick_stop: Positive | None = None
     quick_stop_jerk: Positive | None = None
 
 
 @attrs.frozen(kw_only=True)
-class Spec:
+class Spec(Checked):
     """One motion task, complete: nothing downstream looks anything else up."""
 
-    name: Name
+    name: Name = "profile"
     plant: PlantSpec
     move: MoveSpec
-    actuator: ActuatorSpec
-    robustness: RobustnessSpec
-    cost: CostSpec
-    solver: SolverSpec
-    limits: LimitsSpec
+    actuator: ActuatorSpec = ActuatorSpec()
+    robustness: RobustnessSpec = RobustnessSpec()
+    cost: CostSpec = CostSpec()
+    solver: SolverSpec = SolverSpec()
+    limits: LimitsSpec = LimitsSpec()
     check: CheckSpec
-    axis: Mapping[str, AxisSpec] = attrs.field(converter=frozen_mapping)
-    export: ExportSpec
-    can: CanSpec
-    planner: PlannerSpec = attrs.field(factory=PlannerSpec)
+    axis: Mapping[AxisName, AxisSpec]
+    export: ExportSpec = ExportSpec()
+    can: CanSpec = attrs.field(factory=CanSpec)
+    planner: PlannerSpec = PlannerSpec()
 
     def machine(self) -> Plant:
         """Load the plant."""

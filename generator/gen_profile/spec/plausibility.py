@@ -100,12 +100,12 @@ def _thousandth(value: float, what: str) -> str:
     return f"{what}; did you mean {value / 1e3:.4g}?" if value >= 1.0 else f"{what}; state less."
 
 
-def _fast(place: str, found: str, *, value: float, unit: str, kind: str, cure: str) -> Iterator[Doubt]:
+def _fast(value: float, unit: str, kind: str, sentence: str, cure: str) -> Iterator[Doubt]:
     """Doubt a speed or acceleration."""
     hardly, never = FAST[unit, kind]
     if value > hardly:
         verdict = "which no such machine reaches" if value > never else "which few machines reach"
-        yield Doubt(sentence=f"{place}: {found}, {verdict}; {cure}", refused=value > never)
+        yield Doubt(sentence=f"{sentence}, {verdict}; {cure}", refused=value > never)
 
 
 def _move(spec: Spec) -> Iterator[Doubt]:
@@ -114,33 +114,24 @@ def _move(spec: Spec) -> Iterator[Doubt]:
     for axis, distance, speed in zip(
         axes, map(abs, move.distance), map(abs, move.final_velocity), strict=True
     ):
-        metres = axis.unit == "m"
-        meant = distance / 1e3 if metres else math.radians(distance)
-        units = f"distances are in {axis.unit} and durations in s"
-        cure = f"{units}; did you mean {meant:.4g} {axis.unit}?"
-        mean = distance / move.duration
-        said = f"{axis.name} moves {distance:g} {axis.unit}"
+        unit = axis.unit
+        meant = distance / 1e3 if unit == "m" else math.radians(distance)
+        cure = f"distances are in {unit} and durations in s; did you mean {meant:.4g} {unit}?"
+        said = f"{axis.name} moves {distance:g} {unit}"
         if not move.shortest:
-            found = f"{said} in {move.duration:g} s, at {mean:.3g} {axis.unit}/s on average"
-            hurried = list(
-                _fast("move.duration", found, value=mean, unit=axis.unit, kind="velocity", cure=cure)
-            )
+            mean = distance / move.duration
+            found = f"move.duration: {said} in {move.duration:g} s, at {mean:.3g} {unit}/s on average"
+            hurried = list(_fast(mean, unit, "velocity", found, cure))
             yield from hurried
             if hurried:
                 continue
-        if metres and distance > LONG_WAY:
+        if unit == "m" and distance > LONG_WAY:
             yield Doubt(sentence=f"move.distance: {said}, farther than any crane's runway; {cure}")
-        elif not metres and distance > MANY_TURNS:
+        elif unit == "rad" and distance > MANY_TURNS:
             turns = distance / (2.0 * math.pi)
             yield Doubt(sentence=f"move.distance: {said}, which are {turns:.3g} turns; {cure}")
-        yield from _fast(
-            "move.final_velocity",
-            f"{axis.name} ends at {speed:g} {axis.unit}/s",
-            value=speed,
-            unit=axis.unit,
-            kind="velocity",
-            cure=_thousandth(speed, f"speeds are in {axis.unit}/s"),
-        )
+        found = f"move.final_velocity: {axis.name} ends at {speed:g} {unit}/s"
+        yield from _fast(speed, unit, "velocity", found, _thousandth(speed, f"speeds are in {unit}/s"))
     longest = max(map(abs, move.distance))
     if not move.shortest and move.duration >= LONG_TIME and 0.0 < longest < SLOW * move.duration:
         cure = _thousandth(move.duration, "durations are in s")
@@ -154,11 +145,9 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
         *table, kind = place.split(".")
         unit = units[table[-1]] if len(table) > 1 else max(units.values(), key="m".__eq__)
         if (unit, kind) in FAST:
-            per = "s" if kind == "velocity" else "s²"
-            cure = _thousandth(value, f"limits are in {unit}/{per}")
-            yield from _fast(
-                place, f"allows {value:g} {unit}/{per}", value=value, unit=unit, kind=kind, cure=cure
-            )
+            per = f"{unit}/s" if kind == "velocity" else f"{unit}/s²"
+            cure = _thousandth(value, f"limits are in {per}")
+            yield from _fast(value, unit, kind, f"{place}: allows {value:g} {per}", cure)
     sway, depth = spec.limits.sway, scale.depth[-1]
     if sway is not None and sway > (depth or FAR * max(scale.way[-1], *scale.depth)) > 0.0:
         what = f"the ropes' {depth:.4g} m" if depth else f"{FAR:g} times the move"
@@ -169,8 +158,7 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
 def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
     """Doubt limits of the residual sway that every motion keeps."""
     limits = spec.check.residual_sway
-    axes = zip(spec.machine().actuated, spec.move.distance, strict=True)
-    usual = RESIDUAL_SHARE * max((abs(way) for axis, way in axes if axis.unit == "m"), default=0.0)
+    usual = RESIDUAL_SHARE * spec.move.longest(spec.machine())
     alike = len(set(limits.values())) == 1
     from_rest = not spec.move.initial and spec.move.stops
     end_load = spec.machine().end_load
@@ -215,14 +203,10 @@ def _drive(spec: Spec) -> Iterator[Doubt]:
     if tau is not None and not spec.move.shortest and tau > spec.move.duration:
         cure = _thousandth(tau, "time constants are in s")
         yield Doubt(sentence=f"actuator.tau: {tau:g} s are longer than the whole move; {cure}")
-    ways = [
-        abs(way)
-        for axis, way in zip(spec.machine().actuated, spec.move.distance, strict=True)
-        if axis.unit == "m"
-    ]
+    longest = spec.move.longest(spec.machine()) or math.inf
     for name in ("start_tolerance", "following_error"):
         value, usual = getattr(spec.can, name), getattr(CanSpec(), name)
-        if value is not None and value != usual and value > LOOSE * max(ways, default=math.inf) > 0.0:
+        if value is not None and value != usual and value > LOOSE * longest:
             cure = _thousandth(value, "tolerances are in m")
             yield Doubt(sentence=f"can.{name}: {value:g} m are more than half of the move; {cure}")
 

@@ -8,15 +8,15 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
-from gen_profile.spec.structure import Faults, Table, structure
-from gen_profile.spec.tables import complete
+from gen_profile.spec.tables import Table, structure
 from gen_profile.suggestion import listed, meant, number_meant, suggestion
 
+Document = TypeVar("Document", bound=dict[str, Any])
 HERE = Path()
 SLIPS = {
     r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
@@ -126,7 +126,7 @@ def evolve_spec(spec: Spec | Mapping[str, Any], **tables: Any) -> Spec:
     return spec_from_dict(document)
 
 
-def overridden(document: Mapping[str, Any], overrides: Sequence[str]) -> Table:
+def overridden(document: Document, overrides: Sequence[str]) -> Document:
     """Copy nested plain values and set keys such as ``plant.L1=0.5`` in them.
 
     Raises
@@ -134,21 +134,10 @@ def overridden(document: Mapping[str, Any], overrides: Sequence[str]) -> Table:
     SpecError
         An override makes no sense.
     """
-    changed = copy.deepcopy(dict(document))
-    overridden_in(changed, overrides)
-    return changed
-
-
-def overridden_in(document: Table, overrides: Sequence[str]) -> None:
-    """Set keys such as ``plant.L1=0.5`` in nested plain values.
-
-    Raises
-    ------
-    SpecError
-        An override makes no sense.
-    """
+    changed = copy.deepcopy(document)
     for override in overrides:
-        _override(document, override)
+        _override(changed, override)
+    return changed
 
 
 def presets() -> dict[str, str]:
@@ -196,8 +185,7 @@ def spec_from_dict(document: Mapping[str, Any], folder: Path = HERE) -> Spec:
     SpecError
         With one sentence for every fault found.
     """
-    faults = Faults()
-    spec = structure(complete(document, folder, faults), faults)
+    spec = structure(document, folder)
     refuse_implausible(spec)
     return spec
 

@@ -1,76 +1,227 @@
-"""From plain values to the typed ones of the spec's model; a misfit becomes a sentence with its place."""
+"""From plain values to typed ones, as annotations say; a misfit becomes a sentence with its place.
+
+What fits is kept where other values do not, so that rules across fields find their faults beside them.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
-from typing import Annotated, Any, Literal, get_args, get_origin
+from collections.abc import Iterable, Mapping
+from functools import cache
+from types import MappingProxyType, UnionType
+from typing import Annotated, Any, ClassVar, Union, get_args, get_origin, get_type_hints
 
 import attrs
-from cattrs import Converter
-from cattrs.errors import (
-    ClassValidationError,
-    ForbiddenExtraKeysError,
-    IterableValidationError,
-    IterableValidationNote,
-)
 
 from gen_profile.errors import SpecError
-from gen_profile.plants.machine_file import MachineFile
-from gen_profile.spec.model import ExternalFmu, Spec
-from gen_profile.spec.values import Bounds, Pattern
-from gen_profile.suggestion import number_meant, suggestion
+from gen_profile.spec.values import NONE, Named, Words, found
+from gen_profile.suggestion import suggestion
 
-Table = dict[str, Any]
+Kind = Any  # an annotation
+MISFIT: Any = object()  # in place of a value that does not fit
+FORMS = {
+    float: "a finite number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "text",
+    Mapping: "a table",
+}
 
 
 class Faults:
     """What is wrong with a spec, by place.
 
-    The first fault of a place stands, and those of the places inside it are left out: they follow from it.
+    The first fault of a place stands; those of the places around and inside it are left out, as they follow.
     """
 
     def __init__(self) -> None:
         self._sentences: dict[str, str] = {}
 
-    def add(self, place: str, problem: str) -> None:
-        """Note a problem, such as ``must be positive``, of a place such as ``plant.m1``."""
-        steps = place.split(".")
-        if not any(".".join(steps[: depth + 1]) in self._sentences for depth in range(len(steps))):
+    def add(self, place: str, problem: str, *causes: str) -> None:
+        """Note a problem, such as ``must be positive``, of a place such as ``plant.m1``.
+
+        It is no fault of its own where something is wrong at its causes, which are places, too.
+        """
+        if not any(self._told(one) for one in (place, *causes)):
             self._sentences[place] = f"{place}: {problem}{'' if problem.endswith(('?', '.')) else '.'}"
 
-    def __iter__(self) -> Iterator[str]:
-        """Give one sentence per place."""
-        return iter(self._sentences.values())
+    def _told(self, place: str) -> bool:
+        """Whether something is wrong at a place, around it or inside it."""
+        pairs = ((f"{told}.", f"{place}.") for told in self._sentences)
+        return any(one.startswith(other) or other.startswith(one) for one, other in pairs)
 
-    def __bool__(self) -> bool:
-        return bool(self._sentences)
+    def raise_any(self) -> None:
+        """Raise all faults as one error.
+
+        Raises
+        ------
+        SpecError
+            There are some.
+        """
+        if self._sentences:
+            raise SpecError(*self._sentences.values())
 
 
-def structure(tables: Table, faults: Faults) -> Spec:
-    """Build the spec.
+@attrs.frozen
+class Structurer:
+    """Makes typed values of plain ones.
 
-    Parameters
+    Attributes
     ----------
-    tables : dict
-        Plain values nested as the classes are.
     faults : Faults
-        Those found so far.
+        Where misfits are noted.
+    names : mapping
+        What the machine has, such as ``"axis"``, by name; with the annotation of what is stated of each,
+        where that depends on it, or None.
+    """
+
+    faults: Faults
+    names: Mapping[str, Mapping[str, Kind]] = NONE
+
+    def fit(self, value: Any, kind: Kind, where: str, otherwise: Any = MISFIT, words: str = "") -> Any:
+        """Hold a value to an annotation.
+
+        Parameters
+        ----------
+        value
+            As TOML or Python states it, or typed already.
+        kind : annotation
+        where : str
+            The value's place in the spec.
+        otherwise
+            Stands in for a value that does not fit.
+        words : str
+            What to say of it, as `Words` does.
+        """
+        origin: Any = get_origin(kind)
+        if origin in (Union, UnionType):
+            fitted = None if value is None else self.fit(value, get_args(kind)[0], where, words=words)
+        elif origin is not None:
+            of_form = {Annotated: self._constrained, Mapping: self._mapping, tuple: self._tuple}
+            fitted = of_form.get(origin, self._choice)(value, get_args(kind), where, words)
+        elif attrs.has(kind):
+            fitted = self._table(value, kind, where)
+        else:
+            fitted = self._scalar(value, kind, where, words)
+        return otherwise if fitted is MISFIT else fitted
+
+    def known(self, table: Mapping[str, Any], names: Iterable[str], where: str, word: str = "key") -> Any:
+        """Leave out what has other names than these, and tell."""
+        names = list(names)
+        for key in sorted(set(table).difference(names)):
+            self.faults.add(place(where, key), f"unknown {word}{suggestion(key, names)}")
+        return {key: value for key, value in table.items() if key in names}
+
+    def _misfit(self, where: str, problem: str, value: Any) -> Any:
+        self.faults.add(where, problem.replace("FOUND", found(value)))
+        return MISFIT
+
+    def _constrained(self, value: Any, inner: tuple[Any, ...], where: str, words: str) -> Any:
+        kind, *constraints = inner
+        words = next((one.sentence for one in constraints if isinstance(one, Words)), words)
+        fitted = self.fit(value, kind, where, words=words)
+        for one in constraints:
+            if fitted is not MISFIT and hasattr(one, "problem") and (problem := one.problem(fitted, value)):
+                return self._misfit(where, words or problem, value)
+        return fitted
+
+    def _mapping(self, value: Any, kinds: tuple[Kind, ...], where: str, words: str) -> Any:
+        """Fit what is stated by names of the machine, and put it into the machine's order."""
+        if not isinstance(value, Mapping):
+            return self._misfit(where, words or "must be a table, found FOUND", value)
+        key, kind = kinds
+        (named,) = (one for one in key.__metadata__ if isinstance(one, Named))
+        names = self.names.get(named.of or named.word, dict.fromkeys(value))
+        stated = self.known(value, names, where, named.word)
+        fitted = {
+            name: self.fit(stated[name], own or kind, place(where, name))
+            for name, own in names.items()
+            if name in stated
+        }
+        return MappingProxyType({name: one for name, one in fitted.items() if one is not MISFIT})
+
+    def _tuple(self, value: Any, kinds: tuple[Kind, ...], where: str, words: str) -> Any:
+        many = Ellipsis in kinds
+        if not isinstance(value, list | tuple) or (not many and len(value) != len(kinds)):
+            form = "an array" if many else f"an array of {len(kinds)} numbers"
+            return self._misfit(where, words or f"must be {form}, found FOUND", value)
+        if many:
+            fitted = [self.fit(one, kinds[0], place(where, index)) for index, one in enumerate(value)]
+        else:
+            fitted = [self.fit(one, kind, where, words=words) for one, kind in zip(value, kinds, strict=True)]
+        return MISFIT if MISFIT in fitted else tuple(fitted)
+
+    def _choice(self, value: Any, choices: tuple[Any, ...], where: str, _: str) -> Any:
+        if any(type(choice) is type(value) and choice == value for choice in choices):
+            return value
+        problem = f"unknown value, found FOUND{suggestion(str(value), map(str, choices))}"
+        return self._misfit(where, problem, value)
+
+    def _table(self, value: Any, kind: Kind, where: str) -> Any:
+        """Make an instance of one of the spec's classes; fields that do not fit take their defaults."""
+        if isinstance(value, kind):
+            return value
+        if not isinstance(value, Mapping):
+            value = self._misfit(where, "must be a table, found FOUND", value) and {}
+        kinds = kinds_of(kind)
+        stated = self.known(value, kinds, where)
+        for key in sorted(required(kind) - stated.keys()):
+            self.faults.add(place(where, key), "required, but missing")
+        fitted = {key: self.fit(one, kinds[key], place(where, key)) for key, one in stated.items()}
+        sound = {key: one for key, one in fitted.items() if one is not MISFIT}
+        return kind(**sound) if required(kind) <= sound.keys() else MISFIT
+
+    def _scalar(self, value: Any, kind: type, where: str, words: str) -> Any:
+        is_one = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
+        fitted = finite(value) if kind is float else value if is_one else None
+        if fitted is None:
+            form = FORMS.get(kind, f"a {kind.__name__}")
+            return self._misfit(where, words or f"must be {form}, found FOUND", value)
+        return fitted
+
+
+@attrs.frozen(kw_only=True)
+class Checked:
+    """A table of a spec: its fields hold what their annotations allow, however it is made.
 
     Raises
     ------
     SpecError
-        With all faults, old and new.
+        With all misfits.
     """
-    try:
-        spec = _CONVERTER.structure(tables, Spec)
-    except ClassValidationError as error:
-        _gather(error, "", faults)
-        raise SpecError(*faults) from None  # whose sentences say more than the structuring does
-    if faults:
-        raise SpecError(*faults)
-    return spec
+
+    _place: ClassVar[str] = ""
+
+    def __init_subclass__(cls, table: str | None = None) -> None:
+        """Name the table's place in a spec; attrs, which makes a class anew, calls this without."""
+        if table is not None:
+            cls._place = table
+
+    def __attrs_post_init__(self) -> None:
+        """Type every field that is not left at its default."""
+        structurer = Structurer(Faults())
+        table: Kind = type(self)
+        kinds = kinds_of(table)
+        for field in attrs.fields(table):
+            value = getattr(self, field.name)
+            if value is not field.default:
+                typed = structurer.fit(value, kinds[field.name], place(self._place, field.name))
+                object.__setattr__(self, field.name, typed)  # as converters of frozen classes do
+        structurer.faults.raise_any()
+
+
+@cache
+def kinds_of(table: Kind) -> dict[str, Kind]:
+    """Find the annotation of every field of one of the spec's classes."""
+    kinds = get_type_hints(table, include_extras=True)
+    return {field.name: kinds[field.name] for field in attrs.fields(table)}
+
+
+@cache
+def required(table: Kind) -> frozenset[str]:
+    """Name the fields of one of the spec's classes that have no default."""
+    return frozenset(field.name for field in attrs.fields(table) if field.default is attrs.NOTHING)
 
 
 def finite(value: object) -> float | None:
@@ -84,145 +235,8 @@ def finite(value: object) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def found(value: object) -> str:
-    """Name a value in a sentence, never at length."""
-    match value:
-        case None:
-            return "nothing"
-        case bool():
-            return str(value).lower()
-        case int() if abs(value) >= 10**18:
-            return "a whole number of more than 18 digits"
-        case int() | float():
-            return repr(value)
-        case str():
-            return f"text {value[:60]!r}{number_meant(value)}"
-        case dict():
-            return "a table"
-        case list():
-            return "an array"
-        case _:
-            return "a date or time"
-
-
 def place(outer: str, step: object) -> str:
     """Join a place and a key of it; a key that is no bare TOML key is quoted, lest it pose as more."""
     key = str(step)
-    bare = key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else repr(key[:60])
+    bare = key if key.isidentifier() or re.fullmatch(r"[A-Za-z0-9_-]+", key) else repr(key[:60])
     return f"{outer}.{bare}" if outer else bare
-
-
-def _gather(error: BaseException, where: str, faults: Faults) -> None:
-    """Walk cattrs' tree of errors."""
-    if isinstance(error, ClassValidationError | IterableValidationError):
-        noted, others = error.group_exceptions()
-        for leaf, note in noted:
-            step = note.index if isinstance(note, IterableValidationNote) else note.name
-            _gather(leaf, place(where, step), faults)
-        for leaf in others:
-            _gather(leaf, where, faults)
-    elif isinstance(error, ForbiddenExtraKeysError):
-        known = [field.name for field in attrs.fields(error.cl)]
-        for key in sorted(error.extra_fields):
-            faults.add(place(where, key), f"unknown key{suggestion(key, known)}")
-    elif isinstance(error, KeyError):
-        faults.add(where, "required, but missing")
-    else:
-        faults.add(where, str(error))
-
-
-def _structure_float(value: Any, _: type) -> float:
-    number = finite(value)
-    if number is None:
-        raise ValueError(f"must be a finite number, found {found(value)}")
-    return number
-
-
-def _structure_int(value: Any, _: type) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ValueError(f"must be a whole number, found {found(value)}")
-    return value
-
-
-def _structure_bool(value: Any, _: type) -> bool:
-    if not isinstance(value, bool):
-        raise ValueError(f"must be true or false, found {found(value)}")
-    return value
-
-
-def _structure_str(value: Any, _: type) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"must be text, found {found(value)}")
-    return value
-
-
-def _structure_choice(value: Any, annotation: Any) -> Any:
-    allowed = get_args(annotation)
-    for choice in allowed:
-        if type(choice) is type(value) and choice == value:
-            return choice
-    words = [str(choice) for choice in allowed]
-    raise ValueError(f"unknown value, found {found(value)}{suggestion(str(value), words)}")
-
-
-def _constrained(annotation: Any) -> Callable[[Any, Any], Any]:
-    base, *constraints = get_args(annotation)
-
-    def structure_within(value: Any, _: Any) -> Any:
-        typed = _CONVERTER.structure(value, base)
-        for constraint in constraints:
-            _enforce(typed, constraint)
-        return typed
-
-    return structure_within
-
-
-def _enforce(value: Any, constraint: Bounds | Pattern) -> None:
-    if isinstance(constraint, Pattern):
-        if not re.fullmatch(constraint.expression, value):
-            raise ValueError(f"must be {constraint.meaning}, found {found(value)}")
-    elif not (value > constraint.above and constraint.least <= value <= constraint.most):
-        words = {
-            "greater than": constraint.above,
-            "at least": constraint.least,
-            "at most": constraint.most,
-        }
-        stated = [f"{word} {bound:g}" for word, bound in words.items() if math.isfinite(bound)]
-        meaning = constraint.meaning and f" {constraint.meaning}"
-        raise ValueError(f"must be {' and '.join(stated)}{meaning}, found {found(value)}")
-
-
-def _is_fixed_tuple(annotation: Any) -> bool:
-    return get_origin(annotation) is tuple and Ellipsis not in get_args(annotation)
-
-
-def _fixed_tuple(annotation: Any) -> Callable[[Any, Any], Any]:
-    items = get_args(annotation)
-
-    def structure_items(value: Any, _: Any) -> Any:
-        if not isinstance(value, list | tuple) or len(value) != len(items):
-            raise ValueError(f"must be an array of {len(items)} numbers, found {found(value)}")
-        return tuple(_CONVERTER.structure(one, item) for one, item in zip(value, items, strict=True))
-
-    return structure_items
-
-
-def _is(form: Any) -> Callable[[Any], bool]:
-    return lambda annotation: get_origin(annotation) is form
-
-
-def _converter() -> Converter:
-    converter = Converter(forbid_extra_keys=True, detailed_validation=True)
-    converter.register_structure_hook(float, _structure_float)
-    converter.register_structure_hook(int, _structure_int)
-    converter.register_structure_hook(str, _structure_str)
-    converter.register_structure_hook(MachineFile, lambda value, _: value)
-    converter.register_structure_hook(ExternalFmu, lambda value, _: value)
-    converter.register_structure_hook(bool, _structure_bool)
-    converter.register_structure_hook_func(_is(Literal), _structure_choice)
-    converter.register_structure_hook_factory(_is(Annotated), _constrained)
-    converter.register_structure_hook_factory(_is_fixed_tuple, _fixed_tuple)
-    return converter
-
-
-_CONVERTER = _converter()

@@ -10,7 +10,7 @@ from tomlkit.items import Table
 
 from gen_profile.errors import GenProfileError
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import overridden_in, parse_spec
+from gen_profile.spec.reading import overridden, parse_spec
 
 CHANGED = ("plant", "robustness")
 
@@ -36,8 +36,7 @@ def changed_text(text: str, overrides: tuple[str, ...], given: Spec, spec: Spec,
     str
         With every comment of the old text; the complete spec where that text cannot be changed so.
     """
-    document = tomlkit.parse(text)
-    overridden_in(document, overrides)
+    document = overridden(tomlkit.parse(text), overrides)
     before, after = given.to_dict(), spec.to_dict()
     for name in CHANGED:
         _change(document, name, before[name], after[name])

@@ -1,22 +1,39 @@
-"""Kinds of values in a spec: numbers with bounds, texts with patterns, choices."""
+"""Kinds of values in a spec: numbers with bounds, texts with patterns, choices.
+
+A field's annotation says what it may hold; `gen_profile.spec.structure` holds every value to it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 import attrs
+
+from gen_profile.suggestion import number_meant
+
+NONE: Mapping[str, Any] = MappingProxyType({})  # a default
 
 
 @attrs.frozen
 class Bounds:
     """Allowed values of a number, `above` itself excluded, and what they are: a unit, or words."""
 
-    above: float = -float("inf")
-    least: float = -float("inf")
-    most: float = float("inf")
+    above: float = -math.inf
+    least: float = -math.inf
+    most: float = math.inf
     meaning: str = ""
+
+    def problem(self, value: float, _: object) -> str:
+        """Say what a number must be; nothing where it is."""
+        if value > self.above and self.least <= value <= self.most:
+            return ""
+        words = {"greater than": self.above, "at least": self.least, "at most": self.most}
+        stated = [f"{word} {bound:g}" for word, bound in words.items() if math.isfinite(bound)]
+        return f"must be {' and '.join(stated)}{self.meaning and f' {self.meaning}'}, found {found(value)}"
 
 
 @attrs.frozen
@@ -25,6 +42,68 @@ class Pattern:
 
     expression: str
     meaning: str
+
+    def problem(self, value: str, _: object) -> str:
+        """Say what a text must be; nothing where it is."""
+        fits = re.fullmatch(self.expression, value)
+        return "" if fits else f"must be {self.meaning}, found {found(value)}"
+
+
+@attrs.frozen
+class Rising:
+    """Two numbers, the second no less than the first; or greater, where that is `strict`."""
+
+    meaning: str = ""
+    strict: bool = False
+
+    def problem(self, value: tuple[float, float], written: Sequence[float]) -> str:
+        """Say what two numbers must be; nothing where they are."""
+        low, high = value
+        if low < high or (low == high and not self.strict):
+            return ""
+        meaning = self.meaning or f"numbers, such as {[high, low]}"
+        return f"must be two rising {meaning}, found {list(written)}"
+
+
+@attrs.frozen
+class Words:
+    """What to say of whatever does not fit; ``FOUND`` in it stands for the value."""
+
+    sentence: str
+
+
+def example(toml: str) -> Words:
+    """Show what a table may hold, in TOML, to who states something else."""
+    return Words(f"must be a table such as {{ {toml} }}, found FOUND")
+
+
+@attrs.frozen
+class Named:
+    """Keys that are names of the machine's, such as its axes, or of something that is stated by them."""
+
+    word: str  # such as "axis"
+    of: str = ""  # what is stated by these names, where the machine says what that may be
+
+
+def found(value: object) -> str:
+    """Name a value in a sentence, never at length."""
+    match value:
+        case None:
+            return "nothing"
+        case bool():
+            return str(value).lower()
+        case int() if abs(value) >= 10**18:
+            return "a whole number of more than 18 digits"
+        case int() | float():
+            return repr(value)
+        case str():
+            return f"text {value[:60]!r}{number_meant(value)}"
+        case Mapping():
+            return "a table"
+        case list() | tuple():
+            return "an array"
+        case _:
+            return "a date or time"
 
 
 Name = Annotated[
@@ -36,6 +115,9 @@ Name = Annotated[
         "not ending with a dot or space, and no device's name in Windows, as CON",
     ),
 ]
+AxisName = Annotated[str, Named("axis")]
+LoadName = Annotated[str, Named("load")]
+ParameterName = Annotated[str, Named("parameter")]
 Positive = Annotated[float, Bounds(above=0.0)]
 NotNegative = Annotated[float, Bounds(least=0.0)]
 RelativeRange = Annotated[float, Bounds(above=0.0, most=0.9, meaning="(0.1 is 10 %)")]
@@ -43,10 +125,6 @@ CycleTime = Annotated[float, Bounds(least=1e-5, most=1.0, meaning="s (4 ms are 0
 Duration = Annotated[float, Bounds(least=1e-3, most=1e5, meaning="s")]
 Column = Literal["position", "velocity", "acceleration", "jerk"]
 Distance = Annotated[float, Bounds(least=-1e5, most=1e5, meaning="m (or rad)")]
+Travel = Annotated[tuple[Distance, Distance], Rising()]
 SolverName = Literal["auto", "indirect", "direct"]
 ShaperName = Literal["nzv", "zv", "zvd", "zvdd", "umzvd", "ei", "2hump-ei", "3hump-ei", "mzv"]
-
-
-def frozen_mapping(values: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Copy a mapping, so that nobody alters it."""
-    return MappingProxyType(dict(values))

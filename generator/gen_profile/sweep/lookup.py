@@ -240,4 +240,4 @@ def _spec_there(case: Path, wanted: Mapping[str, Any]) -> Spec:
     path = case / FILENAME
     document = parse_manifest(read_swept(path), str(path)).spec
     machine = {key: value for key, value in wanted.items() if key.startswith(MACHINE)}
-    return spec_from_dict(overridden(document, overrides(machine)), case)
+    return spec_from_dict(overridden(dict(document), overrides(machine)), case)

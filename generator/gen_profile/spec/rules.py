@@ -1,0 +1,219 @@
+"""Rules across the fields of a spec, and between a spec and its machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from types import SimpleNamespace
+
+from gen_profile.plants.plant import Coordinate, Parameter, Plant
+from gen_profile.spec.model import Spec
+from gen_profile.spec.structure import place
+from gen_profile.units import UNITS
+
+LARGEST_ANGLE = 1.4  # rad, of a load at the start
+SHORTEST_MOVE = 1e-12  # m (or rad); squares of what is smaller come near to what floats can hold
+SMALL_SWING = 1e-3  # m (or rad), to compare forces with
+MOST_CORNERS = 10  # parameters whose ranges have 2¹⁰ corners
+
+Fault = tuple[str, ...]  # a place, what is wrong there, and other places that may be the cause
+
+
+def broken_rules(spec: Spec, plant: Plant | None) -> Iterator[Fault]:
+    """Find what a spec's fields, each for itself as it may be, contradict.
+
+    Parameters
+    ----------
+    spec : Spec
+    plant : Plant or None
+        None where the machine is not known: what depends on it is not judged then.
+    """
+    for rule in OF_SPEC:
+        yield from rule(spec)
+    if plant is not None:
+        for of_machine in OF_MACHINE:
+            yield from of_machine(spec, plant)
+
+
+def _drive(spec: Spec) -> Iterator[Fault]:
+    """Hold the time constant and the effort to the kind of drive."""
+    lag = spec.actuator.type == "first-order"
+    if lag and spec.actuator.tau is None:
+        yield "actuator.tau", 'required with type = "first-order" (time constant in s)'
+    if not lag and spec.actuator.tau is not None:
+        yield "actuator.tau", 'only with type = "first-order"; remove it or set the type'
+    if not lag and spec.cost.effort == "reference":
+        yield (
+            "cost.effort",
+            '"reference" weighs the reference of a lagging drive (eq. 6); '
+            'set actuator.type = "first-order" with tau, or choose "jerk" or "snap"',
+        )
+
+
+def _robustness(spec: Spec) -> Iterator[Fault]:
+    own = spec.robustness
+    if own.method != "none" and not own.uncertain:
+        yield "robustness.uncertain", f'required with method = "{own.method}", such as {{ L1 = 0.2 }}'
+    if own.nominal_zero and own.method != "range":
+        yield "robustness.nominal_zero", 'only with method = "range"; elsewhere it is so anyway'
+    if own.order == 2 and own.method == "range":
+        yield "robustness.order", 'only with method = "sensitivity"'
+
+
+def _move(spec: Spec) -> Iterator[Fault]:
+    move = spec.move
+    if not any(move.distance) and move.stops and not any(move.initial.values()):
+        yield "move.distance", "must not be zero on every axis"
+    if any(0.0 < abs(way) < SHORTEST_MOVE for way in move.distance):
+        yield "move.distance", f"must be zero, or at least {SHORTEST_MOVE:g} m (or rad)"
+    limits, limited = ("velocity", "acceleration", "jerk"), " ".join(spec.limits.stated())
+    if move.shortest and not any(name in limited for name in limits):
+        problem = '"minimum" needs a limit: state limits.acceleration, or velocity or jerk'
+        yield "move.duration", problem, "limits.axis", *(f"limits.{name}" for name in limits)
+
+
+def _setpoint_path(spec: Spec) -> Iterator[Fault]:
+    path = spec.check.path
+    least = path.lag[0] if path.lag else spec.actuator.tau or 0.0
+    if path.between == "hold" and least <= 0.0:
+        yield (
+            "check.path.between",
+            '"hold" lets the axis leap to each setpoint, which takes a drive with a lag: '
+            "state check.path.lag, or actuator.tau",
+            "check.path.lag",
+        )
+
+
+def _csv_columns(spec: Spec) -> Iterator[Fault]:
+    columns = spec.export.csv_columns
+    if len(set(columns)) != len(columns):
+        yield "export.csv_columns", "names a column twice"
+    elif not {"position", "velocity"}.intersection(columns):
+        yield "export.csv_columns", 'must hold "position" or "velocity": nothing else can be played'
+
+
+def _can(spec: Spec) -> Iterator[Fault]:
+    can = spec.can
+    if can.feed_forward in ("torque", "both") and can.torque_per_acceleration is None:
+        yield (
+            "can.torque_per_acceleration",
+            f'required with feed_forward = "{can.feed_forward}" (‰ of the rated torque per m/s²)',
+        )
+    if can.mode != "csp" and can.feed_forward != "none":
+        yield "can.feed_forward", 'only with mode = "csp"; remove it or set the mode'
+    if can.mode == "csv" and can.following_error is None:
+        problem = 'required with mode = "csv": how far the axis may be off the motion, in m'
+        yield "can.following_error", problem
+    taken: dict[int, str] = {}
+    for axis, node in can.nodes.items():
+        if taken.setdefault(node, axis) != axis:
+            yield place("can.nodes", axis), f"{node} is the node of the axis {taken[node]} already"
+
+
+def _all_axes(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Have every axis a node and a channel of its own, or none."""
+    for what, stated in (("nodes", spec.can.nodes), ("channels", spec.can.channels)):
+        for axis in plant.actuated:
+            if stated and axis.name not in stated:
+                yield place(f"can.{what}", axis.name), f"required beside the other axes' {what}"
+
+
+def _at_start(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Hold what swings at the start to angles that a taut rope can have."""
+    angles = {q.name for q in plant.unactuated if q.unit == "rad"}
+    for name, value in spec.move.initial.items():
+        if name in angles and abs(value) > LARGEST_ANGLE:
+            yield place("move.initial", name), f"must be from -{LARGEST_ANGLE:g} to {LARGEST_ANGLE:g} rad"
+
+
+def _at_end(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Refuse to end at a speed at which the loads do not hang still, as on a turning jib."""
+    if spec.move.stops:
+        return
+    named = SimpleNamespace(**spec.plant.parameters)
+    still = [0.0] * len(plant.unactuated)
+
+    def pull(q_u: list[float], dq_a: tuple[float, ...]) -> float:
+        terms = plant.equations(q_u, still, list(spec.move.target), list(dq_a), named)
+        return max(abs(float(k + g)) for k, g in zip(terms.K_u, terms.G_u, strict=True))
+
+    swung, standstill = [SMALL_SWING for _ in still], (0.0,) * len(plant.actuated)
+    if pull(still, spec.move.final_velocity) > 1e-9 * pull(swung, standstill):
+        yield "move.final_velocity", "the load does not hang still while the axes move so; end at rest"
+
+
+def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Refuse relative ranges of nothing, and those that reach beyond what the machine takes."""
+    tables: dict[str, Mapping[str, float]] = {
+        "robustness": spec.robustness.uncertain,
+        "check": spec.check.uncertain or {},
+    }
+    cures = {"robustness": "", "check": "; state check.spans"}
+    for table, shares in tables.items():
+        for parameter in plant.parameters:
+            if parameter.name not in shares:
+                continue
+            where, value = place(f"{table}.uncertain", parameter.name), spec.plant.parameters[parameter.name]
+            if value == 0.0:
+                yield where, f"its value is 0, so a relative range is empty{cures[table]}"
+            for end in (value * (1.0 + sign * shares[parameter.name]) for sign in (-1.0, 1.0)):
+                if not parameter.lower <= end <= parameter.upper:
+                    bounds = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
+                    yield where, f"reaches {end:.6g}, and the machine takes {bounds}"
+
+
+def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Hold the ranges of the check to what can be tried, and to whoever tries it."""
+    del plant
+    changed = spec.checked_ranges()
+    if len(changed) > MOST_CORNERS:
+        yield (
+            "check.uncertain",
+            f"{len(changed)} parameters have 2^{len(changed)} corners; name at most {MOST_CORNERS} in "
+            "check.uncertain, widen theirs, and let check.samples draw",
+        )
+    if spec.check.foreign is None:
+        return
+    problem = "required, as it is uncertain; name the FMU's variable for it"
+    unnamed = [name for name in changed if name not in spec.check.foreign.parameters]
+    yield from ((place("check.parameters", name), problem) for name in unnamed)
+    if spec.move.initial or not spec.move.stops:
+        problem = "judges moves from rest to rest only; remove move.initial and final_velocity"
+        yield "check.fmu", problem
+
+
+def _axis_limits(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Hold the limits of every axis against the move."""
+    move, limits = spec.move, spec.limits
+    for column, _ in enumerate(plant.actuated):
+        own = limits.of(column)
+        if own.velocity is not None and abs(move.final_velocity[column]) > own.velocity:
+            problem = f"must keep limits.velocity ({own.velocity:g}), found {list(move.final_velocity)}"
+            yield "move.final_velocity", problem
+        if own.travel is None:
+            continue
+        low, high = own.travel
+        for key, ends in (("start", move.start), ("target", move.target)):
+            if not low <= ends[column] <= high:
+                yield limits.place(column, "travel"), f"must contain the move's {key}, found {[low, high]}"
+
+
+def _units(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Hold the target's units to what its axes measure."""
+    for axis in plant.actuated:
+        unit = spec.axis[axis.name].unit if axis.name in spec.axis else axis.unit
+        if unit in UNITS and UNITS[unit][0] != axis.unit:
+            yield f"axis.{axis.name}.unit", f"{unit!r} does not measure an axis that moves in {axis.unit}"
+
+
+def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:
+    """Let the range of a live parameter begin below the machine's only where that is next to nothing."""
+    known: tuple[Parameter | Coordinate, ...] = (*plant.actuated, *plant.parameters)
+    for name, (low, high) in spec.planner.live.items():
+        least = {one.name: one.lower for one in known}[name]
+        if low < least > 1e-3 * high:
+            problem = f"begins below the least that the machine takes, {least:g}"
+            yield place("planner.live", name), problem
+
+
+OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)
+OF_MACHINE = (_at_start, _at_end, _shares, _checked_machines, _axis_limits, _units, _all_axes, _live)
