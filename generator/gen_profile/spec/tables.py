@@ -88,11 +88,12 @@ def _misplaced(document: Mapping[str, Any], plant: Plant | None, faults: Faults)
     """Tell where a key belongs that stands in another table, or in none."""
     parameters = plant.nominal() if plant else {}
     keys: dict[str, Collection[str]] = {
-        **{name: kinds_of(kind) for name, kind in kinds_of(Spec).items() if attrs.has(kind)},
         "plant": ["type", *FILE_KEYS, *parameters],
         "move": MOVE_KEYS,
         "check": CHECK_KEYS,
     }
+    kinds = kinds_of(Spec).items()
+    keys |= {name: kinds_of(kind) for name, kind in kinds if attrs.has(kind) and name not in keys}
     stated = {"": document} | {
         name: document[name] for name in keys if isinstance(document.get(name), Mapping)
     }
