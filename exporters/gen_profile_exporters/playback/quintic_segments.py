@@ -15,6 +15,7 @@ from gen_profile.motion.profile import Array, read_only
 
 POSITION_ERROR = 1e-9  # m (or rad), of a segment at the cycles inside it
 ACCELERATION_ERROR = 1e-6  # m/s²
+LEAST = 0.01  # of the length that would fit, below which it is not told how much longer it could be
 POINTS = 16, 4096  # where peaks are looked for: per segment, and of all, at least
 
 
@@ -142,25 +143,31 @@ def horner(coefficients: Array, time: Array) -> tuple[Array, Array, Array]:
 
 
 def _longest(samples: Array, begin: int, guess: int, most: int, cycle_time: float) -> int:
-    """Double from a guess while it fits, then halve the gap to what does not: 2 log₂ trials."""
-    fits, fails = 1, most + 1
+    """Find the longest segment that fits: tried where its error says, and now and then in between."""
+    fits, fails, trial = 1, most + 1, 0
     while fails - fits > 1:
-        length = max(fits + 1, guess)
-        if _fits(samples[:, begin : begin + length + 1], cycle_time):
-            fits, guess = length, min(2 * length, (length + fails) // 2 if fails <= most else most)
+        trial += 1
+        length = min(max(guess, fits + 1), fails - 1)
+        reach = _reach(samples[:, begin : begin + length + 1], cycle_time)
+        if reach >= 1.0:
+            fits = length
         else:
-            fails, guess = length, (fits + length) // 2
+            fails = length
+        guess = int(min(reach, 2.0) * length) if trial % 3 else min((fits + fails) // 2, 2 * fits)
     return fits
 
 
-def _fits(samples: Array, cycle_time: float) -> bool:
+def _reach(samples: Array, cycle_time: float) -> float:
+    """Predict how many times as long a segment would fit; at least 1 where this one does.
+
+    Errors of a quintic's position and acceleration grow with the sixth and fourth power of its length.
+    """
     cycles = np.arange(1, samples.shape[1] - 1)
     coefficients = hermite(samples[:, 0], samples[:, -1], (len(cycles) + 1) * cycle_time)
     position, _, acceleration = horner(coefficients[None], (cycles * cycle_time)[:, None])
-    return bool(
-        (np.abs(position - samples[0, 1:-1]) <= POSITION_ERROR).all()
-        and (np.abs(acceleration - samples[2, 1:-1]) <= ACCELERATION_ERROR).all()
-    )
+    far = float(np.abs(position - samples[0, 1:-1]).max()) / POSITION_ERROR
+    bent = float(np.abs(acceleration - samples[2, 1:-1]).max()) / ACCELERATION_ERROR
+    return 1.0 / max(far ** (1 / 6), bent**0.25, LEAST)
 
 
 def _falling(power: int, order: int) -> float:

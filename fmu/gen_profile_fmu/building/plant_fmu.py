@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import attrs
@@ -12,7 +13,7 @@ from gen_profile.plants.plant import Plant
 from gen_profile_fmu.building.build import compile_texts, sources_key
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
-from gen_profile_fmu.description.fmu_files import SOURCE_FILE, Version, archive, fmu_files, sources
+from gen_profile_fmu.description.fmu_files import SOURCE_FILE, Sources, Version, archive, fmu_files, sources
 from gen_profile_fmu.model.contents import Model, plant_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 from gen_profile_fmu.model.variables import VariableTable
@@ -54,16 +55,25 @@ def plant_fmu(plant: Plant, on_build: Callable[[], None] | None = None) -> Plant
     CosimulationError
         When there is no compiler, it fails, or no cache folder can be written.
     """
+    return _cached(_plant_sources(plant), on_build)
+
+
+@cache
+def _plant_sources(plant: Plant) -> Sources:
     machine = PlantInstance(plant=plant, parameters=plant.nominal())
-    return cached_fmu(plant_model(machine, InputKind.SETPOINT), Version.FMI2, on_build)
+    return sources(plant_model(machine, InputKind.SETPOINT), Version.FMI2)
 
 
-def cached_fmu(model: Model, version: Version, on_build: Callable[[], None] | None = None) -> PlantFmu:
+def cached_fmu(model: Model, version: Version) -> PlantFmu:
     """Build a model's FMU for this computer, without documentation, or find it in the cache.
 
     Raises as `plant_fmu` does.
     """
-    made, compiler = sources(model, version), find_compiler()
+    return _cached(sources(model, version))
+
+
+def _cached(made: Sources, on_build: Callable[[], None] | None = None) -> PlantFmu:
+    model, version, compiler = made.model, made.version, find_compiler()
     library = model.identifier + fmpy.sharedLibraryExtension
     platform = fmpy.platform if version is Version.FMI2 else fmpy.platform_tuple
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from gen_profile.verification.worst_machines import worst_machines
 from gen_profile_exporters.exporter import Exporter, target_of
 from gen_profile_exporters.registry import find_exporter, format_named, require_end
 
-LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")
+_LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -168,6 +169,12 @@ def design(
     return Design(spec=spec, plan=planned, check=worst, artefacts=kept, folder=folder)
 
 
+@cache
+def versions() -> tuple[tuple[str, str], ...]:
+    """List the libraries that shape the numbers, with their versions installed here."""
+    return tuple((library, version(library)) for library in _LIBRARIES)
+
+
 def accompany(spec: Spec, staging: Staging) -> None:
     """Put beside the manifest what the spec in it names: an own machine, a foreign judge."""
     if spec.plant.file is not None:
@@ -250,7 +257,7 @@ def _manifest(spec: Spec, planned: Plan, artefacts: tuple[Artefact, ...], check:
         spec=spec.to_dict(),
         spec_sha256=spec.sha256(),
         profile_sha256=planned.evaluation.command.payload_hash(),
-        versions={library: version(library) for library in LIBRARIES},
+        versions=dict(versions()),
         artefacts=artefacts,
         check=None if check is None else check.to_dict(),
     )

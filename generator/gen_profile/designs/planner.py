@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, sha256
 from gen_profile.artefacts.writing import staged
-from gen_profile.designs.design import LIBRARIES, accompany, after_earlier_ones
+from gen_profile.designs.design import accompany, after_earlier_ones, versions
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
 from gen_profile.progress import Progress, untold
@@ -125,7 +124,7 @@ def _manifest(spec: Spec, written: Mapping[str, bytes], proof: Proof | None) -> 
         spec=spec.to_dict(),
         spec_sha256=spec.sha256(),
         profile_sha256="",  # it holds no motion
-        versions={library: version(library) for library in LIBRARIES},
+        versions=dict(versions()),
         artefacts=tuple(
             Artefact(format=FORMAT, path=name, sha256=sha256(content), bytes=len(content))
             for name, content in written.items()

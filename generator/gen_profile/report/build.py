@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,7 +11,7 @@ import attrs
 
 from gen_profile.artefacts.manifest import sha256
 from gen_profile.comparison.compare import Comparison, compare
-from gen_profile.designs.design import LIBRARIES, Design, design
+from gen_profile.designs.design import Design, design, versions
 from gen_profile.evaluation.phrases import move, uncertain
 from gen_profile.progress import Progress, untold
 from gen_profile.report.content import Page
@@ -126,7 +125,7 @@ def report(
 
 def _page(outcome: Design, comparison: Comparison | None, measured: Measured | None) -> Page:
     spec, check = outcome.spec, _checked(outcome)
-    libraries = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
+    libraries = ", ".join(f"{library} {number}" for library, number in versions())
     return Page(
         title=spec.name,
         subtitle=f"{spec.machine().summary}: {move(spec)}; uncertain: {uncertain(spec)}",

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from functools import cache
-from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,7 +17,7 @@ import attrs
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from gen_profile.designs.design import LIBRARIES, Design, design
+from gen_profile.designs.design import Design, design, versions
 from gen_profile.errors import (
     CosimulationError,
     ExportError,
@@ -109,12 +107,6 @@ class CaseOutcome:
     def passed(self) -> bool:
         """Whether the case may be used."""
         return bool(self.record["status"] == PASSED)
-
-
-@cache
-def versions() -> tuple[tuple[str, str], ...]:
-    """List the libraries that shape the numbers, as installed here."""
-    return tuple((library, version(library)) for library in LIBRARIES)
 
 
 def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes | None = None) -> CaseOutcome:

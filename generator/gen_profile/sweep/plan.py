@@ -7,8 +7,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from gen_profile.designs.design import versions
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.sweep.case import Recipe, versions
+from gen_profile.sweep.case import Recipe
 from gen_profile.sweep.grid import Grid
 from gen_profile.sweep.store import Store
 from gen_profile_exporters.registry import find_exporter
