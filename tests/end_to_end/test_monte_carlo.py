@@ -176,7 +176,7 @@ def test_groups_are_judged_apart_and_timing_only_when_strict(tmp_path):
     groups = {group["group"]: group for group in loose.document["check"]["groups"]}
     assert [group["passed"] for group in groups.values()] == [True, False]
     assert (loose.code, groups["timing"]["counts"]) == (0, False)
-    assert "It counts with --strict." in loose.err
+    assert "It counts where the check is strict." in loose.err
     strict = run_here("check", artefact, *tight, "--strict", "--json")
     assert (strict.code, strict.document["check"]["groups"][1]["counts"]) == (4, True)
     assert "timing" in strict.err

@@ -167,7 +167,7 @@ def _reach(samples: Array, cycle_time: float) -> float:
     position, _, acceleration = horner(coefficients[None], (cycles * cycle_time)[:, None])
     far = float(np.abs(position - samples[0, 1:-1]).max()) / POSITION_ERROR
     bent = float(np.abs(acceleration - samples[2, 1:-1]).max()) / ACCELERATION_ERROR
-    return 1.0 / max(far ** (1 / 6), bent**0.25, LEAST)
+    return float(1.0 / max(far ** (1 / 6), bent**0.25, LEAST))
 
 
 def _falling(power: int, order: int) -> float:

@@ -125,6 +125,7 @@ def design(
     check: bool = True,
     keep_failed: bool = False,
     near: Trajectory | None = None,
+    by_fmpy: bool = True,
     progress: Progress = untold,
 ) -> Design:
     """Solve, export, replay what was written, co-simulate, and deliver what passes.
@@ -142,6 +143,8 @@ def design(
         Deliver even what failed, marked so in the manifest.
     near : Trajectory, optional
         Of a similar design's solution, to begin at.
+    by_fmpy : bool
+        Whether FMPy drives the nominal machine, too, and must find the same.
     progress : callable
         Told what is being done.
 
@@ -158,7 +161,7 @@ def design(
     with staged(folder) as staging:
         progress("exporting")
         artefacts, replayed = _export(spec, planned.evaluation.command, exporters, staging)
-        worst = _check(spec, planned, replayed, progress) if check else None
+        worst = _check(spec, planned, replayed, by_fmpy, progress) if check else None
         accompany(spec, staging)
         manifest = _manifest(spec, planned, artefacts, worst)
         staging.write(FILENAME, after_earlier_ones(manifest, folder / FILENAME).to_json())
@@ -209,7 +212,9 @@ def _export(
     return tuple(artefacts), replayed
 
 
-def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progress: Progress) -> Check:
+def _check(
+    spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], by_fmpy: bool, progress: Progress
+) -> Check:
     """Judge all artefacts against the continuous motion, and keep the verdict on the worst."""
     progress("checking by co-simulation")
     machines = planned.evaluation.machines
@@ -221,7 +226,7 @@ def _check(spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], progre
         if spec.check.foreign is not None:
             check = judge_external(spec, spec.check.foreign, setpoints, rows)
         else:
-            check = _judged(spec, planned.evaluation, setpoints, rows, progress)
+            check = _judged(spec, planned.evaluation, setpoints, rows, by_fmpy=by_fmpy, progress=progress)
         checks.append(attrs.evolve(check, searched=worst.tried))
     return max(checks, key=lambda check: check.demand)
 
@@ -231,12 +236,16 @@ def _judged(
     evaluation: MotionEvaluation,
     setpoints: SampledProfile,
     rows: Sequence[Scenario],
+    *,
+    by_fmpy: bool,
     progress: Progress,
 ) -> Check:
     """Judge one artefact in all its scenarios, of which the evaluation's machines are the first."""
     machines = [row for row in rows if row.followed]
     spacing = sample_spacing(spec, setpoints)
-    found = cosimulate(spec, setpoints, machines, output_step=spacing, on_build=_compiling(progress))
+    found = cosimulate(
+        spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, on_build=_compiling(progress)
+    )
     expected = evaluation.followed(found[0].times, machines[len(evaluation.machines) :])
     return with_further(
         spec,

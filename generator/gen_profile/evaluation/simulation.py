@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from itertools import pairwise
 from types import MappingProxyType
 
 import attrs
 import numpy as np
-from scipy.integrate import DOP853, OdeSolution, solve_ivp
 
-from gen_profile.errors import CosimulationError, InfeasibleProblem
+from gen_profile.errors import InfeasibleProblem
+from gen_profile.evaluation.integration import NODES, Accelerations, integrate
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_column
 from gen_profile.problem.initial_state import initial_state
-from gen_profile.problem.linearization import linearize
+from gen_profile.problem.linearization import eigenvalues, linear_terms, linearize
 from gen_profile.problem.symbolic import Function
 from gen_profile.work import spend
 
 RELATIVE_TOLERANCE = 1e-10
 ABSOLUTE_TOLERANCE = 1e-13
+FREE_ACCURACY = 1e-8  # of free swings, which are compared with measured ones
 TRANSIENT_SAMPLES = 4001
-LEAST_STRETCHES, MOST_STRETCHES = 20, 256  # that the integration of a motion is divided into
 SHORTEST_STRETCH = 1e-9  # of a motion's duration: closer times are one
 LONGEST = 1e6  # greatest rate of a machine times its time: some hundred thousand steps, and minutes
-RATE, MACHINE = 4e-5, 2e-6  # s of work to evaluate the equations, and more for each machine
+RATE, POINT = 1e-4, 1e-6  # s of work to evaluate the equations in a step, and more for each point
 AT_REST: Mapping[str, float] = MappingProxyType({})
 
 
@@ -93,28 +91,27 @@ class PlantSimulation:
         *,
         accuracy: float = RELATIVE_TOLERANCE,
     ) -> None:
-        acceleration, self._outputs = _functions(plant)
+        self._outputs = _functions(plant)[1]
         self.plant, self.initial, self._profile = plant, initial, profile
         self._p = p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
-        self._shape = shape = (2, len(machines), len(plant.unactuated))
-        motion = _motion(profile)
         for values in machines:
             _require_pace(plant, values, profile, until)
-
-        start = np.repeat(initial_state(plant, initial).reshape(2, 1, -1), len(machines), axis=1)
-        work = RATE + MACHINE * len(machines)
-
-        def rate(t: float, state: Array) -> Array:
-            spend(work)
-            q_u, dq_u = state.reshape(shape)
-            ddq_u = acceleration(q_u, dq_u, motion(t), p)[:, :, 0]
-            return np.concatenate([dq_u.ravel(), ddq_u.ravel()])
-
-        self._solution = _integrated(rate, start.ravel(), _stretches(profile, until), accuracy, plant.type)
+        start, motion = initial_state(plant, initial).reshape(2, -1), _motion(profile)
+        ends = (profile(np.zeros(1)).position[0], profile.target)
+        self._solution = integrate(
+            _accelerations(plant, p, motion),
+            lambda t: linear_terms(plant, p, motion(np.array([t]))[0, : profile.axes]),
+            np.tile(start, len(p)),
+            _stretches(profile, until),
+            fastest=max(float(np.abs(eigenvalues(plant, p, q_a)).max()) for q_a in ends),
+            accuracy=accuracy,
+            least=ABSOLUTE_TOLERANCE / RELATIVE_TOLERANCE * accuracy,
+            what=f"{plant.type}'s motion",
+        )
 
     def at(self, times: Array) -> tuple[Response, ...]:
         """Evaluate every machine at rising times in s."""
-        states = self._solution(times).reshape(*self._shape, len(times)).transpose(0, 1, 3, 2)
+        states = self._solution(times).reshape(2, len(times), len(self._p), -1).swapaxes(1, 2)
         axes = self._profile(times)
         loads = len(self.plant.loads)
         responses = []
@@ -175,63 +172,47 @@ def free_swing(
     CosimulationError
         The integration fails.
     """
-    acceleration, outputs = _functions(plant)
-    shape = (2, len(machines), len(plant.unactuated))
     position = np.array([q_a], dtype=np.float64)
     axes = np.concatenate([position, np.zeros((1, 2 * position.size))], axis=1)
-
-    def rate(_: float, state: Array) -> Array:
-        q_u, dq_u = state.reshape(shape)
-        return np.concatenate([dq_u.ravel(), acceleration(q_u, dq_u, axes, machines).ravel()])
-
-    start = starts.reshape(len(machines), 2, -1).swapaxes(0, 1).ravel()
-    with np.errstate(over="ignore", invalid="ignore"):  # a failure is told below
-        integral = solve_ivp(
-            rate, (times[0], times[-1]), start, method="DOP853", t_eval=times, rtol=1e-8, atol=1e-11
-        )
-    if not integral.success:
-        raise CosimulationError(f"The {plant.type}'s swing cannot be integrated: {integral.message}")
-    q_u = np.ascontiguousarray(integral.y.reshape(*shape, len(times))[0].transpose(0, 2, 1))
+    swing = integrate(
+        _accelerations(plant, machines, lambda nodes: np.repeat(axes, len(nodes), axis=0)),
+        lambda _: linear_terms(plant, machines, q_a),
+        starts.reshape(len(machines), 2, -1).swapaxes(0, 1).reshape(2, -1),
+        times[[0, -1]],
+        fastest=float(np.abs(eigenvalues(plant, machines, q_a)).max()),
+        accuracy=FREE_ACCURACY,
+        least=ABSOLUTE_TOLERANCE / RELATIVE_TOLERANCE * FREE_ACCURACY,
+        what=f"{plant.type}'s swing",
+    )
+    q_u = np.ascontiguousarray(swing(times)[0].reshape(len(times), len(machines), -1).swapaxes(0, 1))
+    outputs, loads = _functions(plant)[1], len(plant.loads)
     seen = np.stack([outputs(q, position, p[None])[:, :, 0] for q, p in zip(q_u, machines, strict=True)])
-    loads = len(plant.loads)
     return seen[:, :, :loads], seen[:, :, loads:]
 
 
 def _stretches(profile: Profile, until: float) -> Array:
-    """Choose the times between which a motion is smooth, so that no step of integration meets a kink.
-
-    A move begins so gently that a step-size control left alone would leap over it: there are some, anyway.
-    """
-    times = profile.knots if len(profile.knots) <= MOST_STRETCHES else profile.knots[[0, -1]]
-    if len(times) <= LEAST_STRETCHES:
-        times = np.union1d(times, np.linspace(times[0], times[-1], LEAST_STRETCHES + 1))
+    """List the times between which a motion is smooth, so that no step of integration meets a kink."""
+    times = profile.knots
     apart = np.diff(times, prepend=-np.inf) > SHORTEST_STRETCH * profile.duration
     return np.append(times[apart & (times < until * (1.0 - SHORTEST_STRETCH))], until)
 
 
-def _integrated(
-    rate: Callable[[float, Array], Array], start: Array, stretches: Array, accuracy: float, machine: str
-) -> OdeSolution:
-    """Integrate from time to time, by Runge and Kutta's method of order 8 of Dormand and Prince."""
-    times, pieces, state, step = [float(stretches[0])], [], start, None
-    for begin, end in pairwise(stretches.tolist()):
-        solver = DOP853(
-            rate,
-            begin,
-            state,
-            end,
-            rtol=accuracy,
-            atol=ABSOLUTE_TOLERANCE / RELATIVE_TOLERANCE * accuracy,
-            first_step=None if step is None else min(step, end - begin),
-        )
-        while solver.status == "running":
-            message = solver.step()
-            if solver.status == "failed":
-                raise CosimulationError(f"The {machine}'s motion cannot be integrated: {message}")
-            times.append(solver.t)
-            pieces.append(solver.dense_output())
-        state, step = solver.y, solver.h_abs
-    return OdeSolution(times, pieces)
+def _accelerations(plant: Plant, p: Array, motion: Callable[[Array], Array]) -> Accelerations:
+    """Evaluate q̈_u of all machines at the nodes of a step."""
+    acceleration, machines = _functions(plant)[0], np.tile(p, (NODES, 1))
+    work, flat = RATE + POINT * len(machines), (len(machines), len(plant.unactuated))
+
+    def at(times: Array) -> Callable[[Array, Array], Array]:
+        axes = np.repeat(motion(times), len(p), axis=0)
+
+        def evaluate(q_u: Array, dq_u: Array) -> Array:
+            spend(work)
+            found = acceleration(q_u.reshape(flat), dq_u.reshape(flat), axes, machines)
+            return found.reshape(q_u.shape)
+
+        return evaluate
+
+    return at
 
 
 def _require_pace(plant: Plant, parameters: Mapping[str, float], profile: Profile, until: float) -> None:
@@ -254,8 +235,8 @@ def _functions(plant: Plant) -> tuple[Function, Function]:
     return acceleration, Function("seen", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, seen)
 
 
-def _motion(profile: Profile) -> Callable[[float], Array]:
-    """Evaluate position, velocity and acceleration of all axes at one time, as one row, without overhead."""
+def _motion(profile: Profile) -> Callable[[Array], Array]:
+    """Evaluate position, velocity and acceleration of all axes, as rows, without overhead."""
     order = profile.coefficients.shape[1]
     stacked = np.zeros((len(profile.knots), order, 3, profile.axes))  # one segment more: what follows
     stacked[-1, 0, 0], stacked[-1, 0, 1] = profile.target, profile.final_velocity
@@ -266,11 +247,11 @@ def _motion(profile: Profile) -> Callable[[float], Array]:
         stacked[:-1, :kept, derivative] = profile.coefficients[:, derivative:] * falling[:, None]
         falling = falling[1:] * np.arange(1, kept)
     rows = stacked.reshape(len(profile.knots), order, -1)
-    knots, powers = profile.knots.tolist(), np.arange(order)
+    knots, powers = profile.knots, np.arange(order)
 
-    def motion(t: float) -> Array:
-        segment = max(bisect_right(knots, t) - 1, 0)
-        row: Array = ((t - knots[segment]) ** powers) @ rows[segment]
-        return row[None]
+    def motion(times: Array) -> Array:
+        segment = np.maximum(np.searchsorted(knots, times, side="right") - 1, 0)
+        values = np.einsum("tk,tkr->tr", (times - knots[segment])[:, None] ** powers, rows[segment])
+        return np.asarray(values)
 
     return motion

@@ -87,8 +87,27 @@ def linearize(
     return _linearized(plant, tuple(parameters.items()), tuple(axes))
 
 
-def eigenvalues(plant: Plant, machines: Array, q_a: Sequence[float]) -> NDArray[np.complex128]:
+def eigenvalues(plant: Plant, machines: Array, q_a: Sequence[float] | Array) -> NDArray[np.complex128]:
     """Find the eigenvalues of many machines at rest in 1/s, shape (machines, 2 n_u).
+
+    Parameters
+    ----------
+    plant : Plant
+    machines : (machines, parameters) array
+        In the order of `Plant.parameters`.
+    q_a : (m,) sequence of float
+        Where the axes stand.
+    """
+    stiffness, damping = linear_terms(plant, machines, q_a)
+    n_u = len(plant.unactuated)
+    state = np.zeros((len(machines), 2 * n_u, 2 * n_u))
+    state[:, :n_u, n_u:] = np.eye(n_u)
+    state[:, n_u:, :n_u], state[:, n_u:, n_u:] = -stiffness, -damping
+    return np.asarray(np.linalg.eigvals(state), dtype=np.complex128)
+
+
+def linear_terms(plant: Plant, machines: Array, q_a: Sequence[float] | Array) -> tuple[Array, Array]:
+    """Find stiffness and damping of many machines at rest, each of shape (machines, n_u, n_u).
 
     Parameters
     ----------
@@ -100,11 +119,8 @@ def eigenvalues(plant: Plant, machines: Array, q_a: Sequence[float]) -> NDArray[
     """
     n_u, m = len(plant.unactuated), len(plant.actuated)
     still_u, still_a = np.zeros((1, n_u)), np.zeros((1, m))
-    terms = _terms(plant)[0](still_u, still_u, np.array([q_a], dtype=np.float64), still_a, machines)
-    state = np.zeros((len(machines), 2 * n_u, 2 * n_u))
-    state[:, :n_u, n_u:] = np.eye(n_u)
-    state[:, n_u:] = terms[:, :, : 2 * n_u]
-    return np.asarray(np.linalg.eigvals(state), dtype=np.complex128)
+    terms = -_terms(plant)[0](still_u, still_u, np.array([q_a], dtype=np.float64), still_a, machines)
+    return terms[:, :, :n_u], terms[:, :, n_u : 2 * n_u]
 
 
 @lru_cache(maxsize=64)
