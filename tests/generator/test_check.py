@@ -93,7 +93,7 @@ def test_faults_of_timing_count_only_where_that_is_asked_for():
     assert lenient.passed and lenient.worst[1].scenario.name == "nominal"
     (warning,) = lenient.warnings()
     assert warning.startswith("The payload sways by 2.5 mm after the move (lost)")
-    assert warning.endswith("It counts with --strict.")
+    assert warning.endswith("It counts where the check is strict.")
     strict = attrs.evolve(lenient, strict=True)
     assert not strict.passed and strict.warnings() == ()
     assert check(finding("nominal", 0.0, 0.0)).warnings() == ()
