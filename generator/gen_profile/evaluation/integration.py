@@ -106,7 +106,7 @@ def integrate(
     CosimulationError
         It fails, as when a load is thrown over.
     """
-    step = _Step(accelerations, linear, accuracy, least)
+    step = _CollocationStep(accelerations, linear, accuracy, least)
     waiting = [
         pair
         for first, last in pairwise(stretches.tolist())
@@ -132,7 +132,7 @@ def integrate(
     return Trajectories(knots=np.array(knots), position=position, velocity=velocity)
 
 
-class _Step:
+class _CollocationStep:
     """One step, tried; what a Newton step needs is kept for others of the same length."""
 
     def __init__(self, accelerations: Accelerations, linear: Linear, accuracy: float, least: float) -> None:

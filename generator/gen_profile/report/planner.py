@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import tomli_w
 from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.charts.proof import history_figure, map_figure
-from gen_profile.designs.design import LIBRARIES
+from gen_profile.designs.design import versions
 from gen_profile.evaluation.phrases import mm, number
 from gen_profile.progress import Progress, untold
 from gen_profile.proof.check import BlockJudgement, check_block
@@ -83,7 +82,7 @@ def planner_report(
 def _page(judgement: BlockJudgement, followed: Trace) -> Page:
     spec, proof = judgement.spec, judgement.check
     live = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in spec.planner.live.items())
-    libraries = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
+    libraries = ", ".join(f"{library} {number}" for library, number in versions())
     return Page(
         title=spec.name,
         subtitle=f"{spec.machine().summary}: planner block; live parameters: {live or 'none'}",
