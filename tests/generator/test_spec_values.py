@@ -43,9 +43,10 @@ def test_all_misfits_of_a_class_are_told_at_once():
 
 
 def test_values_are_typed_however_they_are_made():
-    move = attrs.evolve(PAPER.move, duration=2, target=[np.float64(0.4)], initial={"theta1": 0})
+    move = attrs.evolve(PAPER.move, duration=np.float32(2), target=np.array([0.4]), initial={"theta1": 0})
     assert move == attrs.evolve(PAPER.move, duration=2.0, target=(0.4,), initial={"theta1": 0.0})
     assert type(move.duration) is float and type(move.target[0]) is float
+    assert attrs.evolve(PAPER.can, node=np.int64(3)).node == 3
     with pytest.raises(TypeError):
         move.initial["theta1"] = 1.0
 

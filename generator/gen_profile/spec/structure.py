@@ -100,7 +100,7 @@ class Structurer:
         elif origin is not None:
             of_form = {Annotated: self._constrained, Mapping: self._mapping, tuple: self._tuple}
             fitted = of_form.get(origin, self._choice)(value, get_args(kind), where, words)
-        elif attrs.has(kind):
+        elif kind not in FORMS and attrs.has(kind):
             fitted = self._table(value, kind, where)
         else:
             fitted = self._scalar(value, kind, where, words)
@@ -142,6 +142,7 @@ class Structurer:
         return MappingProxyType({name: one for name, one in fitted.items() if one is not MISFIT})
 
     def _tuple(self, value: Any, kinds: tuple[Kind, ...], where: str, words: str) -> Any:
+        value = value.tolist() if hasattr(value, "tolist") else value
         many = Ellipsis in kinds
         if not isinstance(value, list | tuple) or (not many and len(value) != len(kinds)):
             form = "an array" if many else f"an array of {len(kinds)} numbers"
@@ -173,6 +174,7 @@ class Structurer:
         return kind(**sound) if required(kind) <= sound.keys() else MISFIT
 
     def _scalar(self, value: Any, kind: type, where: str, words: str) -> Any:
+        value = value.tolist() if hasattr(value, "tolist") else value  # NumPy's
         is_one = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
         fitted = finite(value) if kind is float else value if is_one else None
         if fitted is None:
