@@ -7,6 +7,8 @@ are as long as the error at the cycles between allows; a single cycle always fit
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import attrs
 import numpy as np
 from numpy.typing import NDArray
@@ -162,12 +164,20 @@ def _reach(samples: Array, cycle_time: float) -> float:
 
     Errors of a quintic's position and acceleration grow with the sixth and fourth power of its length.
     """
-    cycles = np.arange(1, samples.shape[1] - 1)
-    coefficients = hermite(samples[:, 0], samples[:, -1], (len(cycles) + 1) * cycle_time)
-    position, _, acceleration = horner(coefficients[None], (cycles * cycle_time)[:, None])
+    at_position, at_acceleration = _interpolation(samples.shape[1] - 1, cycle_time)
+    ends = np.concatenate([samples[:, 0], samples[:, -1]])
+    position, acceleration = at_position @ ends, at_acceleration @ ends
     far = float(np.abs(position - samples[0, 1:-1]).max()) / POSITION_ERROR
     bent = float(np.abs(acceleration - samples[2, 1:-1]).max()) / ACCELERATION_ERROR
     return float(1.0 / max(far ** (1 / 6), bent**0.25, LEAST))
+
+
+@lru_cache(maxsize=1024)
+def _interpolation(length: int, cycle_time: float) -> tuple[Array, Array]:
+    """Matrices from what holds at a segment's ends to position and acceleration at the cycles inside it."""
+    ends, times = np.eye(6), np.arange(1, length, dtype=np.float64) * cycle_time
+    position, _, acceleration = horner(hermite(ends[:3], ends[3:], length * cycle_time), times[:, None])
+    return position, acceleration
 
 
 def _falling(power: int, order: int) -> float:
