@@ -64,6 +64,10 @@ class Instance:
     def get_boolean(self, name: str) -> bool:
         return bool(self.fmu.getBoolean([self.references[name]])[0])
 
+    def read_integers(self, *names: str) -> list[int]:
+        getter = self.fmu.getInteger if self.version is Version.FMI2 else self.fmu.getInt32
+        return list(getter([self.references[name] for name in names]))
+
     def read(self, *names: str) -> Array:
         references = [self.references[name] for name in names]
         getter = self.fmu.getReal if self.version is Version.FMI2 else self.fmu.getFloat64

@@ -185,7 +185,8 @@ def test_unknown_references_and_wrong_types_are_refused(slave):
     for call, message in (
         (lambda: slave.getFloat64([999]), "There is no variable of reference 999."),
         (lambda: slave.getBoolean([0]), "m1 is no boolean variable."),
-        (lambda: slave.getInt32([0]), "fmi3GetInt32: every variable is Float64 or Boolean."),
+        (lambda: slave.getInt32([0]), "m1 is no integer variable."),
+        (lambda: slave.getInt64([0]), "fmi3GetInt64: there is no such variable."),
         (lambda: slave.getFloat64([0], nValues=2), "fmi3GetFloat64: every variable has one value."),
     ):
         slave.reset()

@@ -47,6 +47,19 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference references[]
     return fmi2OK;
 }
 
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference references[], size_t n, fmi2Integer values[]) {
+    ENTER(c, INITIALIZED, "fmi2GetInteger");
+    REQUIRE_POINTER(references, n, "fmi2GetInteger");
+    REQUIRE_POINTER(values, n, "fmi2GetInteger");
+    refresh_outputs(&instance->state);
+    for (size_t i = 0; i < n; i++) {
+        double value = 0.0;
+        if (get_value(instance, references[i], INTEGER, &value) != OK) return fmi2Error;
+        values[i] = (fmi2Integer)value;
+    }
+    return fmi2OK;
+}
+
 enum { SETTING = INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP };
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t n, const fmi2Real values[]) {
@@ -68,14 +81,13 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference references[]
     return fmi2OK;
 }
 
-/* There are no variables of other types: their functions accept nothing but empty lists. */
+/* No strings, and no integers that can be set: these functions accept nothing but empty lists. */
 #define NO_VARIABLES(function, Value)                                                                       \
     fmi2Status function(fmi2Component c, const fmi2ValueReference references[], size_t n, Value values[]) {  \
         ENTER(c, ANY_MODE, #function);                                                                      \
         (void)references, (void)values;                                                                     \
-        return n == 0 ? fmi2OK : FMI(fail(instance, "%s: every variable is real or boolean.", #function));   \
+        return n == 0 ? fmi2OK : FMI(fail(instance, "%s: there is no such variable.", #function));           \
     }
-NO_VARIABLES(fmi2GetInteger, fmi2Integer)
 NO_VARIABLES(fmi2GetString, fmi2String)
 NO_VARIABLES(fmi2SetInteger, const fmi2Integer)
 NO_VARIABLES(fmi2SetString, const fmi2String)

@@ -68,6 +68,20 @@ fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference references[],
     return fmi3OK;
 }
 
+fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference references[], size_t n, fmi3Int32 values[],
+                        size_t n_values) {
+    ENTER(c, READABLE, "fmi3GetInt32");
+    REQUIRE_POINTER(references && values, n, "fmi3GetInt32");
+    REQUIRE_SIZE(n, n_values, "fmi3GetInt32");
+    refresh_outputs(&instance->state);
+    for (size_t i = 0; i < n; i++) {
+        double value = 0.0;
+        if (get_value(instance, references[i], INTEGER, &value) != OK) return fmi3Error;
+        values[i] = (fmi3Int32)value;
+    }
+    return fmi3OK;
+}
+
 enum { SETTING = INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP | ASKING };
 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t n,
@@ -90,9 +104,9 @@ fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference references[],
     return fmi3OK;
 }
 
-/* There are no variables of other types: their functions accept nothing but empty lists. */
+/* No variables of other types, and no integers that can be set: these functions accept nothing but empty lists. */
 #define NONE(function, n) \
-    return (n) == 0 ? fmi3OK : FMI(fail(instance, "%s: every variable is Float64 or Boolean.", function))
+    return (n) == 0 ? fmi3OK : FMI(fail(instance, "%s: there is no such variable.", function))
 
 #define NO_VARIABLES(function, Value)                                                                      \
     fmi3Status function(fmi3Instance c, const fmi3ValueReference references[], size_t n, Value values[],    \
@@ -106,7 +120,6 @@ NO_VARIABLES(fmi3GetInt8, fmi3Int8)
 NO_VARIABLES(fmi3GetUInt8, fmi3UInt8)
 NO_VARIABLES(fmi3GetInt16, fmi3Int16)
 NO_VARIABLES(fmi3GetUInt16, fmi3UInt16)
-NO_VARIABLES(fmi3GetInt32, fmi3Int32)
 NO_VARIABLES(fmi3GetUInt32, fmi3UInt32)
 NO_VARIABLES(fmi3GetInt64, fmi3Int64)
 NO_VARIABLES(fmi3GetUInt64, fmi3UInt64)

@@ -168,7 +168,7 @@ static void refresh_derivatives(State *state) {
 }
 
 static const Variable *find_variable(Instance *instance, unsigned reference, Type type) {
-    static const char *const TYPES[] = {"real", "boolean"};
+    static const char *const TYPES[] = {"real", "boolean", "integer"};
     if (reference >= N_VALUES) fail(instance, "There is no variable of reference %u.", reference);
     else if (VARIABLES[reference].type == type) return &VARIABLES[reference];
     else fail(instance, "%s is no %s variable.", VARIABLES[reference].name, TYPES[type]);

@@ -91,15 +91,23 @@ def value_attributes(variable: FmuVariable) -> dict[str, str]:
     unit = {"unit": variable.unit} if variable.unit else {}
     if variable.display_unit != variable.unit:
         unit["displayUnit"] = variable.display_unit
-    start = (
-        str(bool(variable.start)).lower() if variable.type is Type.BOOLEAN else repr(float(variable.start))
-    )
     return {
         **unit,
         **{name: repr(float(bound)) for name, bound in bounds.items() if bound is not None},
         **({"nominal": repr(variable.nominal)} if variable.nominal != 1.0 else {}),
-        **({"start": start} if variable.kind.has_start else {}),
+        **({"start": text_of(variable.start, variable.type)} if variable.kind.has_start else {}),
     }
+
+
+def text_of(value: float, type_: Type) -> str:
+    """Write a value as XML has it."""
+    match type_:
+        case Type.REAL:
+            return repr(float(value))
+        case Type.BOOLEAN:
+            return str(bool(value)).lower()
+        case Type.INTEGER:
+            return str(int(value))
 
 
 def outputs_of(table: VariableTable) -> list[int]:

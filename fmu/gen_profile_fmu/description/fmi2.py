@@ -18,7 +18,7 @@ from gen_profile_fmu.description.common import (
 )
 from gen_profile_fmu.model.contents import Model
 from gen_profile_fmu.model.dependencies import Dependencies
-from gen_profile_fmu.model.variables import Type, VariableTable
+from gen_profile_fmu.model.variables import VariableTable
 
 
 def model_description(model: Model, guid: str, source_file: str) -> bytes:
@@ -66,8 +66,7 @@ def _add_variables(root: ElementTree.Element, table: VariableTable) -> None:
     state_of = dict(zip(table.derivatives, table.states, strict=True))
     for reference, variable in enumerate(table.variables):
         scalar = ElementTree.SubElement(variables, "ScalarVariable", variable_attributes(reference, variable))
-        tag = "Boolean" if variable.type is Type.BOOLEAN else "Real"
-        value = ElementTree.SubElement(scalar, tag, value_attributes(variable))
+        value = ElementTree.SubElement(scalar, variable.type.name_of_fmi2, value_attributes(variable))
         if reference in state_of:
             value.set("derivative", str(state_of[reference] + 1))
 

@@ -64,7 +64,7 @@ def _add_variables(root: ElementTree.Element, model: Model) -> None:
     state_of = dict(zip(table.derivatives, table.states, strict=True))
     for reference, variable in enumerate(table.variables):
         attributes = variable_attributes(reference, variable) | value_attributes(variable)
-        element = ElementTree.SubElement(variables, variable.type.value, attributes)
+        element = ElementTree.SubElement(variables, variable.type.name_of_fmi3, attributes)
         if model.interpolates_inputs and variable.kind.causality in {"input", "output"}:
             element.set("intermediateUpdate", "true")
         if reference in state_of:

@@ -12,10 +12,10 @@ from xml.etree import ElementTree
 import attrs
 
 from gen_profile_fmu.description.base_units import BASE_UNITS
-from gen_profile_fmu.description.common import to_bytes
+from gen_profile_fmu.description.common import text_of, to_bytes
 from gen_profile_fmu.description.fmu_files import archive
 from gen_profile_fmu.model.contents import Model
-from gen_profile_fmu.model.variables import FmuVariable, Type
+from gen_profile_fmu.model.variables import FmuVariable
 
 STRUCTURE = "SystemStructure.ssd"
 PARAMETER_SET = "initialValues"  # as others call it, and as Ecos is told to take
@@ -133,7 +133,7 @@ def _add_component(elements: ElementTree.Element, component: Component, left: fl
         connector = ElementTree.SubElement(
             connectors, "ssd:Connector", name=variable.name, kind=variable.kind.causality
         )
-        ElementTree.SubElement(connector, f"ssc:{_type_name(variable)}", _unit(variable))
+        ElementTree.SubElement(connector, f"ssc:{variable.type.name_of_fmi2}", _unit(variable))
     ElementTree.SubElement(
         element,
         "ssd:ElementGeometry",
@@ -163,15 +163,10 @@ def _parameters(component: Component) -> bytes:
     variables = component.variables("parameter")
     for variable in variables:
         parameter = ElementTree.SubElement(parameters, "ssv:Parameter", name=variable.name)
-        real = variable.type is Type.REAL
-        value = repr(float(variable.start)) if real else str(bool(variable.start)).lower()
-        ElementTree.SubElement(parameter, f"ssv:{_type_name(variable)}", {"value": value, **_unit(variable)})
+        value = {"value": text_of(variable.start, variable.type), **_unit(variable)}
+        ElementTree.SubElement(parameter, f"ssv:{variable.type.name_of_fmi2}", value)
     _add_units(ElementTree.SubElement(root, "ssv:Units"), variables)
     return to_bytes(root)
-
-
-def _type_name(variable: FmuVariable) -> str:
-    return "Real" if variable.type is Type.REAL else "Boolean"
 
 
 def _unit(variable: FmuVariable) -> dict[str, str]:

@@ -20,6 +20,7 @@ UNITS = (
     "m/s^2",
     "s",
 )  # with which comments of declarations begin, beside those of live parameters
+TYPES = {"LREAL": Type.REAL, "BOOL": Type.BOOLEAN, "DINT": Type.INTEGER}
 CYCLE = "fCycleTime"  # of the task: fixed, where others are inputs
 SETPOINTS = {
     "fPosition": "setpoint",
@@ -82,7 +83,7 @@ def _variables(source: BlockSource, block: Translation, axis: str, live: tuple[s
             description=description or f"{v.name} of the block",
             unit=unit if v.type == "LREAL" else "",
             kind=kind,
-            type=Type.BOOLEAN if v.type == "BOOL" else Type.REAL,
+            type=TYPES[v.type],
             start=v.start if kind.has_start else 0.0,
         )
 

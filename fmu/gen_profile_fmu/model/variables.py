@@ -26,10 +26,15 @@ _DISPLAY_UNITS = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2", "rad/s^3
 
 
 class Type(Enum):
-    """What values a variable has."""
+    """What values a variable has, as FMI 3 calls it; FMI 2 and SSP have names of their own."""
 
-    REAL = "Float64"
-    BOOLEAN = "Boolean"
+    REAL = ("Float64", "Real")
+    BOOLEAN = ("Boolean", "Boolean")
+    INTEGER = ("Int32", "Integer")
+
+    def __init__(self, name_of_fmi3: str, name_of_fmi2: str) -> None:
+        self.name_of_fmi3 = name_of_fmi3
+        self.name_of_fmi2 = name_of_fmi2
 
 
 class Kind(Enum):
@@ -68,7 +73,7 @@ class FmuVariable:
     Attributes
     ----------
     name, description, unit : str
-        `unit` is empty for booleans.
+        `unit` is empty for booleans and integers.
     display_unit : str
         In which tools show values; that of the angle for angles, else `unit`, by default.
     kind : Kind
