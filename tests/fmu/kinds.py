@@ -12,12 +12,12 @@ from gen_profile.planner.design import planner_block
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.reading import preset_spec
 from gen_profile_fmu.model.contents import Model, plant_model, profile_model, system_model
-from gen_profile_fmu.model.planner import planner_model
+from gen_profile_fmu.model.planner import planned_system_model, planner_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 INPUTS = {f"plant-{kind.value}": kind for kind in InputKind}
 KINDS = (*INPUTS, "profile", "system")  # of any plant
-ALL_KINDS = (*KINDS, "planner")
+ALL_KINDS = (*KINDS, "planner", "planned-system")
 
 
 PLANNED = preset_spec(
@@ -60,6 +60,9 @@ def model_of(kind: str, plant: Plant, profile: Profile | None = None) -> Model:
         return profile_model("paper profile", plant.actuated, profile)
     if kind == "planner":
         return _planner()
+    if kind == "planned-system":
+        machine = machine_of(plant)
+        return planned_system_model("paper planned", planner_text(), machine, tuple(PLANNED.planner.live))
     if kind == "system":
         return system_model("paper system", machine_of(plant), profile)
     machine = attrs.evolve(machine_of(plant), tau=0.1 if kind == "plant-velocity" else 0.0)

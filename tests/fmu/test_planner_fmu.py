@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from fmu.drivers import Instance
+from fmu.drivers import advance as integrate
 from fmu.kinds import PLANNED, model_of, planner_text
 
 from gen_profile.planner.execution import BlockInstance
@@ -27,6 +28,7 @@ OUTPUTS = {
     "cart.setpoint_acceleration": "fAcceleration",
     "stop_distance": "fStopDistance",
 }
+SEEN = ("sway.hook", "sway.payload", "cart.position")
 NUMBERS = {"error_id": "nErrorId", "promise_number": "nPromise"}
 
 
@@ -122,3 +124,68 @@ def test_steps_need_not_be_cycles_and_a_saved_state_goes_on(instance):
         assert shown(instance) == due[199].tolist()
         instance.fmu.setFMUState(state)
     instance.fmu.freeFMUState(state)
+
+
+@pytest.fixture
+def joined(version, request):
+    """The planner and the plant that it drives, in one FMU."""
+    plant = find_plant("double-pendulum-crane")
+    made = Instance(cached_fmu(model_of("planned-system", plant), version), version, exchange=request.param)
+    made.begin({"cart.start": -0.1, "max_step": 5e-3}, START)
+    yield made
+    made.close()
+
+
+def swings(version):
+    """How the loads sway where the plant's FMU alone is led from setpoint to setpoint of the block."""
+    fmu = cached_fmu(model_of("plant-setpoint", find_plant("double-pendulum-crane")), version)
+    plant = Instance(fmu, version, exchange=False)
+    plant.begin({"cart.start": -0.1, "max_step": 5e-3}, START)
+    rows = []
+    for number, setpoint in enumerate(expected()[:, 0]):
+        plant.write({"cart.setpoint": setpoint})
+        plant.fmu.doStep(START + number * CYCLE, CYCLE)
+        rows.append(plant.read(*SEEN))
+    plant.close()
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("joined", [False], indirect=True)
+def test_the_plant_follows_the_planner_in_one_fmu(joined, version):
+    """Setpoints are the block's, bit for bit; the loads sway as those of a plant that is led by them."""
+    sways, time = [], START
+
+    def advance(_):
+        nonlocal time
+        joined.fmu.doStep(time, CYCLE)
+        time += CYCLE
+        sways.append(joined.read(*SEEN))
+
+    assert issued(joined, advance).tolist() == expected().tolist()
+    np.testing.assert_allclose(sways, swings(version), atol=1e-12)
+    assert np.abs(np.array(sways)[:, 1]).max() > 1e-3
+    joined.fmu.reset()
+    joined.begin({"cart.start": -0.1, "max_step": 5e-3}, START)  # steps need not be cycles
+    order(joined, ORDERS[0][1])
+    joined.fmu.doStep(START, 20 * CYCLE)
+    order(joined, ORDERS[1][1])
+    for number in range(80):
+        joined.fmu.doStep(START + (20 + 2.5 * number) * CYCLE, 2.5 * CYCLE)
+    assert shown(joined) == expected()[219].tolist()
+    np.testing.assert_allclose(joined.read(*SEEN), sways[219], atol=1e-9)
+
+
+@pytest.mark.parametrize("joined", [True], indirect=True)
+def test_the_plant_follows_the_planner_in_model_exchange(joined, version):
+    sways = []
+
+    def advance(number):
+        if number > 0:
+            joined.fmu.enterContinuousTimeMode()
+            integrate(joined, START + (number - 1) * CYCLE, CYCLE, lambda _: None)
+            joined.fmu.enterEventMode()
+            sways.append(joined.read(*SEEN))
+        assert joined.events() == pytest.approx(START + (number + 1) * CYCLE, abs=1e-12)
+
+    assert issued(joined, advance).tolist() == expected().tolist()
+    np.testing.assert_allclose(sways, swings(version)[:-1], atol=1e-6)

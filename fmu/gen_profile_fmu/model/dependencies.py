@@ -49,7 +49,7 @@ def plant_structure(
     known: dict[int, set[int]] = {reference: {reference} for reference in states}
     known |= _observed(equations, table, drives)
     known |= _derivatives(equations, table, drives)
-    if "COMMAND" in table.blocks:
+    if "DISTANCE" in table.blocks:
         known |= _motion(table)
     start = dict(zip(table.references("Q_A"), (origins[axis] for axis in sorted(origins)), strict=True))
     start |= {reference: set() for reference in table.references("DQ_A")}

@@ -92,6 +92,21 @@ def block_page(name: str, words: str, table: VariableTable) -> str:
     return _page(name, (text, f"<h2>The block</h2><pre>{escape(words)}</pre>", _variables(table)))
 
 
+def planned_system_page(name: str, machine: PlantInstance, words: str, table: VariableTable) -> str:
+    """Describe a plant that a planner drives, in HTML."""
+    parts = (
+        f"<p>{_capital(machine.plant.summary)}, whose drives go from setpoint to setpoint of a planner "
+        "block, which is called once in every cycle, behind a first-order lag where τ &gt; 0. In "
+        "co-simulation the cycles that begin within a step are called with the inputs of the step's "
+        "beginning.</p>",
+        _equations(machine.plant),
+        _ERROR,
+        f"<h2>The block</h2><pre>{escape(words)}</pre>",
+        _variables(table),
+    )
+    return _page(name, parts)
+
+
 def _page(title: str, parts: Iterable[str]) -> str:
     style = (
         "body{font-family:sans-serif;max-width:60em;margin:2em auto} svg{display:block;margin:1em 0} "

@@ -1,17 +1,21 @@
-"""An FMU's content of a planner block: the block's own text in C, as a sampled controller."""
+"""An FMU's content of a planner block, alone or with the plant that it drives: the block's own text in C."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import partial
 
+import attrs
+
+from gen_profile.problem.dynamics import dynamics
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.st_to_c import StVariable, Translation, translate
-from gen_profile_fmu.model.c_sources import hand_written, variables_header
-from gen_profile_fmu.model.contents import PLAIN, Model, identifier_of
-from gen_profile_fmu.model.dependencies import Structure
-from gen_profile_fmu.model.documentation import block_page
-from gen_profile_fmu.model.plant_variables import time_variable
+from gen_profile_fmu.model.c_sources import equations_source, hand_written, variables_header
+from gen_profile_fmu.model.contents import PLAIN, PLANT_FILES, Model, identifier_of
+from gen_profile_fmu.model.dependencies import Structure, plant_structure
+from gen_profile_fmu.model.documentation import block_page, planned_system_page
+from gen_profile_fmu.model.plant_variables import PlantInstance, planned_system_variables, time_variable
 from gen_profile_fmu.model.variables import FmuVariable, Kind, Type, VariableTable, require_good_names
 
 UNITS = (
@@ -22,11 +26,53 @@ UNITS = (
 )  # with which comments of declarations begin, beside those of live parameters
 TYPES = {"LREAL": Type.REAL, "BOOL": Type.BOOLEAN, "DINT": Type.INTEGER}
 CYCLE = "fCycleTime"  # of the task: fixed, where others are inputs
+STANDS = "fActPosition"
 SETPOINTS = {
     "fPosition": "setpoint",
     "fVelocity": "setpoint_velocity",
     "fAcceleration": "setpoint_acceleration",
 }
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _PlacedBlock:
+    """A block, as it is among an FMU's variables.
+
+    Attributes
+    ----------
+    source : BlockSource
+    code : Translation
+    axis : str
+        That it plans.
+    live : tuple of str
+    inside : tuple of str
+        Inputs of the block that are none of the FMU's.
+    """
+
+    source: BlockSource
+    code: Translation
+    axis: str
+    live: tuple[str, ...]
+    inside: tuple[str, ...]
+
+    @property
+    def given(self) -> list[StVariable]:
+        """Inputs of the FMU."""
+        return [v for v in self.code.inputs if v.name not in self.inside]
+
+    @property
+    def cycle(self) -> float:
+        """Of the task, in s."""
+        return next(v.start for v in self.code.inputs if v.name == CYCLE)
+
+    @property
+    def files(self) -> dict[str, str]:
+        """C files of the block alone."""
+        return {
+            f"{self.code.name}.h": self.code.header,
+            f"{self.code.name}.c": self.code.source,
+            "planner_block.h": _block_header(self.code),
+        }
 
 
 def planner_model(name: str, text: str, axis: str, live: tuple[str, ...]) -> Model:
@@ -47,62 +93,125 @@ def planner_model(name: str, text: str, axis: str, live: tuple[str, ...]) -> Mod
     ExportError
         The text is no function block.
     """
-    source, block = parse_function_block(text), translate(text)
-    table = _variables(source, block, axis, live)
-    cycle = next(v.start for v in block.inputs if v.name == CYCLE)
-    constants = PLAIN | {"HAS_BLOCK": "1", "CYCLE": repr(cycle)}
+    block = _PlacedBlock(
+        source=parse_function_block(text), code=translate(text), axis=axis, live=live, inside=(CYCLE,)
+    )
+    orders, issued = _orders(block), _issued(block)
+    table = VariableTable(blocks={**orders, **issued, "TIME": (time_variable(),)})
+    require_good_names("Planner", [axis, *live], table)
+    at = _references(block, table)
     return Model(
         name=name,
         identifier=identifier_of(name),
         summary=f"planner of motions of {axis} that leave no sway",
         variables=table,
-        structure=_structure(block, table),
+        structure=_structure(block, table, at),
         interpolates_inputs=False,
         code={
             **hand_written("planner_model.c"),
-            "variables.h": variables_header(table, 1, 0, constants),
-            f"{block.name}.h": block.header,
-            f"{block.name}.c": block.source,
-            "planner_block.h": _block_header(block),
-            "planner_block.c": _block_source(block, table),
+            "variables.h": variables_header(table, 1, 0, PLAIN | _constants(block)),
+            **block.files,
+            "planner_block.c": _block_source(block, at),
         },
         order=("planner_block.c", "planner_model.c"),
-        page=partial(block_page, name, source.header.strip("(*) \n"), table),
+        page=partial(block_page, name, _words(block), table),
         stop_time=30.0,
-        step=cycle,
+        step=block.cycle,
     )
 
 
-def _variables(source: BlockSource, block: Translation, axis: str, live: tuple[str, ...]) -> VariableTable:
-    comments = {v.name: v.comment for v in source.variables}
+def planned_system_model(name: str, text: str, machine: PlantInstance, live: tuple[str, ...]) -> Model:
+    """Make the FMU's content of a planner block and the plant that it drives.
 
-    def variable(v: StVariable, kind: Kind) -> FmuVariable:
-        unit, description = _explained(comments[v.name], is_live=_is_live(v, live))
-        return FmuVariable(
-            name=_name(v, axis, live),
-            description=description or f"{v.name} of the block",
-            unit=unit if v.type == "LREAL" else "",
-            kind=kind,
-            type=TYPES[v.type],
-            start=v.start if kind.has_start else 0.0,
+    Parameters
+    ----------
+    name, text, live
+        As of `planner_model`.
+    machine : PlantInstance
+        Whose first axis the block plans.
+
+    Raises
+    ------
+    ExportError
+        The text is no function block.
+    CosimulationError
+        The plant's names cannot be those of an FMU's variables.
+    """
+    plant, equations = machine.plant, dynamics(machine.plant)
+    block = _PlacedBlock(
+        source=parse_function_block(text),
+        code=translate(text),
+        axis=plant.actuated[0].name,
+        live=live,
+        inside=(CYCLE, STANDS),  # the axis stands where it was led to
+    )
+    table = planned_system_variables(machine, _orders(block), _issued(block))
+    at = _references(block, table) | {STANDS: table.offset("COMMAND")}
+    tau, velocity, start = (table.references(of) for of in ("TAU", "DQ_A", "START"))
+    drives = {axis: {rate, *tau} for axis, rate in enumerate(velocity)}
+    of_plant = plant_structure(equations, table, drives, {axis: {place} for axis, place in enumerate(start)})
+    of_block = _structure(block, table, at | {STANDS: start[0]})
+    constants = PLAIN | {"N_ORDERS": "1"} | _constants(block)
+    return Model(
+        name=name,
+        identifier=identifier_of(name),
+        summary=f"{plant.summary}, following a planner",
+        variables=table,
+        structure=Structure(
+            running=of_plant.running | of_block.running, starting=of_plant.starting | of_block.starting
+        ),
+        interpolates_inputs=False,
+        code={
+            **hand_written(*PLANT_FILES, "planned_system_model.c"),
+            "variables.h": variables_header(table, len(plant.actuated), len(plant.unactuated), constants),
+            "equations.c": equations_source(equations),
+            **block.files,
+            "planner_block.c": _block_source(block, at),
+        },
+        order=("equations.c", "driven_plant.c", "planner_block.c", "planned_system_model.c"),
+        page=partial(planned_system_page, name, machine, _words(block), table),
+        stop_time=30.0,
+        step=block.cycle,
+    )
+
+
+def _constants(block: _PlacedBlock) -> dict[str, str]:
+    return {"HAS_BLOCK": "1", "CYCLE": repr(block.cycle)}
+
+
+def _words(block: _PlacedBlock) -> str:
+    return block.source.header.strip("(*) \n")
+
+
+def _orders(block: _PlacedBlock) -> dict[str, tuple[FmuVariable, ...]]:
+    """List the FMU's inputs."""
+    return {
+        "ORDERS": tuple(
+            _variable(v, block, Kind.INPUT if v.type == "LREAL" else Kind.DISCRETE_INPUT) for v in block.given
         )
+    }
 
-    inputs = [
-        variable(v, Kind.INPUT if v.type == "LREAL" else Kind.DISCRETE_INPUT)
-        for v in block.inputs
-        if v.name != CYCLE
-    ]
-    outputs = {v.name: variable(v, Kind.DISCRETE_OUTPUT) for v in _outputs(block)}
-    table = VariableTable(
-        blocks={
-            "ORDERS": tuple(inputs),
-            "COMMAND": tuple(made for name, made in outputs.items() if name in SETPOINTS),
-            "TOLD": tuple(made for name, made in outputs.items() if name not in SETPOINTS),
-            "TIME": (time_variable(),),
-        }
+
+def _issued(block: _PlacedBlock) -> dict[str, tuple[FmuVariable, ...]]:
+    """List the outputs, setpoints apart."""
+    outputs = {v.name: _variable(v, block, Kind.DISCRETE_OUTPUT) for v in _outputs(block.code)}
+    return {
+        "COMMAND": tuple(made for name, made in outputs.items() if name in SETPOINTS),
+        "TOLD": tuple(made for name, made in outputs.items() if name not in SETPOINTS),
+    }
+
+
+def _variable(v: StVariable, block: _PlacedBlock, kind: Kind) -> FmuVariable:
+    comments = {known.name: known.comment for known in block.source.variables}
+    unit, description = _explained(comments[v.name], is_live=_is_live(v, block.live))
+    return FmuVariable(
+        name=_name(v, block.axis, block.live),
+        description=description or f"{v.name} of the block",
+        unit=unit if v.type == "LREAL" else "",
+        kind=kind,
+        type=TYPES[v.type],
+        start=v.start if kind.has_start else 0.0,
     )
-    require_good_names("Planner", [axis, *live], table)
-    return table
 
 
 def _name(variable: StVariable, axis: str, live: tuple[str, ...]) -> str:
@@ -139,20 +248,18 @@ def _taken_over(block: Translation) -> dict[str, str]:
     return {output: given for output, given in actual.items() if given in inputs}
 
 
-def _references(block: Translation, table: VariableTable) -> dict[str, int]:
+def _references(block: _PlacedBlock, table: VariableTable) -> dict[str, int]:
     """Value references by the block's own names."""
-    inputs = [v.name for v in block.inputs if v.name != CYCLE]
-    names = [*inputs, *(v.name for v in _outputs(block))]
+    names = [v.name for v in (*block.given, *_outputs(block.code))]
     return dict(zip(names, table.references("ORDERS", "COMMAND", "TOLD"), strict=True))
 
 
-def _structure(block: Translation, table: VariableTable) -> Structure:
+def _structure(block: _PlacedBlock, table: VariableTable, at: Mapping[str, int]) -> Structure:
     """Let outputs follow from the time and all inputs, and at the start from where the axis stands."""
-    at = _references(block, table)
     outputs = table.references("COMMAND", "TOLD")
     running = table.references("ORDERS", "TIME")
     starting: dict[int, list[int]] = {output: [] for output in outputs}
-    starting |= {at[output]: [at[given]] for output, given in _taken_over(block).items()}
+    starting |= {at[output]: [at[given]] for output, given in _taken_over(block.code).items()}
     return Structure(running=dict.fromkeys(outputs, running), starting=starting)
 
 
@@ -171,22 +278,22 @@ typedef {block.name} PlannerBlock;
 """
 
 
-def _block_source(block: Translation, table: VariableTable) -> str:
-    at, taken = _references(block, table), _taken_over(block)
+def _block_source(block: _PlacedBlock, at: Mapping[str, int]) -> str:
+    code, taken = block.code, _taken_over(block.code)
     given = [
         f"block->{v.name} = values[{at[v.name]}]{' != 0.0' if v.type == 'BOOL' else ''};"
-        for v in block.inputs
+        for v in code.inputs
         if v.name != CYCLE
     ]
-    shown = [f"values[{at[v.name]}] = block->{v.name};" for v in block.outputs]
+    shown = [f"values[{at[v.name]}] = block->{v.name};" for v in code.outputs]
     stands = [f"block->{output} = values[{at[given]}];" for output, given in taken.items()]
     changes = [f"tangent[{at[output]}] = tangent[{at[given]}];" for output, given in taken.items()]
     return f"""\
 /* The planner block, and its inputs and outputs among the FMU's variables. */
-#include "{block.name}.c"
+#include "{code.name}.c"
 
 static void block_begin(PlannerBlock *block, const double values[]) {{
-    {block.name}_init(block);
+    {code.name}_init(block);
     {_statements(stands)}
 }}
 
@@ -196,7 +303,7 @@ static void block_begin_tangent(double tangent[]) {{
 
 static void block_call(PlannerBlock *block, const double values[]) {{
     {_statements(given)}
-    {block.name}_step(block);
+    {code.name}_step(block);
 }}
 
 static void block_show(const PlannerBlock *block, double values[]) {{

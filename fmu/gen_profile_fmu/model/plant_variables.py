@@ -118,6 +118,34 @@ def system_variables(machine: PlantInstance, motion: Profile) -> VariableTable:
     return table
 
 
+def planned_system_variables(machine: PlantInstance, orders: Blocks, issued: Blocks) -> VariableTable:
+    """List the variables of a plant that follows a planner; raises as `plant_variables` does.
+
+    Parameters
+    ----------
+    machine : PlantInstance
+    orders, issued : dict of str to tuple of FmuVariable
+        Inputs and outputs of the block.
+    """
+    axes = machine.plant.actuated
+    words = "position to reach in a cycle, of an axis that the block does not plan"
+    others = _at(machine.position[1:], _per_axis(axes[1:], "setpoint", words, 0, Kind.INPUT))
+    start = _per_axis(axes, "start", "position at rest at the start", 0, Kind.FIXED_PARAMETER)
+    table = VariableTable(
+        blocks={
+            **_parameters(machine, InputKind.SETPOINT),
+            "START": _at(machine.position, start),
+            **orders,
+            "OTHERS": others,
+            **_states_and_outputs(machine),
+            **issued,
+            "TIME": (time_variable(),),
+        }
+    )
+    _check_names(machine.plant, table)
+    return table
+
+
 def _parameters(machine: PlantInstance, kind: InputKind) -> Blocks:
     parameters = tuple(
         FmuVariable(

@@ -1,4 +1,4 @@
-"""From a spec to an FMU of its plant, motion or planner, or of plant and motion, joined or as a system."""
+"""From a spec to an FMU of its plant, motion or planner, of the plant with either, or to a system of FMUs."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from gen_profile_fmu.model.contents import (
     system_model,
 )
 from gen_profile_fmu.model.nominals import smooth_move, state_nominals
-from gen_profile_fmu.model.planner import planner_model
+from gen_profile_fmu.model.planner import planned_system_model, planner_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
-KINDS = ("plant", "profile", "system", "planner", "ssp")
+KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp")
 
 
 @attrs.frozen(kw_only=True)
@@ -146,6 +146,10 @@ def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Progress) -> 
         progress("finding the modes over the live ranges")
         axis = spec.machine().actuated[0].name
         return planner_model(name, planner_block(spec).text, axis, tuple(spec.planner.live))
+    if kind == "planned-system":
+        progress("finding the modes over the live ranges")
+        machine = _machine(spec, _rough_nominals(spec))
+        return planned_system_model(name, planner_block(spec).text, machine, tuple(spec.planner.live))
     evaluation = plan(spec, progress=progress).evaluation
     if kind == "profile":
         return profile_model(name, spec.machine().actuated, evaluation.command)
