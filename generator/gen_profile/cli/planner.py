@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -275,6 +274,7 @@ def planned(
 @contextmanager
 def status_line() -> Iterator[Callable[[str], None]]:
     """Keep one line of the terminal for what is said."""
+    import shutil
 
     def tell(words: str) -> None:
         width = shutil.get_terminal_size().columns - 1

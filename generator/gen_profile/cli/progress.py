@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-import attrs
 import click
 
 from gen_profile.progress import Progress
@@ -18,16 +17,12 @@ FIRST_LINE, LONGEST_PAUSE = 2.0, 30.0  # s after which a log hears of work again
 REFRESH = 4.0  # times a second, on a terminal
 
 
-@attrs.define
 class _Step:
     """How far a stage is."""
 
-    stage: str = ""
-    done: int = 0
-    total: int = 0
-    remark: str = ""
-    began: float = 0.0
-    before: int = 0  # steps that were done when the stage began
+    def __init__(self, stage: str = "") -> None:
+        self.stage, self.done, self.total, self.remark = stage, 0, 0, ""
+        self.began, self.before = 0.0, 0  # when, and after how many steps, the stage began
 
     def take(self, stage: str, done: int, total: int, remark: str) -> bool:
         """Take what is told, and find out whether a stage begins."""
@@ -105,7 +100,7 @@ class _OnTerminal:
         from rich.spinner import Spinner
         from rich.text import Text
 
-        self._step, self._spinner, self._text = _Step(stage="starting"), Spinner("dots"), Text
+        self._step, self._spinner, self._text = _Step("starting"), Spinner("dots"), Text
         self._step.began = time.monotonic()
         self._live = Live(
             get_renderable=self._shown,

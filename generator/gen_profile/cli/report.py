@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import attrs
 import click
 
 from gen_profile.cli.commands import cli
@@ -109,8 +108,10 @@ def report(
             fields=[(name.strip(), value.strip()) for name, _, value in parted], progress=tell
         )
         if on_paper:
+            from attrs import evolve
+
             tell("printing")
-            made = attrs.evolve(made, content=printed(made.content))
+            made = evolve(made, content=printed(made.content))
         deliver(out, made.content)
     print_outcome(made.to_dict(out), made_of.words(made, out), as_json)
     if faults := made.faults():
@@ -122,8 +123,7 @@ for parameter in report.params:
         parameter.metavar = "[SPEC.toml|BLOCK]"
 
 
-@attrs.frozen(kw_only=True)
-class _Subject:
+class _Subject(NamedTuple):
     """What a report is about: its name, and how a page is made and told of."""
 
     name: str

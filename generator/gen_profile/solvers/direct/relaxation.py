@@ -13,7 +13,6 @@ from functools import cache
 
 import attrs
 import numpy as np
-from scipy.optimize import brentq
 
 from gen_profile.motion.profile import Array
 from gen_profile.problem.problem import Problem
@@ -163,6 +162,8 @@ def least_duration(problem: Problem) -> float | None:
     for _ in range(ROUNDS):
         enough = short + float(np.clip(excess(short) / POWER, *STEPS))
         if excess(enough) <= 0.0:
+            from scipy.optimize import brentq  # noqa: PLC0415  (a tenth of what the main job takes to start)
+
             return math.exp(brentq(excess, short, enough, xtol=DURATION_PRECISION))
         if excess(enough) < excess(lowest) - LITTLE:
             lowest = enough
