@@ -1,6 +1,7 @@
 """`gen-profile stream --planner` as a user calls it: which blocks are taken, and what is reported."""
 
 import csv
+import errno
 
 import pytest
 from command_line import run_here
@@ -8,6 +9,7 @@ from exporters.can.bench import HastyClock
 from fmu.kinds import PLANNED, planner_text
 
 from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, sha256
+from gen_profile.cli import planner
 from gen_profile.planner.commands import play
 from gen_profile.streaming import stream as workflow
 
@@ -94,3 +96,12 @@ def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, options, wo
     outcome = run_here("stream", *options, "--simulate-drive")
     assert outcome.code == 2
     assert words in outcome.err
+
+
+def test_a_terminal_that_is_gone_hides_nothing(monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(errno.EIO, "gone")
+
+    monkeypatch.setattr(planner.click, "echo", refuse)
+    with planner.status_line():
+        pass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -283,7 +283,8 @@ def status_line() -> Iterator[Callable[[str], None]]:
     try:
         yield tell
     finally:
-        click.echo(CLEARED, err=True, nl=False)
+        with suppress(OSError):  # of a terminal that is gone, which must not hide what became of the stream
+            click.echo(CLEARED, err=True, nl=False)
 
 
 def _numbers(live_parameters: tuple[str, ...]) -> dict[str, float]:
