@@ -73,3 +73,14 @@ def test_what_follows_from_a_fault_is_no_other():
     assert {fault.partition(":")[0] for fault in caught.value.faults} == {
         "plant.L1", "robustness.uncertain.L1", "limits.jerk", "check.path.lag",
     }  # fmt: skip
+
+
+def test_live_parameters_keep_the_order_in_which_a_block_shall_have_them():
+    """They are its inputs; ranges of the design come in the machine's order, whatever a file says first."""
+    spec = evolve_spec(
+        PAPER,
+        robustness={"uncertain": {"L1": 0.1, "m2": 0.1}},
+        planner={"live": {"L1": [0.3, 0.6], "m2": [0.1, 0.3]}},
+    )
+    assert list(spec.robustness.uncertain) == ["m2", "L1"]
+    assert list(spec.planner.live) == ["L1", "m2"]

@@ -47,7 +47,7 @@ DEFAULT_COUNTS_PER_SI = 1e6
 RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longest axis move
 
 ParameterSpan = Annotated[str, Named("parameter", of="span")]
-LiveParameter = Annotated[str, Named("parameter", of="live")]
+LiveParameter = Annotated[str, Named("parameter", of="live", reorder=False)]
 Span = Annotated[tuple[float, float], Rising()]
 SwingState = Annotated[str, Named("coordinate")]
 Shares = Annotated[Mapping[ParameterName, RelativeRange], example("L1 = 0.2")]

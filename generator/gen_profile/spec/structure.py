@@ -127,18 +127,15 @@ class Structurer:
         return fitted
 
     def _mapping(self, value: Any, kinds: tuple[Kind, ...], where: str, words: str) -> Any:
-        """Fit what is stated by names of the machine, and put it into the machine's order."""
+        """Fit what is stated by names of the machine."""
         if not isinstance(value, Mapping):
             return self._misfit(where, words or "must be a table, found FOUND", value)
         key, kind = kinds
         (named,) = (one for one in key.__metadata__ if isinstance(one, Named))
         names = self.names.get(named.of or named.word, dict.fromkeys(value))
         stated = self.known(value, names, where, named.word)
-        fitted = {
-            name: self.fit(stated[name], own or kind, place(where, name))
-            for name, own in names.items()
-            if name in stated
-        }
+        order = [name for name in names if name in stated] if named.reorder else stated
+        fitted = {name: self.fit(stated[name], names[name] or kind, place(where, name)) for name in order}
         return MappingProxyType({name: one for name, one in fitted.items() if one is not MISFIT})
 
     def _tuple(self, value: Any, kinds: tuple[Kind, ...], where: str, words: str) -> Any:

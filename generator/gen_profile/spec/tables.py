@@ -302,8 +302,9 @@ def _axis(table: Table, plant: Plant | None, structurer: Structurer) -> Table:
         return {}
     if len(plant.actuated) == 1:
         table = _named(plant.actuated[0].name, table, structurer.faults)
+    table = {**{axis.name: {} for axis in plant.actuated}, **table}
     for axis in plant.actuated:
-        given = table.get(axis.name, {})
+        given = table[axis.name]
         if isinstance(given, Mapping):
             table[axis.name] = {"unit": axis.unit, **_feed_constant(given, f"axis.{axis.name}", structurer)}
     return table

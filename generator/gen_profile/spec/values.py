@@ -83,6 +83,7 @@ class Named:
 
     word: str  # such as "axis"
     of: str = ""  # what is stated by these names, where the machine says what that may be
+    reorder: bool = True  # into the machine's order, so that the one they are written in means nothing
 
 
 def found(value: object) -> str:
@@ -115,7 +116,7 @@ Name = Annotated[
         "not ending with a dot or space, and no device's name in Windows, as CON",
     ),
 ]
-AxisName = Annotated[str, Named("axis")]
+AxisName = Annotated[str, Named("axis", reorder=False)]
 LoadName = Annotated[str, Named("load")]
 ParameterName = Annotated[str, Named("parameter")]
 Positive = Annotated[float, Bounds(above=0.0)]
