@@ -26,6 +26,7 @@ ABSOLUTE_TOLERANCE = 1e-13
 FREE_ACCURACY = 1e-8  # of free swings, which are compared with measured ones
 TRANSIENT_SAMPLES = 4001
 SHORTEST_STRETCH = 1e-9  # of a motion's duration: closer times are one
+GROWTH = 1e-6  # of the fastest rate, beyond which a machine does not return to rest
 LONGEST = 1e6  # greatest rate of a machine times its time: some hundred thousand steps, and minutes
 RATE, POINT = 1e-4, 1e-6  # s of work to evaluate the equations in a step, and more for each point
 AT_REST: Mapping[str, float] = MappingProxyType({})
@@ -94,16 +95,25 @@ class PlantSimulation:
         self._outputs = _functions(plant)[1]
         self.plant, self.initial, self._profile = plant, initial, profile
         self._p = p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
-        for values in machines:
-            _require_pace(plant, values, profile, until)
         start, motion = initial_state(plant, initial).reshape(2, -1), _motion(profile)
-        ends = (profile(np.zeros(1)).position[0], profile.target)
+        ends = [profile(np.zeros(1)).position[0], profile.target]
+        rates = np.array([eigenvalues(plant, p, q_a) for q_a in ends])
+        fastest = float(np.abs(rates).max())
+        for growing in np.flatnonzero((rates.real > GROWTH * fastest).any(axis=(0, 2))).tolist():
+            linearize(plant, machines[growing], profile.target.tolist())  # which says what is wrong
+        _require_pace(plant, fastest, until)
+        first, last = (linear_terms(plant, p, q_a) for q_a in ends)
+        alike = all(map(np.array_equal, first, last))
+
+        def linear(time: float) -> tuple[Array, Array]:
+            return first if alike else linear_terms(plant, p, motion(np.array([time]))[0, : profile.axes])
+
         self._solution = integrate(
             _accelerations(plant, p, motion),
-            lambda t: linear_terms(plant, p, motion(np.array([t]))[0, : profile.axes]),
+            linear,
             np.tile(start, len(p)),
             _stretches(profile, until),
-            fastest=max(float(np.abs(eigenvalues(plant, p, q_a)).max()) for q_a in ends),
+            fastest=fastest,
             accuracy=accuracy,
             least=ABSOLUTE_TOLERANCE / RELATIVE_TOLERANCE * accuracy,
             what=f"{plant.type}'s motion",
@@ -215,9 +225,7 @@ def _accelerations(plant: Plant, p: Array, motion: Callable[[Array], Array]) -> 
     return at
 
 
-def _require_pace(plant: Plant, parameters: Mapping[str, float], profile: Profile, until: float) -> None:
-    linear = linearize(plant, parameters, profile.target.tolist())
-    fastest = max(linear.frequencies[-1], np.abs(np.linalg.eigvals(linear.damping)).max())
+def _require_pace(plant: Plant, fastest: float, until: float) -> None:
     if fastest * until > LONGEST:
         raise InfeasibleProblem(
             f"plant: a motion of the {plant.type} changes within {1.0 / fastest:.1g} s, too fast to be "
