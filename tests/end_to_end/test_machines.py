@@ -92,6 +92,6 @@ def test_a_machine_too_stiff_to_be_followed_is_refused(tmp_path):
     )
     assert outcome.code == 3
     assert re.search(
-        r"changes within 4e-07 s, too fast to be followed for 7\.\d+ s; look at", outcome.errors[-1]
+        r"changes within 3e-07 s, too fast to be followed for 7\.\d+ s; look at", outcome.errors[-1]
     )
     assert not (tmp_path / "new").exists()
