@@ -84,3 +84,8 @@ def test_live_parameters_keep_the_order_in_which_a_block_shall_have_them():
     )
     assert list(spec.robustness.uncertain) == ["m2", "L1"]
     assert list(spec.planner.live) == ["L1", "m2"]
+
+
+def test_a_distance_out_of_bounds_is_a_target_out_of_bounds():
+    with pytest.raises(SpecError, match=r"^move\.target\.0: must be at least -100000 and at most 100000 m"):
+        evolve_spec(PAPER, move={"distance": 1e6})

@@ -256,6 +256,7 @@ def _per_axis(
     numbers = [structurer.fit(one, float, where) for one in values]
     if MISFIT in numbers:
         return harmless
+    where = where.replace("distance", "target")  # from 0, that is what a distance is
     return tuple(structurer.fit(numbers, tuple[Distance, ...], where, harmless))
 
 
