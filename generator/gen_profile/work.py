@@ -1,8 +1,8 @@
 """What a search may cost at most, so that every spec is answered in bounded time.
 
 Work is counted where it is done, in seconds that it takes on a usual processor, by formulas of its size: so a
-search ends at the same place on every machine and every day. The processor's own clock is only looked at in
-case a formula is far off.
+search ends at the same place on every machine and every day. The processor's own clock, which counts what all
+threads of this process compute, ends what takes longer than an answer may.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from contextvars import ContextVar
 
 import attrs
 
-CLOCK = 10.0  # times the budget by the processor's clock, after which the counted work is not believed
 LOOK = 0.05  # s of work between looks at the clock, which take time themselves
 
 
@@ -26,7 +25,7 @@ class OutOfWork(Exception):
 @attrs.define
 class _Budget:
     left: float
-    ends: float  # by the clock
+    ends: float  # by the processor's clock
     look: float  # at the clock, when so much is left
     outer: _Budget | None
 
@@ -36,7 +35,7 @@ class _Budget:
             raise OutOfWork
         if self.left < self.look:
             self.look = self.left - LOOK
-            if time.thread_time() > self.ends:
+            if time.process_time() > self.ends:
                 raise OutOfWork
 
 
@@ -44,11 +43,17 @@ _current: ContextVar[_Budget | None] = ContextVar("budget", default=None)
 
 
 @contextmanager
-def budget(seconds: float) -> Iterator[None]:
-    """Let what is done in the context cost no more than this, nor more than budgets around it have left."""
-    outer = _current.get()
-    ends = time.thread_time() + CLOCK * seconds
-    token = _current.set(_Budget(seconds, ends, seconds, outer))
+def budget(seconds: float, clock: float = math.inf) -> Iterator[None]:
+    """Let what is done in the context cost no more than this, nor more than budgets around it have left.
+
+    Parameters
+    ----------
+    seconds : float
+        Of counted work.
+    clock : float
+        By the processor's clock, in s.
+    """
+    token = _current.set(_Budget(seconds, time.process_time() + clock, seconds, _current.get()))
     try:
         yield
     finally:

@@ -15,6 +15,7 @@ from gen_profile.solvers.direct import relaxation, set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.infeasibility import CandidateTest, cures
 from gen_profile.spec.reading import preset_spec
+from gen_profile.work import OutOfWork
 
 HOIST = "limits.axis.hoist={travel=[0.9, 7.1], acceleration=0.3}"
 LAG = "actuator={type='first-order', tau=0.1}"
@@ -100,11 +101,26 @@ def test_limits_that_no_single_one_is_to_blame_for_are_widened_together():
     assert all(works("paper", *overrides, *change) for change in changes)
 
 
+def test_what_was_found_before_the_work_is_used_up_is_told():
+    problem = problem_of(preset_spec("paper", ["limits.sway=0.01"]))
+    told = []
+
+    def solve(other, easiest):
+        if told:
+            raise OutOfWork
+        told.append(choice.attempt(other, "direct", easiest=easiest))
+        return told[0]
+
+    trial = CandidateTest(solve=solve, keeps=choice.keeps_limits, welcome=lambda _: False)
+    named = cures(problem, trial)
+    assert named == f"In 3 s it would do with limits.sway = {told[0].problem.limits.sway:g}."
+
+
 @pytest.mark.parametrize(("order", "less"), [(1, 'robustness.method = "none"'), (2, "robustness.order = 1")])
 def test_robustness_is_to_blame_where_nothing_else_is(order, less):
     problem = problem_of(preset_spec("paper", [f"robustness.order={order}"]))
 
-    def solve(other):
+    def solve(other, _):
         hard = bool(other.desensitized) and other.order == order
         return choice.attempt(attrs.evolve(other, duration=0.3) if hard else other, "direct")
 
@@ -136,9 +152,9 @@ def test_the_least_sway_of_a_pendulum_is_what_its_load_needs_to_get_there():
 
 def test_the_share_falls_with_the_duration():
     shares = [
-        relaxation.relaxed(
-            problem_of(preset_spec("paper", ["limits.sway=0.01", f"move.duration={t}"])), ["limits.sway"]
-        )
+        relaxation.Relaxation(
+            problem_of(preset_spec("paper", ["limits.sway=0.01", f"move.duration={t}"]))
+        ).least(("limits.sway",))
         for t in (2.5, 3.0, 4.0, 6.0)
     ]
     assert all(later.share < earlier.share for earlier, later in pairwise(shares))
@@ -188,8 +204,8 @@ def test_the_sway_between_collocation_points_is_within_the_limit_over_a_range_to
 def test_redundant_sensitivities_are_left_out_here_too():
     uncertain = ["robustness.uncertain={L1=0.2, L2=0.2}"]
     problem = problem_of(preset_spec("paper", [*uncertain, "limits.sway=0.016"]))
-    easiest = relaxation.relaxed(problem, ["limits.sway"])
-    alone = relaxation.relaxed(attrs.evolve(problem, desensitized=("L1",)), ["limits.sway"])
+    easiest = relaxation.Relaxation(problem).least(("limits.sway",))
+    alone = relaxation.Relaxation(attrs.evolve(problem, desensitized=("L1",))).least(("limits.sway",))
     assert easiest.share == pytest.approx(alone.share, rel=1e-6)
     begun_there = direct.solve(problem, easiest.iterate)
     assert begun_there.redundant == ("L2",)

@@ -162,3 +162,19 @@ def test_a_limit_that_makes_the_cost_of_sway_steep_is_kept():
     task = ["cost.effort=snap", "move.duration=6.0", "limits.velocity=0.2"]
     solution = direct.solve(problem_of(preset_spec("slosh-tank", task)))
     assert greatest(optimal_profile(solution), 1) == pytest.approx(0.2, rel=1e-3)
+
+
+def test_where_programs_on_a_finer_mesh_fail_a_coarser_one_does(monkeypatch):
+    plainly, problem = direct.sequence, limited(acceleration=0.4)
+
+    def failing(start, goal, *enough):
+        found = plainly(start, goal, *enough)
+        fine = goal.setup.transcription.intervals > set_up.INTERVALS
+        return attrs.evolve(found, verdict=direct.ConicStatus.FAILED) if fine else found
+
+    best = direct.solve(problem).raise_for_status()
+    monkeypatch.setattr(direct, "sequence", failing)
+    found = direct.solve(problem)
+    assert len(found.raise_for_status().knots) == set_up.INTERVALS + 1 < len(best.knots)
+    assert best.cost < found.optimum.cost < 1.05 * best.cost
+    assert choice.keeps_limits(found)

@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import attrs
 import numpy as np
 import pytest
 from fmu import absolute_angle_crane as oracle
@@ -132,3 +133,18 @@ def test_infeasible_limits_are_infeasible_here_too():
 def test_a_problem_without_a_worst_case_is_a_mistake():
     with pytest.raises(ValueError, match="worst case"):
         worst_case.solve(crane_problem())
+
+
+def test_where_programs_for_the_least_worst_case_fail_it_is_bisected(monkeypatch):
+    problem = ranged(duration=1.6)
+    best = worst_case.solve(problem)
+    least, failing = worst_case._least_worst, worst_case.ConicStatus.FAILED
+    monkeypatch.setattr(worst_case, "_least_worst", lambda *task: attrs.evolve(least(*task), verdict=failing))
+    found = worst_case.solve(problem)
+
+    def worst(solution):
+        motion, machines = optimal_profile(solution), worst_case.ends(problem, problem.worst_case)
+        return worst_case.residual_shares(problem, problem.worst_case, motion, machines).max()
+
+    assert worst(best) < worst(found) < 1.6 * worst(best)
+    assert found.worst_case_bound < 0.003 * worst(found)

@@ -28,7 +28,7 @@ from gen_profile.work import OutOfWork, budget
 SLOW = 5.0  # periods of the slowest mode, which are time enough where no duration keeps the limits
 CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
 EXPLAINING = "looking for what would do"
-SEARCHING = 14.0  # s of work to find the shortest duration
+SEARCHING = 20.0  # s of work to find the shortest duration
 SPREADS = 2  # times that it is measured how much more than the nominal machine others sway on the way
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
@@ -164,15 +164,25 @@ def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold
     InfeasibleProblem, SolverDiverged, LimitViolation
     """
     try:
-        with budget(choice.ANSWER):
-            spec = timed(spec, progress)
-            progress("solving")
-            began = time.perf_counter()
-            solution, motion = _designed(spec, near, progress)
-            solver_time = time.perf_counter() - began
+        with budget(*choice.ANSWER):
+            return _planned(timed(spec, progress), near, progress)
     except OutOfWork:
         choice.given_up(problem_of(spec)).raise_for_status()
         raise
+
+
+def _planned(spec: Spec, near: Trajectory | None, progress: Progress) -> Plan:
+    """Plan a spec that has a duration.
+
+    Raises
+    ------
+    OutOfWork
+        Nothing is left of a budget.
+    """
+    progress("solving")
+    began = time.perf_counter()
+    solution, motion = _designed(spec, near, progress)
+    solver_time = time.perf_counter() - began
     evaluation = evaluate(spec, motion)
     found = evaluation.figures
     swing = max(found["sway_transient_peak_m"], found["sway_transient_worst_m"] / SWAY_TOLERANCE)

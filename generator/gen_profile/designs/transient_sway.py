@@ -31,7 +31,7 @@ SAMPLES = 1001
 def solve(spec: Spec) -> Solution:
     """Solve a spec so that all machines keep its limits; where that fails, find out what would help."""
     try:
-        with budget(choice.ANSWER):
+        with budget(*choice.ANSWER):
             return choice.diagnosed(attempt(spec), spec.solver.solver)
     except OutOfWork:
         return choice.given_up(problem_of(spec))
@@ -102,7 +102,7 @@ def with_usual_spread(spec: Spec, problem: Problem) -> Problem:
     if spec.limits.sway is None or not spec.checked_ranges():
         return problem
     limits = attrs.evolve(problem.limits, sway=None)
-    free = choice.attempt(attrs.evolve(problem, limits=limits, worst_case=None))
+    free = choice.attempt(attrs.evolve(problem, limits=limits, worst_case=None), "direct")
     if free.optimum is None:
         return problem
     nominal, worst = sways(spec, optimal_profile(free))

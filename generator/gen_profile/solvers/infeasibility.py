@@ -6,15 +6,16 @@ Values are solved for (see `solvers.relaxation`), rounded to the safe side, and 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, partial
 from typing import Any
 
 import attrs
 
 from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers.direct.relaxation import least_duration, relaxed
+from gen_profile.solvers.direct.relaxation import Relaxation, least_duration
+from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.solution import Solution
 from gen_profile.work import OutOfWork, budget, left, spend
 
@@ -22,6 +23,7 @@ FACTORS = (1.01, 1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for wh
 NEAR = 1.05  # how many times a value that will not do the one that is named may be
 WORK = 20.0  # s to look for all cures
 SHARE = 0.5  # of the work that is left, which one cure may take
+MOST = 0.7  # likewise a longer move, where no limit by itself is to blame
 FARTHER = 1.7  # times the least value with a solution, up to which one that is welcome is looked for
 
 
@@ -31,31 +33,39 @@ class CandidateTest:
 
     Attributes
     ----------
-    solve : Problem → Solution
+    solve : Problem, Iterate or None → Solution
+        Where nothing is found from rest, from a motion that was found to be most easily within the limits.
     keeps : Solution → bool
         Whether it is one that will do.
     welcome : Solution → bool
         Whether it is one that is better named than others near by.
-    work : float
-        In s, that it may take to look for all cures.
     """
 
-    solve: Callable[[Problem], Solution]
+    solve: Callable[[Problem, Iterate | None], Solution]
     keeps: Callable[[Solution], bool]
     welcome: Callable[[Solution], bool]
-    work: float = WORK
 
     def pleases(self, problem: Problem) -> bool:
         """Whether a problem has a solution that will do and is welcome."""
-        solution = self.solve(problem)
+        solution = self.solve(problem, None)
         return self.keeps(solution) and self.welcome(solution)
 
-    def least(self, changed: Callable[[float], Problem]) -> float | None:
-        """Find the least factor of a change that will do: the first one nearly always does."""
+    def least(self, changed: Callable[[float], Problem], easiest: Iterate | None = None) -> float | None:
+        """Find the least factor of a change that will do, as near as the work that is left allows."""
+        found: list[float] = []
+        try:
+            found.extend(self._ever_better(changed, easiest))
+        except OutOfWork:
+            if not found:
+                raise
+        return found[-1] if found else None
+
+    def _ever_better(self, changed: Callable[[float], Problem], easiest: Iterate | None) -> Iterator[float]:
+        """Try factors, the first of which nearly always does: one that is welcome, then lesser ones."""
 
         @cache
         def kept(factor: float) -> Solution | None:
-            solution = self.solve(changed(factor))
+            solution = self.solve(changed(factor), easiest)
             return solution if self.keeps(solution) else None
 
         def does(factor: float) -> bool:
@@ -67,15 +77,17 @@ class CandidateTest:
 
         first = next(filter(does, FACTORS), None)
         if first is None:
-            return None
+            return
+        yield first
         near = [factor for factor in FACTORS if first <= factor <= FARTHER * first]
         pleasing = next(filter(pleases, near), None)
         enough, will_do = (first, does) if pleasing is None else (pleasing, pleases)
+        yield enough
         short = max((factor for factor in FACTORS if factor < enough), default=1.0)
         while enough > NEAR * short:
             middle = math.sqrt(enough * short)
             enough, short = (middle, short) if will_do(middle) else (enough, middle)
-        return enough
+            yield enough
 
 
 def cures(problem: Problem, trial: CandidateTest, *, in_time: bool = False) -> str:
@@ -90,51 +102,43 @@ def cures(problem: Problem, trial: CandidateTest, *, in_time: bool = False) -> s
         Look for what would do in the duration asked for only.
     """
     longer, instead, sentences = "", list[str](), list[str]()
+    stated, relaxation = problem.limits.stated(), Relaxation(problem)
+    alone = (partial(_widened, relaxation, trial, {place: value}) for place, value in stated.items())
+    together = [partial(_widened, relaxation, trial, stated)] if len(stated) > 1 else []
     try:
-        with budget(trial.work):
-            longer = "" if in_time else _in_time(lambda: _longer(problem, trial))
-            instead = _wider(problem, trial)
-            if not instead and (less := _in_time(lambda: _less_robust(problem, trial))):
-                instead = [less]
+        with budget(WORK):
+            instead.extend(filter(None, map(_in_time, alone)))
+            if not in_time:
+                longer = _in_time(partial(_longer, relaxation, trial), 1.0 if instead else MOST)
+            for last_resort in (*together, partial(_less_robust, problem, trial)):
+                if not instead:
+                    instead.extend(filter(None, [_in_time(last_resort)]))
     except OutOfWork:  # of the budget for the whole answer: what was found so far is told
         pass
     if longer:
-        within = "With these limits it" if problem.limits.stated() else "It"
+        within = "With these limits it" if stated else "It"
         sentences.append(f"{within} takes at least {longer} s (move.duration).")
     if instead:
         sentences.append(f"In {problem.duration:g} s it would do with {', or with '.join(instead)}.")
     return " ".join(sentences)
 
 
-def _longer(problem: Problem, trial: CandidateTest) -> str:
+def _longer(relaxation: Relaxation, trial: CandidateTest) -> str:
     """Find the least duration that will do, in s, rounded up to three digits; empty where there is none."""
-    enough = least_duration(problem)
+    enough = least_duration(relaxation)
     if enough is None:
         return ""
 
     def lasting(factor: float) -> Problem:
-        return attrs.evolve(problem, duration=float(rounded_up(factor * enough)))
+        return attrs.evolve(relaxation.problem, duration=float(rounded_up(factor * enough)))
 
     factor = trial.least(lasting)
     return "" if factor is None else rounded_up(factor * enough)
 
 
-def _wider(problem: Problem, trial: CandidateTest) -> list[str]:
-    """Widen one limit by itself as little as will do; all of them alike where one is not enough."""
-    stated = problem.limits.stated()
-
-    def widened(limits: Mapping[str, Any]) -> str:
-        return _in_time(lambda: _widened(problem, limits, trial))
-
-    alone = [found for place, value in stated.items() if (found := widened({place: value}))]
-    if not alone and len(stated) > 1 and (together := widened(stated)):
-        alone = [together]
-    return alone
-
-
-def _widened(problem: Problem, limits: Mapping[str, Any], trial: CandidateTest) -> str:
-    """Write the values of some limits that will do, the others as they are; nothing where there are none."""
-    easiest = relaxed(problem, tuple(limits))
+def _widened(relaxation: Relaxation, trial: CandidateTest, limits: Mapping[str, Any]) -> str:
+    """Widen some limits as little as will do, the others as they are; nothing where nothing will."""
+    problem, easiest = relaxation.problem, relaxation.least(tuple(limits))
     if easiest is None:
         return ""
     enough = max(easiest.share, 1.0)
@@ -142,7 +146,10 @@ def _widened(problem: Problem, limits: Mapping[str, Any], trial: CandidateTest) 
     def wider(factor: float) -> dict[str, Any]:
         return {place: _times(value, factor * enough) for place, value in limits.items()}
 
-    factor = trial.least(lambda factor: attrs.evolve(problem, limits=problem.limits.changed(wider(factor))))
+    def widened(factor: float) -> Problem:
+        return attrs.evolve(problem, limits=problem.limits.changed(wider(factor)))
+
+    factor = trial.least(widened, easiest.iterate)
     if factor is None:
         return ""
     return " and ".join(f"{place} = {_written(value)}" for place, value in wider(factor).items())
@@ -157,10 +164,10 @@ def _less_robust(problem: Problem, trial: CandidateTest) -> str:
     return ""
 
 
-def _in_time(find: Callable[[], str]) -> str:
+def _in_time(find: Callable[[], str], share: float = SHARE) -> str:
     """Find words for a cure in a share of the work that is left; none where that is not enough."""
     try:
-        with budget(SHARE * left()):
+        with budget(share * left()):
             return find()
     except OutOfWork:
         spend(0.0)

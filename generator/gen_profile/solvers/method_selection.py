@@ -15,10 +15,11 @@ from gen_profile.progress import Progress, untold
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct import worst_case
-from gen_profile.solvers.direct.relaxation import relaxed
+from gen_profile.solvers.direct.relaxation import Relaxation
+from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way
 from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.infeasibility import WORK, CandidateTest, cures
+from gen_profile.solvers.infeasibility import CandidateTest, cures
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
@@ -28,8 +29,8 @@ from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]
 SHORTEST = "looking for the shortest duration"
-ANSWER = 30.0  # s of work for all that a spec asks for, and for what would do where it cannot be had
-SOLVING = 5.0  # s of work for one method; twice that where there is no other
+ANSWER = 24.0, 30.0  # s of work for all that a spec asks for or would do instead, and of the processor
+SOLVING = 8.0  # s of work for one method; twice that where there is no other
 RANGE = 2.0  # times the work for a whole range
 
 
@@ -45,7 +46,7 @@ def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None
         Of the solution of a similar problem: the indirect method begins there.
     """
     try:
-        with budget(ANSWER):
+        with budget(*ANSWER):
             return diagnosed(attempt(problem, method, near), method)
     except OutOfWork:
         return given_up(problem)
@@ -75,10 +76,9 @@ def diagnosed(solution: Solution, method: SolverName = "auto", welcome: Judge = 
 def remedy(problem: Problem, method: SolverName = "auto", welcome: Judge = lambda _: True) -> str:
     """Say which other values would let a method find a motion within the limits; nothing where none will."""
     trial = CandidateTest(
-        solve=lambda other: attempt(other, method),
+        solve=lambda other, easiest: attempt(other, method, easiest=easiest),
         keeps=keeps_limits,
         welcome=welcome,
-        work=WORK * patience(problem),
     )
     found = cures(problem, trial)
     elsewhere = method == "indirect" and problem.worst_case is None
@@ -95,16 +95,22 @@ def patience(problem: Problem) -> float:
     return 1.0 if problem.worst_case is None else RANGE
 
 
-def attempt(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
+def attempt(
+    problem: Problem,
+    method: SolverName = "auto",
+    near: Trajectory | None = None,
+    easiest: Iterate | None = None,
+) -> Solution:
     """Solve a problem without finding out what would help where that fails."""
+    directly = partial(_direct, easiest=easiest)
     if problem.worst_case is not None:
         return _in_time(worst_case.solve, problem, 2.0 * SOLVING)
     if method == "direct":
-        return _in_time(_direct, problem, 2.0 * SOLVING)
+        return _in_time(directly, problem, 2.0 * SOLVING)
     solution = _in_time(partial(indirect.solve, near=near), problem, SOLVING)
     if method == "indirect" or keeps_limits(solution):
         return solution
-    other = _in_time(_direct, problem, SOLVING)
+    other = _in_time(directly, problem, SOLVING)
     return solution if other.optimum is None and solution.optimum is None else other
 
 
@@ -131,19 +137,23 @@ def given_up(problem: Problem) -> Solution:
     )
 
 
-def _direct(problem: Problem) -> Solution:
+def _direct(problem: Problem, easiest: Iterate | None = None) -> Solution:
     """Begin at rest, and where that misleads, at the motion that is most easily within the limits."""
     solution = direct.solve(problem)
     if keeps_limits(solution) or not problem.limits.stated():
         return solution
-    easiest = relaxed(problem, tuple(problem.limits.stated()))
-    return solution if easiest is None or easiest.share > 1.0 else direct.solve(problem, easiest.iterate)
+    if easiest is None:
+        found = Relaxation(problem).least(tuple(problem.limits.stated()))
+        easiest = None if found is None or found.share > 1.0 else found.iterate
+    return solution if easiest is None else direct.solve(problem, easiest)
 
 
 def requirements(problem: Problem) -> str:
     """Say which limits would have to be wider for a motion in the duration of a problem that has none."""
     trial = CandidateTest(
-        solve=lambda other: attempt(other, "direct"), keeps=keeps_limits, welcome=lambda _: True
+        solve=lambda other, easiest: attempt(other, "direct", easiest=easiest),
+        keeps=keeps_limits,
+        welcome=lambda _: True,
     )
     return cures(problem, trial, in_time=True)
 

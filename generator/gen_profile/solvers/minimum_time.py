@@ -41,21 +41,25 @@ def shortest_duration(problem: Problem, solve: Callable[[Problem], Solution]) ->
     return least(feasible, period, LONGEST * period)
 
 
-def least(feasible: Callable[[float], bool], guess: float, most: float) -> float | None:
-    """Bisect for the least duration that will do, where every longer one does.
+def least(
+    feasible: Callable[[float], bool], guess: float, most: float, precision: float = PRECISION
+) -> float | None:
+    """Bisect for the least value that will do, where every greater one does.
 
     Parameters
     ----------
     feasible : float → bool
     guess : float
-        Roughly, in s.
+        Roughly.
     most : float
-        Where to give up, in s.
+        Where to give up.
+    precision : float
+        Relative.
 
     Returns
     -------
     float or None
-        s; None where none up to `most` was found to do.
+        None where none up to `most` was found to do.
     """
     if feasible(guess):
         enough, short = guess, guess / STRIDE
@@ -67,7 +71,7 @@ def least(feasible: Callable[[float], bool], guess: float, most: float) -> float
             enough, short = STRIDE * enough, enough
             if enough > most:
                 return None
-    return _between(feasible, short, enough)
+    return _between(feasible, short, enough, precision)
 
 
 def least_beyond(feasible: Callable[[float], bool], short: float, most: float) -> float | None:
@@ -91,12 +95,12 @@ def least_beyond(feasible: Callable[[float], bool], short: float, most: float) -
         if enough > most:
             return None
         short, stride = enough, LONGER * stride
-    return _between(feasible, short, enough)
+    return _between(feasible, short, enough, PRECISION)
 
 
-def _between(feasible: Callable[[float], bool], short: float, enough: float) -> float:
+def _between(feasible: Callable[[float], bool], short: float, enough: float, precision: float) -> float:
     """Bisect, and return the feasible end."""
-    while enough - short > PRECISION * enough:
+    while enough - short > precision * enough:
         middle = (enough + short) / 2.0
         enough, short = (middle, short) if feasible(middle) else (enough, middle)
     return enough

@@ -19,8 +19,10 @@ from gen_profile.work import spend
 Matrix = Any  # scipy.sparse matrix or array
 TOLERANCE = 1e-10
 MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
-STEEP = 100.0  # slope of a cost from which on our units alone may scale it better than with Clarabel's on top
-POSING, ITERATION = 5e-7, 1e-7  # s of work for each entry of the constraints, and for each of an iteration's
+POSING, ITERATION = (
+    1.5e-6,
+    1.7e-7,
+)  # s of work for each entry of the constraints, and for each of an iteration's
 
 
 class ConicStatus(Enum):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, cached_property
 
 import attrs
 import numpy as np
@@ -21,13 +21,22 @@ from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
 from gen_profile.solvers.direct.set_up import Setup, set_up
-from gen_profile.solvers.direct.solver import MAX_ITERATIONS, STEP_TOLERANCE, CostProgram, sequence
+from gen_profile.solvers.direct.solver import (
+    MAX_ITERATIONS,
+    ROUGH,
+    STEP_TOLERANCE,
+    CostProgram,
+    ProgramSequence,
+    sequence,
+)
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.spec.model import LimitsSpec
 
 PRICES = (1e-5, 1e-3, 1e-1)  # of the effort without limits: ever less sway would take ever more of it
 CHANGE = 1e-4  # of the share, relative, that is worth another program
-DURATION_PRECISION = 5e-3  # relative
+ENOUGH = 5e-3  # by which the share's logarithm may exceed 0
+CLOSE = 0.05  # by which it may fall short of 0: the duration found is then tried
+DURATION_PRECISION = 2e-2  # relative
 POWER = 1.8  # with which shares fall over the duration, more or less
 STEPS = (math.log(1.1), math.log(2.0))  # of the duration's logarithm
 LITTLE = 0.01  # by which the share's logarithm must fall within the longer of them
@@ -100,46 +109,63 @@ class Relaxed:
     iterate: Iterate
 
 
-def relaxed(problem: Problem, loosened: Sequence[str]) -> Relaxed | None:
-    """Find how many times as wide limits must be, where those not loosened stay as they are.
+class Relaxation:
+    """A problem whose limits may be widened.
 
     Parameters
     ----------
     problem : Problem
         With limits; where it has a `worst_case`, no residual sway is asked for.
-    loosened : sequence of str
-        Places of limits, such as ``limits.sway``.
-
-    Returns
-    -------
-    Relaxed or None
-        None where the other limits cannot be kept, or the programs do not settle.
     """
-    setup, redundant = set_up(problem)
-    if redundant:
-        kept = tuple(name for name in problem.desensitized if name not in redundant)
-        return relaxed(attrs.evolve(problem, desensitized=kept), loosened)
-    setup = attrs.evolve(setup, tried=())
-    free = CostProgram(
-        setup=attrs.evolve(setup, problem=attrs.evolve(problem, limits=LimitsSpec())),
-        sway_cost=SwayCost(beta=0.0, gamma=1.0),
-        sway_limit=None,
-    )
-    unlimited = sequence(setup.transcription.rest(), free)
-    if unlimited.verdict is not ConicStatus.SOLVED:
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.least = cache(self._least)
+
+    @cached_property
+    def _begun(self) -> tuple[Setup, ProgramSequence]:
+        """Transcribe the problem, and find about what motion it would take without limits."""
+        problem = self.problem
+        setup, redundant = set_up(problem)
+        if redundant:
+            kept = tuple(name for name in problem.desensitized if name not in redundant)
+            setup, _ = set_up(attrs.evolve(problem, desensitized=kept))
+        setup = attrs.evolve(setup, tried=())
+        free = CostProgram(
+            setup=attrs.evolve(setup, problem=attrs.evolve(setup.problem, limits=LimitsSpec())),
+            sway_cost=SwayCost(beta=0.0, gamma=1.0),
+            sway_limit=None,
+        )
+        return setup, sequence(setup.transcription.rest(), free, ROUGH)
+
+    def _least(self, loosened: tuple[str, ...]) -> Relaxed | None:
+        """Find how many times as wide limits must be, where those not loosened stay as they are.
+
+        Parameters
+        ----------
+        loosened : tuple of str
+            Places of limits, such as ``limits.sway``.
+
+        Returns
+        -------
+        Relaxed or None
+            None where the other limits cannot be kept, or the programs do not settle.
+        """
+        setup, unlimited = self._begun
+        if unlimited.verdict is not ConicStatus.SOLVED:
+            return None
+        effort = setup.effort(unlimited.iterate.local)
+        for price in PRICES:
+            goal = LeastShare(setup=setup, loosened=loosened, price=price / effort)
+            found = sequence(unlimited.iterate, goal)
+            if found.verdict is ConicStatus.SOLVED:
+                return Relaxed(share=float(found.solutions[-1].x[-1]), iterate=found.iterate)
+            if found.verdict is ConicStatus.INFEASIBLE or found.iterations == MAX_ITERATIONS:
+                break
         return None
-    effort = setup.effort(unlimited.iterate.local)
-    for price in PRICES:
-        goal = LeastShare(setup=setup, loosened=tuple(loosened), price=price / effort)
-        found = sequence(unlimited.iterate, goal)
-        if found.verdict is ConicStatus.SOLVED:
-            return Relaxed(share=float(found.solutions[-1].x[-1]), iterate=found.iterate)
-        if found.verdict is ConicStatus.INFEASIBLE or found.iterations == MAX_ITERATIONS:
-            break
-    return None
 
 
-def least_duration(problem: Problem) -> float | None:
+def least_duration(relaxation: Relaxation) -> float | None:
     """Find the duration in s, no shorter than the problem's, in which all limits can just be kept.
 
     Returns
@@ -148,19 +174,23 @@ def least_duration(problem: Problem) -> float | None:
         None where the limits cannot be kept however long the move is. The problem's own where the programs do
         not settle, so that nothing is known.
     """
-    places = tuple(problem.limits.stated())
+    problem = relaxation.problem
+    places, asked = tuple(problem.limits.stated()), math.log(problem.duration)
 
     @cache
     def excess(log_duration: float) -> float:
-        found = relaxed(attrs.evolve(problem, duration=math.exp(log_duration)), places)
-        return UNSETTLED if found is None else math.log(max(found.share, TINY)) - DURATION_PRECISION
+        lasting = attrs.evolve(problem, duration=math.exp(log_duration))
+        found = (relaxation if log_duration == asked else Relaxation(lasting)).least(places)
+        return UNSETTLED if found is None else math.log(max(found.share, TINY)) - ENOUGH
 
-    short = math.log(problem.duration)
+    short = asked
     if not places or excess(short) <= 0.0:
         return problem.duration
     lowest = short
     for _ in range(ROUNDS):
         enough = short + float(np.clip(excess(short) / POWER, *STEPS))
+        if -CLOSE < excess(enough) <= 0.0:
+            return math.exp(enough)
         if excess(enough) <= 0.0:
             from scipy.optimize import brentq  # noqa: PLC0415  (a tenth of what the main job takes to start)
 

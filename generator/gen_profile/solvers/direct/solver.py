@@ -144,20 +144,28 @@ def refined(start: Iterate, goal: CostProgram) -> ProgramSequence:
     if not goal.setup.problem.limits.stated():
         return sequence(start, goal)
     solutions: tuple[ConicSolution, ...] = ()
+    begun: list[tuple[Iterate, CostProgram]] = []
     cost = float("inf")
     for _ in range(MAX_BISECTIONS):
         found = sequence(start, goal, ROUGH)
         solutions += found.solutions
         if found.verdict is not ConicStatus.SOLVED:
-            return attrs.evolve(found, solutions=solutions)
+            break
         start, before, cost = found.iterate, cost, goal.setup.cost(found.iterate, goal.sway_cost)
+        begun.append((start, goal))
         where = switching(goal.setup, start, goal.sway_limit)
         if abs(before - cost) < WORTH_BISECTING * cost or not where.any():
             break
         finer, start = bisected(goal.setup, start, where)
         goal = attrs.evolve(goal, setup=finer)
-    found = sequence(start, goal)
-    return attrs.evolve(found, solutions=(*solutions, *found.solutions))
+    else:
+        begun.append((start, goal))
+    for start, goal in reversed(begun):  # where programs on the finest mesh fail, a coarser one does
+        found = sequence(start, goal)
+        solutions += found.solutions
+        if found.verdict is ConicStatus.SOLVED:
+            break
+    return attrs.evolve(found, solutions=solutions)
 
 
 def sequence(start: Iterate, goal: Goal, enough: float = STEP_TOLERANCE) -> ProgramSequence:

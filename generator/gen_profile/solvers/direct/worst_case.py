@@ -25,6 +25,7 @@ from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.conic import ConicStatus
 from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.solver import (
+    ROUGH,
     CostProgram,
     LeastWorst,
     ProgramSequence,
@@ -32,12 +33,18 @@ from gen_profile.solvers.direct.solver import (
     resolve_sway_cost,
     sequence,
 )
+from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import within_sway
+from gen_profile.solvers.minimum_time import least
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
 from gen_profile.work import OutOfWork, budget, left, spend
 
 TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case
+BISECTED = (
+    0.35  # relative precision of the least worst case where programs for it fail; less takes ever more effort
+)
+HOPELESS = 1e3  # times a load's limit, above which the least worst case is not looked for
 MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
 SLACK = 1.003  # what the least cost may give away of the least worst case
 GOOD_ENOUGH = 0.01  # share of a load's limit below which nobody need seek less
@@ -146,23 +153,26 @@ def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
     """Solve for a few machines, search for worse ones, and solve again with them, until there are none."""
     worst_case, problem = _taken_apart(problem)
     sway_cost, iterations = resolve_sway_cost(problem)
-    tried, bound = ends(problem, worst_case), 0.0
+    tried, bound, found = ends(problem, worst_case), 0.0, None
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
         goal = CostProgram(
             setup=setup, sway_cost=sway_cost, sway_limit=problem.nominal_sway, worst=GOOD_ENOUGH
         )
+        start = _begun(setup, found)
         # the bound only rises with more machines: what was not good enough before is not now
-        found = sequence(setup.transcription.rest(), goal) if bound <= GOOD_ENOUGH else None
+        found = sequence(start, goal) if bound <= GOOD_ENOUGH else None
         if found is None or found.verdict is not ConicStatus.SOLVED:
             best = _least_worst(setup, traces)
             iterations += best.iterations
-            bound = float(best.solutions[0].x[-1])
-            if best.verdict is not ConicStatus.SOLVED:
+            bound, enough = float(best.solutions[0].x[-1]), SLACK * float(best.solutions[-1].x[-1]) + MARGIN
+            if best.verdict is ConicStatus.FAILED and (bisected := _bisected(start, goal)) is not None:
+                bound, enough = (1.0 - BISECTED) * bisected, bisected
+            elif best.verdict is not ConicStatus.SOLVED:
                 yield conclude(best, sway_cost, iterations)
                 return
-            goal = attrs.evolve(goal, worst=SLACK * float(best.solutions[-1].x[-1]) + MARGIN)
-            found = sequence(best.iterate, goal)
+            goal = attrs.evolve(goal, worst=enough)
+            found = sequence(best.iterate if best.verdict is ConicStatus.SOLVED else start, goal)
         iterations += found.iterations
         solution = conclude(found, sway_cost, iterations)
         yield attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
@@ -182,6 +192,25 @@ def _least_worst(setup: Setup, traces: Sequence[float]) -> ProgramSequence:
         if best.verdict is not ConicStatus.FAILED:
             break
     return best
+
+
+def _bisected(start: Iterate, goal: CostProgram) -> float | None:
+    """Find about the least worst share that motions of least cost keep to, whose programs do not fail."""
+
+    def feasible(worst: float) -> bool:
+        return sequence(start, attrs.evolve(goal, worst=worst), ROUGH).verdict is ConicStatus.SOLVED
+
+    return least(feasible, 1.0, HOPELESS, BISECTED)
+
+
+def _begun(setup: Setup, found: ProgramSequence | None) -> Iterate:
+    """Begin at a motion found for fewer machines, new ones swinging as the nominal one does; or at rest."""
+    rest = setup.transcription.rest()
+    if found is None or found.verdict is not ConicStatus.SOLVED:
+        return rest
+    known = found.iterate.stages
+    new = tuple(known[0][:, :, : stages.shape[2]] for stages in rest.stages[len(known) :])
+    return Iterate(local=found.iterate.local, stages=(*known, *new))
 
 
 def _taken_apart(problem: Problem) -> tuple[WorstCase, Problem]:
