@@ -58,17 +58,6 @@ def test_a_case_ends_in_a_record(tmp_path, values, status, reason):
     assert json.loads(json.dumps(outcome.record, allow_nan=False)) == outcome.record
 
 
-@pytest.mark.slow
-def test_a_case_begins_where_its_neighbour_ended(tmp_path):
-    far = ["cost.sway_weight=50", 'cost.sway_scale="auto"', "move.distance=3.2"]  # swings by 20°
-    recipe = prepared(tmp_path, "plant.L1=0.45,0.46", overrides=far).recipe
-    cold = run_case(recipe, 1, {"plant.L1": 0.46})
-    warm = run_case(recipe, 1, {"plant.L1": 0.46}, run_case(recipe, 0, {"plant.L1": 0.45}).start)
-    assert warm.record["solver"]["iterations"] < cold.record["solver"]["iterations"]
-    assert warm.record["figures"] == pytest.approx(cold.record["figures"], rel=1e-5, abs=1e-9)
-    assert run_case(recipe, 0, {"solver.method": "zvd"}).start is None
-
-
 def test_a_bug_stops_one_case_only(tmp_path, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("0/0")
@@ -298,7 +287,7 @@ def test_a_table_that_is_missing_or_damaged_is_named(tmp_path):
 def test_a_case_whose_record_is_damaged_is_not_finished(tmp_path, content):
     store = prepared(tmp_path, "move.duration=3,4")
     for case in range(2):
-        store.keep(case, failed(case, store.grid[case], "infeasible", "no"), followed=False)
+        store.keep(case, failed(case, store.grid[case], "infeasible", "no"))
     assert store.is_finished(0) and store.is_finished(1)
     (store.case_folder(0) / "case.json").write_bytes(content)
     assert not store.is_finished(0) and store.is_finished(1)

@@ -5,12 +5,10 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gen_profile.errors import SpecError
 from gen_profile.spec.reading import preset_spec
-from gen_profile.sweep.grid import CHAIN, GridAxis, grid_of_values, overrides, parse_grid
+from gen_profile.sweep.grid import GridAxis, grid_of_values, overrides, parse_grid
 
 
 def test_the_last_axis_changes_fastest():
@@ -68,16 +66,6 @@ def test_lists_are_toml_or_else_texts(text, values):
     axis = parse_grid([text]).axes[0]
     assert axis.values == values
     assert axis.numeric == all(type(value) in (int, float) for value in values)
-
-
-@given(st.lists(st.integers(1, 23), min_size=1, max_size=3))
-def test_chains_cover_every_case_once_along_the_last_axis(lengths):
-    grid = parse_grid([f"k{n}={','.join(map(str, range(length)))}" for n, length in enumerate(lengths)])
-    chains = grid.chains()
-    assert list(itertools.chain(*chains)) == list(range(len(grid)))
-    for chain in chains:
-        assert len(chain) <= CHAIN
-        assert len({tuple(grid[case].values())[:-1] for case in chain}) == 1
 
 
 def test_overrides_say_what_the_values_are():

@@ -20,7 +20,6 @@ from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, untold
-from gen_profile.solvers.collocation import Trajectory
 from gen_profile.spec.model import Spec
 from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
@@ -124,7 +123,6 @@ def design(
     *,
     check: bool = True,
     keep_failed: bool = False,
-    near: Trajectory | None = None,
     by_fmpy: bool = True,
     progress: Progress = untold,
 ) -> Design:
@@ -141,8 +139,6 @@ def design(
         Without it the manifest says ``"unverified"``.
     keep_failed : bool
         Deliver even what failed, marked so in the manifest.
-    near : Trajectory, optional
-        Of a similar design's solution, to begin at.
     by_fmpy : bool
         Whether FMPy drives the nominal machine, too, and must find the same.
     progress : callable
@@ -156,7 +152,7 @@ def design(
     folder, formats = Path(folder), [formats] if isinstance(formats, str) else formats
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
     require_end(exporters, stops=spec.move.stops)
-    planned = plan(spec, near, progress)
+    planned = plan(spec, progress)
     spec = planned.spec
     with staged(folder) as staging:
         progress("exporting")

@@ -18,7 +18,6 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.minimum_time import least_beyond
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
@@ -149,14 +148,12 @@ def _is_calm(spec: Spec, solution: Solution) -> bool:
     return not swings and keeps_residual_sway(spec, evaluation, CALM)
 
 
-def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold) -> Plan:
+def plan(spec: Spec, progress: Progress = untold) -> Plan:
     """Solve a spec, or shape a move for it, and try the motion on all machines.
 
     Parameters
     ----------
     spec : Spec
-    near : Trajectory, optional
-        Of a similar spec's solution, to begin at.
     progress : Progress
 
     Raises
@@ -165,13 +162,13 @@ def plan(spec: Spec, near: Trajectory | None = None, progress: Progress = untold
     """
     try:
         with budget(*choice.ANSWER):
-            return _planned(timed(spec, progress), near, progress)
+            return _planned(timed(spec, progress), progress)
     except OutOfWork:
         choice.given_up(problem_of(spec)).raise_for_status()
         raise
 
 
-def _planned(spec: Spec, near: Trajectory | None, progress: Progress) -> Plan:
+def _planned(spec: Spec, progress: Progress) -> Plan:
     """Plan a spec that has a duration.
 
     Raises
@@ -181,7 +178,7 @@ def _planned(spec: Spec, near: Trajectory | None, progress: Progress) -> Plan:
     """
     progress("solving")
     began = time.perf_counter()
-    solution, motion = _designed(spec, near, progress)
+    solution, motion = _designed(spec, progress)
     solver_time = time.perf_counter() - began
     evaluation = evaluate(spec, motion)
     found = evaluation.figures
@@ -195,11 +192,11 @@ def _planned(spec: Spec, near: Trajectory | None, progress: Progress) -> Plan:
     return Plan(spec=spec, solution=solution, solver_time=solver_time, evaluation=evaluation, figures=found)
 
 
-def _designed(spec: Spec, near: Trajectory | None, progress: Progress) -> tuple[Solution | None, Profile]:
+def _designed(spec: Spec, progress: Progress) -> tuple[Solution | None, Profile]:
     """Solve a spec that has a duration, or find out what would help; or shape a move for it."""
     if spec.solver.shaper is not None:
         return None, shaped_motion(spec, spec.solver.shaper)
-    attempt = transient_sway.attempt(spec, near, progress)
+    attempt = transient_sway.attempt(spec, progress)
     if attempt.optimum is None:
         progress(EXPLAINING)
     solution = choice.diagnosed(attempt, spec.solver.solver, partial(_is_calm, spec))

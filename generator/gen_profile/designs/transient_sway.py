@@ -15,7 +15,6 @@ from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
@@ -55,17 +54,13 @@ def measured_spread(spec: Spec, spread: float) -> float:
     return spread if worst <= max(ENOUGH * limit, nominal) else MARGIN * worst / nominal
 
 
-def attempt(
-    spec: Spec, near: Trajectory | None = None, progress: Progress = untold, spread: float = 1.0
-) -> Solution:
+def attempt(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Solution:
     """Solve a spec so that no machine of its ranges sways more on the way than its limit.
 
     Parameters
     ----------
     spec : Spec
         With a duration.
-    near : Trajectory, optional
-        Of a similar spec's solution, to begin at.
     progress : Progress
     spread : float
         How many times as much as the nominal machine the worst one sways, as far as that is known.
@@ -77,12 +72,12 @@ def attempt(
     """
     problem, method, limit = problem_of(spec), spec.solver.solver, spec.limits.sway
     if limit is None or not spec.checked_ranges():
-        return choice.attempt(problem, method, near)
+        return choice.attempt(problem, method)
     if problem.worst_case is not None:  # the least residual of the worst machine takes longest to find
         quick = attempt(attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, method="none")))
         spread = max(spread, quick.problem.sway_spread)
     problem = attrs.evolve(problem, sway_spread=spread)
-    solution = choice.attempt(problem, method, near)
+    solution = choice.attempt(problem, method)
     if solution.optimum is None and problem.sway_spread == 1.0:
         return attrs.evolve(solution, problem=with_usual_spread(spec, problem))
     for _ in range(ROUNDS):

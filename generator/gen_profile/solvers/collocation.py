@@ -89,7 +89,6 @@ def _gauss(name: str, stages: int) -> Scheme:
 GAUSS = _gauss("Gauss", STAGES)
 LONG_GAUSS = _gauss("Gauss, long intervals", 9)
 RADAU = _scheme("Radau", np.append((roots_jacobi(STAGES - 1, 1.0, 0.0)[0] + 1.0) / 2.0, 1.0))
-SCHEMES = {scheme.name: scheme for scheme in (GAUSS, LONG_GAUSS, RADAU)}
 
 
 @attrs.frozen(kw_only=True, eq=False)

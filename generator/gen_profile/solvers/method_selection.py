@@ -12,7 +12,6 @@ from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.problem import Problem
 from gen_profile.progress import Progress, untold
-from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct import worst_case
 from gen_profile.solvers.direct.relaxation import Relaxation
@@ -34,7 +33,7 @@ SOLVING = 8.0  # s of work for one method; twice that where there is no other
 RANGE = 2.0  # times the work for a whole range
 
 
-def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None = None) -> Solution:
+def solve(problem: Problem, method: SolverName = "auto") -> Solution:
     """Solve a problem by the method that suits it; where that fails, find out what would help.
 
     Parameters
@@ -42,12 +41,10 @@ def solve(problem: Problem, method: SolverName = "auto", near: Trajectory | None
     problem : Problem
     method : str
         ``"indirect"`` knows no limits; ``"auto"`` takes it where none binds, and the direct method elsewhere.
-    near : Trajectory, optional
-        Of the solution of a similar problem: the indirect method begins there.
     """
     try:
         with budget(*ANSWER):
-            return diagnosed(attempt(problem, method, near), method)
+            return diagnosed(attempt(problem, method), method)
     except OutOfWork:
         return given_up(problem)
 
@@ -95,19 +92,14 @@ def patience(problem: Problem) -> float:
     return 1.0 if problem.worst_case is None else RANGE
 
 
-def attempt(
-    problem: Problem,
-    method: SolverName = "auto",
-    near: Trajectory | None = None,
-    easiest: Iterate | None = None,
-) -> Solution:
+def attempt(problem: Problem, method: SolverName = "auto", easiest: Iterate | None = None) -> Solution:
     """Solve a problem without finding out what would help where that fails."""
     directly = partial(_direct, easiest=easiest)
     if problem.worst_case is not None:
         return _in_time(worst_case.solve, problem, 2.0 * SOLVING)
     if method == "direct":
         return _in_time(directly, problem, 2.0 * SOLVING)
-    solution = _in_time(partial(indirect.solve, near=near), problem, SOLVING)
+    solution = _in_time(indirect.solve, problem, SOLVING)
     if method == "indirect" or keeps_limits(solution):
         return solution
     other = _in_time(directly, problem, SOLVING)

@@ -9,7 +9,6 @@ import attrs
 from gen_profile.errors import GenProfileError, InfeasibleProblem, SolverDiverged
 from gen_profile.motion.profile import Array
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers.collocation import Trajectory
 
 
 class Status(Enum):
@@ -102,9 +101,6 @@ class Solution:
         angles are small; None where the worst machine was not what counted.
     cure : str
         What to change, a sentence; empty on success.
-    trajectory : Trajectory or None
-        Dimensionless states and costates, near which those of a similar problem lie; None where the method
-        has none.
     """
 
     status: Status
@@ -116,7 +112,6 @@ class Solution:
     redundant: tuple[str, ...] = ()
     worst_case_bound: float | None = None
     cure: str = ""
-    trajectory: Trajectory | None = None
 
     @property
     def redundancy(self) -> str:

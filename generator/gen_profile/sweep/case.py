@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, cast
 
 import attrs
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from gen_profile.designs.design import Design, design, versions
@@ -28,7 +26,6 @@ from gen_profile.errors import (
     SolverDiverged,
     SpecError,
 )
-from gen_profile.solvers.collocation import SCHEMES, Trajectory
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec
 from gen_profile.sweep.grid import overrides
@@ -37,7 +34,6 @@ from gen_profile.verification.verdict import Check
 
 _ALONE = threading.Lock()  # FMUs are no guests for threads, and a Dask worker may have several
 EVERY = 20  # case is co-simulated by FMPy, too, which must agree with the compiled loop
-TRAJECTORY = ("mesh", "nodes", "stages")
 PASSED, CHECK_FAILED, CRASHED = "passed", "check failed", "crashed"
 STATUSES: dict[type[GenProfileError], str] = {
     SpecError: "faulty spec",
@@ -96,13 +92,10 @@ class CaseOutcome:
         Plain values: the case's row of the table. It tells of no clock and no computer.
     files : dict of str to bytes
         Artefacts with their manifest; none where the case failed.
-    start : bytes or None
-        Where the search for the next case's solution may begin, if there is such a place.
     """
 
     record: dict[str, Any]
     files: dict[str, bytes]
-    start: bytes | None = None
 
     @property
     def passed(self) -> bool:
@@ -110,7 +103,7 @@ class CaseOutcome:
         return bool(self.record["status"] == PASSED)
 
 
-def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes | None = None) -> CaseOutcome:
+def run_case(recipe: Recipe, case: int, values: Mapping[str, Any]) -> CaseOutcome:
     """Design, export and check one case; whatever is wrong with it becomes its record.
 
     Parameters
@@ -119,8 +112,6 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes 
     case : int
     values : mapping
         Of the keys varied.
-    start : bytes, optional
-        Of the outcome of a neighbour.
 
     Raises
     ------
@@ -141,12 +132,10 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any], start: bytes 
             threadpool_limits(1),
             on_processors(1),
         ):
-            near = None if start is None else _unpacked(start)
-            outcome = design(
-                recipe.spec(values), recipe.formats, Path(folder), near=near, by_fmpy=case % EVERY == 0
-            )
+            by_fmpy = case % EVERY == 0
+            outcome = design(recipe.spec(values), recipe.formats, Path(folder), by_fmpy=by_fmpy)
             files = {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
-        return CaseOutcome(record=_record(case, values, outcome), files=files, start=_packed(outcome))
+        return CaseOutcome(record=_record(case, values, outcome), files=files)
     except OutputError:
         raise
     except GenProfileError as error:
@@ -189,22 +178,6 @@ def _record(case: int, values: Mapping[str, Any], outcome: Design) -> dict[str, 
         },
         "artefacts": [attrs.asdict(artefact) for artefact in outcome.artefacts],
     }
-
-
-def _packed(outcome: Design) -> bytes | None:
-    """Write down where the search for a neighbour's solution may begin."""
-    solution = outcome.plan.solution
-    if solution is None or solution.trajectory is None:
-        return None
-    buffer, start = BytesIO(), solution.trajectory
-    np.savez(buffer, scheme=start.scheme.name, **{name: getattr(start, name) for name in TRAJECTORY})
-    return buffer.getvalue()
-
-
-def _unpacked(start: bytes) -> Trajectory:
-    with np.load(BytesIO(start)) as arrays:
-        scheme = SCHEMES[str(arrays["scheme"])]
-        return Trajectory(scheme=scheme, **{name: arrays[name] for name in TRAJECTORY})
 
 
 def _listed(installed: tuple[tuple[str, str], ...]) -> str:

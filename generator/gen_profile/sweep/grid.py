@@ -1,4 +1,4 @@
-"""What a sweep varies: axes of values, all their combinations, and the chains in which these are solved."""
+"""What a sweep varies: axes of values, and all their combinations."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ import numpy.typing as npt
 from gen_profile.errors import SpecError
 from gen_profile.suggestion import number_meant
 
-CHAIN = 10  # cases, at most, that are solved one after another, each from its neighbour's solution
 MOST_CASES = 10_000_000
 DIGITS = 12  # of a value between the ends of an axis: 0.3, not 0.30000000000000004
 
@@ -63,19 +62,6 @@ class Grid:
         """Value of every key in a case."""
         places = np.unravel_index(case, self._shape)
         return {axis.key: axis.values[int(at)] for axis, at in zip(self.axes, places, strict=True)}
-
-    def chains(self) -> list[range]:
-        """Cut the cases into runs of neighbours along the last axis.
-
-        Where a chain begins depends on the grid alone: whoever solves it, the results are the same.
-        """
-        inner = self._shape[-1]
-        pieces = np.array_split(np.arange(inner), -(-inner // CHAIN))
-        return [
-            range(first + int(piece[0]), first + int(piece[-1]) + 1)
-            for first in range(0, len(self), inner)
-            for piece in pieces
-        ]
 
     @cached_property
     def _shape(self) -> tuple[int, ...]:

@@ -27,7 +27,7 @@ from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, failed, run_cas
 from gen_profile.sweep.store import Store, opened
 from gen_profile.sweep.table import write_table
 
-CHAINS_AHEAD = 3  # per process: one at work, and what keeps it busy while this process takes results in
+CASES_AHEAD = 3  # per process: one at work, and what keeps it busy while this process takes results in
 ANSWER_TIME = "30s"  # that a scheduler and its first worker have to answer
 
 
@@ -111,17 +111,15 @@ def sweep(
     grid = store.grid
     statuses, reasons = Counter({PASSED: 0}), dict[str, str]()
     with opened(store):
-        unfinished = ([case for case in chain if not store.is_finished(case)] for chain in grid.chains())
-        chains = [chain for chain in unfinished if chain]
-        if chains:
-            _work(store, chains, scheduler, workers, progress)
+        unfinished = [case for case in range(len(grid)) if not store.is_finished(case)]
+        if unfinished:
+            _work(store, unfinished, scheduler, workers, progress)
         table = write_table(store.folder, grid, _counted(store.records(), statuses, reasons))
-        store.tidy()
     return Sweep(
         store=store,
         statuses=dict(statuses),
         reasons=reasons,
-        kept=len(grid) - sum(map(len, chains)),
+        kept=len(grid) - len(unfinished),
         table=table,
     )
 
@@ -139,37 +137,34 @@ def _counted(
 
 def _work(
     store: Store,
-    chains: Sequence[Sequence[int]],
+    unfinished: Sequence[int],
     scheduler: str | None,
     workers: int | None,
     progress: Callable[[CasesDone], None],
 ) -> None:
-    """Hand the chains to workers, a few ahead, and keep what comes back."""
+    """Hand the cases to workers, a few ahead, and keep what comes back."""
     total, failures = len(store.grid), 0
-    done = total - sum(map(len, chains))
+    done = total - len(unfinished)
     progress(CasesDone(done=done, failed=failures, total=total))
-    waiting: Iterator[Sequence[int]] = iter(chains)
-    with _client(scheduler, min(workers or CPU_COUNT, len(chains))) as client:
-        running: dict[Future, tuple[int, Sequence[int]]] = {}
+    waiting = iter(unfinished)
+    with _client(scheduler, min(workers or CPU_COUNT, len(unfinished))) as client:
+        running: dict[Future, int] = {}
         completed = as_completed(loop=client.loop)
 
-        def begin(chain: Sequence[int]) -> None:
-            case = chain[0]
-            start = store.start(case)
-            future = client.submit(run_case, store.recipe, case, store.grid[case], start, pure=False)
-            running[future] = (case, chain[1:])
+        def begin(case: int) -> None:
+            future = client.submit(run_case, store.recipe, case, store.grid[case], pure=False)
+            running[future] = case
             completed.add(future)
 
-        for chain in islice(waiting, CHAINS_AHEAD * _processes(client)):
-            begin(chain)
+        for case in islice(waiting, CASES_AHEAD * _processes(client)):
+            begin(case)
         for future in completed:
-            case, rest = running.pop(future)
+            case = running.pop(future)
             outcome = _outcome(future, case, store.grid[case])
-            store.keep(case, outcome, followed=bool(rest))
+            store.keep(case, outcome)
             done, failures = done + 1, failures + (not outcome.passed)
             progress(CasesDone(done=done, failed=failures, total=total))
-            following = rest or next(waiting, ())
-            if following:
+            for following in islice(waiting, 1):
                 begin(following)
 
 

@@ -5,7 +5,6 @@
     sweep.json               what is varied, from which spec, with which versions
     sweep.parquet            one row per case, once all are finished
     cases/0000/017/          case 17: its artefacts with their manifest, and case.json, its row
-    .starts/17.npz           where the search for the solution of case 18 begins, as long as that is wanted
     .lock                    held by the one who sweeps
 
 A case is finished when its ``case.json`` is there, which is the last of its files to appear, whole.
@@ -14,7 +13,6 @@ A case is finished when its ``case.json`` is there, which is the last of its fil
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -39,7 +37,7 @@ RECORD_TYPES = {
     "check": dict,
     "solver": dict,
 }
-STARTS, LOCK = ".starts", ".lock"
+LOCK = ".lock"
 PER_FOLDER = 1000
 
 
@@ -72,32 +70,18 @@ class Store:
         """Whether a case's record is there, and whole: a power cut may leave a part."""
         return self._record(case) is not None
 
-    def start(self, case: int) -> bytes | None:
-        """Find what a case's neighbour left for it to begin at."""
-        path = self._start_path(case - 1)
-        return path.read_bytes() if path.is_file() else None
-
-    def keep(self, case: int, outcome: CaseOutcome, *, followed: bool) -> None:
-        """Write a finished case, and what the next one begins at if one follows.
-
-        That comes first and goes last: whenever this is interrupted, the case that is to come finds it.
+    def keep(self, case: int, outcome: CaseOutcome) -> None:
+        """Write a finished case.
 
         Raises
         ------
         OutputError
         """
-        if followed and outcome.start is not None:
-            deliver(self._start_path(case), outcome.start)
         with staged(self.case_folder(case)) as staging:
             for name, content in outcome.files.items():
                 staging.write(name, content)
             staging.write(RECORD, _json(outcome.record))
             staging.deliver()
-        self._start_path(case - 1).unlink(missing_ok=True)
-
-    def tidy(self) -> None:
-        """Remove what nobody needs once all cases are finished."""
-        shutil.rmtree(self.folder / STARTS, ignore_errors=True)
 
     def records(self) -> Iterator[dict[str, Any]]:
         """Read the records of all cases in their order.
@@ -125,9 +109,6 @@ class Store:
         whole: dict[str, Any] = {"artefacts": [], "figures": {}, "check": {}, "solver": {}} | record
         sound = all(isinstance(whole.get(key), kind) for key, kind in RECORD_TYPES.items())
         return record if sound else None
-
-    def _start_path(self, case: int) -> Path:
-        return self.folder / STARTS / f"{case}.npz"
 
     def describe(self) -> dict[str, Any]:
         """Nest plain values for ``sweep.json``: equal sweeps have equal ones, wherever their spec lies."""

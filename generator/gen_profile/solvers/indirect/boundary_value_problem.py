@@ -88,14 +88,6 @@ class BoundaryValueProblem:
         """Turn ζ into states and costates as `system` knows them, shape (points, 2 n)."""
         return points @ self.coordinates.transform.T
 
-    def dimensionless(self, solution: Trajectory) -> Trajectory:
-        """Turn ζ into states and costates along a solution."""
-        return solution.transformed(self.coordinates.transform)
-
-    def modal(self, solution: Trajectory) -> Trajectory:
-        """Turn states and costates into ζ."""
-        return solution.transformed(self.coordinates.inverse_transform)
-
     def flow(self, points: Array) -> Array:
         """Evaluate ζ' and beside it its Jacobian, shape (points, 2 n, 1 + 2 n).
 

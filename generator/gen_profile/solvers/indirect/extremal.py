@@ -32,7 +32,6 @@ def judged(
         optimum=optimum,
         iterations=iterations,
         residual=residual,
-        trajectory=weighted.dimensionless(found),
     )
 
 

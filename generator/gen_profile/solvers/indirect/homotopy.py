@@ -17,7 +17,7 @@ import numpy as np
 
 from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers.collocation import GAUSS, RADAU, Scheme, Trajectory, sampled
+from gen_profile.solvers.collocation import GAUSS, RADAU, Scheme, Trajectory
 from gen_profile.solvers.indirect.arclength import follow
 from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem, quintic, with_sway_cost
 from gen_profile.solvers.indirect.continuation import Advance, advance
@@ -39,14 +39,14 @@ MODERATE_ANGLE = np.pi / 4.0  # up to which Newton's method hardly fails
 SMALL_ANGLE = np.radians(50.0)  # of the linear model; from there on nonlinearity is blamed where Newton fails
 
 
-def solve_by_homotopy(problem: Problem, quiet: BoundaryValueProblem, near: Trajectory | None) -> Solution:
+def solve_by_homotopy(problem: Problem, quiet: BoundaryValueProblem) -> Solution:
     """Begin on a coarse mesh, which smooths the way; where it misleads, on finer ones."""
     fine = float(np.clip(quiet.phase / RADIANS_PER_INTERVAL, INTERVALS, MAX_INTERVALS))
     iterations = 0
     for level in range(LEVELS):
         intervals = min(MAX_INTERVALS, math.ceil(2**level * fine / COARSER))
         try:
-            solution = _on_mesh(problem, quiet, near, intervals, math.ceil(fine))
+            solution = _on_mesh(problem, quiet, intervals, math.ceil(fine))
         except np.linalg.LinAlgError:
             cure = "The end conditions contradict one another; allow more time."
             solution = failure(problem, Status.DIVERGED, 1, cure)
@@ -56,9 +56,7 @@ def solve_by_homotopy(problem: Problem, quiet: BoundaryValueProblem, near: Traje
     return attrs.evolve(solution, iterations=iterations)
 
 
-def _on_mesh(
-    problem: Problem, quiet: BoundaryValueProblem, near: Trajectory | None, coarse: int, fine: int
-) -> Solution:
+def _on_mesh(problem: Problem, quiet: BoundaryValueProblem, coarse: int, fine: int) -> Solution:
     """Follow the solution from the linear model's to that with the β asked for."""
     guess = quintic(quiet, np.linspace(0.0, 1.0, coarse + 1), _scheme(quiet))
     quiet, linear = quiet.rescaled(quiet.solve_linear(quiet.flow(guess.points), guess))
@@ -70,7 +68,7 @@ def _on_mesh(
     measured, spent = _measured(problem, still, guess, fine)
     iterations += spent
     weighted = with_sway_cost(problem, still, measured)
-    climb = _beside(weighted, near, fine) or advance(lambda share: _lighter(weighted, share), guess)
+    climb = advance(lambda share: _lighter(weighted, share), guess)
     iterations += climb.iterations
     if climb.reached < 1.0:
         around = follow(weighted, guess, HORIZONTAL)
@@ -118,19 +116,6 @@ def _slower(quiet: BoundaryValueProblem, linear: Trajectory, factor: float) -> N
     """Solve for a longer duration, from the linear model's solution for that."""
     slower, rest = quiet.slower(factor), linear.scaled(0.0)
     return solve_newton(slower, slower.solve_linear(slower.flow(rest.points), rest))
-
-
-def _beside(weighted: BoundaryValueProblem, near: Trajectory | None, intervals: int) -> Advance | None:
-    """Find the solution from that of a similar problem, if that lies near enough."""
-    if near is None or near.size != 2 * len(weighted.final) or weighted.data.beta == 0.0:
-        return None
-    mesh = np.linspace(0.0, 1.0, intervals + 1)
-    outcome = solve_newton(weighted, weighted.modal(sampled(near, _scheme(weighted), mesh)))
-    if outcome.solution is None:
-        return None
-    return Advance(
-        solution=outcome.solution, reached=1.0, iterations=outcome.iterations, residual=outcome.residual
-    )
 
 
 def _scheme(canonical: BoundaryValueProblem) -> Scheme:

@@ -36,14 +36,12 @@ LONG_INTERVALS = 8  # at least
 RADIANS_PER_LONG_INTERVAL = 6.0  # of the fastest mode that matters
 
 
-def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
+def solve(problem: Problem) -> Solution:
     """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
 
     Parameters
     ----------
     problem : Problem
-    near : Trajectory, optional
-        Of the solution of a similar problem, to begin at where one linear model does not do.
 
     Returns
     -------
@@ -56,23 +54,23 @@ def solve(problem: Problem, near: Trajectory | None = None) -> Solution:
         The machine does not hang at rest, so that it has no natural frequencies.
     """
     with one_thread():
-        return _solve(problem, near)
+        return _solve(problem)
 
 
-def _solve(problem: Problem, near: Trajectory | None) -> Solution:
+def _solve(problem: Problem) -> Solution:
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     quiet = canonical_problem(problem, system)
     asked, redundant = independence(quiet)
     if redundant:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
-        solution = _solve(attrs.evolve(problem, desensitized=kept), near)
+        solution = _solve(attrs.evolve(problem, desensitized=kept))
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
     try:
         found = _solve_simply(problem, quiet)
     except np.linalg.LinAlgError:
         found = None
-    return found or solve_by_homotopy(problem, quiet, near)
+    return found or solve_by_homotopy(problem, quiet)
 
 
 def _solve_simply(problem: Problem, quiet: BoundaryValueProblem) -> Solution | None:
