@@ -142,10 +142,6 @@ class Trajectory:
         """Multiply every unknown by its factor."""
         return attrs.evolve(self, nodes=self.nodes * factors, stages=self.stages * factors)
 
-    def transformed(self, matrix: Array) -> Trajectory:
-        """Multiply the unknowns by a matrix."""
-        return attrs.evolve(self, nodes=self.nodes @ matrix.T, stages=self.stages @ matrix.T)
-
     def integral(self, values: Array) -> float:
         """∫ over time of values at the collocation points, shape (points,)."""
         weights = np.diff(self.mesh)[:, None] * self.scheme.b

@@ -1,8 +1,8 @@
 """The indirect method for machines that swing far, or have modes too fast to follow.
 
 1. With β = 0 the problem is nearly linear, and Newton's method converges from the linear model's optimum;
-   where angles are large it is led there through shorter or slower moves, or around folds.
-2. From there to the β asked for, at once where that converges, else through smaller ones, or around folds.
+   where angles are large it is led there through shorter moves.
+2. From there to the β asked for, at once where that converges, else through smaller ones.
 3. All this on a coarse mesh, which smooths the way. What it gave is then refined: intervals on which the
    Hamiltonian drifts or the canonical equations are missed are split.
 """
@@ -10,7 +10,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import attrs
 import numpy as np
@@ -18,9 +17,8 @@ import numpy as np
 from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.collocation import GAUSS, RADAU, Scheme, Trajectory
-from gen_profile.solvers.indirect.arclength import follow
 from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem, quintic, with_sway_cost
-from gen_profile.solvers.indirect.continuation import Advance, advance
+from gen_profile.solvers.indirect.continuation import advance
 from gen_profile.solvers.indirect.extremal import failure, judged, too_steep
 from gen_profile.solvers.indirect.newton import NewtonOutcome, solve_newton
 from gen_profile.solvers.indirect.refinement import refine
@@ -30,7 +28,6 @@ INTERVALS = 30
 RADIANS_PER_INTERVAL = 1.0  # of the fastest mode that matters, to judge a solution by
 COARSER = 2.5  # times as long are intervals to begin with
 LEVELS = 3  # of coarse meshes, each with half the intervals' length
-SLOWER = 1.5  # times the duration, to come from where the straight way fails
 LONGER = 1.1 ** np.arange(1, 60)  # times the duration, to look for one that is long enough
 MAX_INTERVALS = 480
 BETA_DECADES = 8.0  # from share 0 to 1
@@ -60,7 +57,7 @@ def _on_mesh(problem: Problem, quiet: BoundaryValueProblem, coarse: int, fine: i
     """Follow the solution from the linear model's to that with the β asked for."""
     guess = quintic(quiet, np.linspace(0.0, 1.0, coarse + 1), _scheme(quiet))
     quiet, linear = quiet.rescaled(quiet.solve_linear(quiet.flow(guess.points), guess))
-    approach = _approach(quiet, linear)
+    approach = advance(quiet.towards, linear, linear.scaled(0.0))
     iterations = approach.iterations
     if approach.reached < 1.0 or quiet.greatest_angle(approach.solution) > HORIZONTAL:
         return _too_hard(problem, quiet, linear, iterations)
@@ -71,11 +68,7 @@ def _on_mesh(problem: Problem, quiet: BoundaryValueProblem, coarse: int, fine: i
     climb = advance(lambda share: _lighter(weighted, share), guess)
     iterations += climb.iterations
     if climb.reached < 1.0:
-        around = follow(weighted, guess, HORIZONTAL)
-        iterations += around.iterations
-        if around.reached < 1.0:
-            return _too_heavy(problem, iterations, climb.reached)
-        climb = around
+        return _too_heavy(problem, iterations, climb.reached)
     refined = refine(weighted, climb.solution, fine)
     iterations += refined.iterations
     if refined.solution is None and problem.sway_weight > 0.0:
@@ -85,31 +78,6 @@ def _on_mesh(problem: Problem, quiet: BoundaryValueProblem, coarse: int, fine: i
     if weighted.greatest_angle(refined.solution) > HORIZONTAL:
         return _too_hard(problem, quiet, linear, iterations)
     return judged(problem, weighted, refined.solution, iterations, refined.residual or climb.residual)
-
-
-def _approach(quiet: BoundaryValueProblem, linear: Trajectory) -> Advance:
-    """Solve the problem with β = 0: at once, else through shorter moves, slower ones, or around folds."""
-    ways: tuple[Callable[[], Advance], ...] = (
-        lambda: advance(quiet.towards, linear, linear.scaled(0.0)),
-        lambda: _from_slower(quiet, linear),
-        lambda: follow(quiet, linear, HORIZONTAL),
-    )
-    iterations = 0
-    for way in ways:
-        found = way()
-        iterations += found.iterations
-        if found.reached == 1.0:
-            break
-    return attrs.evolve(found, iterations=iterations)
-
-
-def _from_slower(quiet: BoundaryValueProblem, linear: Trajectory) -> Advance:
-    """Begin at a longer duration, at which the load swings less."""
-    slowly = _slower(quiet, linear, SLOWER)
-    if slowly.solution is None:
-        return Advance(solution=linear, reached=0.0, iterations=slowly.iterations, residual=slowly.residual)
-    found = advance(lambda share: quiet.slower(SLOWER ** (1.0 - share)), slowly.solution)
-    return attrs.evolve(found, iterations=slowly.iterations + found.iterations)
 
 
 def _slower(quiet: BoundaryValueProblem, linear: Trajectory, factor: float) -> NewtonOutcome:
