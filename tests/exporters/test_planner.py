@@ -28,6 +28,7 @@ limits = {{ velocity = {VELOCITY}, acceleration = {ACCELERATION}, jerk = {JERK},
 planner = {{ live = {{ L1 = [3.0, 9.0], m2 = [0.0, 2000.0] }} }}
 export = {{ cycle_time = {CYCLE} }}
 """
+FOLLOWING = ["planner.live_rate={L1=0.25}", "check.residual_sway=0.05"]  # the block that has most to do
 
 
 @pytest.fixture(scope="module")
@@ -148,16 +149,17 @@ def test_moves_take_little_longer_than_the_shortest(text, rope, load, distance):
 
 @pytest.fixture(scope="module")
 def counted():
-    return compile_counting(planner_block(parse_spec(BAY, ["export.cycle_time=0.001"])).text)
+    return compile_counting(planner_block(parse_spec(BAY, ["export.cycle_time=0.001", *FOLLOWING])).text)
 
 
-def test_planning_takes_20_cycles_of_3000_operations_at_most(counted):
+def test_planning_takes_24_cycles_of_3000_operations_at_most(counted):
+    """And 20, where no rope changes on the way."""
     for rope, load in ((3.0, 2000.0), (6.2, 350.0), (9.0, 0.0)):
         block = CountedBlock(counted, fL1=rope, fm2=load)
         worst = block.hold(600)["operations"].max()
         for target in (1.0, 3.0, 8.0, 39.0):
             out = block.hold(60_000, bExecute=1.0, fTarget=target)
-            assert np.argmax(out["fVelocity"] != 0.0) <= 20
+            assert np.argmax(out["fVelocity"] != 0.0) <= 24
             assert out["bDone"][-1]
             worst = max(worst, out["operations"].max())
         assert worst <= 3000
@@ -166,10 +168,44 @@ def test_planning_takes_20_cycles_of_3000_operations_at_most(counted):
 def test_no_cycle_takes_more_operations_on_the_way_either(counted):
     block = CountedBlock(counted, fL1=5.0)
     out = [block.hold(300), block.hold(9000, bExecute=1.0, fTarget=39.0)]
+    for step in range(600):  # hoisting at 0.2 m/s
+        command = {"bExecute": 1.0, "fTarget": (3.0, 9.0, 4.0)[step // 200]} if step % 200 == 0 else {}
+        out.append(block.hold(20, **command, fL1=5.0 + 0.004 * (step if step < 300 else 600 - step)))
     for _ in range(4):
         out += [block.hold(3000, bExecute=1.0, fTarget=target) for target in (20.0, 30.0, 3.0)]
         out += [block.hold(250, bVelocity=1.0, fVelocityCommand=speed) for speed in (1.0, -1.0, 0.3)]
         out += [block.hold(2500, bVelocity=0.0, fL1=block.inputs["fL1"] + 0.002)]
+    assert max(part["operations"].max() for part in out) <= 3000
+
+
+MACHINES = {
+    "paper": ["limits.velocity=0.3", "limits.acceleration=0.7", "planner.live={L1=[0.3, 0.6]}"],
+    "single-pendulum-crane": [
+        "planner.live={hoist=[0.0, 5.0]}",
+        "planner.live_rate={hoist=0.1}",
+        "plant.c=0.0",
+    ],
+    "slosh-tank": [],
+    "double-pendulum-crane": ["plant.c1=100.0", "plant.c2=200.0"],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("preset", MACHINES)
+def test_no_machine_takes_more_operations(preset):
+    limits = ["velocity=0.5", "acceleration=0.3", "jerk=2.0", "travel=[-20.0, 20.0]"]
+    changes = [*(f"limits.{limit}" for limit in limits), "export.cycle_time=0.002", *MACHINES[preset]]
+    text = planner_block(preset_spec(preset, changes)).text
+    assert len(text) < 100_000
+    library, *_ = compiled = compile_counting(text)
+    assert library.size() < 64 * 1024
+    block = CountedBlock(compiled, fActPosition=0.0)
+    out = [block.hold(2000)]
+    out += [block.hold(700, bExecute=1.0, fTarget=target) for target in (5.0, 0.3, 2.0)]
+    out += [block.hold(100, bVelocity=1.0, fVelocityCommand=speed) for speed in (0.5, -0.5, 0.2)]
+    out.append(block.hold(20_000, bVelocity=0.0))
+    out.append(block.hold(20_000, bExecute=1.0, fTarget=-1.0))
+    assert out[-1]["bDone"][-1]
     assert max(part["operations"].max() for part in out) <= 3000
 
 

@@ -10,9 +10,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_profile_exporters.planner.calming_text import CALMING
 from gen_profile_exporters.planner.interface_text import HEADER, INTERFACE
 from gen_profile_exporters.planner.motion_text import INPUTS, OUTPUTS, SLOTS
-from gen_profile_exporters.planner.planning_text import PLANNING
+from gen_profile_exporters.planner.planning_text import PLANNING, POWERS
 from gen_profile_exporters.planner.programme_text import EXTENT, PROGRAMME
 from gen_profile_exporters.playback.structured_text import block_name, initialiser, literal
 
@@ -27,6 +28,7 @@ REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, 120
 CHUNK = 45  # slots that a phase takes at once
 WORK = 2960  # floating-point operations that a cycle may spend, by a cautious count
 ITERATIONS = 6
+ROUNDING = 1e-3  # of a live parameter's greatest rate
 SPARE = 0.3  # slots more than expected, by slots between two measured motions
 MORE_ITERATIONS = 5  # where these do not lead to a plan
 WAY_ITERATIONS = 13  # where the axis moves already
@@ -34,6 +36,8 @@ SLOTS_PER_PERIOD = 20.0  # of the slowest mode
 MIRROR_DECAY = 0.2  # over a motion, up to which its halves mirror each other until the last projection
 CENTRE = 0.15  # of an interior-point iteration: the complementarity it aims at, relative to that of now
 STEP = 0.93  # share of the way to the nearest bound that it goes
+FRESH = 8  # cycles, for which the machine that is followed counts as constant
+RESERVE = 0.1  # share of the limits that only calming takes up, where live parameters change on the way
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 
 
@@ -58,12 +62,20 @@ class PlannerConstants:
         Their values where the controller gives none.
     drift : tuple of float
         By how much each may change before it is taken over anew.
+    rates : mapping of str to float
+        How fast some may change on the way, per s.
+    calm : float
+        m, sway up to which nothing is done about it.
+    targets : (float, float)
+        m, within the travel.
     degrees : int
         Chebyshev polynomials per live parameter.
     exponents : (parameters, terms) array of int
         Which of them are multiplied.
     frequencies, decays : (modes, terms) arrays
         Coefficients for the sum of the squared frequencies (and, of two, the product), and for the decays.
+    matrix : (modes², terms) array
+        Likewise for the matrix of the linear machine in the loads' sway, row by row; no rows without rates.
     """
 
     name: str
@@ -81,17 +93,23 @@ class PlannerConstants:
     units: tuple[str, ...]
     nominal: tuple[float, ...]
     drift: tuple[float, ...]
+    rates: Mapping[str, float]
+    calm: float
+    targets: tuple[float, float]
     degrees: int
     exponents: NDArray[np.int64]
     frequencies: Array
     decays: Array
+    matrix: Array
 
 
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
-    body = PLANNING.replace("@programme\n", PROGRAMME)
+    body = PLANNING.replace("@programme\n", PROGRAMME).replace("@calming\n", CALMING)
     body = body.replace("@extent\n", indent(EXTENT, 16 * " "))
-    text = HEADER + INTERFACE + INPUTS + SLOTS + body + OUTPUTS
+    body = body.replace("@powers\n", indent(POWERS, 20 * " "))
+    slots = SLOTS.replace("@powers\n", indent(POWERS, 8 * " "))
+    text = HEADER + INTERFACE + INPUTS + slots + body + OUTPUTS
     values = _values(constants)
     return re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
 
@@ -103,6 +121,7 @@ def _values(c: PlannerConstants) -> dict[str, str]:
     known = list(zip(c.live.items(), c.units, c.nominal, strict=True))
     ranges = [
         f"f{name}: live parameter {name}, {low:g} to {high:g} {unit}".rstrip()
+        + (f", on the way at most {c.rates[name]:g} {unit}/s" if name in c.rates else "")
         for (name, (low, high)), unit, _ in known
     ]
     inputs = [
@@ -114,6 +133,7 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "power": max(1, len(lives)) * c.degrees,
         "live": max(1, len(lives)),
         "mode": modes,
+        "matrix": modes**2,
         "column": WIDE,
         "wide": WIDE,
         "conditions": conditions * KERNEL_SLOTS,
@@ -136,6 +156,8 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "travel": f"{c.travel[0]:g} to {c.travel[1]:g}",
         "quick_deceleration": f"{c.quick_deceleration:g}",
         "quick_jerk": f"{c.quick_jerk:g}",
+        "targets": f"{c.targets[0]:g} to {c.targets[1]:g}",
+        "live_rates": " faster than stated" if c.rates else "",
         "live_lines": "\n    ".join(ranges) or "No live parameters.",
         "live_inputs": "\n".join(inputs),
         "take_live": "\n".join(f"aLiveNow[{k}] := f{name};" for k, name in enumerate(lives)),
@@ -147,6 +169,9 @@ def _values(c: PlannerConstants) -> dict[str, str]:
 def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
     whole = {
         "cModes": len(c.frequencies),
+        "cMatrices": len(c.frequencies) if c.rates else 0,
+        "cFresh": FRESH,
+        "cCycleWork": 85 + (40 + 30 * len(c.frequencies) ** 2 if c.rates else 0),
         "cConditions": conditions,
         "cLives": len(c.live),
         "cTerms": terms,
@@ -177,7 +202,11 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cTravelLow": c.travel[0],
         "cTravelHigh": c.travel[1],
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
-        "cInside": INSIDE,
+        "cInside": RESERVE if c.rates else INSIDE,
+        "cReserve": RESERVE if c.rates else 0.0,
+        "cCalm": c.calm,
+        "cTargetLow": c.targets[0],
+        "cTargetHigh": c.targets[1],
         "cSpare": SPARE,
         "cMirrorDecay": MIRROR_DECAY,
         "cCentre": CENTRE,
@@ -189,10 +218,14 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveDrift": c.drift or (0.0,),
+        "cLiveStep": [c.cycle * c.rates.get(name, 0.0) * (1.0 + ROUNDING) for name in lives],
         "cFrequency": c.frequencies.ravel(),
         "cDecay": c.decays.ravel(),
+        "cMatrix": c.matrix.ravel() if c.rates else (0.0,),
     }
-    lines = [f"    {name} : DINT := {value};" for name, value in whole.items()]
+    follows = "TRUE" if c.rates else "FALSE"
+    lines = [f"    cFollows : BOOL := {follows}; (* how live parameters change on the way *)"]
+    lines += [f"    {name} : DINT := {value};" for name, value in whole.items()]
     lines += [f"    {name} : LREAL := {literal(value)};" for name, value in real.items()]
     lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in arrays.items()]
     lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))

@@ -15,18 +15,19 @@ HEADER = """\
     axis follows fVelocityCommand (a stick). bStop stops without sway, as does dropping bVelocity or bEnable.
     bQuickStop brakes at once, with @quick_deceleration m/s2 and @quick_jerk m/s3: the load swings then.
     rOverride (above 0, to 1) and fVelocityLimit (0: none) slow down what is planned from then on.
-    The live parameters may change at any time. Where they do on the way, bPromise drops until bEnable does.
+    The live parameters may change at any time. Where they do on the way@live_rates, bPromise drops until
+    bEnable does.
 
     nErrorId: 0 none
               1 fCycleTime is not the cycle time of this block
               2 a live parameter is out of its range
-              3 fTarget or fVelocityCommand is no number, or fTarget is outside the travel
+              3 fTarget or fVelocityCommand is no number, or fTarget is not within @targets m
               4 fActPosition is no number, or outside the travel
               5 rOverride does not lie above 0 and up to 1, or fVelocityLimit is negative or no number
               6 contradictory commands: a rising edge of bExecute while bVelocity is set
     An error stops the axis without sway; it goes with the next command, or when its cause does.
-    nPromise: 0 holds; 1 a live parameter changed on the way; 2 quick stop, until bEnable is dropped;
-              3 not ready: no live parameters taken over yet
+    nPromise: 0 holds; 1 a live parameter changed on the way@live_rates; 2 quick stop, until bEnable is
+              dropped; 3 not ready: no live parameters taken over yet
 *)
 """
 
@@ -82,6 +83,7 @@ VAR
     bDrifted : BOOL; (* a live parameter changed on the way *)
     bNew : BOOL; (* a slot begins *)
     bPulse : BOOL;
+    bDue : BOOL; (* a motion to the goal is to be planned *)
     bSurrender : BOOL; (* planning failed: go there by pulses *)
 
     (* The committed future: v(t) is the quadratic B-spline with these coefficients, one a slot. *)
@@ -99,7 +101,7 @@ VAR
     (* Modes of the machine. *)
     aPower : ARRAY [0..@last_power] OF LREAL; (* Chebyshev polynomials of the live parameters *)
     aLive : ARRAY [0..@last_live] OF LREAL; (* as taken over *)
-    aLiveStood : ARRAY [0..@last_live] OF LREAL; (* as taken over when the axis stood last *)
+    aLiveFollowed : ARRAY [0..@last_live] OF LREAL; (* follows as fast as it may change on the way *)
     aLiveNow : ARRAY [0..@last_live] OF LREAL;
     aFrequency : ARRAY [0..@last_mode] OF LREAL; (* rad/s *)
     aDecay : ARRAY [0..@last_mode] OF LREAL; (* 1/s *)
@@ -114,12 +116,36 @@ VAR
     fGrowth : LREAL;
     fHalf : LREAL;
 
+    (* The machine followed: what sways where live parameters change on the way, and a pulse that takes it. *)
+    aMatrixNow : ARRAY [0..@last_matrix] OF LREAL; (* 1/s2: sway'' = acceleration - matrix * sway *)
+    aMatrix : ARRAY [0..@last_matrix] OF LREAL; (* as the modes were taken over *)
+    nFresh : DINT; (* cycles since the matrix was renewed *)
+    aSway : ARRAY [0..@last_mode] OF LREAL; (* m, of the loads *)
+    aSwayRate : ARRAY [0..@last_mode] OF LREAL; (* m/s *)
+    aSwayD2 : ARRAY [0..@last_mode] OF LREAL; (* further time derivatives *)
+    aSwayD3 : ARRAY [0..@last_mode] OF LREAL;
+    aSwayD4 : ARRAY [0..@last_mode] OF LREAL;
+    aSwayD5 : ARRAY [0..@last_mode] OF LREAL;
+    aSwayAt : ARRAY [0..@last_mode] OF LREAL; (* at the beginning of the slot *)
+    aSwayRateAt : ARRAY [0..@last_mode] OF LREAL;
+    aLeftRe : ARRAY [0..@last_mode] OF LREAL; (* m/s: what the committed future leaves in a mode *)
+    aLeftIm : ARRAY [0..@last_mode] OF LREAL;
+    fAccelerationBefore : LREAL;
+    fLeft : LREAL; (* m, all modes together *)
+    bSways : BOOL; (* any of them, more than little *)
+    bLook : BOOL; (* what is left in the modes is to be looked at *)
+    bLooked : BOOL; (* it was last, so the live parameters come first *)
+    bCalming : BOOL; (* the pulse is due where the next slot begins *)
+    aCalming : ARRAY [0..@last_column] OF LREAL; (* m/s *)
+    aFactors : ARRAY [0..@last_gram] OF LREAL; (* of the kernel's conditions *)
+
     (* Kernel: a pulse of the velocity that leaves no sway. *)
     aKernelWide : ARRAY [0..@last_column] OF LREAL; (* with zeros at both ends *)
     aKernel : ARRAY [0..@last_column] OF LREAL;
     nKernel : DINT;
 
-    (* Planning, spread over cycles: nJob 0 none, 1 kernel, 2 position, 3 stop, 4 measuring the reach. *)
+    (* Planning, spread over cycles: nJob 0 none, 1 kernel, 2 position, 3 stop, 4 measuring the reach,
+       5 calming. *)
     nJob : DINT;
     nPhase : DINT;
     nPart : DINT;
@@ -146,6 +172,7 @@ VAR
     fStepX : LREAL;
     fStepZ : LREAL;
     fBound : LREAL;
+    aBound : ARRAY [0..3] OF LREAL; (* of velocity, change, its change, and place *)
     fSlackA : LREAL;
     fSlackB : LREAL;
     fDelta : LREAL;

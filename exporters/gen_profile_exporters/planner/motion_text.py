@@ -10,7 +10,7 @@ FOR nIndex := 0 TO cLives - 1 DO
         bLiveGood := FALSE;
     END_IF;
 END_FOR;
-nWork := 85;
+nWork := cCycleWork;
 
 IF nState = 0 THEN
     bFault := FALSE;
@@ -35,6 +35,14 @@ IF nState = 0 THEN
             fTop := cVelocity;
             bReady := FALSE;
             bSettled := TRUE;
+            bCalming := FALSE;
+            bSways := FALSE;
+            nFresh := cFresh;
+            fAccelerationBefore := 0.0;
+            FOR nIndex := 0 TO cModes - 1 DO
+                aSway[nIndex] := 0.0;
+                aSwayRate[nIndex] := 0.0;
+            END_FOR;
             bPulses := TRUE;
             nTick := 0;
             nJob := 0;
@@ -56,7 +64,7 @@ IF (nState = 1) OR (nState = 2) THEN
     ELSIF bExecute AND NOT bExecuteBefore THEN
         bCommandAborted := (nCommand = 1) AND NOT bDone;
         nErrorId := 0;
-        IF NOT (fTarget >= cTravelLow) OR NOT (fTarget <= cTravelHigh) THEN nErrorId := 3; END_IF;
+        IF NOT (fTarget >= cTargetLow) OR NOT (fTarget <= cTargetHigh) THEN nErrorId := 3; END_IF;
         bFault := nErrorId <> 0;
         nCommand := 1;
         fGoal := fTarget;
@@ -103,6 +111,7 @@ IF bQuickStop AND (nState = 2) THEN
     IF nCommand <> 0 THEN bCommandAborted := TRUE; END_IF;
     nCommand := 0;
     bSettled := FALSE;
+    bCalming := FALSE;
     fQuickTime := 0.0;
     fQuickX := fPosition;
     fQuickV := fVelocity;
@@ -171,6 +180,7 @@ ELSIF nState = 2 THEN
         END_FOR;
         aFuture[cFuture - 1] := 0.0;
         IF nFuture > 0 THEN nFuture := nFuture - 1; END_IF;
+        IF nJob = 5 THEN nJob := 0; END_IF;
         IF (nJob > 1) AND (nAhead > 0) THEN
             nAhead := nAhead - 1;
             IF (nAhead = 0) AND NOT bPlanned THEN nJob := 0; END_IF;
@@ -230,14 +240,19 @@ IF bNew THEN
 END_IF;
 IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
     fWanted := 0.0;
-    bPulse := FALSE;
-    IF nCommand = 1 THEN
+    bDue := (nCommand = 1) AND (ABS(fGoal - fFinal) > 1.0E-9) AND NOT bSurrender
+        AND (bMeasured OR (ABS(fGoal - fFinal) <= fReached * fTop * fSlot));
+    bPulse := bCalming AND ((nJob = 0) OR (nJob = 4)) AND NOT bDue;
+    bCalming := bPulse;
+    fShare := 1.0;
+    IF bCalming THEN
+        fWanted := 1.0;
+    ELSIF nCommand = 1 THEN
         IF ABS(fGoal - fFinal) > 1.0E-9 THEN
             IF bSurrender THEN
                 bPulse := TRUE;
                 fWanted := (fGoal - fFinal) / fSlot;
-            ELSIF (bMeasured OR (ABS(fGoal - fFinal) <= fReached * fTop * fSlot))
-                AND ((nJob = 0) OR (nJob = 4)) THEN
+            ELSIF bDue AND ((nJob = 0) OR (nJob = 4)) THEN
                 nJob := 2;
                 nPhase := 2;
                 bPlanned := FALSE;
@@ -257,39 +272,48 @@ IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
     END_IF;
     IF bPulse AND ((nJob = 0) OR (nJob = 4)) THEN
         nJob := 0;
-        IF fWanted > fTop THEN fWanted := fTop; END_IF;
-        IF fWanted < -fTop THEN fWanted := -fTop; END_IF;
+        IF NOT bCalming THEN
+            fShare := 1.0 - cReserve;
+            IF fWanted > fTop * fShare THEN fWanted := fTop * fShare; END_IF;
+            IF fWanted < -fTop * fShare THEN fWanted := -fTop * fShare; END_IF;
+        END_IF;
         (* The greatest share of the pulse that keeps every limit over the whole committed time. *)
         fLow := -1.0E+9;
         fHigh := 1.0E+9;
         fSum := 0.0;
         fPath := fFinal - fSlot * fRest;
+        fHalf := 0.5 * (cTravelHigh + cTravelLow);
+        aBound[0] := fShare * cVelocity;
+        aBound[1] := fShare * cAcceleration * fSlot;
+        aBound[2] := fShare * cJerk * fSlot * fSlot;
+        aBound[3] := 0.5 * (cTargetHigh - cTargetLow);
+        IF bCalming THEN aBound[3] := 0.5 * (cTravelHigh - cTravelLow); END_IF;
         FOR nIndex := 0 TO nKernel + 1 DO
             aKernelWide[nIndex + 2] := 0.0;
-            IF nIndex < nKernel THEN aKernelWide[nIndex + 2] := aKernel[nIndex]; END_IF;
+            IF nIndex < nKernel THEN
+                aKernelWide[nIndex + 2] := aKernel[nIndex];
+                IF bCalming THEN aKernelWide[nIndex + 2] := aCalming[nIndex]; END_IF;
+            END_IF;
         END_FOR;
         FOR nIndex := 2 TO nKernel + 3 DO
             fSum := fSum + fSlot * aKernelWide[nIndex];
             fPath := fPath + fSlot * aFuture[nIndex];
             FOR nRow := 0 TO 3 DO
+                fBound := aBound[nRow];
                 CASE nRow OF
                     0:
                         fDelta := aKernelWide[nIndex];
                         fValue := aFuture[nIndex];
-                        fBound := cVelocity;
                     1:
                         fDelta := aKernelWide[nIndex] - aKernelWide[nIndex - 1];
                         fValue := aFuture[nIndex] - aFuture[nIndex - 1];
-                        fBound := cAcceleration * fSlot;
                     2:
                         fDelta := aKernelWide[nIndex] - 2.0 * aKernelWide[nIndex - 1]
                             + aKernelWide[nIndex - 2];
                         fValue := aFuture[nIndex] - 2.0 * aFuture[nIndex - 1] + aFuture[nIndex - 2];
-                        fBound := cJerk * fSlot * fSlot;
                     3:
                         fDelta := fSum;
-                        fValue := fPath - 0.5 * (cTravelHigh + cTravelLow);
-                        fBound := 0.5 * (cTravelHigh - cTravelLow);
+                        fValue := fPath - fHalf;
                 END_CASE;
                 IF fDelta < 0.0 THEN
                     fDelta := -fDelta;
@@ -308,16 +332,19 @@ IF bNew AND bReady AND ((nState = 1) OR (nState = 2)) THEN
         nWork := nWork + 60 + 60 * nKernel;
         IF fWanted <> 0.0 THEN
             FOR nIndex := 0 TO nKernel - 1 DO
-                aFuture[nIndex + 2] := aFuture[nIndex + 2] + fWanted * aKernel[nIndex];
+                aFuture[nIndex + 2] := aFuture[nIndex + 2] + fWanted * aKernelWide[nIndex + 2];
             END_FOR;
-            fFinal := fFinal + fSlot * fWanted;
-            fRest := fRest + fWanted;
+            IF NOT bCalming THEN
+                fFinal := fFinal + fSlot * fWanted;
+                fRest := fRest + fWanted;
+            END_IF;
             IF ABS(fGoal - fFinal) <= 1.0E-9 THEN
                 IF nCommand = 1 THEN fFinal := fGoal; END_IF;
             END_IF;
             IF nFuture < nKernel + 2 THEN nFuture := nKernel + 2; END_IF;
             nState := 2;
         END_IF;
+        bCalming := FALSE;
     END_IF;
 END_IF;
 
@@ -326,20 +353,61 @@ bStale := FALSE;
 FOR nIndex := 0 TO cLives - 1 DO
     fDelta := ABS(aLiveNow[nIndex] - aLive[nIndex]);
     IF fDelta > 0.5 * cLiveDrift[nIndex] THEN bStale := TRUE; END_IF;
-    IF (nState = 2) AND NOT (ABS(aLiveNow[nIndex] - aLiveStood[nIndex]) <= cLiveDrift[nIndex]) THEN
+    IF bLiveGood THEN
+        fDelta := aLiveNow[nIndex] - aLiveFollowed[nIndex];
+        IF fDelta > cLiveStep[nIndex] THEN fDelta := cLiveStep[nIndex]; END_IF;
+        IF fDelta < -cLiveStep[nIndex] THEN fDelta := -cLiveStep[nIndex]; END_IF;
+        aLiveFollowed[nIndex] := aLiveFollowed[nIndex] + fDelta;
+    END_IF;
+    IF (nState = 2) AND NOT (ABS(aLiveNow[nIndex] - aLiveFollowed[nIndex]) <= cLiveDrift[nIndex]) THEN
         bDrifted := TRUE;
     END_IF;
 END_FOR;
 IF bNew AND ((nState = 1) OR (nState = 2)) AND ((nJob = 0) OR (bMeasured AND (nJob = 4))) THEN
-    IF bLiveGood AND (bStale OR NOT bReady) AND (bMeasured OR (nUnmeasured = 0)) THEN
+    bLook := cFollows AND bReady AND bSettled AND NOT bCalming AND ((nState = 2) OR bSways);
+    IF bLiveGood AND (bStale OR NOT bReady) AND (bMeasured OR (nUnmeasured = 0) OR bLook)
+        AND (bLooked OR NOT bLook) THEN
         nJob := 1;
         nPhase := 1;
+        bLooked := FALSE;
         bPlanned := FALSE;
+    ELSIF bLook THEN
+        nJob := 5;
+        nPhase := 40;
+        nAhead := 0;
+        bLooked := TRUE;
+        bPlanned := FALSE;
+        FOR nIndex := 0 TO cModes - 1 DO
+            aSwayAt[nIndex] := aSway[nIndex];
+            aSwayRateAt[nIndex] := aSwayRate[nIndex];
+        END_FOR;
     ELSIF (nState = 1) AND (nJob = 0) AND (nUnmeasured > 0) THEN
         nJob := 4;
         nPhase := 2;
         bPlanned := FALSE;
     END_IF;
+END_IF;
+(* The matrix of the machine followed is renewed every few cycles, where there is room. *)
+nFresh := nFresh + 1;
+nCost := (cLives + 2 * cMatrices * cModes) * cTerms + (4 * cDegrees + 10) * cLives;
+IF cFollows AND bReady AND bLiveGood AND (nState > 0) AND (nFresh >= cFresh) AND (nWork + nCost <= cWork) THEN
+    nFresh := 0;
+    nWork := nWork + nCost;
+    FOR nIndex := 0 TO cLives - 1 DO
+@powers
+    END_FOR;
+    FOR nRow := 0 TO cMatrices * cModes - 1 DO
+        aMatrixNow[nRow] := 0.0;
+    END_FOR;
+    FOR nTerm := 0 TO cTerms - 1 DO
+        fValue := 1.0;
+        FOR nIndex := 0 TO cLives - 1 DO
+            fValue := fValue * aPower[nIndex * cDegrees + cExponent[nIndex * cTerms + nTerm]];
+        END_FOR;
+        FOR nRow := 0 TO cMatrices * cModes - 1 DO
+            aMatrixNow[nRow] := aMatrixNow[nRow] + cMatrix[nRow * cTerms + nTerm] * fValue;
+        END_FOR;
+    END_FOR;
 END_IF;
 IF (nState = 2) AND bNew THEN
     fFrom := fFinal - fSlot * (aFuture[0] / 6.0 + 5.0 * aFuture[1] / 6.0 + fRest);
@@ -359,6 +427,39 @@ IF nState = 2 THEN
         + fPart * fPart * fPart * aFuture[2] / 6.0);
 END_IF;
 
+(* What the loads do: a Taylor step of the machine of now. *)
+IF cFollows AND (nState > 0) THEN
+    bSways := FALSE;
+    fDelta := (fAcceleration - fAccelerationBefore) / cCycle;
+    FOR nRow := 0 TO cModes - 1 DO
+        aSwayD2[nRow] := fAccelerationBefore;
+        aSwayD3[nRow] := fDelta;
+        FOR nIndex := 0 TO cModes - 1 DO
+            aSwayD2[nRow] := aSwayD2[nRow] - aMatrixNow[nRow * cModes + nIndex] * aSway[nIndex];
+            aSwayD3[nRow] := aSwayD3[nRow] - aMatrixNow[nRow * cModes + nIndex] * aSwayRate[nIndex];
+        END_FOR;
+    END_FOR;
+    FOR nRow := 0 TO cModes - 1 DO
+        aSwayD4[nRow] := 0.0;
+        aSwayD5[nRow] := 0.0;
+        FOR nIndex := 0 TO cModes - 1 DO
+            aSwayD4[nRow] := aSwayD4[nRow] - aMatrixNow[nRow * cModes + nIndex] * aSwayD2[nIndex];
+            aSwayD5[nRow] := aSwayD5[nRow] - aMatrixNow[nRow * cModes + nIndex] * aSwayD3[nIndex];
+        END_FOR;
+    END_FOR;
+    FOR nRow := 0 TO cModes - 1 DO
+        aSway[nRow] := aSway[nRow] + cCycle * (aSwayRate[nRow] + cCycle / 2.0 * (aSwayD2[nRow]
+            + cCycle / 3.0 * (aSwayD3[nRow] + cCycle / 4.0 * (aSwayD4[nRow]
+            + cCycle / 5.0 * aSwayD5[nRow]))));
+        aSwayRate[nRow] := aSwayRate[nRow] + cCycle * (aSwayD2[nRow] + cCycle / 2.0 * (aSwayD3[nRow]
+            + cCycle / 3.0 * (aSwayD4[nRow] + cCycle / 4.0 * aSwayD5[nRow])));
+        IF ABS(aSway[nRow]) + ABS(aSwayRate[nRow]) / aFrequency[0] > cCalm THEN
+            bSways := bReady AND bSettled;
+        END_IF;
+    END_FOR;
+    fAccelerationBefore := fAcceleration;
+END_IF;
+
 bPromise := bReady AND bSettled AND (nState > 0);
 nPromise := 0;
 IF NOT bReady THEN nPromise := 3; END_IF;
@@ -371,8 +472,8 @@ IF NOT bSettled THEN nPromise := 2; END_IF;
 
 bEnabled := nState > 0;
 bError := bFault;
-bDone := (nState = 1) AND (nCommand = 1) AND (ABS(fGoal - fFinal) <= 1.0E-9);
-bBusy := (nState > 1) OR ((nState = 1) AND (nCommand = 1) AND NOT bDone);
+bDone := (nState = 1) AND (nCommand = 1) AND NOT bSways AND (ABS(fGoal - fFinal) <= 1.0E-9);
+bBusy := (nState > 1) OR bSways OR ((nState = 1) AND (nCommand = 1) AND NOT bDone);
 bInVelocity := (nCommand = 2) AND (ABS(fVelocity - fVelocityCommand) <= 1.0E-6 * cVelocity);
 fTimeToGo := 0.0;
 fStopDistance := 0.0;

@@ -14,7 +14,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
     IF nSlots < nOther THEN nOther := nSlots; END_IF;
     IF nOld > nOther THEN nOther := cChunk; END_IF;
     CASE nPhase OF
-        1: nCost := (cLives + 4 * cModes) * cTerms + 90 * cModes + 30 * cLives;
+        1: nCost := (cLives + (4 + cMatrices) * cModes) * cTerms + 90 * cModes + 30 * cLives;
         2: nCost := 120 + 6 * (nFuture + cReaches);
         3: nCost := 25 * nOther + 10;
         5: nCost := 7 * nColumns + 10;
@@ -30,6 +30,10 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
         17: nCost := 3 * nColumns + 60;
         18: nCost := 28 * nOther + 80;
         19: nCost := 22 * nColumns + 60;
+        40: nCost := 80 * cModes;
+        41: nCost := 10 * nFuture + 20;
+        42: nCost := 60 * cModes + 2 * cConditions * cConditions;
+        43: nCost := (10 + 20 * cModes) * nKernel + 20;
     ELSE
         nCost := 4 * nColumns;
     END_CASE;
@@ -48,20 +52,15 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
             1: (* frequencies of the live parameters *)
                 FOR nIndex := 0 TO cLives - 1 DO
                     aLive[nIndex] := aLiveNow[nIndex];
-                    IF nState <> 2 THEN aLiveStood[nIndex] := aLive[nIndex]; END_IF;
-                    fValue := (2.0 * aLive[nIndex] - cLiveLow[nIndex] - cLiveHigh[nIndex])
-                        / (cLiveHigh[nIndex] - cLiveLow[nIndex]);
-                    nFirst := nIndex * cDegrees;
-                    aPower[nFirst] := 1.0;
-                    aPower[nFirst + 1] := fValue;
-                    FOR nTerm := 2 TO cDegrees - 1 DO
-                        aPower[nFirst + nTerm] := 2.0 * fValue * aPower[nFirst + nTerm - 1]
-                            - aPower[nFirst + nTerm - 2];
-                    END_FOR;
+                    IF nState <> 2 THEN aLiveFollowed[nIndex] := aLive[nIndex]; END_IF;
+@powers
                 END_FOR;
                 FOR nMode := 0 TO cModes - 1 DO
                     aFrequency[nMode] := 0.0;
                     aDecay[nMode] := 0.0;
+                END_FOR;
+                FOR nIndex := 0 TO cMatrices * cModes - 1 DO
+                    aMatrix[nIndex] := 0.0;
                 END_FOR;
                 FOR nTerm := 0 TO cTerms - 1 DO
                     fValue := 1.0;
@@ -72,6 +71,9 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                         nIndex := nMode * cTerms + nTerm;
                         aFrequency[nMode] := aFrequency[nMode] + cFrequency[nIndex] * fValue;
                         aDecay[nMode] := aDecay[nMode] + cDecay[nIndex] * fValue;
+                    END_FOR;
+                    FOR nIndex := 0 TO cMatrices * cModes - 1 DO
+                        aMatrix[nIndex] := aMatrix[nIndex] + cMatrix[nIndex * cTerms + nTerm] * fValue;
                     END_FOR;
                 END_FOR;
                 IF cModes > 1 THEN
@@ -317,6 +319,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                 nFirst := 0;
                 nPhase := 6;
 @programme
+@calming
             17: (* the plan: as far as the target is, along the straight line from the old future *)
                 fSum := 0.0;
                 FOR nIndex := 0 TO nColumns - 1 DO
@@ -415,4 +418,15 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
         END_CASE;
     END_IF;
 END_WHILE;
+"""
+
+POWERS = """\
+fValue := (2.0 * aLiveNow[nIndex] - cLiveLow[nIndex] - cLiveHigh[nIndex])
+    / (cLiveHigh[nIndex] - cLiveLow[nIndex]);
+nFirst := nIndex * cDegrees;
+aPower[nFirst] := 1.0;
+aPower[nFirst + 1] := fValue;
+FOR nTerm := 2 TO cDegrees - 1 DO
+    aPower[nFirst + nTerm] := 2.0 * fValue * aPower[nFirst + nTerm - 1] - aPower[nFirst + nTerm - 2];
+END_FOR;
 """

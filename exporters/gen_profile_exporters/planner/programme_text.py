@@ -93,6 +93,9 @@ PROGRAMME = """\
                     nPhase := 30;
                     IF bGood OR (nColumns >= cColumns) THEN
                         nKernel := nColumns;
+                        FOR nIndex := 0 TO cConditions * cConditions - 1 DO
+                            aFactors[nIndex] := aS[nIndex];
+                        END_FOR;
                         bReady := TRUE;
                         nUnmeasured := cReaches;
                         nJob := 0;

@@ -29,6 +29,9 @@ typedef struct {
     const double *parameters;
     double *setpoints;                   /* where axes stand that the block does not lead */
     const size_t *led;                   /* n_axes: places among the setpoints */
+    size_t n_hoists;                     /* axes that follow an input of the block */
+    const size_t *hoists, *told;         /* their places among the setpoints, and of the inputs */
+    const double *ratios;                /* of the axis's position to the input */
 } History;
 
 /* Of an axis; gap: by how far the position is not the velocity's integral, nor this the acceleration's. */
@@ -103,7 +106,8 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
     found->status = begin(fmu, 0.0, history->parameter_references, history->n_parameters, history->parameters);
     for (long k = 0; k < end && found->status == GOOD; k++, found->cycles = k) {
         while (row + 1 < history->n_rows && history->begins[row + 1] <= k) row++;
-        found->fault = block->play(block->instance, history->inputs + row * block->n_inputs, 1, now);
+        const double *inputs = history->inputs + row * block->n_inputs;
+        found->fault = block->play(block->instance, inputs, 1, now);
         if (found->fault != 0) return;
         take_states(block, now, found);
         if (k >= last && found->stands < 0 && standing(block, now)) {
@@ -116,6 +120,9 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
             take_axis(block->axes + 3 * i, before, now, history->cycle, found->axes + i);
             if (found->stands >= 0) found->axes[i].creep = greater(found->axes[i].creep, position - stood[i]);
             history->setpoints[history->led[i]] = position;
+        }
+        for (size_t i = 0; i < history->n_hoists; i++) {
+            history->setpoints[history->hoists[i]] = history->ratios[i] * inputs[history->told[i]];
         }
         found->status = set(fmu, history->setpoint_references, history->n_setpoints, history->setpoints);
         if (found->status == GOOD) found->status = step(fmu, (double)k * history->cycle, history->cycle);

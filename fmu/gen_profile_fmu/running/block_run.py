@@ -71,6 +71,25 @@ class Script:
     watch: int
 
 
+@attrs.frozen(kw_only=True)
+class Hoist:
+    """An axis that follows what the block is told, not what it issues.
+
+    Attributes
+    ----------
+    axis : int
+        Of the plant.
+    told : int
+        Place among the block's inputs.
+    ratio : float
+        Of the axis's position to the input.
+    """
+
+    axis: int
+    told: int
+    ratio: float
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class AxisExtremes:
     """What an axis came to, in m and s.
@@ -153,6 +172,9 @@ class _History(Structure):
         ("parameters", POINTER(c_double)),
         ("setpoints", POINTER(c_double)),
         ("led", POINTER(c_size_t)),
+        ("n_hoists", c_size_t),
+        *((name, POINTER(c_size_t)) for name in ("hoists", "told")),
+        ("ratios", POINTER(c_double)),
     ]
 
 
@@ -203,6 +225,7 @@ class BlockFollower:
         values: Mapping[str, float],
         led: Sequence[int],
         *,
+        hoists: Sequence[Hoist] = (),
         rows: int = 0,
     ) -> BlockRun:
         """Let the plant follow a block.
@@ -216,6 +239,7 @@ class BlockFollower:
             Start values of the FMU's variables, its setpoints among them.
         led : (axes,) sequence of int
             Which axis of the plant each axis of the block is.
+        hoists : sequence of Hoist
         rows : int
             Cycles of which everything is to be kept: as many as an earlier run took, or none.
 
@@ -237,7 +261,7 @@ class BlockFollower:
         self._loop(
             byref(self._fmu),
             byref(_called(block, script)),
-            byref(self._history(script, values, led)),
+            byref(self._history(script, values, led, hoists)),
             _doubles(room),
             byref(found),
         )
@@ -254,7 +278,9 @@ class BlockFollower:
             **{name: getattr(found, name) for name in _SIMPLE},
         )
 
-    def _history(self, script: Script, values: Mapping[str, float], led: Sequence[int]) -> _History:
+    def _history(
+        self, script: Script, values: Mapping[str, float], led: Sequence[int], hoists: Sequence[Hoist]
+    ) -> _History:
         begins = (c_long * len(script.begins))(*script.begins)
         setpoints = [values[name] for name in self._setpoints]
         return _History(
@@ -274,6 +300,10 @@ class BlockFollower:
             parameters=(c_double * len(values))(*values.values()),
             setpoints=(c_double * len(setpoints))(*setpoints),
             led=(c_size_t * len(led))(*led),
+            n_hoists=len(hoists),
+            hoists=(c_size_t * len(hoists))(*(hoist.axis for hoist in hoists)),
+            told=(c_size_t * len(hoists))(*(hoist.told for hoist in hoists)),
+            ratios=(c_double * len(hoists))(*(hoist.ratio for hoist in hoists)),
         )
 
     def _numbers(self, names: Mapping[str, float] | Sequence[str]) -> Any:

@@ -35,12 +35,30 @@ STILL = 0.5  # s of standing after which nothing more is expected
 
 @attrs.frozen(kw_only=True)
 class Command:
-    """What holds from a time on: one of `COMMANDS`, its value, and live parameters by name."""
+    """What holds from a time on.
+
+    Attributes
+    ----------
+    time : float
+        s.
+    command : str
+        One of `COMMANDS`.
+    value : float
+        m or m/s.
+    live : mapping of str to float
+        Live parameters that change.
+    override : float
+        Of the greatest velocity.
+    velocity_limit : float
+        m/s; 0 for none but the machine's.
+    """
 
     time: float
     command: str
     value: float = 0.0
     live: Mapping[str, float] = attrs.field(factory=dict)
+    override: float = 1.0
+    velocity_limit: float = 0.0
 
     def begin(self, cycle: float) -> int:
         """Tell in which cycle, of so many seconds, it begins."""
@@ -210,6 +228,8 @@ def inputs_of(command: Command) -> dict[str, float]:
         "bQuickStop": float(command.command == "quick-stop"),
         "bExecute": float(command.command == "position"),
         "fTarget" if command.command == "position" else "fVelocityCommand": command.value,
+        "rOverride": command.override,
+        "fVelocityLimit": command.velocity_limit,
     }
 
 

@@ -16,6 +16,8 @@ from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstan
 
 FEWEST_CYCLES = 4  # in a slot
 STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
+CALM = 0.1  # of the allowed sway, which the block leaves as it is
+MARGIN = 2.0  # between targets and the travel's ends, relative to the allowed sway, for calming
 QUICK = 2.0  # default deceleration of a quick stop, relative to the limit of the acceleration
 QUICK_JERK = 4.0
 
@@ -70,10 +72,14 @@ def planner_block(spec: Spec) -> PlannerBlock:
         units=tuple(_unit(spec, name) for name in found.live),
         nominal=tuple(_nominal(spec, name) for name in found.live),
         drift=tuple(STEADY * high for _, high in found.live.values()),
+        rates=spec.planner.live_rate,
+        calm=CALM * min(spec.check.residual_sway.values()),
+        targets=target_range(spec),
         degrees=int(interpolant.exponents.max(initial=0)) + 1,
         exponents=interpolant.exponents,
         frequencies=coefficients[: found.modes],
-        decays=coefficients[found.modes :],
+        decays=coefficients[found.modes : 2 * found.modes],
+        matrix=coefficients[2 * found.modes :],
     )
     return PlannerBlock(
         filename=f"{spec.name}.st",
@@ -91,6 +97,14 @@ def quick_limits(spec: Spec) -> tuple[float, float]:
         spec.planner.quick_stop or QUICK * own.acceleration,
         spec.planner.quick_stop_jerk or QUICK_JERK * own.jerk,
     )
+
+
+def target_range(spec: Spec) -> tuple[float, float]:
+    """Least and greatest target in m, where the travel is stated: room is left for calming."""
+    travel = spec.limits.of(0).travel
+    assert travel is not None
+    margin = MARGIN * min(spec.check.residual_sway.values()) if spec.planner.live_rate else 0.0
+    return travel[0] + margin, travel[1] - margin
 
 
 def _limits(spec: Spec) -> tuple[float, float, float, tuple[float, float]]:
@@ -130,5 +144,5 @@ def _corners(found: LiveModes) -> list[Sequence[float]]:
 
 
 def _rates(found: LiveModes, point: Sequence[float]) -> tuple[Array, Array]:
-    invariants, decays = np.split(found.interpolant(point), [found.modes])
+    invariants, decays, _ = np.split(found.interpolant(point), [found.modes, 2 * found.modes])
     return frequencies(invariants), decays

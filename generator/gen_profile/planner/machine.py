@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
+from types import SimpleNamespace
 
 import attrs
 import numpy as np
@@ -32,7 +33,8 @@ class LiveModes:
     live : mapping of str to (float, float)
     interpolant : Interpolant
         Of the live parameters, each mapped to −1 … 1: the elementary symmetric polynomials of the squared
-        frequencies (which have no branch point where two modes come near each other), then the decays.
+        frequencies (which have no branch point where two modes come near each other), then the decays; and
+        where live parameters change on the way, the matrix of the loads' sway in 1/s², row by row.
     error : float
         Greatest relative error of a frequency found between the points of interpolation.
     """
@@ -53,6 +55,7 @@ def live_modes(spec: Spec) -> LiveModes:
     """
     live = spec.planner.live
     _refuse_others(spec)
+    _refuse_rates(spec)
 
     def invariants(point: Sequence[float]) -> Array:
         found = _linearized(spec, point)
@@ -62,6 +65,7 @@ def live_modes(spec: Spec) -> LiveModes:
                 squares.sum(),
                 *[squares.prod()][: len(squares) - 1],
                 *(found.damping_ratios * found.frequencies),
+                *(_sway_matrix(found).ravel() if spec.planner.live_rate else ()),
             ]
         )
 
@@ -110,6 +114,50 @@ def _linearized(spec: Spec, point: Sequence[float]) -> Linearization:
     }
     q_a = [values.get(axis.name, start) for axis, start in zip(plant.actuated, spec.move.start, strict=True)]
     return linearize(plant, parameters, q_a)
+
+
+def _sway_matrix(found: Linearization) -> Array:
+    """Find A of sway'' = acceleration − A sway.
+
+    A rope's rate appears in it nowhere: a load's horizontal acceleration is the rope's force by its mass, and
+    that depends on where the loads are.
+    """
+    gain = found.sway_gain
+    return np.asarray(gain @ found.stiffness @ np.linalg.inv(gain))
+
+
+def _refuse_rates(spec: Spec) -> None:
+    """Refuse live parameters that change on the way, of machines that sway otherwise than loads on ropes."""
+    plant, rates = spec.machine(), spec.planner.live_rate
+    if not rates:
+        return
+    middle = _linearized(spec, [0.0] * len(spec.planner.live))
+    if np.abs(middle.damping).max() > 0.0:
+        raise SpecError(
+            "planner.live_rate: the planner block follows machines without damping only; set the damping "
+            "to 0, which is the worse case."
+        )
+    if plant.bodies != plant.loads or middle.sway_gain.shape[0] != middle.sway_gain.shape[1]:
+        raise SpecError(f"planner.live_rate: the loads of a {plant.type} do not hang on ropes alone.")
+    for name in rates:
+        if not _is_length(spec, name):
+            raise SpecError(f"planner.live_rate.{name}: no rope's length; only these may change on the way.")
+
+
+def _is_length(spec: Spec, name: str) -> bool:
+    """Whether a load comes down by as much as a parameter grows, all hanging still."""
+    plant, (low, high) = spec.machine(), spec.planner.live[name]
+    still = [0.0] * len(plant.unactuated)
+    heights = []
+    for value in (low, high):
+        places = [
+            value if axis.name == name else start
+            for axis, start in zip(plant.actuated, spec.move.start, strict=True)
+        ]
+        parameters = SimpleNamespace(**{**spec.plant.parameters, name: value})
+        heights.append(float(plant.outputs(still, places, parameters).height[-1]))
+    hangs = low > 0.0 or name not in spec.plant.parameters
+    return hangs and abs(heights[0] - heights[1] - (high - low)) <= 1e-9 * high
 
 
 def _refuse_others(spec: Spec) -> None:

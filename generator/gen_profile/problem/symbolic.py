@@ -45,6 +45,16 @@ def matrix(rows: Sequence[Sequence[Any]]) -> Symbol:
     return casadi.vertcat(*(casadi.horzcat(*row) for row in rows))
 
 
+def zeros(count: int, width: int) -> Symbol:
+    """Make a matrix of zeros."""
+    return casadi.SX(count, width)
+
+
+def rows(matrix: Symbol) -> list[list[Symbol]]:
+    """Entries of a matrix, row by row."""
+    return [list(casadi.horzsplit(row)) for row in casadi.vertsplit(matrix)]
+
+
 def solve(a: Symbol, b: Symbol) -> Symbol:
     """Solve ``a x = b`` symbolically."""
     return casadi.solve(a, b)

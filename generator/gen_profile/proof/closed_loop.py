@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from queue import SimpleQueue
@@ -13,19 +13,20 @@ from typing import Self
 import numpy as np
 
 from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
-from gen_profile.motion.profile import SampledProfile
+from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.proof.histories import Histories, History
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
-from gen_profile_fmu.running.block_run import BlockFollower, BlockRun, Script
+from gen_profile_fmu.running.block_run import BlockFollower, BlockRun, Hoist, Script
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 STEP_PHASE = 0.05  # rad of the fastest mode that an integration step may cover
 WATCHED = 2.2  # of the slowest periods in which the residual sway shows
 PATIENCE = 30.0  # of these periods that the axes have to come to rest, and the travel's time beside
+HOIST_STARTS = 0.1  # of these periods, in which a hoist takes up its speed
 
 
 class ClosedLoop:
@@ -68,7 +69,8 @@ class ClosedLoop:
         self._workers = workers
         self._open = ExitStack()
         self._followers: SimpleQueue[BlockFollower] = SimpleQueue()
-        fmu = plant_fmu(spec.machine(), on_build)
+        self._machine = histories.machine
+        fmu = plant_fmu(self._machine, on_build)
         for _ in range(workers):
             self._followers.put(self._open.enter_context(BlockFollower(fmu)))
 
@@ -116,6 +118,7 @@ class ClosedLoop:
                 self._script(history),
                 self._values(history, max_step or self.max_step),
                 led=(0,),
+                hoists=self._hoists(history),
                 rows=rows,
             )
         finally:
@@ -131,13 +134,16 @@ class ClosedLoop:
         """
         traced = self.run(history, rows=cycles).trace
         assert traced is not None
-        led = traced[:, self.outputs.index("fPosition")]
-        position = np.tile(history.places, (len(traced) + 1, 1))
-        position[1:, 0] = led
-        with PlantCosimulation(self._spec.machine()) as fmu:
+        position = np.tile(self._places(history), (len(traced) + 1, 1))
+        position[1:, 0] = traced[:, self.outputs.index("fPosition")]
+        script = self._script(history)
+        row = np.searchsorted(script.begins, np.arange(len(traced)), side="right") - 1
+        for hoist in self._hoists(history):
+            position[1:, hoist.axis] = hoist.ratio * script.inputs[row, hoist.told]
+        with PlantCosimulation(self._machine) as fmu:
             response = fmu.run(
                 SampledProfile(cycle_time=self.cycle, position=position),
-                history.parameters,
+                self._parameters(history),
                 tau=self._spec.actuator.tau or 0.0,
                 max_step=self.max_step,
                 settle=0.0,
@@ -148,7 +154,7 @@ class ClosedLoop:
     def _script(self, history: History) -> Script:
         values = self._block.inputs | {"bEnable": 1.0, "fActPosition": history.places[0]}
         values |= {f"f{name}": value for name, value in history.live.items()}
-        begins, inputs = input_rows(history.commands, values, self.cycle)
+        begins, inputs = self._hoisted(history, *input_rows(history.commands, values, self.cycle))
         limits, period = self._spec.limits.of(0), self._histories.period
         assert limits.velocity and limits.travel
         patience = PATIENCE * period + (limits.travel[1] - limits.travel[0]) / limits.velocity
@@ -164,8 +170,41 @@ class ClosedLoop:
             watch=watched,
         )
 
+    def _hoisted(self, history: History, begins: list[int], inputs: Array) -> tuple[Sequence[int], Array]:
+        """Give a row to every cycle in which live parameters change."""
+        if not history.hoisting:
+            return begins, inputs
+        starting = math.ceil(HOIST_STARTS * self._histories.period / self.cycle)
+        end = max(corners[-1][0] for corners in history.hoisting.values())
+        cycles = np.arange(max(begins[-1], math.ceil(end / self.cycle) + starting) + 1)
+        inputs = inputs[np.searchsorted(begins, cycles, side="right") - 1]
+        for name, corners in history.hoisting.items():
+            low, high = self._spec.planner.live[name]
+            line = np.interp(np.arange(1 - starting, len(cycles)) * self.cycle, *np.transpose(corners))
+            rounded = np.convolve(line, np.full(starting, 1.0 / starting), mode="valid")
+            inputs[:, list(self._block.inputs).index(f"f{name}")] = np.clip(rounded, low, high)
+        return range(len(cycles)), inputs
+
+    def _hoists(self, history: History) -> list[Hoist]:
+        """Tell how axes follow what the block is told."""
+        axes, inputs = [axis.name for axis in self._machine.actuated], list(self._block.inputs)
+        return [
+            Hoist(
+                axis=axes.index(name),
+                told=inputs.index(f"f{name}"),
+                ratio=history.parameters[name] / history.live[name] if name in history.parameters else 1.0,
+            )
+            for name in history.hoisting
+        ]
+
+    def _places(self, history: History) -> list[float]:
+        return [*history.places, *(history.parameters[name] for name in self._histories.driven)]
+
+    def _parameters(self, history: History) -> dict[str, float]:
+        return {known.name: history.parameters[known.name] for known in self._machine.parameters}
+
     def _values(self, history: History, max_step: float) -> dict[str, float]:
-        values = {**history.parameters, TAU: self._spec.actuator.tau or 0.0, MAX_STEP: max_step}
-        for axis, place in zip(self._spec.machine().actuated, history.places, strict=True):
+        values = {**self._parameters(history), TAU: self._spec.actuator.tau or 0.0, MAX_STEP: max_step}
+        for axis, place in zip(self._machine.actuated, self._places(history), strict=True):
             values |= {f"{axis.name}.start": place, f"{axis.name}.setpoint": place}
         return values

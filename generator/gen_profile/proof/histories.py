@@ -1,14 +1,15 @@
 """Histories of commands that a planner block is proved on.
 
 A history is made of *choices*, shares from 0 to 1: where it starts, the live parameters that the block is
-told, by how much the machine differs from them, and what is commanded when. So histories are drawn as a Latin
-hypercube, corners are choices of 0 and 1, and a search moves through the same cube.
+told, by how much the machine differs from them, what is commanded when, and how ropes change on the way. So
+histories are drawn as a Latin hypercube, corners are choices of 0 and 1, and a search moves through the same
+cube.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import islice, product
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate, islice, pairwise, product
 from typing import Self
 
 import attrs
@@ -17,6 +18,9 @@ from scipy.stats import qmc
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.commands import Command
+from gen_profile.planner.design import target_range
+from gen_profile.plants.plant import Plant
+from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
 from gen_profile.spec.model import Spec
 
@@ -27,8 +31,12 @@ SHORTEST, LONGEST = 0.02, 3.0  # periods between two commands
 MOST_COMMANDS = 16
 MANNERS = ((0.85, 0.05, 0.1), (0.05, 0.9, 0.05), (0.4, 0.4, 0.2))  # shares of positions, a stick, and stops
 MOST_CORNERS = 10  # ranges up to which all corners are tried where histories are enough
+SLOWEST = 0.3  # override, and velocity limit as a share of the machine's
+LEGS = 8  # of one speed each, in which a live parameter changes on the way
+HOISTED_ON = 2.0  # periods after the last command in which it still may
 
-_PER_COMMAND = 3  # choices: which, its value, how long
+_PER_COMMAND = 3  # choices: which, its value, how long; and how slowly, where that is varied
+_PER_LEG = 2  # choices: speed, how long
 
 
 @attrs.frozen(kw_only=True)
@@ -44,12 +52,16 @@ class History:
     places : tuple of float
         Where the machine's axes stand at first, in m (or rad).
     commands : tuple of Command
+    hoisting : mapping of str to tuple of (float, float)
+        What the block is told of live parameters that change on the way: corners (time in s, value) of a
+        line, which begins with the value in `live` and ends constant.
     """
 
     live: Mapping[str, float]
     parameters: Mapping[str, float]
     places: tuple[float, ...]
     commands: tuple[Command, ...]
+    hoisting: Mapping[str, tuple[tuple[float, float], ...]] = attrs.field(factory=dict)
 
     @property
     def brakes(self) -> bool:
@@ -70,15 +82,18 @@ class Histories:
         Of the slowest mode over all ranges, in s.
     fastest : float
         Frequency of the fastest mode there, in rad/s.
+    slowed : bool
+        Whether override and velocity limit vary, too; those of earlier manifests do not.
     """
 
     spec: Spec
     uncertain: Mapping[str, tuple[float, float]]
     period: float
     fastest: float
+    slowed: bool = True
 
     @classmethod
-    def of(cls, spec: Spec) -> Self:
+    def of(cls, spec: Spec, *, slowed: bool = True) -> Self:
         """Look at the ranges of a spec, whose limits are stated."""
         live, nominal = spec.planner.live, spec.plant.parameters
         ranges = {
@@ -94,7 +109,18 @@ class Histories:
             errors = dict(zip(ranges, chosen[len(live) :], strict=True))
             found.append(linearize(spec.machine(), *_machine(spec, told, errors)).frequencies)
         slowest, fastest = float(np.min(found)), float(np.max(found))
-        return cls(spec=spec, uncertain=ranges, period=2.0 * np.pi / slowest, fastest=fastest)
+        period = 2.0 * np.pi / slowest
+        return cls(spec=spec, uncertain=ranges, period=period, fastest=fastest, slowed=slowed)
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Live parameters that change on the way and are no axes of the machine."""
+        return tuple(name for name in self.spec.planner.live_rate if name in self.spec.plant.parameters)
+
+    @property
+    def machine(self) -> Plant:
+        """The machine that follows, where what is `driven` are the last axes."""
+        return hoisted(self.spec.machine(), self.driven)
 
     @property
     def box(self) -> int:
@@ -104,7 +130,20 @@ class Histories:
     @property
     def choices(self) -> int:
         """Number of choices of a history."""
-        return 5 + self.box + _PER_COMMAND * MOST_COMMANDS
+        return self._first_leg + LEGS * _PER_LEG * len(self.spec.planner.live_rate)
+
+    @property
+    def _per_command(self) -> int:
+        return _PER_COMMAND + self.slowed
+
+    @property
+    def _first_leg(self) -> int:
+        return 5 + self.box + self._per_command * MOST_COMMANDS
+
+    @property
+    def _ends(self) -> int:
+        """Number of choices of one end or the other: those of `box`, and a direction for all legs."""
+        return self.box + len(self.spec.planner.live_rate)
 
     def drawn(self, count: int, seed: int) -> Array:
         """Draw choices as a Latin hypercube, the first ones at the corners of the machine's ranges.
@@ -122,14 +161,18 @@ class Histories:
         random = np.random.default_rng(seed)
         drawn: Array = qmc.LatinHypercube(self.choices, seed=random).random(count)
         corners = self.corners(count)
-        every = 2 ** min(self.box, 62)
+        every = 2 ** min(self._ends, 62)
         numbers = np.arange(every) if every == corners else random.integers(every, size=corners)
-        drawn[:corners, 1 : 1 + self.box] = (numbers[:, None] >> np.arange(self.box)) & 1
+        ends = (numbers[:, None] >> np.arange(self._ends)) & 1
+        drawn[:corners, 1 : 1 + self.box] = ends[:, : self.box]
+        for number, end in enumerate(ends[:, self.box :].T):
+            first = self._first_leg + number * LEGS * _PER_LEG
+            drawn[:corners, first : first + LEGS * _PER_LEG : _PER_LEG] = end[:, None]
         return drawn
 
     def corners(self, count: int) -> int:
         """How many of so many histories are at corners."""
-        every: int = 2 ** min(self.box, MOST_CORNERS)
+        every: int = 2 ** min(self._ends, MOST_CORNERS)
         return min(every, count // 2)
 
     def history(self, choices: Array) -> History:
@@ -145,15 +188,32 @@ class Histories:
         travel = self.spec.limits.of(0).travel
         assert travel is not None
         places[0] = _between(travel, _widened(start))
-        rows = choices[5 + self.box :].reshape(MOST_COMMANDS, _PER_COMMAND)[: int(amount * MOST_COMMANDS)]
+        rows = choices[5 + self.box : self._first_leg].reshape(MOST_COMMANDS, self._per_command)
+        commands = tuple(self._commands(rows[: int(amount * MOST_COMMANDS)], first, manner, ending))
         return History(
             live=told,
             parameters=parameters,
             places=tuple(places),
-            commands=tuple(self._commands(rows, first, manner, ending)),
+            commands=commands,
+            hoisting=self._hoisting(choices[self._first_leg :], told, commands[-1].time),
         )
 
-    def machine(self, history: History, errors: Mapping[str, float]) -> dict[str, float]:
+    def _hoisting(
+        self, choices: Array, told: Mapping[str, float], last: float
+    ) -> dict[str, tuple[tuple[float, float], ...]]:
+        """Let live parameters change, leg by leg, at their greatest rates or below."""
+        rates = self.spec.planner.live_rate
+        until, found = last + HOISTED_ON * self.period, {}
+        for (name, rate), legs in zip(
+            rates.items(), choices.reshape(len(rates), LEGS, _PER_LEG), strict=True
+        ):
+            speeds = [rate * _between((-1.0, 1.0), _widened(share, 0.25)) for share in legs[:, 0].tolist()]
+            shares = 0.1 + legs[:, 1]
+            times = list(accumulate((until * shares / shares.sum()).tolist(), initial=0.0))
+            found[name] = _bouncing(told[name], speeds, times, self.spec.planner.live[name])
+        return found
+
+    def perturbed(self, history: History, errors: Mapping[str, float]) -> dict[str, float]:
         """Parameters of a machine that differs by some errors from what the block is told in a history."""
         return _machine(self.spec, history.live, errors)[0]
 
@@ -162,10 +222,11 @@ class Histories:
         within = max(COMMANDED, PERIODS * self.period)
         likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
         time = first * SOONEST
-        for which, value, lasts in rows.tolist():
+        for which, value, lasts, *slow in rows.tolist():
             if time > within:
                 break
-            yield self._command(time, int(np.searchsorted(np.cumsum(likely), which)), value)
+            command = self._command(time, int(np.searchsorted(np.cumsum(likely), which)), value)
+            yield self._slowed(command, *slow)
             time += self.period * SHORTEST * (LONGEST / SHORTEST) ** lasts
         time = min(time, within)
         if ending < 0.05:
@@ -173,13 +234,24 @@ class Histories:
         else:
             yield self._command(time, 0 if ending < 0.5 else 2, (ending - 0.05) / 0.45)
 
+    def _slowed(self, command: Command, choice: float = 0.0) -> Command:
+        """Limit one command in four by the override, and one in four by the velocity limit."""
+        limit = self.spec.limits.of(0).velocity
+        assert limit
+        if choice < 0.5:
+            return command
+        if choice < 0.75:
+            return attrs.evolve(command, override=_between((SLOWEST, 1.0), 4.0 * choice - 2.0))
+        return attrs.evolve(command, velocity_limit=limit * _between((SLOWEST, 1.0), 4.0 * choice - 3.0))
+
     def _command(self, time: float, which: int, value: float) -> Command:
         limits = self.spec.limits.of(0)
-        assert limits.velocity and limits.travel
+        assert limits.velocity
         match which:
             case 0:
+                targets = target_range(self.spec)
                 return Command(
-                    time=time, command="position", value=_between(limits.travel, _widened(value)), live={}
+                    time=time, command="position", value=_between(targets, _widened(value)), live={}
                 )
             case 1:
                 ends = (-limits.velocity, limits.velocity)
@@ -197,6 +269,26 @@ def _between(ends: tuple[float, float], share: float) -> float:
 def _widened(share: float, margin: float = 0.05) -> float:
     """Stretch, so that both ends are chosen with a share of `margin` each."""
     return min(max((share - margin) / (1.0 - 2.0 * margin), 0.0), 1.0)
+
+
+def _bouncing(
+    value: float, speeds: Sequence[float], times: Sequence[float], ends: tuple[float, float]
+) -> tuple[tuple[float, float], ...]:
+    """Corners of a line of these speeds between rising times, which turns round at the ends of its range."""
+    corners, sign, (low, high) = [(times[0], value)], 1.0, ends
+    for speed, (begin, end) in zip(speeds, pairwise(times), strict=True):
+        time = begin
+        while speed:
+            bound = high if sign * speed > 0.0 else low
+            arrives = time + abs((bound - value) / speed)
+            if arrives >= end:
+                break
+            if arrives > time:
+                corners.append((arrives, bound))
+            time, value, sign = arrives, bound, -sign
+        value = min(max(value + sign * speed * (end - time), low), high)
+        corners.append((end, value))
+    return tuple(corners)
 
 
 def _machine(

@@ -28,6 +28,7 @@ def prove(
     text: str,
     *,
     histories: int = HISTORIES,
+    slowed: bool = True,
     workers: int | None = None,
     progress: Progress = untold,
 ) -> Proof:
@@ -40,6 +41,8 @@ def prove(
     text : str
         The block, as it was written.
     histories : int
+    slowed : bool
+        As of `Histories`.
     workers : int, optional
         Processors to use; all that there are by default. What is found does not depend on it.
     progress : callable
@@ -52,7 +55,7 @@ def prove(
     CosimulationError
         Something cannot be compiled or loaded.
     """
-    numbering = Numbering.of(Histories.of(spec), histories, spec.check.seed)
+    numbering = Numbering.of(Histories.of(spec, slowed=slowed), histories, spec.check.seed)
     with closed_loop(spec, text, numbering.histories, workers, progress) as loop:
         judged = _judge(spec, loop, numbering, range(len(numbering.drawn)), progress)
         for numbers in numbering.rounds:
@@ -139,6 +142,7 @@ def _verdict(
         error_bound=error,
         seed=numbering.seed,
         count=numbering.count,
+        slowed=numbering.histories.slowed,
         parents=numbering.parents,
         judged=tuple(judged),
         by_fmpy=tuple(by_fmpy),

@@ -51,7 +51,7 @@ def trace(
     """
     progress("following a history")
     end_load = spec.machine().end_load
-    told, *perturbed = [histories.machine(history, errors) for errors in _errors(histories)]
+    told, *perturbed = [histories.perturbed(history, errors) for errors in _errors(histories)]
     machines = {"this history": history.parameters, "as told": told}
     machines |= {f"perturbed {number}": machine for number, machine in enumerate(perturbed, start=1)}
     sways = {}

@@ -72,9 +72,19 @@ class JudgedHistory:
             "live": dict(self.history.live),
             "parameters": dict(self.history.parameters),
             "commands": [
-                {"time_s": command.time, "command": command.command, "value": command.value}
+                {
+                    "time_s": command.time,
+                    "command": command.command,
+                    "value": command.value,
+                    "override": command.override,
+                    "velocity_limit_m_per_s": command.velocity_limit,
+                }
                 for command in self.history.commands
             ],
+            "hoisting": {
+                name: [{"time_s": time, "value": value} for time, value in corners]
+                for name, corners in self.history.hoisting.items()
+            },
             "promise": self.promise,
             "rests_after_s": self.rests_after,
             "residual_peaks_m": dict(self.residual),
@@ -96,6 +106,8 @@ class Proof:
         No residual is further than this from the truth, in m.
     seed, count : int
         With which the histories were drawn, and how many.
+    slowed : bool
+        Whether override and velocity limit varied, too.
     parents : sequence of sequences of int
         From which histories each round of the search began.
     judged : tuple of JudgedHistory
@@ -113,6 +125,7 @@ class Proof:
     error_bound: float
     seed: int
     count: int
+    slowed: bool
     parents: Sequence[Sequence[int]]
     judged: tuple[JudgedHistory, ...]
     by_fmpy: tuple[int, ...]
@@ -191,6 +204,7 @@ class Proof:
             "error_bound_m": self.error_bound,
             "histories": self.count,
             "seed": self.seed,
+            "slowed": self.slowed,
             "search_parents": [list(numbers) for numbers in self.parents],
             "share": self.share(self.worst),
             "worst": self.described(self.worst),

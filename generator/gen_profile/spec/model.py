@@ -48,6 +48,7 @@ RESIDUAL_SHARE = 0.01  # default limit of residual sway: this share of the longe
 
 ParameterSpan = Annotated[str, Named("parameter", of="span")]
 LiveParameter = Annotated[str, Named("parameter", of="live", reorder=False)]
+LiveRate = Annotated[str, Named("parameter", of="rate", reorder=False)]
 Span = Annotated[tuple[float, float], Rising()]
 SwingState = Annotated[str, Named("coordinate")]
 Shares = Annotated[Mapping[ParameterName, RelativeRange], example("L1 = 0.2")]
@@ -359,6 +360,8 @@ class PlannerSpec(Checked, table="planner"):
     ----------
     live : mapping of str to (float, float)
         Ranges of the machine's parameters, or places of its hoist, that the controller knows.
+    live_rate : mapping of str to float
+        How fast some of them may change on the way, each in its unit per second.
     quick_stop : float or None
         Deceleration of a stop that lets the load swing, in m/s²; None takes twice the limit.
     quick_stop_jerk : float or None
@@ -366,6 +369,7 @@ class PlannerSpec(Checked, table="planner"):
     """
 
     live: Annotated[Mapping[LiveParameter, Span], example("L1 = [3.0, 9.0]")] = NONE
+    live_rate: Annotated[Mapping[LiveRate, Positive], example("L1 = 0.1")] = NONE
     quick_stop: Positive | None = None
     quick_stop_jerk: Positive | None = None
 
@@ -424,6 +428,8 @@ class Spec(Checked):
         del document["check"]["default"]
         if self.planner == PlannerSpec():  # a spec without hashes as it did
             del document["planner"]
+        elif not self.planner.live_rate:
+            del document["planner"]["live_rate"]
         if self.check.foreign is not None:
             del document["check"]["foreign"]
             document["check"] |= self.check.foreign.to_dict()

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from gen_profile.plants.plant import Coordinate, Parameter, Plant
 from gen_profile.spec.model import Spec
 from gen_profile.spec.structure import place
+from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
 
 LARGEST_ANGLE = 1.4  # rad, of a load at the start
@@ -213,6 +214,10 @@ def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:
         if low < least > 1e-3 * high:
             problem = f"begins below the least that the machine takes, {least:g}"
             yield place("planner.live", name), problem
+    live = spec.planner.live
+    for name in spec.planner.live_rate:
+        if name not in live:
+            yield place("planner.live_rate", name), f"not among planner.live{suggestion(name, live)}"
 
 
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)

@@ -145,6 +145,7 @@ def _names(plant: Plant) -> dict[str, dict[str, Any]]:
         "coordinate": dict.fromkeys([*swing, *(f"{name}.rate" for name in swing)]),
         "parameter": dict.fromkeys(plant.nominal()),
         "span": {p.name: _span_within(p) for p in plant.parameters},
+        "rate": dict.fromkeys(known.name for known in live),
         "live": {known.name: _live_within(known) for known in live},
     }
 
