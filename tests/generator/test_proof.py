@@ -179,6 +179,7 @@ def followed(spec, text, ratio=1.0, corners=HOISTED):
         return run, dict(zip([*loop.outputs, "hook", "payload"], kept.T, strict=True))
 
 
+@pytest.mark.slow
 def test_a_rope_that_changes_on_the_way_against_other_equations(hoisting):
     """The rope is 2 % longer than the block is told, and takes up its speed within a tenth period."""
     run, out = followed(*hoisting, ratio=1.02)
@@ -192,6 +193,7 @@ def test_a_rope_that_changes_on_the_way_against_other_equations(hoisting):
     assert sway.max() > 0.3
 
 
+@pytest.mark.slow
 def test_what_a_changing_rope_leaves_is_calmed(hoisting):
     """Without, a tenth of the sway on the way and more would remain."""
     run, _ = followed(*hoisting)
@@ -204,6 +206,7 @@ def test_what_a_changing_rope_leaves_is_calmed(hoisting):
     assert out["bDone"].any()
 
 
+@pytest.mark.slow
 def test_a_rope_that_changes_faster_than_stated_ends_the_promise(hoisting):
     run, out = followed(*hoisting, corners=((0.0, 6.0), (2.0, 6.0), (22.0, 8.2)))
     assert not run.promise
@@ -236,6 +239,7 @@ def test_a_block_is_proved_for_ropes_that_change_on_the_way(written, changes):
     assert min(map(min, speeds)) < 0.5 * rate
 
 
+@pytest.mark.slow
 def test_hoisting_too_fast_for_the_allowed_sway_is_refused_with_its_number():
     changes = ["planner.live_rate={L1=0.1}", "robustness.uncertain={L1=0.05}", "check.residual_sway=0.005"]
     spec = parse_spec(BAY, changes)
