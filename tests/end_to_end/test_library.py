@@ -161,7 +161,7 @@ def test_a_sweep_without_plc_blocks_is_refused(tmp_path):
     outcome = run_here("library", folder, "--out", tmp_path / "library.st")
     assert (outcome.code, outcome.errors) == (
         2,
-        ["Error: A library needs the cases' PLC blocks: sweep again with --export plc."],
+        ["Error: A library needs the cases' PLC blocks: sweep again with the format plc."],
     )
 
 

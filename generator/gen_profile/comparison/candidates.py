@@ -132,7 +132,8 @@ def _optimal_within(spec: Spec, own: Callable[[], Profile | GenProfileError]) ->
     command = lag_compensated(motion, spec.actuator.tau)
     taken = max(greatest(command, 2, axis) for axis in range(command.axes))
     problem = problem_of(attrs.evolve(spec, limits=attrs.evolve(spec.limits, acceleration=taken)))
-    solution = direct.solve(problem) if problem.worst_case is None else worst_case.solve(problem)
+    solve = direct.solve if problem.worst_case is None else worst_case.solve
+    solution = transient_sway.kept_by_all(spec, problem, solve)
     if solution.optimum is None:
         unit = spec.machine().actuated[0].unit
         raise InfeasibleProblem(

@@ -6,6 +6,8 @@ is hardly depends on the motion: it is measured on one, and tried on the next.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import attrs
 
 from gen_profile.evaluation.scenarios import scenarios
@@ -77,9 +79,28 @@ def attempt(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Sol
         quick = attempt(attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, method="none")))
         spread = max(spread, quick.problem.sway_spread)
     problem = attrs.evolve(problem, sway_spread=spread)
-    solution = choice.attempt(problem, method)
-    if solution.optimum is None and problem.sway_spread == 1.0:
+    solution = kept_by_all(spec, problem, lambda asked: choice.attempt(asked, method), progress)
+    if solution.optimum is None and solution.problem.sway_spread == 1.0:
         return attrs.evolve(solution, problem=with_usual_spread(spec, problem))
+    return solution
+
+
+def kept_by_all(
+    spec: Spec, problem: Problem, solve: Callable[[Problem], Solution], progress: Progress = untold
+) -> Solution:
+    """Solve a problem again with less sway of the nominal machine, until all of a spec's keep its limit.
+
+    Parameters
+    ----------
+    spec : Spec
+    problem : Problem
+        Of that spec, whatever else it asks for.
+    solve : callable
+    progress : Progress
+    """
+    solution, limit = solve(problem), spec.limits.sway
+    if limit is None or not spec.checked_ranges():
+        return solution
     for _ in range(ROUNDS):
         if solution.optimum is None:
             break
@@ -88,7 +109,7 @@ def attempt(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Sol
             break
         spread = MARGIN * worst / nominal
         progress("solving", remark=f"for the machine that sways {spread:.3g} times as much on the way")
-        solution = choice.attempt(attrs.evolve(problem, sway_spread=spread), method)
+        solution = solve(attrs.evolve(problem, sway_spread=spread))
     return solution
 
 
