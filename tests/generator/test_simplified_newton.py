@@ -24,7 +24,7 @@ def posed(problem):
 
 
 def solve_surely(problem):
-    return solve_by_homotopy(problem, posed(problem), None)
+    return solve_by_homotopy(problem, posed(problem))
 
 
 def is_quick(solution):
