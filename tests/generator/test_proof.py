@@ -8,9 +8,9 @@ import attrs
 import numpy as np
 import pytest
 from command_line import run_here
+from generator.planned_machines import BAY, CYCLE, HOIST, PAPER, swing
 
 from gen_profile.artefacts.manifest import parse_manifest
-from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command, play
 from gen_profile.planner.design import planner_block
 from gen_profile.proof.closed_loop import ClosedLoop
@@ -20,41 +20,6 @@ from gen_profile.proof.numbering import CORNERS, DRAWS, SEARCH, Numbering
 from gen_profile.proof.prove import prove, replay
 from gen_profile.spec.reading import parse_spec
 from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
-
-G = 9.81
-CYCLE = 0.004
-BAY = f"""
-name = "bay 3"
-plant = {{ type = "double-pendulum-crane", m1 = 350.0, m2 = 2000.0, L1 = 6.0, L2 = 1.5 }}
-move = {{ distance = 8.0, duration = 14.0 }}
-limits = {{ velocity = 1.0, acceleration = 0.3, jerk = 1.0, travel = [0.0, 40.0] }}
-planner = {{ live = {{ L1 = [3.0, 9.0], m2 = [0.0, 2000.0] }} }}
-robustness = {{ uncertain = {{ L1 = 0.05 }} }}
-check = {{ residual_sway = 0.05 }}
-export = {{ cycle_time = {CYCLE} }}
-"""
-
-
-PAPER = """
-name = "paper"
-plant = { type = "double-pendulum-crane", m1 = 0.192, m2 = 0.203, L1 = 0.47, L2 = 0.391 }
-move = { distance = 0.3, duration = 3.0 }
-limits = { velocity = 0.3, acceleration = 0.7, jerk = 20.0, travel = [0.0, 2.0] }
-planner = { live = { L1 = [0.3, 0.6] } }
-robustness = { uncertain = { L1 = 0.03 } }
-check = { residual_sway = 0.003 }
-export = { cycle_time = 0.001 }
-"""
-HOIST = """
-name = "hoist"
-plant = { type = "single-pendulum-crane" }
-move = { distance = [1.0, 0.0], duration = 8.0 }
-limits = { velocity = 0.5, acceleration = 0.3, jerk = 2.0, travel = [0.0, 6.0] }
-planner = { live = { hoist = [0.0, 2.0] } }
-robustness = { uncertain = {} }
-check = { residual_sway = 0.01 }
-export = { cycle_time = 0.004 }
-"""
 
 
 @pytest.fixture(scope="module")
@@ -83,38 +48,6 @@ def designed(block):
 @pytest.fixture(scope="module")
 def proof(spec, text):
     return prove(spec, text, histories=40)
-
-
-def swing(time, acceleration, m1, m2, L1, L2, **_):
-    """Sway of two point masses below a cart, by absolute angles and their Lagrangian equations.
-
-    By Runge-Kutta steps over two cycles each, and so known in every second one. L1 is a number, or the rope's
-    length at these times.
-    """
-    rope = np.broadcast_to(L1, time.shape)
-    rate = np.gradient(rope, time)
-    driven = np.transpose([acceleration, rope, rate, np.gradient(rate, time)]).tolist()
-
-    def slope(state, inputs):
-        (a, b, da, db), (push, L, dL, ddL) = state, inputs
-        heavy, coupling, turned = (m1 + m2) * L, np.cos(a - b), 2.0 * dL * da
-        first = (m1 + m2) * (push * np.cos(a) - G * np.sin(a) - turned) - m2 * L2 * db**2 * np.sin(a - b)
-        second = push * np.cos(b) - G * np.sin(b) + (L * da**2 - ddL) * np.sin(a - b) - turned * coupling
-        ratio = m2 * coupling
-        dda = (first - ratio * second) / (heavy - ratio * L * coupling)
-        return np.array([da, db, dda, (second - L * coupling * dda) / L2])
-
-    states, step = [np.zeros(4)], 2.0 * (time[1] - time[0])
-    for begin, middle, end in zip(driven[:-2:2], driven[1:-1:2], driven[2::2], strict=True):
-        state = states[-1]
-        k1 = slope(state, begin)
-        k2 = slope(state + 0.5 * step * k1, middle)
-        k3 = slope(state + 0.5 * step * k2, middle)
-        k4 = slope(state + step * k3, end)
-        states.append(state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
-    found = np.transpose(states)
-    hook = rope[: 2 * len(states) : 2] * np.sin(found[0])
-    return np.abs([hook, hook + L2 * np.sin(found[1])])
 
 
 def test_a_history_against_other_equations(spec, text):
@@ -147,122 +80,6 @@ def test_a_move_on_the_machine_as_told_leaves_a_thousandth_of_its_sway(spec, tex
     with ClosedLoop(spec, text, Histories.of(spec)) as loop:
         run = loop.run(history)
     assert (run.residual < 1e-3 * run.on_the_way).all()
-
-
-HOISTED = ((0.0, 6.0), (2.0, 6.0), (27.0, 8.5), (32.0, 8.0))  # s and m: at 0.1 m/s
-
-
-@pytest.fixture(scope="module")
-def hoisting():
-    spec = parse_spec(BAY, ["planner.live_rate={L1=0.1}", "robustness.uncertain={L1=0.01}"])
-    return spec, planner_block(spec).text
-
-
-def followed(spec, text, ratio=1.0, corners=HOISTED):
-    """A move of 8 m and a stick while the rope changes, and all outputs and sways in every cycle."""
-    commands = (
-        Command(time=1.0, command="position", value=9.0, live={}),
-        Command(time=21.0, command="velocity", value=-0.7, live={}),
-        Command(time=25.0, command="stop", value=0.0, live={}),
-    )
-    history = History(
-        live={"L1": 6.0, "m2": 2000.0},
-        parameters=dict(spec.plant.parameters) | {"L1": ratio * 6.0},
-        places=(1.0,),
-        commands=commands,
-        hoisting={"L1": corners},
-    )
-    with ClosedLoop(spec, text, Histories.of(spec)) as loop:
-        run = loop.run(history)
-        kept = loop.run(history, rows=run.cycles).trace
-        assert loop.distance_from_fmpy(history, run.cycles) < 1e-12
-        return run, dict(zip([*loop.outputs, "hook", "payload"], kept.T, strict=True))
-
-
-@pytest.mark.slow
-def test_a_rope_that_changes_on_the_way_against_other_equations(hoisting):
-    """The rope is 2 % longer than the block is told, and takes up its speed within a tenth period."""
-    run, out = followed(*hoisting, ratio=1.02)
-    time = CYCLE * np.arange(run.cycles)
-    rounding = round(0.1 * Histories.of(hoisting[0]).period / CYCLE)
-    line = np.interp(CYCLE * (np.arange(1 - rounding, run.cycles)), *np.transpose(HOISTED))
-    rope = 1.02 * np.convolve(line, np.full(rounding, 1.0 / rounding), mode="valid")
-    sway = swing(time, out["fAcceleration"], m1=350.0, m2=2000.0, L1=rope, L2=1.5)
-    found = np.abs([out["hook"], out["payload"]])[:, : 2 * sway.shape[1] : 2]
-    assert np.abs(found - sway).max() < 1e-3
-    assert sway.max() > 0.3
-
-
-@pytest.mark.slow
-def test_what_a_changing_rope_leaves_is_calmed(hoisting):
-    """Without, a tenth of the sway on the way and more would remain."""
-    run, _ = followed(*hoisting)
-    assert run.promise
-    assert run.stands > 0
-    assert run.residual.max() < 0.01 * run.on_the_way.max()
-    spec, text = hoisting
-    careless, out = followed(spec, text.replace("cFollows : BOOL := TRUE", "cFollows : BOOL := FALSE"))
-    assert careless.residual.max() > 0.1 * careless.on_the_way.max()
-    assert out["bDone"].any()
-
-
-@pytest.mark.slow
-def test_a_rope_that_changes_faster_than_stated_ends_the_promise(hoisting):
-    run, out = followed(*hoisting, corners=((0.0, 6.0), (2.0, 6.0), (22.0, 8.2)))
-    assert not run.promise
-    assert out["nPromise"][-1] == 1
-    assert run.axes[0].jerk <= 1.0 + 1e-9
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("written", "changes"),
-    [
-        (BAY, ["planner.live_rate={L1=0.1}", "robustness.uncertain={L1=0.01}"]),
-        (HOIST, ["planner.live_rate={hoist=0.1}"]),
-    ],
-)
-def test_a_block_is_proved_for_ropes_that_change_on_the_way(written, changes):
-    """At the stated speed throughout, in corners, up and down, and with starts and stops in the others."""
-    spec = parse_spec(written, changes)
-    proof = prove(spec, planner_block(spec).text, histories=40)
-    assert proof.reasons() == ()
-    ((name, rate),) = spec.planner.live_rate.items()
-    speeds = []
-    for one in proof.judged:
-        times, values = np.transpose(one.history.hoisting[name])
-        assert min(values) >= spec.planner.live[name][0]
-        assert max(values) <= spec.planner.live[name][1]
-        speeds.append(np.abs(np.diff(values)) / np.diff(times))
-    assert max(map(max, speeds)) == pytest.approx(rate)
-    assert min(speeds[0]) == pytest.approx(rate)
-    assert min(map(min, speeds)) < 0.5 * rate
-
-
-@pytest.mark.slow
-def test_hoisting_too_fast_for_the_allowed_sway_is_refused_with_its_number():
-    changes = ["planner.live_rate={L1=0.1}", "robustness.uncertain={L1=0.05}", "check.residual_sway=0.005"]
-    spec = parse_spec(BAY, changes)
-    (reason,) = prove(spec, planner_block(spec).text, histories=12).reasons()
-    assert re.search(r"The payload sways by [0-9.]+ mm after history [0-9]+, and 5 mm are allowed", reason)
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        (["planner.live_rate={L2=0.1}"], "planner.live_rate.L2: not among planner.live"),
-        (["planner.live_rate={L1=0}"], "planner.live_rate.L1: must be greater than 0"),
-        (["planner.live_rate=0.1"], "planner.live_rate: must be a table such as"),
-        (["planner.live_rate={m2=1.0}"], "planner.live_rate.m2: no rope's length"),
-        (
-            ["planner.live_rate={L1=0.1}", "plant.c1=1.0"],
-            "planner.live_rate: the planner block follows machines",
-        ),
-    ],
-)
-def test_a_rate_that_cannot_be_followed_is_refused(changes, words):
-    with pytest.raises(SpecError, match=words):
-        planner_block(parse_spec(BAY, changes))
 
 
 def test_numbers_of_an_earlier_version_mean_what_they_meant(deployed, tmp_path):

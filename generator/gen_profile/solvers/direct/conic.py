@@ -19,10 +19,8 @@ from gen_profile.work import spend
 Matrix = Any  # scipy.sparse matrix or array
 TOLERANCE = 1e-10
 MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
-POSING, ITERATION = (
-    1.5e-6,
-    1.7e-7,
-)  # s of work for each entry of the constraints, and for each of an iteration's
+POSING = 1.5e-6  # s of work for each entry of the constraints
+ITERATION = 1.7e-7  # s of work for each entry, in each iteration
 
 
 class ConicStatus(Enum):
