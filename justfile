@@ -2,11 +2,24 @@
 check: lint coverage
 
 # Format, lint, types and import layers.
-lint:
+[parallel]
+lint: style types types-on-windows layers
+
+[private]
+style:
     ruff format --check
     ruff check
+
+[private]
+types:
     mypy
+
+[private]
+types-on-windows:
     mypy --platform win32 --cache-dir .mypy_cache/win32
+
+[private]
+layers:
     lint-imports
 
 # The whole suite with branch coverage; pyproject.toml holds the least share.
@@ -29,3 +42,7 @@ bench:
 # Random specs of all machines: how planning each one ends, and how long it takes.
 battery *arguments:
     python tests/generator/battery.py {{ arguments }}
+
+# Random sequences of knobs in the studio: how they end, and what they leave behind.
+knobs *arguments:
+    python tests/end_to_end/knob_sequences.py {{ arguments }}

@@ -1,4 +1,4 @@
-"""For all tests: Hypothesis without deadlines, as machines differ, and derandomised; one cache of FMUs."""
+"""For all tests: Hypothesis without deadlines, as machines differ, and derandomised; one cache; options."""
 
 import os
 import signal
@@ -17,6 +17,35 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 if sys.platform != "win32":
     signal.signal(signal.SIGQUIT, signal.SIG_DFL)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup has it ignored
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Give `-n auto` one process more than there are processors, since many tests wait for other programs."""
+    return (os.cpu_count() or 1) + 1
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--first-cases",
+        action="store_true",
+        help="run each parametrised test once only, which does to try other versions of libraries",
+    )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--first-cases"):
+        first = {item.nodeid.partition("[")[0]: item for item in reversed(items)}
+        kept = set(first.values())
+        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+        items[:] = [item for item in items if item in kept]
+
+
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Halve the intervals of limited motions: what is refused, named and found to work is so on any mesh."""
+    monkeypatch.setattr("gen_profile.solvers.direct.set_up.INTERVALS", 20)
 
 
 @pytest.fixture(scope="session", autouse=True)

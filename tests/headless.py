@@ -34,13 +34,22 @@ class Browser:
     def __init__(self, driver: webdriver.Chrome) -> None:
         self._driver = driver
 
+    @property
+    def driver(self) -> webdriver.Chrome:
+        """For what else a hand does."""
+        return self._driver
+
     def open(self, page: Path, *, width: int = 1280, mobile: bool = False) -> None:
         """Load a page in a window of a width, and wait until it has drawn everything."""
-        size = {"width": width, "height": 844, "deviceScaleFactor": 1, "mobile": mobile}
-        self._driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        self._driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": mobile})
+        self.size(width, 844, mobile=mobile)
         self.visit(page.as_uri())
         self.wait("return document.documentElement.dataset.drawn === 'true'")
+
+    def size(self, width: int, height: int, *, mobile: bool = False) -> None:
+        """Give the window a size in pixels."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": mobile}
+        self._driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        self._driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": mobile})
 
     def visit(self, address: str) -> None:
         """Load whatever is at an address."""
@@ -54,13 +63,24 @@ class Browser:
         """Run a function's body whose last argument takes the result."""
         return self._driver.execute_async_script(script, *arguments)
 
-    def wait(self, script: str) -> None:
+    def wait(self, script: str, *arguments: object) -> None:
         """Wait until a function's body gives something true."""
-        WebDriverWait(self._driver, PATIENCE, poll_frequency=0.05).until(lambda _: self.run(script))
+        WebDriverWait(self._driver, PATIENCE, poll_frequency=0.05).until(
+            lambda _: self.run(script, *arguments)
+        )
 
     def find(self, selector: str) -> WebElement:
         """Find the first element of a CSS selector."""
         return self._driver.find_element(By.CSS_SELECTOR, selector)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 10) -> None:
+        """Press the mouse at a place of the window, move it to another in steps, and let go."""
+        for step in (-1, *range(steps + 1), steps + 1):
+            share = min(max(step, 0), steps) / steps
+            x, y = (a + share * (b - a) for a, b in zip(start, end, strict=True))
+            kind = {-1: "mousePressed", steps + 1: "mouseReleased"}.get(step, "mouseMoved")
+            mouse = {"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1}
+            self._driver.execute_cdp_cmd("Input.dispatchMouseEvent", mouse)
 
     def complaints(self) -> list[str]:
         """What the console said since the last call: errors, warnings, what the page's policy refused."""

@@ -66,7 +66,6 @@ class Exporter(Protocol):
         ExportError
             The format or the target cannot take the motion.
         """
-        ...
 
     def replay(self, content: bytes, target: Target) -> SampledProfile:
         """Read what the controller will issue each cycle.
@@ -76,11 +75,10 @@ class Exporter(Protocol):
         ExportError
             The content is not what `encode` writes: truncated, damaged or meant for another target.
         """
-        ...
 
 
 class BlockContainer(Exporter, Protocol):
-    """A format whose first file holds a function block: any, be it of one motion or of a library."""
+    """A format whose first file holds a function block, of one motion or of a library."""
 
     def wrap(self, source: BlockSource, target: Target) -> tuple[File, ...]:
         """Write the block, and what the controller needs around it.
@@ -90,7 +88,6 @@ class BlockContainer(Exporter, Protocol):
         ExportError
             The format or the target cannot take the block.
         """
-        ...
 
     def unwrap(self, content: bytes, target: Target) -> BlockSource:
         """Read the first file's first block as Structured Text has it.
@@ -100,7 +97,6 @@ class BlockContainer(Exporter, Protocol):
         ExportError
             There is none.
         """
-        ...
 
 
 def target_of(spec: Spec) -> Target:

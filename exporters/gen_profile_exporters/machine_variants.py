@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import product
 from types import SimpleNamespace
+from typing import Any
 
 import attrs
 import numpy as np
@@ -54,7 +55,8 @@ class AxisVariants:
     shift: bool = False
 
 
-# Accelerations, then sways, of (q_u, q̇_u, q_a, q̇_a, q̈_a).
+# Accelerations, then sways, of q_u, q̇_u, q_a, q̇_a, q̈_a; each has a row for every state.
+States = list[Array]
 Law = Callable[[Array, Array, Array, Array, Array], tuple[Array, Array]]
 
 
@@ -75,22 +77,33 @@ def _law(plant: Plant, spec: Spec) -> Law:
     p = SimpleNamespace(**spec.plant.parameters)
 
     def law(q_u: Array, dq_u: Array, q_a: Array, dq_a: Array, ddq_a: Array) -> tuple[Array, Array]:
-        terms = plant.equations(list(q_u), list(dq_u), list(q_a), list(dq_a), p)
-        push = np.array(terms.K_u) + np.array(terms.G_u) - np.array(terms.M_au).T @ ddq_a
-        sway = plant.outputs(list(q_u), list(q_a), p).sway
-        return np.linalg.solve(np.array(terms.M_uu, dtype=float), push), np.array(sway, dtype=float)
+        count, swing, at = len(q_u), list(q_u.T), list(q_a.T)
+        terms = plant.equations(swing, list(dq_u.T), at, list(dq_a.T), p)
+        driven = _matrices(terms.M_au, count).swapaxes(1, 2) @ ddq_a[..., None]
+        push = _matrices([terms.K_u, terms.G_u], count).sum(axis=1)[..., None] - driven
+        sway = _matrices([plant.outputs(swing, at, p).sway], count)[:, 0]
+        return np.linalg.solve(_matrices(terms.M_uu, count), push)[..., 0], sway
 
     return law
 
 
-def _states(plant: Plant, spec: Spec) -> list[list[Array]]:
+def _matrices(rows: Sequence[Sequence[Any]], count: int) -> Array:
+    """Stack matrices of so many states, whose entries are an array over the states or the same in all."""
+    found = np.empty((count, len(rows), len(rows[0])))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            found[:, i, j] = entry
+    return found
+
+
+def _states(plant: Plant, spec: Spec) -> States:
     """List states on the way of the move, at which laws are compared; always the same ones."""
     random = np.random.default_rng(1)
     start, target = np.array(spec.move.start), np.array(spec.move.target)
     size = np.abs(target - start) + 0.1
     speed, push = size / spec.move.duration, size / spec.move.duration**2
     loads = len(plant.unactuated)
-    return [
+    states = [
         [
             *(SWING * random.uniform(-1.0, 1.0, (2, loads))),
             start + share * (target - start),
@@ -99,49 +112,51 @@ def _states(plant: Plant, spec: Spec) -> list[list[Array]]:
         ]
         for share in np.linspace(0.1, 0.9, STATES)
     ]
+    return [np.array(values) for values in zip(*states, strict=True)]
 
 
 def _same(found: Sequence[Array], due: Sequence[Array]) -> bool:
+    """Whether quantities are the same in every state, each in units of its greatest entry there."""
     return all(
-        np.abs(one - other).max() <= TOLERANCE * (np.abs(other).max() + TOLERANCE)
+        bool((_greatest(one - other) <= TOLERANCE * (_greatest(other) + TOLERANCE)).all())
         for one, other in zip(found, due, strict=True)
     )
 
 
-def _changed(state: list[Array], axis: int, *, by: float = 0.0, factor: float = 1.0) -> list[Array]:
+def _greatest(values: Array) -> Array:
+    """Greatest magnitude in every state."""
+    return np.asarray(np.abs(values.reshape(len(values), -1)).max(axis=1))
+
+
+def _changed(states: States, axis: int, *, by: float = 0.0, factor: float = 1.0) -> States:
     """Let an axis stand elsewhere, and move so many times as fast."""
-    q_u, dq_u, q_a, dq_a, ddq_a = (values.copy() for values in state)
-    q_a[axis] += by
-    dq_a[axis] *= factor
-    ddq_a[axis] *= factor
+    q_u, dq_u, q_a, dq_a, ddq_a = (values.copy() for values in states)
+    q_a[:, axis] += by
+    dq_a[:, axis] *= factor
+    ddq_a[:, axis] *= factor
     return [q_u, dq_u, q_a, dq_a, ddq_a]
 
 
-def _shifts(law: Law, states: list[list[Array]], axis: int) -> bool:
-    return all(
-        _same(law(*_changed(state, axis, by=by)), law(*state)) for state in states for by in (0.05, 0.01)
-    )
+def _shifts(law: Law, states: States, axis: int) -> bool:
+    due = law(*states)
+    return all(_same(law(*_changed(states, axis, by=by)), due) for by in (0.05, 0.01))
 
 
-def _mirrors(law: Law, states: list[list[Array]], axis: int) -> bool:
-    loads = len(states[0][0])
+def _mirrors(law: Law, states: States, axis: int) -> bool:
+    loads = states[0].shape[1]
     signs = product((-1.0, 1.0), repeat=loads) if loads <= MOST_SIGNS else [(-1.0,) * loads]
-    return any(all(_mirrored(law, state, axis, np.array(sign)) for state in states) for sign in signs)
+    return any(_mirrored(law, states, axis, np.array(sign)) for sign in signs)
 
 
-def _mirrored(law: Law, state: list[Array], axis: int, sign: Array) -> bool:
-    q_u, dq_u, *axes = _changed(state, axis, factor=-1.0)
+def _mirrored(law: Law, states: States, axis: int, sign: Array) -> bool:
+    q_u, dq_u, *axes = _changed(states, axis, factor=-1.0)
     acceleration, sway = law(sign * q_u, sign * dq_u, *axes)
-    due, seen = law(*state)
+    due, seen = law(*states)
     return _same((sign * acceleration, np.abs(sway)), (due, np.abs(seen)))
 
 
-def _is_linear(law: Law, states: list[list[Array]], axis: int) -> bool:
-    return all(_linear_at(law, state, axis) for state in states)
-
-
-def _linear_at(law: Law, state: list[Array], axis: int) -> bool:
-    rest = [np.zeros_like(state[0]), np.zeros_like(state[1]), *state[2:]]
+def _is_linear(law: Law, states: States, axis: int) -> bool:
+    rest = [np.zeros_like(states[0]), np.zeros_like(states[1]), *states[2:]]
     still = _changed(rest, axis, factor=0.0)
     others = law(*still)[0]
     whole = law(*rest)[0] - others
@@ -152,28 +167,28 @@ def _linear_at(law: Law, state: list[Array], axis: int) -> bool:
     coupling = _coupling(law, still)
     if not _same([_coupling(law, rest)], [coupling]):
         return False
-    return not (_reached(whole, coupling) & _reached(others, coupling)).any()
+    return not bool((_reached(whole, coupling) & _reached(others, coupling)).any())
 
 
-def _coupling(law: Law, state: list[Array]) -> Array:
+def _coupling(law: Law, states: States) -> Array:
     """Differentiate the accelerations by q_u, then by q̇_u, one column each."""
     columns = []
-    for which, number in product((0, 1), range(len(state[0]))):
+    for which, number in product((0, 1), range(states[0].shape[1])):
         ends = []
         for sign in (-1.0, 1.0):
-            moved = [values.copy() for values in state]
-            moved[which][number] += sign * STEP
+            moved = [values.copy() for values in states]
+            moved[which][:, number] += sign * STEP
             ends.append(law(*moved)[0])
         columns.append((ends[1] - ends[0]) / (2.0 * STEP))
-    return np.array(columns).T
+    return np.stack(columns, axis=-1)
 
 
 def _reached(push: Array, coupling: Array) -> NDArray[np.bool_]:
-    """Tell which coordinates a push moves, through their coupling too."""
-    small = TOLERANCE * np.abs(coupling).max()
-    loads = len(push)
-    linked = (np.abs(coupling[:, :loads]) > small) | (np.abs(coupling[:, loads:]) > small)
-    reached: NDArray[np.bool_] = np.abs(push) > TOLERANCE * (np.abs(push).max() + TOLERANCE)
+    """Tell which coordinates a push moves, through their coupling too, in every state."""
+    small = TOLERANCE * _greatest(coupling)[:, None, None]
+    loads = push.shape[1]
+    linked = (np.abs(coupling[:, :, :loads]) > small) | (np.abs(coupling[:, :, loads:]) > small)
+    reached: NDArray[np.bool_] = np.abs(push) > TOLERANCE * (_greatest(push)[:, None] + TOLERANCE)
     for _ in range(loads):
-        reached = reached | (linked @ reached)
+        reached = reached | (linked @ reached[..., None])[..., 0]
     return reached

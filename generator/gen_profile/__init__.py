@@ -10,6 +10,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gen_profile.certificate.from_file import certify_artefact as certify_artefact
+    from gen_profile.certificate.from_file import check_certificate as check_certificate
     from gen_profile.charts.plot import plot as plot
     from gen_profile.comparison.compare import compare as compare
     from gen_profile.comparison.robustness import robustness as robustness
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from gen_profile.designs.fmu import export_fmu as export_fmu
     from gen_profile.designs.plan import plan as plan
     from gen_profile.designs.planner import deploy_planner as deploy_planner
+    from gen_profile.errors import CertificateError as CertificateError
     from gen_profile.errors import CheckFailed as CheckFailed
     from gen_profile.errors import CosimulationError as CosimulationError
     from gen_profile.errors import ExportError as ExportError
@@ -51,48 +54,32 @@ if TYPE_CHECKING:
     from gen_profile.verification.from_python import cosimulate as cosimulate
     from gen_profile.verification.from_python import residual_sways as residual_sways
 
-_HOMES = {
-    "CheckFailed": "errors",
-    "CosimulationError": "errors",
-    "Design": "designs.design",
-    "ExportError": "errors",
-    "GenProfileError": "errors",
-    "InfeasibleProblem": "errors",
-    "LimitViolation": "errors",
-    "OutputError": "errors",
-    "Planner": "planner.planner",
-    "Profile": "motion.profile",
-    "SampledProfile": "motion.profile",
-    "SolverDiverged": "errors",
-    "Spec": "spec.model",
-    "SpecError": "errors",
-    "check_artefact": "verification.check",
-    "compare": "comparison.compare",
-    "cosimulate": "verification.from_python",
-    "deploy_planner": "designs.planner",
-    "design": "designs.design",
-    "evaluate": "evaluation.motion_evaluation",
-    "evolve_spec": "spec.reading",
-    "export_fmu": "designs.fmu",
-    "identify": "identification.identify",
-    "linearize": "problem.linearization",
-    "lookup": "sweep.lookup",
-    "make_spec": "spec.reading",
-    "parse_period": "identification.measurements",
-    "parse_reading": "identification.measurements",
-    "parse_spec": "spec.reading",
-    "plan": "designs.plan",
-    "plot": "charts.plot",
-    "preset_spec": "spec.reading",
-    "presets": "spec.reading",
-    "read_spec": "spec.reading",
-    "read_swing": "identification.identify",
-    "residual_sways": "verification.from_python",
-    "robustness": "comparison.robustness",
-    "run_sweep": "sweep.from_python",
-    "sample": "motion.profile",
-    "write_library": "sweep.library",
-}
+_NAMES = {
+    "errors": "CertificateError CheckFailed CosimulationError ExportError GenProfileError InfeasibleProblem "
+    "LimitViolation OutputError SolverDiverged SpecError",
+    "certificate.from_file": "certify_artefact check_certificate",
+    "charts.plot": "plot",
+    "comparison.compare": "compare",
+    "comparison.robustness": "robustness",
+    "designs.design": "Design design",
+    "designs.fmu": "export_fmu",
+    "designs.plan": "plan",
+    "designs.planner": "deploy_planner",
+    "evaluation.motion_evaluation": "evaluate",
+    "identification.identify": "identify read_swing",
+    "identification.measurements": "parse_period parse_reading",
+    "motion.profile": "Profile SampledProfile sample",
+    "planner.planner": "Planner",
+    "problem.linearization": "linearize",
+    "spec.model": "Spec",
+    "spec.reading": "evolve_spec make_spec parse_spec preset_spec presets read_spec",
+    "sweep.from_python": "run_sweep",
+    "sweep.library": "write_library",
+    "sweep.lookup": "lookup",
+    "verification.check": "check_artefact",
+    "verification.from_python": "cosimulate residual_sways",
+}  # by module
+_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> Any:

@@ -10,6 +10,7 @@
     ├── LimitViolation       3   the motion found breaks a limit of the spec
     ├── CheckFailed          4   the written artefact leaves too much sway
     ├── CosimulationError    4   the check itself could not be carried out
+    ├── CertificateError     4   a certificate cannot be made, or does not hold
     ├── ExportError          5   the target cannot take the motion
     └── StreamAborted        6   streaming was stopped
 
@@ -76,6 +77,12 @@ class CheckFailed(GenProfileError):
 
 class CosimulationError(GenProfileError):
     """The plant FMU could not be built, loaded or stepped."""
+
+    exit_code = 4
+
+
+class CertificateError(GenProfileError):
+    """A proof cannot be carried out, or a certificate does not prove what it says."""
 
     exit_code = 4
 

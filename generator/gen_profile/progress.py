@@ -10,7 +10,6 @@ class Progress(Protocol):
 
     def __call__(self, stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
         """Take the stage, how many of its steps are done, of how many if that is known, and a remark."""
-        ...
 
 
 def untold(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:

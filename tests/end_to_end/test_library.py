@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from command_line import run_here
+from sweeps import archived
 
 from gen_profile.errors import ExportError
 from gen_profile.spec.reading import preset_spec
@@ -49,6 +50,12 @@ def library(swept, tmp_path_factory):
     stages = [line for line in outcome.err.splitlines() if not line.startswith("reading profiles, ")]
     assert stages == ["writing the library and reading it back …"]
     return path, outcome.document
+
+
+def test_one_file_gives_the_same_library(swept, library, tmp_path):
+    path = archived(swept, tmp_path / "swept.sqlite")
+    assert run_here("library", path, "--out", tmp_path / "bay 3.st").code == 0
+    assert (tmp_path / "bay 3.st").read_bytes() == library[0].read_bytes()
 
 
 @pytest.mark.slow

@@ -38,6 +38,7 @@ def test_a_limit_that_can_be_kept_is_kept(tmp_path, free, name, limit):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize(("name", "limit", "lag"), IMPOSSIBLE)
 def test_an_impossible_limit_is_named_with_a_cure_that_works(tmp_path, name, limit, lag):
     words = (*lag, "--set", f"limits.{name}={limit}", "--out", tmp_path / "new", "--json")

@@ -2,11 +2,13 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import pyarrow
 import pytest
 from command_line import run_here
 from pyarrow import parquet
+from sweeps import archived
 
 from gen_profile.spec.reading import preset_spec
 from gen_profile.sweep.store import grid_of
@@ -61,6 +63,18 @@ def test_what_was_swept_is_found_itself(library):
     assert found["artefact"]["manifest"] == "matches"
     assert found["sway_residual_worst_m"] == pytest.approx(row["check_worst_sway_m"], rel=1e-3)
     assert found["artefacts"][0]["path"] == str(library / row["folder"] / "paper.csv")
+
+
+def test_one_file_answers_as_the_folder_does_and_gives_the_profile_out(library, tmp_path):
+    words = ("--move.distance", "0.31", "--plant.L1", "0.305", "--solver.method", "auto")
+    path = archived(library, tmp_path / "library.sqlite")
+    due, found = looked_up(library, *words), looked_up(path, *words, "--out", tmp_path / "out")
+    files = {"artefact": found["artefact"], "artefacts": found["artefacts"]}
+    assert found == due | files
+    for one, other in zip(due["artefacts"], found["artefacts"], strict=True):
+        assert Path(other["path"]).parent == tmp_path / "out"
+        assert Path(other["path"]).read_bytes() == Path(one["path"]).read_bytes()
+    assert check_artefact(found["artefacts"][0]["path"]).manifest == "matches"
 
 
 @pytest.mark.parametrize("length", [0.305, 0.31])

@@ -1,7 +1,6 @@
 """The picture of a comparison."""
 
 import os
-import re
 from itertools import combinations
 from xml.etree import ElementTree
 
@@ -9,12 +8,14 @@ import numpy as np
 import pytest
 from command_line import run_here, run_process
 from matplotlib import image, pyplot
+from pictures import colours
 
 import gen_profile as gp
 from gen_profile.charts.comparison import comparison_figure
-from gen_profile.charts.figure import LIMIT
+from gen_profile.charts.figure import LIMIT, Figure, Line, Panel
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.charts.picture import drawn as draw_side_by_side
+from gen_profile.charts.picture import save
 from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.phrases import number
@@ -36,20 +37,21 @@ def plain():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("comparison", ["paper"], indirect=True)
 def test_a_bitmap_shows_lines_of_many_colours(comparison, tmp_path):
     gp.plot(comparison, tmp_path / "picture.png")
     pixels = image.imread(tmp_path / "picture.png")
     height, width, _ = pixels.shape
     assert height > 800 and width > 800
-    bytes_ = (255 * pixels[..., :3]).astype(int).reshape(-1, 3)
-    colours, counts = np.unique(bytes_, axis=0, return_counts=True)
-    vivid = (np.ptp(colours, axis=1) > 80) & (counts > 100)
+    found, counts = colours(tmp_path / "picture.png")
+    vivid = (np.ptp(found[:, :3], axis=1) > 80) & (counts > 100)
     assert vivid.sum() >= 5  # one colour per method
     rows_with_ink = (pixels[..., :3].min(axis=2) < 0.9).any(axis=1)
     assert rows_with_ink.mean() > 0.8
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("comparison", ["flexible-joint"], indirect=True)
 def test_a_vector_picture_is_well_formed_and_names_what_it_shows(comparison, tmp_path):
     gp.plot(comparison, tmp_path / "picture.svg")
     root = ElementTree.parse(tmp_path / "picture.svg").getroot()
@@ -59,29 +61,32 @@ def test_a_vector_picture_is_well_formed_and_names_what_it_shows(comparison, tmp
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("preset", "load"), [("paper-beta0", "payload"), ("gantry-crane", "load")])
-def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path, preset, load):
+def test_a_load_with_two_directions_is_drawn_as_a_whole(tmp_path):
     picture = tmp_path / "picture.svg"
-    assert run_here("compare", "--preset", preset, *FEW, "--plot", picture).code == 0
+    assert run_here("compare", "--preset", "gantry-crane", *FEW, "--plot", picture).code == 0
     text = picture.read_text("utf-8")
-    assert f"<!-- Worst residual sway of the {load} over all machines -->" in text
-    assert f"<!-- Sway of the {load}, nominal -->" in text
+    assert "<!-- Worst residual sway of the load over all machines -->" in text
+    assert "<!-- Sway of the load, nominal -->" in text
     assert "payload-" not in text
 
 
-def test_a_notebook_shows_what_a_file_holds(plain, tmp_path):
+@pytest.mark.slow
+def test_a_notebook_shows_what_a_file_holds_whenever_it_is_drawn(plain, tmp_path, monkeypatch):
+    monkeypatch.setattr("time.time", lambda: 1e9)
     shown = gp.plot(plain)
+    monkeypatch.setattr("time.time", lambda: 1.1e9)
     gp.plot(plain, tmp_path / "picture.svg")
     assert shown._repr_svg_() == (tmp_path / "picture.svg").read_text("utf-8")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_pictures_of_one_comparison_are_alike_to_the_byte(plain, tmp_path, suffix, monkeypatch):
+def test_pictures_of_one_figure_are_alike_to_the_byte(tmp_path, suffix, monkeypatch):
+    line = Line(name="line", x=np.arange(3.0), y=np.arange(3.0))
+    figure = Figure(caption="caption", panels=[Panel(title="panel", x_label="x", y_label="y", lines=[line])])
     pictures = []
     for clock in (1e9, 1.1e9):
         monkeypatch.setattr("time.time", lambda clock=clock: clock)
-        gp.plot(plain, tmp_path / f"picture{suffix}")
+        save([figure], tmp_path / f"picture{suffix}", "salt", "title")
         pictures.append((tmp_path / f"picture{suffix}").read_bytes())
     assert pictures[0] == pictures[1]
 
@@ -177,9 +182,9 @@ def test_limits_are_drawn_where_curves_come_near():
     pyplot.close(picture)
 
 
-def test_numerical_error_is_no_figure_of_a_bar(plain, tmp_path):
-    gp.plot(plain, tmp_path / "picture.svg")
-    assert not re.search(r"<!-- +[\d.]+e-", (tmp_path / "picture.svg").read_text("utf-8"))
+def test_numerical_error_is_no_figure_of_a_bar(plain):
+    bars = comparison_figure(plain).panels[-1]
+    assert len(bars.texts) > 5 and not any("e-" in text for text in bars.texts)
 
 
 def test_sway_is_drawn_on_the_nominal_machine_and_at_both_ends_of_the_ranges(drawn):

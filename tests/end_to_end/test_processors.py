@@ -4,8 +4,9 @@ import os
 
 import pytest
 
+from gen_profile.artefacts.manifest import versions
 from gen_profile.plants.registry import find_plant
-from gen_profile.sweep.case import Recipe, run_case, versions
+from gen_profile.sweep.case import Recipe, run_case
 from gen_profile.verification import batch as many_machines
 from gen_profile.verification.batch import on_processors
 from gen_profile_fmu.running.many_runs import ManyRuns

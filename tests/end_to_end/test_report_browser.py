@@ -162,7 +162,7 @@ def test_the_slider_sets_the_time_and_larger_sway_is_drawn_larger(browser, paper
     assert hanging == pytest.approx(end, abs=0.5)
     assert "arrived" in browser.find(".clock").text
     browser.run(SEEK, 0.1)  # 0.7 s
-    told = float(re.search(r"\+([0-9.]+) mm", browser.find(".actor h4 span").text)[1])
+    told = float(re.search(r"\+([0-9.]+) mm", browser.find(".actor h3 span").text)[1])
     assert told == pytest.approx(19.35, abs=0.05)
     scale = (end - start) / 300.0
     trolley, load = places()

@@ -41,7 +41,7 @@ def swing(motion, p, until):
         return [da, db, *np.linalg.solve(M, force)]
 
     times = np.arange(0.0, until, STEP)
-    solved = solve_ivp(rate, (0.0, until), [0.0] * 4, t_eval=times, rtol=1e-9, atol=1e-12, max_step=0.05)
+    solved = solve_ivp(rate, (0.0, until), [0.0] * 4, "DOP853", times, rtol=1e-9, atol=1e-12, max_step=0.2)
     return times, solved.y[0], solved.y[1]
 
 

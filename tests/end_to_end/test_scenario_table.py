@@ -51,6 +51,7 @@ def test_every_row_is_the_scenario_of_the_json_document(checked, tmp_path):
     assert {row["verdict"] for row in found} == {"passed", "failed"}
 
 
+@pytest.mark.slow
 def test_it_tells_what_each_group_s_setpoints_went_through(checked, tmp_path):
     path = tmp_path / "rows.csv"
     run_here("check", checked / "paper.csv", "--csv", path)

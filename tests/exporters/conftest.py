@@ -14,11 +14,13 @@ from system_parts import missing
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-collect_ignore = [] if os.environ.get("IEC2C") else ["test_compiled_block.py", "test_compiled_library.py"]
+collect_ignore_glob = [] if os.environ.get("IEC2C") else ["test_compiled_*.py"]
 
 
 def pytest_report_header():
-    state = "NOT compiled, as IEC2C is not set" if collect_ignore else f"compiled by {os.environ['IEC2C']}"
+    state = (
+        "NOT compiled, as IEC2C is not set" if collect_ignore_glob else f"compiled by {os.environ['IEC2C']}"
+    )
     return f"structured text: interpreted; {state}"
 
 

@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from exporters.st_interpreter import FunctionBlock
 
 from gen_profile_exporters.st_to_c import translate
 
@@ -68,3 +69,18 @@ class CountedBlock:
             self.memory, rows.ctypes.data_as(DOUBLES), ctypes.c_long(cycles), issued.ctypes.data_as(DOUBLES)
         )
         return dict(zip(self.outputs, issued.T, strict=True))
+
+
+def require_interpreted(text, block, orders):
+    """Hold what a block issues, bit for bit, to an interpreter that also refuses indices out of bounds.
+
+    Orders are cycles and the inputs that change from there on. Gives the outputs of the last cycle.
+    """
+    oracle = FunctionBlock(text)
+    for cycles, given in orders:
+        for number in range(cycles):
+            out = block.hold(1, **(given if number == 0 else {}))
+            due = oracle.call(**{k: bool(v) if k[0] == "b" else v for k, v in block.inputs.items()})
+            shown = {name: value[0] for name, value in out.items() if name != "operations"}
+            assert {name: float(due[name.lower()]) for name in shown} == shown
+    return shown

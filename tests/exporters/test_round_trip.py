@@ -18,7 +18,7 @@ AXES = {1: ("cart",), 2: ("bridge", "trolley")}
 MOVES = {1: quintic((0.1, 0.4)), 2: quintic((0.1, 0.4), (1.2, -0.7))}
 UNITS = ["m", "mm", "um", "deg", "counts"]
 
-bounded = settings(max_examples=60, deadline=None, derandomize=True)
+bounded = settings(max_examples=30, deadline=None, derandomize=True)
 
 
 class Contract(NamedTuple):

@@ -10,6 +10,7 @@ import pytest
 from fmu.caches import share_zig
 
 from gen_profile.errors import CosimulationError
+from gen_profile_fmu.building import build
 from gen_profile_fmu.building.cache import cache_folders, cached, is_intact, write_entry
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
@@ -46,6 +47,28 @@ def new_cache(tmp_path, cache, monkeypatch):
     return folder
 
 
+@pytest.fixture(scope="module")
+def libraries():
+    """What was compiled, by all that it is made of."""
+    return {}
+
+
+@pytest.fixture
+def compiled_once(libraries, monkeypatch):
+    """Spare tests of what becomes of a library its second compilation."""
+    compile_library = build.compile_library
+
+    def compile_or_copy(compiler, folder, source, output, zig_cache):
+        texts = tuple((path.name, path.read_bytes()) for path in sorted(folder.iterdir()))
+        key = (compiler, texts, source, output)
+        if key not in libraries:
+            compile_library(compiler, folder, source, output, zig_cache)
+            libraries[key] = (folder / output).read_bytes()
+        (folder / output).write_bytes(libraries[key])
+
+    monkeypatch.setattr(build, "compile_library", compile_or_copy)
+
+
 @pytest.fixture
 def temporary_folder(tmp_path, monkeypatch):
     folder = tmp_path / "temporary"
@@ -66,6 +89,7 @@ class TestPlantFmu:
         assert first.archive.is_relative_to(new_cache)
         assert first.archive.is_file()
 
+    @pytest.mark.usefixtures("compiled_once")
     def test_is_compiled_again_for_other_equations(self, new_cache, builds, crane):
         first = builds.get()
         other = attrs.evolve(
@@ -76,6 +100,7 @@ class TestPlantFmu:
         assert first.folder != second.folder
 
     @pytest.mark.slow
+    @pytest.mark.usefixtures("compiled_once")
     @pytest.mark.parametrize("kind", ["*.xml", "*.fmu", "binaries/*/*", "checksums.json"])
     @pytest.mark.parametrize("damage", ["truncated", "missing", "altered"])
     def test_is_mended(self, new_cache, builds, crane, kind, damage):
@@ -96,7 +121,7 @@ class TestPlantFmu:
         assert path.read_bytes() == content
         assert works(crane)
 
-    @pytest.mark.slow
+    @pytest.mark.usefixtures("compiled_once")
     @pytest.mark.parametrize("listing", ["[]", "{}", '"text"', "3", '{"gone": "00"}', "\udcff"])
     def test_is_mended_when_its_listing_is_something_else(self, new_cache, builds, listing):
         path = builds.get().folder / "checksums.json"
@@ -126,6 +151,7 @@ class TestPlantFmu:
         assert is_intact(paths.pop().parent)
         assert not list(new_cache.glob("build-*"))
 
+    @pytest.mark.usefixtures("compiled_once")
     def test_needs_no_home(self, cache, temporary_folder, builds, crane, monkeypatch):
         """As for a user of a container whom the list of users does not know."""
 
@@ -139,6 +165,7 @@ class TestPlantFmu:
         assert builds.get().folder.is_relative_to(temporary_folder)
         assert works(crane)
 
+    @pytest.mark.usefixtures("compiled_once")
     @pytest.mark.parametrize("obstacle", ["a file", "a folder that does not take files"])
     def test_falls_back_when_the_cache_cannot_be_written(
         self, obstacle, tmp_path, cache, temporary_folder, builds, crane, monkeypatch
@@ -152,6 +179,7 @@ class TestPlantFmu:
         assert builds.count == 1
         assert works(crane)
 
+    @pytest.mark.usefixtures("compiled_once")
     def test_is_read_from_a_cache_that_cannot_be_written(self, new_cache, builds, monkeypatch):
         first = builds.get()
 

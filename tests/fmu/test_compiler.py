@@ -12,7 +12,7 @@ from system_parts import program
 
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import sample
-from gen_profile.plants.registry import BUILT_IN, find_plant
+from gen_profile.plants.registry import find_plant
 from gen_profile_fmu.building import platforms
 from gen_profile_fmu.building.compiler import compile_library, find_compiler
 from gen_profile_fmu.building.plant_fmu import plant_fmu
@@ -22,6 +22,7 @@ from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 CRANE = find_plant("double-pendulum-crane")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
+SMALL_STACK = "-Wframe-larger-than=4000"  # bytes; a page, beyond which Windows wants a runtime's probes
 
 
 HEADERS = Path(fmu_manipulation_toolbox.__file__).parent / "resources" / "fmi"  # unaltered
@@ -60,13 +61,13 @@ def zig_cc(tmp_path, cache):
     ("plant", "kind", "version"),
     [
         *((CRANE, kind, Version.FMI2) for kind in ALL_KINDS),
-        *((find_plant(name), "system", Version.FMI3) for name in BUILT_IN),
+        *((find_plant(name), "system", Version.FMI3) for name in ("tower-crane", "slosh-tank")),
     ],
 )
 def test_no_source_has_a_warning(written, zig_cc, plant, kind, version):
     """By Clang's front end; GNU's is asked where importers' compilers are."""
     written(plant, kind, version)
-    zig_cc(*STRICT, "-isystem", str(HEADERS), "-c", SOURCE_FILE, "-o", "object.o")
+    zig_cc(*STRICT, SMALL_STACK, "-isystem", str(HEADERS), "-c", SOURCE_FILE, "-o", "object.o")
 
 
 def test_no_compiled_loop_has_a_warning(tmp_path, zig_cc):

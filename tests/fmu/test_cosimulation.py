@@ -6,12 +6,14 @@ import attrs
 import fmpy
 import numpy as np
 import pytest
+from fmpy.fmi2 import FMU2Slave
 from fmu.caches import share_zig
 from fmu.hoisting_pendulum import PLANT as WINCH
 
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import SampledProfile, sample
 from gen_profile_fmu.building.plant_fmu import plant_fmu
+from gen_profile_fmu.running import instances
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 
@@ -168,6 +170,30 @@ def test_events_of_the_fmu_are_logged_for_debugging(crane, setpoints, caplog):
         cosimulation.run(setpoints, crane.nominal(), max_step=1e-3, settle=0.0)
     messages = [record.getMessage().removeprefix("logEvents: ") for record in caplog.records]
     assert messages == ["Instantiated.", "Reset.", "Initialized at time 0 s."]
+
+
+def test_an_instance_is_kept_for_the_next_of_its_fmu_and_begins_anew(crane, setpoints, monkeypatch):
+    loaded = []
+
+    def counted(**named):
+        loaded.append(named["modelIdentifier"])
+        return FMU2Slave(**named)
+
+    monkeypatch.setattr(instances, "FMU2Slave", counted)
+    with PlantCosimulation(WINCH):  # frees what other tests have left
+        pass
+    loaded.clear()
+    found = []
+    for plant in (crane, crane, WINCH, crane):
+        with PlantCosimulation(plant) as cosimulation:
+            if plant is crane:
+                found.append(cosimulation.run(setpoints, crane.nominal(), max_step=1e-3, settle=0.1).sway)
+                if len(found) == 1:
+                    with pytest.raises(CosimulationError):
+                        cosimulation.run(setpoints, {**crane.nominal(), "g": 0.0}, max_step=1e-3, settle=0.1)
+    assert len(loaded) == 3  # the crane's twice, for the winch came between, and the winch's again
+    np.testing.assert_array_equal(found[1], found[0])
+    np.testing.assert_array_equal(found[2], found[0])
 
 
 def test_tells_before_it_compiles(crane, tmp_path, cache, monkeypatch):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from fmu.drivers import Instance, cosimulate
-from fmu.kinds import ALL_KINDS, INPUTS, model_of, motion
+from fmu.kinds import INPUTS, PAIRS, model_of, motion
 from numpy.polynomial import Polynomial
 from system_parts import program
 
@@ -79,7 +79,7 @@ if tuple(map(int, casadi.__version__.split(".")[:2])) >= (3, 8):  # older ones r
             np.array(jacobian(x, u)), _own_jacobian(kind, x, u), rtol=1e-10, atol=1e-12
         )
 
-    @pytest.mark.parametrize("kind", ALL_KINDS)
+    @pytest.mark.parametrize(("kind", "version"), PAIRS)
     def test_casadi_reads_every_kind(kind, version):
         fmu = cached_fmu(model_of(kind, CRANE), version)
         builder = casadi.DaeBuilder("fmu", str(fmu.folder))
@@ -171,7 +171,7 @@ def test_events_may_lie_next_to_communication_points(kind, start, version):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ALL_KINDS)
+@pytest.mark.parametrize(("kind", "version"), PAIRS)
 def test_source_fmus_compile_with_a_plain_compiler_and_run(kind, version, tmp_path):
     """By C99 alone and with the standard's headers, as an importer does, who finds nothing to warn of."""
     model = model_of(kind, CRANE)

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import zipfile
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,7 +20,7 @@ import ziglang
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from fmu.hoisting_pendulum import PLANT as WINCH
-from fmu.kinds import ALL_KINDS, INPUTS, KINDS, model_of
+from fmu.kinds import ALL_KINDS, INPUTS, KINDS, PAIRS, model_of
 
 from gen_profile.errors import CosimulationError
 from gen_profile.plants.plant import Coordinate, Parameter
@@ -34,6 +35,7 @@ PLANTS = [*(find_plant(name) for name in BUILT_IN), WINCH]
 CRANE = find_plant("double-pendulum-crane")
 
 
+@cache
 def read(model, version):
     """The model description as FMPy reads it, from an FMU without binaries."""
     packed = archive(fmu_files(sources(model, version), {}, with_extras=False))
@@ -56,14 +58,15 @@ def kind(request):
 
 
 @pytest.mark.slow
-def test_fmpy_finds_no_fault(plant, kind, version, tmp_path):
+def test_fmpy_finds_no_fault(plant, kind, tmp_path):
+    version = [*Version][(PLANTS.index(plant) + KINDS.index(kind)) % 2]
     path = tmp_path / "model.fmu"
     path.write_bytes(archive(fmu_files(sources(model_of(kind, plant), version), {}, with_extras=False)))
     assert validate_fmu(str(path)) == []
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ALL_KINDS)
+@pytest.mark.parametrize(("kind", "version"), PAIRS)
 def test_fmutool_finds_no_fault(kind, version):
     tool = Path(sys.executable).with_name("fmutool")
     built = cached_fmu(model_of(kind, CRANE), version).archive

@@ -5,11 +5,16 @@ import pytest
 from fmu.drivers import Instance
 from fmu.drivers import advance as integrate
 from fmu.kinds import PLANNED, model_of, planner_text
+from generator.planned_machines import GANTRY
 
+from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.plants.registry import find_plant
+from gen_profile.spec.reading import parse_spec
 from gen_profile_fmu.building.plant_fmu import cached_fmu
 from gen_profile_fmu.description.fmu_files import Version
+from gen_profile_fmu.model.planner import planned_system_model
+from gen_profile_fmu.model.plant_variables import PlantInstance
 
 CYCLE = PLANNED.export.cycle_time
 START = 2.0
@@ -189,3 +194,27 @@ def test_the_plant_follows_the_planner_in_model_exchange(joined, version):
 
     assert issued(joined, advance).tolist() == expected().tolist()
     np.testing.assert_allclose(sways, swings(version)[:-1], atol=1e-6)
+
+
+@pytest.mark.slow
+def test_two_axes_are_planned_and_drive_their_plant():
+    spec = parse_spec(GANTRY)
+    machine = PlantInstance(plant=spec.machine(), parameters=spec.plant.parameters)
+    text, axes = planner_block(spec).text, {"_x": "x", "_y": "y"}
+    fmu = cached_fmu(planned_system_model("gantry", text, machine, axes, ("L",)), Version.FMI2)
+    system = Instance(fmu, Version.FMI2, exchange=False)
+    system.begin({"x.start": 0.2, "max_step": 0.02}, 0.0)
+    system.set_boolean("enable", value=True)
+    system.fmu.doStep(0.0, 3.0)
+    system.write({"x.target": 1.0, "y.target": 0.6})
+    system.set_boolean("execute", value=True)
+    steps = []
+    for number in range(120):
+        system.fmu.doStep(3.0 + 0.1 * number, 0.1)
+        steps.append(system.read("x.setpoint", "y.setpoint"))
+    moves = (np.array(steps) - [0.2, 0.0]) / [0.8, 0.6]
+    np.testing.assert_allclose(moves[-1], 1.0, atol=1e-12)
+    assert np.flatnonzero(moves[:, 0] < 1.0)[-1] == np.flatnonzero(moves[:, 1] < 1.0)[-1]
+    assert system.read("x.position", "y.position") == pytest.approx([1.0, 0.6], abs=1e-9)
+    assert np.abs(system.read("sway.payload_x", "sway.payload_y")).max() < 1e-3
+    system.close()

@@ -7,6 +7,7 @@ import subprocess
 import zipfile
 from pathlib import Path
 
+import attrs
 import fmpy
 import lief
 import numpy as np
@@ -108,9 +109,9 @@ def test_windows_runs_under_wine(cache, tmp_path):
     shutil.copy(Path(__file__).with_name("windows_runner.c"), tmp_path)
     for header in (Path(fmpy.__file__).parent / "c-code").glob("fmi2*.h"):
         shutil.copy(header, tmp_path)
-    compile_library(
-        find_compiler("windows-x86_64"), tmp_path, "windows_runner.c", "runner.dll", zig_cache=cache / "zig"
-    )
+    compiler = find_compiler("windows-x86_64")
+    loads = attrs.evolve(compiler, libraries=(*compiler.libraries, "-lkernel32"))
+    compile_library(loads, tmp_path, "windows_runner.c", "runner.dll", zig_cache=cache / "zig")
     fmu = cached_fmu(SYSTEM, Version.FMI2)
     first = SYSTEM.variables.offset("Q_U")
     names = [variable.name for variable in SYSTEM.variables.variables[first:]]

@@ -4,6 +4,7 @@
  */
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <windows.h>
 
 #include "fmi2Functions.h"
@@ -16,10 +17,12 @@ static void ignore(fmi2ComponentEnvironment environment, fmi2String name, fmi2St
 #define FUNCTION(name) name##TYPE *name##_ = (name##TYPE *)(void *)GetProcAddress(library, #name)
 
 __declspec(dllexport) void CALLBACK run(HWND window, HINSTANCE module, LPSTR command, int show) {
-    char path[512], guid[64], result[512];
-    int steps, first, count;
     (void)window, (void)module, (void)show;
-    if (sscanf(command, "%511s %63s %d %d %d %511s", path, guid, &steps, &first, &count, result) != 6) return;
+    char *words[6] = {strtok(command, " ")};
+    for (int k = 1; k < 6; k++) words[k] = strtok(NULL, " ");
+    if (!words[5]) return;
+    const char *path = words[0], *guid = words[1], *result = words[5];
+    int steps = atoi(words[2]), first = atoi(words[3]), count = atoi(words[4]);
     FILE *file = fopen(result, "w");
     HMODULE library = LoadLibraryA(path);
     if (!file || !library) return;
@@ -40,9 +43,11 @@ __declspec(dllexport) void CALLBACK run(HWND window, HINSTANCE module, LPSTR com
         for (unsigned reference = (unsigned)first; reference < (unsigned)(first + count); reference++) {
             double value;
             if (fmi2GetReal_(c, &reference, 1, &value) != fmi2OK) break;
-            fprintf(file, "%.17g ", value);
+            char digits[64];
+            fputs(_gcvt(value, 17, digits), file);
+            fputs(" ", file);
         }
-        fprintf(file, "\n");
+        fputs("\n", file);
     }
     fmi2FreeInstance_(c);
     fclose(file);

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
-import re
 import resource
 import signal
 import sys
@@ -21,6 +21,7 @@ from random_specs import random_spec
 from gen_profile.designs.plan import plan
 from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.spec.reading import overridden, spec_from_dict
+from gen_profile.studio.views import cures
 
 KILLED_AFTER = 60  # s of processor
 
@@ -66,18 +67,6 @@ def outcome(document: dict[str, Any]) -> Outcome:
     return Outcome(kind or "KILLED", words, usage.ru_utime + usage.ru_stime)
 
 
-def cures(words: str) -> list[list[str]]:
-    """Read what a refusal names, each as overrides."""
-    named = [
-        [f"move.duration={value}"] for value in re.findall(r"at least (\S+) s \(move\.duration\)", words)
-    ]
-    named += [[f"move.duration={value}"] for value in re.findall(r"about (\S+) s \(move\.duration\)", words)]
-    for choices in re.findall(r"it would do with (.*)\.$", words, re.MULTILINE):
-        for choice in choices.split(", or with "):
-            named.append([re.sub(r" = ", "=", part, count=1) for part in choice.split(" and ")])
-    return named
-
-
 def main() -> None:
     """Run the battery."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -99,7 +88,8 @@ def main() -> None:
         kinds[found.kind] += 1
         slow.append((found.seconds, index, found.kind))
         print(f"{index}: {found.seconds:.1f} s, {found.kind}: {found.words!r}", flush=True)
-        for changes in cures(found.words):
+        for edits in cures(found.words):
+            changes = [f"{place}={json.dumps(value)}" for place, value in edits.items()]
             cured = outcome(overridden(document, changes))
             works = "worked" if cured.kind == "solved" else "FAILED"
             tried[works] += 1

@@ -36,6 +36,18 @@ robustness = { uncertain = {} }
 check = { residual_sway = 0.01 }
 export = { cycle_time = 0.004 }
 """
+GANTRY = """
+name = "gantry"
+plant = { type = "gantry-crane", m = 1000.0, L = 5.0 }
+move = { distance = [8.0, 3.0], duration = 14.0 }
+planner = { live = { L = [3.0, 9.0] } }
+robustness = { uncertain = { L = 0.02 } }
+check = { residual_sway = 0.05 }
+export = { cycle_time = 0.001 }
+[limits.axis]
+x = { velocity = 1.0, acceleration = 0.3, jerk = 1.0, travel = [0.0, 40.0] }
+y = { velocity = 0.5, acceleration = 0.4, jerk = 1.0, travel = [0.0, 12.0] }
+"""
 
 
 def swing(time, acceleration, m1, m2, L1, L2, **_):

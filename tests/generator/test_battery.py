@@ -1,8 +1,9 @@
 """A sample of the battery: what is found keeps its limits and costs least, what is refused is told a cure."""
 
+import json
+
 import numpy as np
 import pytest
-from generator.battery import cures
 from generator.random_specs import random_spec
 
 from gen_profile.designs.plan import plan
@@ -11,7 +12,9 @@ from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
+from gen_profile.solvers.direct.relaxation import Relaxation
 from gen_profile.spec.reading import overridden, spec_from_dict
+from gen_profile.studio.views import cures
 
 SOLVED = [3, 13, 19, 20, 25, 29, 35, 45]  # tower, joint, chain, double pendulum, tower, chain, tank, gantry
 ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
@@ -32,6 +35,14 @@ def test_what_is_found_keeps_its_limits_and_costs_least(monkeypatch, index):
     assert found.solution.raise_for_status().cost == pytest.approx(fine.cost, rel=2e-4)
 
 
+def test_efforts_that_do_not_see_the_highest_derivative_have_programs_that_can_be_solved():
+    """A drive with lag whose jerk is limited, and the effort of its setpoints."""
+    problem = problem_of(spec_from_dict(random_spec("fresh-33")))
+    assert problem.effort == "reference"
+    easiest = Relaxation(problem).least(tuple(problem.limits.stated()))
+    assert easiest.share == pytest.approx(0.4685, abs=1e-3)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [28])
 def test_what_is_refused_is_told_cures_that_work(index):
@@ -40,6 +51,7 @@ def test_what_is_refused_is_told_cures_that_work(index):
         plan(spec_from_dict(document))
     named = cures(str(refusal.value))
     assert named
-    for changes in named:
+    for edits in named:
+        changes = [f"{place}={json.dumps(value)}" for place, value in edits.items()]
         problem = problem_of(spec_from_dict(overridden(document, changes)))
         assert choice.keeps_limits(choice.attempt(problem))

@@ -25,8 +25,8 @@ def usage(name, command):
 
 
 def row(option):
-    choices = f"[{'|'.join(option.type.choices)}]" if isinstance(option.type, click.Choice) else ""
-    cells = (f"{option.opts[0]} {option.metavar or choices}".rstrip(), option.help)
+    name, _ = option.get_help_record(click.Context(click.Command("any")))
+    cells = (name, option.help)
     return "| `{}` | {} |".format(*(cell.replace("|", r"\|").replace("<", r"\<") for cell in cells))
 
 

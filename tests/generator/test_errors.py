@@ -14,6 +14,7 @@ EXIT_CODES = {
     "InfeasibleProblem": 3,
     "SolverDiverged": 3,
     "LimitViolation": 3,
+    "CertificateError": 4,
     "CheckFailed": 4,
     "CosimulationError": 4,
     "ExportError": 5,

@@ -5,8 +5,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
+from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import CosimulationError
-from gen_profile.evaluation.integration import integrate
+from gen_profile.evaluation import simulation
+from gen_profile.evaluation.integration import MOST, NODES, integrate
+from gen_profile.spec.reading import preset_spec
 
 TIGHT = {"accuracy": 1e-10, "least": 1e-13, "what": "test"}
 
@@ -81,3 +84,33 @@ def test_what_runs_away_is_a_sentence():
             fastest=1.0,
             **TIGHT,
         )
+
+
+def test_however_many_machines_and_steps_there_are_few_are_taken_at_once():
+    asked = []
+
+    def accelerations(times):
+        asked.append(len(times))
+        return lambda q, _: -(q**3)
+
+    integrate(
+        accelerations,
+        constant(np.ones((900, 1, 1)), np.zeros((900, 1, 1))),
+        np.full((2, 900), 0.1),
+        np.array([0.0, 20.0]),
+        fastest=1.0,
+        accuracy=1e-6,
+        least=1e-9,
+        what="test",
+    )
+    assert len(asked) > 2 and max(asked) * 900 <= NODES * MOST
+
+
+def test_loads_that_swing_too_far_to_be_followed_sway_without_bound(monkeypatch):
+    def lost(*_, **__):
+        raise CosimulationError("The machine cannot be integrated beyond 1 s.")
+
+    monkeypatch.setattr(simulation, "PlantSimulation", lost)
+    plant = preset_spec("paper").machine()
+    motion = shaped_motion(preset_spec("paper"), "zv")
+    assert np.isinf(simulation.greatest_sway(plant, motion, [plant.nominal()] * 2)).tolist() == [True, True]

@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from functools import cache
 from pathlib import Path
 
@@ -19,6 +19,8 @@ PACKAGES = {
     "gen_profile_exporters": ROOT / "exporters",
 }
 
+SAYING = (ast.Raise, ast.Yield)  # of errors, and of warnings
+MOST_LINES = 500
 MOST_FILES = 16  # the package's own included
 
 
@@ -83,6 +85,11 @@ def test_shapers_need_numpy_only(heavy):
     assert heavy not in loaded_by("gen_profile.shapers.shaped_move")
 
 
+@pytest.mark.parametrize("slow", ["scipy.stats", "scipy.special", "matplotlib", "plotly", "distributed"])
+def test_the_main_job_does_not_wait_for_what_it_seldom_needs(slow):
+    assert slow not in loaded_by("gen_profile.designs.design")
+
+
 FAULTY = """
 import sys
 from gen_profile.cli import main
@@ -143,12 +150,22 @@ def test_only_the_command_line_names_flags_in_errors():
     for package, root in PACKAGES.items():
         for file in set((root / package).rglob("*.py")) - set((root / package / "cli").rglob("*.py")):
             nodes = ast.walk(ast.parse(file.read_text("utf-8")))
-            raised = [part for node in nodes if isinstance(node, ast.Raise) for part in ast.walk(node)]
-            texts = [str(part.value) for part in raised if isinstance(part, ast.Constant)]
+            said = [part for node in nodes if isinstance(node, SAYING) for part in ast.walk(node)]
+            texts = [str(part.value) for part in said if isinstance(part, ast.Constant)]
             assert not [text for text in texts if re.search(r"(^|[ (])--[a-z]", text)], file
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_a_folder_has_so_few_files_that_they_are_seen_at_once(package):
-    folders = {file.parent for file in (PACKAGES[package] / package).rglob("*.py")}
-    assert max(len(list(folder.glob("*.py"))) for folder in folders) <= MOST_FILES
+    files = [file for file in (PACKAGES[package] / package).rglob("*.*") if "__pycache__" not in file.parts]
+    assert max(Counter(file.parent for file in files).values()) <= MOST_FILES
+
+
+def test_a_file_is_short_enough_to_be_read_at_once():
+    folders = [*PACKAGES.values(), ROOT / "tests", ROOT / "examples"]
+    files = [
+        file for folder in folders for kind in ("py", "js", "c", "h") for file in folder.rglob(f"*.{kind}")
+    ]
+    ours = [file for file in files if "uPlot" not in file.parts]
+    assert len(ours) > 500
+    assert [file for file in ours if len(file.read_text("utf-8").splitlines()) > MOST_LINES] == []

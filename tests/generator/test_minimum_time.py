@@ -6,11 +6,13 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import feasible, modes
 from scipy.linalg import eigvalsh
 
+from gen_profile.designs import plan as planning
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.minimum_time import PRECISION, least_beyond
+from gen_profile.solvers.minimum_time import PRECISION, least, least_beyond
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
+from gen_profile.work import OutOfWork, budget, spend
 
 
 def shortest(frequencies, distances, guess, desensitized, **limits):
@@ -29,13 +31,13 @@ def shortest(frequencies, distances, guess, desensitized, **limits):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("desensitized", [(), ("L1",)])
 @pytest.mark.parametrize(
-    "limits",
+    ("limits", "desensitized"),
     [
-        {"acceleration": 0.3},
-        {"velocity": 0.15, "acceleration": 0.5, "jerk": 10.0},
-        {"jerk": 5.0},
+        ({"acceleration": 0.3}, ("L1",)),
+        ({"velocity": 0.15, "acceleration": 0.5, "jerk": 10.0}, ()),
+        ({"velocity": 0.15, "acceleration": 0.5, "jerk": 10.0}, ("L1",)),
+        ({"jerk": 5.0}, ()),
     ],
 )
 def test_of_the_papers_crane(limits, desensitized):
@@ -45,6 +47,7 @@ def test_of_the_papers_crane(limits, desensitized):
     assert 0.998 * best < found < 1.02 * best
 
 
+@pytest.mark.slow
 def test_with_a_limit_of_the_sway_on_the_way():
     limits = LimitsSpec(acceleration=0.5, sway=0.02)
     found = choice.minimum_time(crane_problem(desensitized=("L1",), limits=limits))
@@ -86,8 +89,9 @@ MACHINES = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["none", "sensitivity"])
-@pytest.mark.parametrize("preset", MACHINES)
+@pytest.mark.parametrize(
+    ("preset", "method"), [*zip(MACHINES, ["none", "sensitivity", "sensitivity", "none"], strict=True)]
+)
 def test_of_other_machines(preset, method):
     frequencies, undamped, limits = MACHINES[preset]
     spec = preset_spec(
@@ -121,3 +125,29 @@ def test_a_duration_next_to_one_that_is_too_short_is_found_at_once(enough, tries
 
 def test_no_duration_is_looked_for_without_end():
     assert least_beyond(lambda _: False, 10.0, 100.0) is None
+
+
+@pytest.mark.parametrize("search", [lambda f: least(f, 10.0, 100.0), lambda f: least_beyond(f, 10.0, 100.0)])
+def test_the_shortest_duration_found_before_the_work_is_used_up_is_taken(search):
+    def feasible(duration):
+        spend(1.0)
+        return duration >= 12.0
+
+    with budget(4.5):
+        assert 12.0 <= search(feasible) <= 16.0
+    with pytest.raises(OutOfWork), budget(0.5):
+        search(feasible)
+
+
+def test_no_motion_is_designed_twice_for_durations_that_end_on_the_same_cycle(monkeypatch):
+    tried = []
+
+    def calms(spec, _):
+        tried.append(spec.move.duration)
+        return spec.move.duration > 0.05
+
+    monkeypatch.setattr(planning.choice, "minimum_time", lambda *_, **__: 0.048)
+    monkeypatch.setattr(planning, "_calms", calms)
+    spec = preset_spec("paper", ["move.duration=minimum", "limits.acceleration=1", "export.cycle_time=0.001"])
+    assert planning.timed(spec).move.duration == 0.051
+    assert len(tried[1:]) == len(set(tried[1:]))

@@ -1,6 +1,7 @@
 """The proof of a planner block: against other equations and another importer, and that it can fail."""
 
 import json
+import pickle
 import re
 from time import sleep
 
@@ -8,18 +9,26 @@ import attrs
 import numpy as np
 import pytest
 from command_line import run_here
-from generator.planned_machines import BAY, CYCLE, HOIST, PAPER, swing
+from distributed import LocalCluster
+from generator.planned_machines import BAY, CYCLE, GANTRY, HOIST, PAPER, swing
 
 from gen_profile.artefacts.manifest import parse_manifest
+from gen_profile.charts.proof import history_figure
+from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command, play
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.interface import BlockAxis
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.judging import judge_run
 from gen_profile.proof.numbering import CORNERS, DRAWS, SEARCH, Numbering
+from gen_profile.proof.on_cluster import ProofRecipe, judge_part
 from gen_profile.proof.prove import prove, replay
+from gen_profile.proof.trace import trace
 from gen_profile.spec.reading import parse_spec
 from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
+
+LOOPBACK = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
 
 
 @pytest.fixture(scope="module")
@@ -54,9 +63,9 @@ def test_a_history_against_other_equations(spec, text):
     """The setpoints are those of `planner play`; the machine's rope is 4 % longer than the block is told."""
     machine = dict(spec.plant.parameters) | {"L1": 1.04 * 6.0}
     commands = (
-        Command(time=0.4, command="position", value=9.0, live={}),
-        Command(time=5.0, command="velocity", value=-0.7, live={}),
-        Command(time=9.0, command="stop", value=0.0, live={}),
+        Command(time=0.4, command="position", values=(9.0,), live={}),
+        Command(time=5.0, command="velocity", values=(-0.7,), live={}),
+        Command(time=9.0, command="stop", live={}),
     )
     table = play(text, "time_s,command,value\n0.4,position,9\n5,velocity,-0.7\n9,stop,0\n").table
     columns = np.array([line.split(",")[:4] for line in table.splitlines()[1:]], dtype=float).T
@@ -73,7 +82,7 @@ def test_a_history_against_other_equations(spec, text):
 
 
 def test_a_move_on_the_machine_as_told_leaves_a_thousandth_of_its_sway(spec, text):
-    move = (Command(time=0.5, command="position", value=4.0, live={}),)
+    move = (Command(time=0.5, command="position", values=(4.0,), live={}),)
     history = History(
         live={"L1": 6.0, "m2": 2000.0}, parameters=spec.plant.parameters, places=(0.0,), commands=move
     )
@@ -82,6 +91,7 @@ def test_a_move_on_the_machine_as_told_leaves_a_thousandth_of_its_sway(spec, tex
     assert (run.residual < 1e-3 * run.on_the_way).all()
 
 
+@pytest.mark.slow
 def test_numbers_of_an_earlier_version_mean_what_they_meant(deployed, tmp_path):
     """Its manifest does not tell of override and velocity limit, which its histories left alone."""
     (tmp_path / "bay 3.st").write_bytes((deployed[0] / "bay 3.st").read_bytes())
@@ -102,10 +112,10 @@ def test_a_sound_block_is_proved(spec, proof):
     assert 0.0 < proof.share(proof.worst) < 1.0
     assert proof.apart < 1e-12
     slowed = [
-        (one.override, one.velocity_limit) for judged in proof.judged for one in judged.history.commands
+        (one.override, *one.velocity_limits) for judged in proof.judged for one in judged.history.commands
     ]
-    assert min(override for override, _ in slowed) < 0.5
-    assert 0.3 <= min(limit for _, limit in slowed if limit) < 0.5
+    assert min(override for override, *_ in slowed) < 0.5
+    assert 0.3 <= min(limit for _, *limits in slowed for limit in limits) < 0.5
     assert len(proof.by_fmpy) >= 2
     live, ropes = spec.planner.live, [one.history.parameters["L1"] for one in proof.judged]
     assert min(ropes) == pytest.approx(0.95 * live["L1"][0])
@@ -123,6 +133,7 @@ def test_sway_on_the_way_is_told_where_it_is_limited(proof):
     assert "100 mm are stated (limits.sway)" in sentence
 
 
+@pytest.mark.slow
 def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypatch):
     begun = []
 
@@ -151,6 +162,7 @@ def test_a_block_that_fails_in_every_history_is_told_once(spec, text, monkeypatc
     assert reason == ("In history 0 the block goes beyond the end of an array, and likewise in 3 others.")
 
 
+@pytest.mark.slow
 def test_every_history_can_be_had_again_by_its_number(spec, text, proof):
     numbering = Numbering.of(Histories.of(spec), proof.count, proof.seed, proof.parents)
     for number in (0, 20, 39):
@@ -158,9 +170,51 @@ def test_every_history_can_be_had_again_by_its_number(spec, text, proof):
         assert again.to_dict() == proof.judged[number].to_dict()
 
 
+@pytest.mark.slow
 def test_what_is_found_does_not_depend_on_the_number_of_workers(spec, text, proof):
     other = prove(spec, text, histories=40, workers=3)
     assert other.to_dict() == proof.to_dict()
+
+
+def test_workers_of_a_scheduler_find_the_same(spec, text, proof):
+    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, **LOOPBACK) as cluster:
+        other = prove(spec, text, histories=40, scheduler=cluster.scheduler_address)
+    assert other.to_dict() == proof.to_dict()
+
+
+def test_a_worker_gets_the_machine_s_file(tmp_path):
+    machine = (
+        "from gen_profile.plants.registry import find_plant\nPLANT = find_plant('double-pendulum-crane')\n"
+    )
+    (tmp_path / "own.py").write_text(machine, "utf-8")
+    own = parse_spec(BAY.replace('type = "double-pendulum-crane"', 'file = "own.py"'), (), "bay", tmp_path)
+    recipe = ProofRecipe.of(own, "", Histories.of(own))
+    (tmp_path / "own.py").unlink()
+    assert pickle.loads(pickle.dumps(recipe)).read_spec().sha256() == own.sha256()
+
+
+def test_a_worker_with_other_libraries_judges_nothing(spec):
+    recipe = attrs.evolve(ProofRecipe.of(spec, "", Histories.of(spec)), versions=(("numpy", "0.9"),))
+    with pytest.raises(SpecError, match=r"a worker has gen-profile .*, and this proof needs numpy 0\.9"):
+        judge_part(recipe, [])
+
+
+def test_a_scheduler_that_nobody_runs_is_named(spec, text, monkeypatch):
+    monkeypatch.setattr("gen_profile.cluster.ANSWER_TIME", "200ms")
+    with pytest.raises(SpecError, match=r"scheduler tcp://127\.0\.0\.1:9: no worker answers"):
+        prove(spec, text, histories=1, scheduler="tcp://127.0.0.1:9")
+
+
+def test_a_worker_that_fails_is_told(spec, text, monkeypatch):
+    def unable(*_):
+        raise ModuleNotFoundError("No module 'x'")
+
+    monkeypatch.setattr("gen_profile.proof.on_cluster.judge_part", unable)
+    with (
+        LocalCluster(n_workers=1, processes=False, **LOOPBACK) as cluster,
+        pytest.raises(SpecError, match=r"the workers cannot go on .*No module 'x'"),
+    ):
+        prove(spec, text, histories=2, scheduler=cluster.scheduler_address)
 
 
 def test_the_ends_of_every_choice_make_a_history(spec):
@@ -186,9 +240,9 @@ def scaled(text, name, factor, part=slice(None)):
 @pytest.mark.slow
 def test_a_block_with_altered_constants_fails(spec, text):
     """Frequencies 10 % too high (their squares' sum and product are stored), and 1 % above the velocity."""
-    stored = text.split("cFrequency")[1].split(";")[0].count(",") + 1
-    altered = scaled(text, "cFrequency", 1.1**2, slice(0, stored // 2))
-    altered = scaled(altered, "cFrequency", 1.1**4, slice(stored // 2, None))
+    row = (text.split("cModel :")[1].split(";")[0].count(",") + 1) // 4  # of two sums for each mode
+    altered = scaled(text, "cModel", 1.1**2, slice(0, row))
+    altered = scaled(altered, "cModel", 1.1**4, slice(row, 2 * row))
     proof = prove(spec, scaled(altered, "cVelocity", 1.01), histories=20)
     sway, velocity = proof.reasons()
     assert "sways by" in sway
@@ -209,6 +263,25 @@ def test_other_machines_are_proved(written, live):
     assert (len(hoisted) > 1) == (live == "hoist")
 
 
+@pytest.mark.slow
+def test_several_axes_are_proved_while_they_move_at_once():
+    spec = parse_spec(GANTRY)
+    text = planner_block(spec).text
+    proof = prove(spec, text, histories=20)
+    assert proof.reasons() == ()
+    document = proof.to_dict()
+    names = [f"{axis}_{name}" for axis in "xy" for name in ("velocity", "acceleration", "jerk")]
+    assert all(0.9 < document["limits"][name] <= 1.0 + 1e-9 for name in names)
+    assert {"x_start_m", "y_start_m"} < document["worst"].keys()
+    sticks = [one for judged in proof.judged for one in judged.history.commands if one.command == "velocity"]
+    assert any(0.0 in one.values and any(one.values) for one in sticks)
+    assert any(all(one.values) for one in sticks)
+    followed = trace(spec, text, Histories.of(spec), proof.worst.history)
+    titles = [panel.title for panel in history_figure(spec, proof, followed).panels]
+    assert titles[0] == "Position of x"
+    assert titles[4] == "Velocity of y"
+
+
 GOOD = BlockRun(
     axes=(
         AxisExtremes(
@@ -219,7 +292,6 @@ GOOD = BlockRun(
     residual=np.array([0.01, 0.01]),
     cycles=100,
     stands=50,
-    unpromised=0,
     promise=True,
     error=0,
     fault=0,
@@ -247,14 +319,28 @@ def test_every_fault_of_a_run_is_told(spec, changed, words):
     axis = {name: value for name, value in changed.items() if hasattr(GOOD.axes[0], name)}
     others = {name: value for name, value in changed.items() if name not in axis}
     run = attrs.evolve(GOOD, axes=(attrs.evolve(GOOD.axes[0], **axis),), **others)
-    stop = Command(time=0.1, command="stop", value=0.0, live={})
+    stop = Command(time=0.1, command="stop", live={})
     history = History(live={}, parameters={}, places=(0.0,), commands=(stop,))
     faults = judge_run(spec, run, history, cycle=CYCLE, number=0, group=DRAWS).faults
     assert faults == () if words is None else words in faults[0]
 
 
+def test_of_several_axes_the_one_at_fault_is_named():
+    spec = parse_spec(GANTRY)
+    axes = dict(enumerate([BlockAxis(name="x"), BlockAxis(name="y")]))
+    fast = attrs.evolve(GOOD.axes[0], velocity=0.6)
+    run = attrs.evolve(GOOD, axes=(fast, attrs.evolve(fast, highest=12.5)))
+    stop = Command(time=0.1, command="stop")
+    history = History(live={}, parameters={}, places=(0.0, 0.0), commands=(stop,), axes=axes)
+    faults = judge_run(spec, run, history, cycle=CYCLE, number=0, group=DRAWS).faults
+    assert faults == (
+        "the velocity of y is above its limit by 20 %",
+        "the axis y leaves its travel by 0.5 m",
+    )
+
+
 def test_after_a_quick_stop_nothing_is_promised(spec):
-    stop = Command(time=0.1, command="quick-stop", value=0.0, live={})
+    stop = Command(time=0.1, command="quick-stop", live={})
     history = History(live={}, parameters={}, places=(0.0,), commands=(stop,))
     swaying = attrs.evolve(GOOD, promise=False, residual=np.array([1.0, 1.0]))
     judged = judge_run(spec, swaying, history, cycle=CYCLE, number=0, group=DRAWS)

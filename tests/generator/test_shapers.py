@@ -67,7 +67,6 @@ def test_a_shaper_leaves_its_mode_at_rest_and_the_distance_as_it_was(name, frequ
     assert (np.diff(impulses.times) > 0.0).all()
     assert impulses.amplitudes.sum() == pytest.approx(1.0, abs=1e-15)
     left = vibration(impulses, [frequency], ratio)[0]
-    assert left == pytest.approx(impulses.vibration(frequency, ratio), abs=1e-13)
     assert left < (1e-13 if name in AT_REST else 0.05 + 1e-12)
 
 

@@ -8,9 +8,12 @@ from generator.crane_problems import crane_problem
 from scipy import sparse
 
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct import set_up
+from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.conic import ConicProgram
 from gen_profile.solvers.interrupts import interrupts_collected
 from gen_profile.solvers.solution import Status
+from gen_profile.spec.model import LimitsSpec
 from gen_profile.work import OutOfWork, budget, left, spend
 
 
@@ -36,13 +39,29 @@ def test_the_clock_of_all_threads_ends_what_takes_longer_than_an_answer_may(monk
         now = 3.1
         with pytest.raises(OutOfWork):
             spend(0.3)
+        with pytest.raises(OutOfWork):
+            spend(0.0)
 
 
 def test_a_search_that_costs_too_much_is_given_up(monkeypatch):
     monkeypatch.setattr(choice, "SOLVING", 1e-4)
+    monkeypatch.setattr(choice, "DIRECTLY", 1e-4)
     solution = choice.attempt(crane_problem())
     assert solution.status is Status.GIVEN_UP
     assert "units" in solution.cure
+
+
+def test_a_motion_on_the_first_mesh_will_do_where_bisecting_costs_too_much(monkeypatch):
+    monkeypatch.setattr(set_up, "INTERVALS", 20)
+    problem = crane_problem(limits=LimitsSpec(acceleration=0.3))
+    fine = direct.solve(problem).raise_for_status()
+    with budget(1e9):
+        coarse = direct.solve(problem, coarse=True).raise_for_status()
+        took = 1e9 - left()
+    with budget(4.0 * took):
+        found = direct.solve(problem)
+    assert len(found.raise_for_status().knots) == len(coarse.knots) < len(fine.knots)
+    assert choice.keeps_limits(found)
 
 
 def test_an_interrupt_comes_when_compiled_code_has_ended():

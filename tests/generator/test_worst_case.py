@@ -9,13 +9,15 @@ from fmu import absolute_angle_crane as oracle
 from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import least_worst_sway
 
-from gen_profile.problem.problem import WorstCase
+from gen_profile.motion.metrics import greatest
+from gen_profile.problem.problem import WorstCase, problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct import worst_case
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
+from gen_profile.spec.reading import preset_spec
 
 ZVD_ACCELERATION = 0.7067  # m/s²: what the paper's ZVD motion takes
 
@@ -72,6 +74,16 @@ def test_what_lies_between_the_ends_counts():
     assert shares.max() <= 1.05 * max(shares[0], shares[-1], shares[20], np.sort(shares)[-5])
 
 
+@pytest.mark.slow
+def test_without_limits_little_more_acceleration_is_taken_than_by_the_exact_motion():
+    changes = ("robustness.method=range", "cost.sway_weight=0")
+    over_range, exact = (
+        greatest(optimal_profile(choice.solve(problem_of(preset_spec("mass-spring-chain", overrides)))), 2, 0)
+        for overrides in (changes[:1], changes[1:])
+    )
+    assert over_range <= 1.501 * exact
+
+
 def drawn(problem, uncertain, count):
     places = np.random.default_rng(3).uniform(-1.0, 1.0, (count, len(uncertain)))
     nominal = problem.parameters
@@ -88,6 +100,7 @@ def drawn(problem, uncertain, count):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse")
 def test_no_machine_inside_is_worse_than_those_found(monkeypatch):
     """After one round, a grid along each range and 64 machines within them miss a tenth of the worst sway."""
     monkeypatch.setattr(worst_case, "ROUNDS", 1)
@@ -101,6 +114,7 @@ def test_no_machine_inside_is_worse_than_those_found(monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse")
 def test_two_ranges():
     problem = ranged(uncertain={"L1": 0.1, "m2": 0.2})
     solution = choice.solve(problem)
@@ -110,6 +124,7 @@ def test_two_ranges():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse")
 def test_minimum_time_keeps_the_loads_limits():
     problem = ranged(limits=LimitsSpec(acceleration=0.4))
     shortest = choice.minimum_time(problem)
@@ -148,3 +163,13 @@ def test_where_programs_for_the_least_worst_case_fail_it_is_bisected(monkeypatch
 
     assert worst(best) < worst(found) < 1.6 * worst(best)
     assert found.worst_case_bound < 0.003 * worst(found)
+
+
+def test_where_programs_for_more_machines_fail_the_motion_for_fewer_is_taken(monkeypatch):
+    problem = ranged()
+    motion = choice.attempt(attrs.evolve(problem, worst_case=None, limits=LimitsSpec()))
+    failed = choice.given_up(problem)
+    monkeypatch.setattr(worst_case, "_rounds", lambda *_: iter([motion, failed]))
+    assert worst_case.solve(problem).optimum is motion.optimum
+    monkeypatch.setattr(worst_case, "_rounds", lambda *_: iter([failed]))
+    assert worst_case.solve(problem).optimum is None

@@ -10,11 +10,13 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile_exporters.planner.calming_text import CALMING
+from gen_profile_exporters.planner.calming_text import CALMING, FOLLOWING
 from gen_profile_exporters.planner.interface_text import HEADER, INTERFACE
 from gen_profile_exporters.planner.motion_text import INPUTS, OUTPUTS, SLOTS
-from gen_profile_exporters.planner.planning_text import PLANNING, POWERS
+from gen_profile_exporters.planner.planning_text import MODEL, PLANNING
 from gen_profile_exporters.planner.programme_text import EXTENT, PROGRAMME
+from gen_profile_exporters.planner.pulses_text import PULSES
+from gen_profile_exporters.planner.request_text import REQUEST
 from gen_profile_exporters.playback.structured_text import block_name, initialiser, literal
 
 Array = NDArray[np.float64]
@@ -35,25 +37,72 @@ WAY_ITERATIONS = 13  # where the axis moves already
 SLOTS_PER_PERIOD = 20.0  # of the slowest mode
 MIRROR_DECAY = 0.2  # over a motion, up to which its halves mirror each other until the last projection
 CENTRE = 0.15  # of an interior-point iteration: the complementarity it aims at, relative to that of now
+AGAINST = 0.1  # share of full speed away from a new target, from which an axis turns round first
+NEARER = 6.0  # slots at full speed, by which a new target is so much nearer that the axis brakes first
 STEP = 0.93  # share of the way to the nearest bound that it goes
 FRESH = 8  # cycles, for which the machine that is followed counts as constant
 RESERVE = 0.1  # share of the limits that only calming takes up, where live parameters change on the way
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
+FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
+PLACE = "fActPosition"
+TAKEN = {  # inputs of each axis, by the arrays that hold them
+    "aTarget": "fTarget",
+    "aCommand": "fVelocityCommand",
+    "aLimit": "fVelocityLimit",
+    "aActual": PLACE,
+}
+GIVEN = {  # and outputs
+    "aPosition": "fPosition",
+    "aVelocity": "fVelocity",
+    "aAcceleration": "fAcceleration",
+    "aDistanceToGo": "fDistanceToGo",
+    "aStopDistance": "fStopDistance",
+}
+
+
+@attrs.frozen(kw_only=True)
+class AxisConstants:
+    """What the block needs to know of an axis, in its unit and s.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+        m or rad.
+    suffix : str
+        Of the names of its inputs and outputs; none where it is the only axis.
+    start : float
+        Where it stands in the block's example.
+    velocity, acceleration, jerk : float
+    quick_deceleration, quick_jerk : float
+    travel, targets : (float, float)
+        `targets` lie within the travel.
+    """
+
+    name: str
+    unit: str
+    suffix: str
+    start: float
+    velocity: float
+    acceleration: float
+    jerk: float
+    quick_deceleration: float
+    quick_jerk: float
+    travel: tuple[float, float]
+    targets: tuple[float, float]
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class PlannerConstants:
-    """What the block needs to know of a machine, in m and s.
+    """What the block needs to know of a machine.
 
     Attributes
     ----------
-    name, machine, axis : str
-    start : float
-        m, where the axis stands in the block's example.
+    name, machine : str
+    axes : tuple of AxisConstants
+        That it plans.
     cycle : float
-    velocity, acceleration, jerk : float
-    quick_deceleration, quick_jerk : float
-    travel : (float, float)
+        s.
     live : mapping of str to (float, float)
         Ranges of the live parameters.
     units : tuple of str
@@ -66,57 +115,66 @@ class PlannerConstants:
         How fast some may change on the way, per s.
     calm : float
         m, sway up to which nothing is done about it.
-    targets : (float, float)
-        m, within the travel.
     degrees : int
         Chebyshev polynomials per live parameter.
     exponents : (parameters, terms) array of int
         Which of them are multiplied.
-    frequencies, decays : (modes, terms) arrays
-        Coefficients for the sum of the squared frequencies (and, of two, the product), and for the decays.
-    matrix : (modes², terms) array
-        Likewise for the matrix of the linear machine in the loads' sway, row by row; no rows without rates.
+    modes : int
+    model : (rows, terms) array
+        Coefficients for the squared frequencies (of two, for their sum and product), for the decays, and with
+        rates for the matrix of the linear machine in the loads' sway, row by row.
     """
 
     name: str
     machine: str
-    axis: str
-    start: float
+    axes: tuple[AxisConstants, ...]
     cycle: float
-    velocity: float
-    acceleration: float
-    jerk: float
-    quick_deceleration: float
-    quick_jerk: float
-    travel: tuple[float, float]
     live: Mapping[str, tuple[float, float]]
     units: tuple[str, ...]
     nominal: tuple[float, ...]
     drift: tuple[float, ...]
     rates: Mapping[str, float]
     calm: float
-    targets: tuple[float, float]
     degrees: int
     exponents: NDArray[np.int64]
-    frequencies: Array
-    decays: Array
-    matrix: Array
+    modes: int
+    model: Array
 
 
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
-    body = PLANNING.replace("@programme\n", PROGRAMME).replace("@calming\n", CALMING)
+    body = PLANNING.replace("@request\n", REQUEST)
+    body = body.replace("@programme\n", PROGRAMME).replace("@calming\n", CALMING)
     body = body.replace("@extent\n", indent(EXTENT, 16 * " "))
-    body = body.replace("@powers\n", indent(POWERS, 20 * " "))
-    slots = SLOTS.replace("@powers\n", indent(POWERS, 8 * " "))
-    text = HEADER + INTERFACE + INPUTS + slots + body + OUTPUTS
+    body = body.replace("@model\n", indent(MODEL, 16 * " "))
+    follow = FOLLOWING.replace("@model\n", indent(MODEL, 4 * " "))
+    text = HEADER + INTERFACE + INPUTS + SLOTS + PULSES + follow + body + OUTPUTS
     values = _values(constants)
-    return re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
+    return _narrow(_with_while_loops(re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)))
+
+
+def _with_while_loops(text: str) -> str:
+    """Write FOR loops as WHILE loops: since 2024 matiec leaves out those of a single pass."""
+    lines, counters = list[str](), list[str]()
+    for line in text.split("\n"):
+        if begins := FOR.fullmatch(line):
+            margin, counter, first, last, more = begins.groups()
+            lines += [f"{margin}{counter} := {first};", f"{margin}WHILE {counter} <= {last} DO{more}"]
+            counters.append(counter)
+        elif ends := END_FOR.fullmatch(line):
+            margin, more, counter = *ends.groups(), counters.pop()
+            lines += [f"{margin}    {counter} := {counter} + 1;", f"{margin}END_WHILE;{more}"]
+        else:
+            lines.append(line)
+    return "\n".join(lines)
+
+
+def _narrow(text: str) -> str:
+    """Indent by two columns: controllers bound how long a text may be."""
+    return re.sub("(?m)^ +", lambda margin: margin[0][: len(margin[0]) // 2], text)
 
 
 def _values(c: PlannerConstants) -> dict[str, str]:
-    modes, terms = c.frequencies.shape
-    conditions = 1 + 4 * modes
     lives = list(c.live)
     known = list(zip(c.live.items(), c.units, c.nominal, strict=True))
     ranges = [
@@ -128,50 +186,134 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         f"    f{name} : LREAL := {literal(value)}; (* {unit or 1}, {low:g} to {high:g} *)"
         for (name, (low, high)), unit, value in known
     ]
-    lasts = {
-        "future": FUTURE,
-        "power": max(1, len(lives)) * c.degrees,
-        "live": max(1, len(lives)),
+    return {
+        "name": c.name,
+        "block": f"{block_name(c.name)}_planner",
+        "machine": c.machine,
+        "cycle_time": literal(c.cycle),
+        "cycle": f"{c.cycle:g}",
+        "live_rates": " faster than stated" if c.rates else "",
+        "live_lines": "\n    ".join(ranges) or "No live parameters.",
+        "live_inputs": "\n".join(inputs),
+        "take_live": "\n".join(f"aLiveNow[{k}] := f{name};" for k, name in enumerate(lives)),
+        "constants": _constants(c),
+        **_words(c.axes),
+        **_interface(c.axes),
+        **{f"last_{name}": str(length - 1) for name, length in _lengths(c).items()},
+    }
+
+
+def _words(axes: Sequence[AxisConstants]) -> dict[str, str]:
+    """Tell of the axes in the block's header."""
+    several = len(axes) > 1
+    units = " and ".join(dict.fromkeys(axis.unit for axis in axes))
+    names = " and ".join(axis.name for axis in axes)
+    limits = [
+        f"Limits{f' of {a.name}' if several else ''}: velocity {a.velocity:g} {a.unit}/s, acceleration "
+        f"{a.acceleration:g} {a.unit}/s2, jerk {a.jerk:g} {a.unit}/s3, travel {a.travel[0]:g} to "
+        f"{a.travel[1]:g} {a.unit}."
+        for a in axes
+    ]
+    if several:
+        limits.append(
+            f"Each axis has inputs and outputs of its own, such as fTarget{axes[0].suffix}; a command is for "
+            "all of them,\n    and at their targets they come to rest together."
+        )
+    quick = [
+        f"{a.quick_deceleration:g} {a.unit}/s2 and {a.quick_jerk:g} {a.unit}/s3"
+        + (f" ({a.name})" if several else "")
+        for a in axes
+    ]
+    targets = [
+        f"{a.targets[0]:g} to {a.targets[1]:g} {a.unit}" + (f" ({a.name})" if several else "") for a in axes
+    ]
+    return {
+        "axes": f"{'Axes' if several else 'Axis'} {names}, in {units} and s.",
+        "limits": "\n    ".join(limits),
+        "quick": ", ".join(quick),
+        "targets": ", ".join(targets),
+    }
+
+
+def _interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
+    """Declare what each axis is told and tells, and carry it to and from the arrays."""
+
+    def declared(name: str, comment: str) -> str:
+        return "\n".join(
+            f"    {name}{a.suffix} : LREAL{f' := {literal(a.start)}' if name == PLACE else ''}; "
+            f"(* {a.unit}{comment} *)"
+            for a in axes
+        )
+
+    taken = [
+        f"{array}[{k}] := {name}{a.suffix};" for k, a in enumerate(axes) for array, name in TAKEN.items()
+    ]
+    given = [
+        f"{name}{a.suffix} := {array}[{k}];" for k, a in enumerate(axes) for array, name in GIVEN.items()
+    ]
+    return {
+        "target_inputs": declared("fTarget", ""),
+        "command_inputs": declared("fVelocityCommand", "/s"),
+        "limit_inputs": declared("fVelocityLimit", "/s; 0.0: none but the machine's"),
+        "place_inputs": declared(PLACE, ", where the axis stands"),
+        "setpoint_outputs": "\n".join(
+            [declared("fPosition", ""), declared("fVelocity", "/s"), declared("fAcceleration", "/s2")]
+        ),
+        "distance_outputs": "\n".join(
+            [
+                declared("fDistanceToGo", ", to the target"),
+                declared("fStopDistance", ", which a stop without sway takes at most"),
+            ]
+        ),
+        "take_axes": "\n".join(taken),
+        "give_axes": "\n".join(given),
+    }
+
+
+def _lengths(c: PlannerConstants) -> dict[str, int]:
+    """Lengths of the block's arrays."""
+    modes, axes = c.modes, len(c.axes)
+    conditions = 1 + 4 * modes
+    return {
+        "axis": axes,
+        "future": axes * FUTURE,
+        "power": max(1, len(c.live)) * c.degrees,
+        "live": max(1, len(c.live)),
         "mode": modes,
         "matrix": modes**2,
+        "model": modes * (2 + modes),
         "column": WIDE,
         "wide": WIDE,
         "conditions": conditions * KERNEL_SLOTS,
         "row": conditions,
         "gram": conditions**2,
         "bounds": 3 * WIDE,
-        "reach": len(REACH_SLOTS),
+        "reach": axes * len(REACH_SLOTS),
     }
+
+
+def _constants(c: PlannerConstants) -> str:
+    follows = "TRUE" if c.rates else "FALSE"
+    lines = [f"    cFollows : BOOL := {follows}; (* how live parameters change on the way *)"]
+    lines += [f"    {name} : DINT := {value};" for name, value in _whole_constants(c).items()]
+    lines += [f"    {name} : LREAL := {literal(value)};" for name, value in _real_constants(c).items()]
+    lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in _arrays(c).items()]
+    exponents = c.exponents if c.live else np.zeros((1, c.model.shape[1]), dtype=np.int64)
+    lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))
+    lines.append(_array("cReachSlots", "DINT", [str(v) for v in REACH_SLOTS]))
+    return "\n".join(lines)
+
+
+def _whole_constants(c: PlannerConstants) -> dict[str, int]:
+    modes, (rows, terms) = c.modes, c.model.shape
+    conditions = 1 + 4 * modes
     return {
-        "name": c.name,
-        "block": f"{block_name(c.name)}_planner",
-        "machine": c.machine,
-        "axis": c.axis,
-        "start": literal(c.start),
-        "cycle_time": literal(c.cycle),
-        "cycle": f"{c.cycle:g}",
-        "velocity": f"{c.velocity:g}",
-        "acceleration": f"{c.acceleration:g}",
-        "jerk": f"{c.jerk:g}",
-        "travel": f"{c.travel[0]:g} to {c.travel[1]:g}",
-        "quick_deceleration": f"{c.quick_deceleration:g}",
-        "quick_jerk": f"{c.quick_jerk:g}",
-        "targets": f"{c.targets[0]:g} to {c.targets[1]:g}",
-        "live_rates": " faster than stated" if c.rates else "",
-        "live_lines": "\n    ".join(ranges) or "No live parameters.",
-        "live_inputs": "\n".join(inputs),
-        "take_live": "\n".join(f"aLiveNow[{k}] := f{name};" for k, name in enumerate(lives)),
-        "constants": _constants(c, terms, conditions),
-        **{f"last_{name}": str(length - 1) for name, length in lasts.items()},
-    }
-
-
-def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
-    whole = {
-        "cModes": len(c.frequencies),
-        "cMatrices": len(c.frequencies) if c.rates else 0,
+        "cAxes": len(c.axes),
+        "cModes": modes,
+        "cMatrices": modes if c.rates else 0,
+        "cRows": rows,
         "cFresh": FRESH,
-        "cCycleWork": 85 + (40 + 30 * len(c.frequencies) ** 2 if c.rates else 0),
+        "cCycleWork": _cycle_work(c),
         "cConditions": conditions,
         "cLives": len(c.live),
         "cTerms": terms,
@@ -181,6 +323,7 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cHalf": MOST // 2,
         "cLongest": LONGEST,
         "cKernelFirst": 18,
+        "cLongestKernel": _longest_kernel(c),
         "cLongKernel": 40,
         "cWide": WIDE,
         "cChunk": CHUNK,
@@ -192,45 +335,56 @@ def _constants(c: PlannerConstants, terms: int, conditions: int) -> str:
         "cColumnWork": 220 + 12 * conditions + conditions * conditions,
         "cReaches": len(REACH_SLOTS),
     }
-    real = {
+
+
+def _cycle_work(c: PlannerConstants) -> int:
+    """Floating-point operations of every cycle, whatever is planned."""
+    return 120 * len(c.axes) - 35 + (40 + 30 * c.modes**2 if c.rates else 0)
+
+
+def _longest_kernel(c: PlannerConstants) -> int:
+    """Slots of the longest kernel whose last step fits into one cycle at rest: the block's own count."""
+    conditions = 1 + 4 * c.modes
+    left = WORK - _cycle_work(c) - 20 - conditions * conditions * (conditions + 6) // 3 - 100
+    return min(KERNEL_SLOTS, left // (2 * conditions + 8))
+
+
+def _real_constants(c: PlannerConstants) -> dict[str, float]:
+    return {
         "cCycle": c.cycle,
-        "cVelocity": c.velocity,
-        "cAcceleration": c.acceleration,
-        "cJerk": c.jerk,
-        "cQuickDeceleration": c.quick_deceleration,
-        "cQuickJerk": c.quick_jerk,
-        "cTravelLow": c.travel[0],
-        "cTravelHigh": c.travel[1],
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
+        "cRate": min(axis.acceleration / axis.velocity for axis in c.axes),
+        "cCurve": min(axis.jerk / axis.velocity for axis in c.axes),
         "cInside": RESERVE if c.rates else INSIDE,
         "cReserve": RESERVE if c.rates else 0.0,
         "cCalm": c.calm,
-        "cTargetLow": c.targets[0],
-        "cTargetHigh": c.targets[1],
         "cSpare": SPARE,
         "cMirrorDecay": MIRROR_DECAY,
         "cCentre": CENTRE,
+        "cNearer": NEARER,
+        "cAgainst": AGAINST,
         "cStep": STEP,
     }
+
+
+def _arrays(c: PlannerConstants) -> dict[str, Sequence[float] | Array]:
     lives = c.live or {"": (0.0, 1.0)}
-    exponents = c.exponents if c.live else np.zeros((1, terms), dtype=np.int64)
-    arrays = {
+    return {
+        "cVelocity": [axis.velocity for axis in c.axes],
+        "cAcceleration": [axis.acceleration for axis in c.axes],
+        "cJerk": [axis.jerk for axis in c.axes],
+        "cQuickDeceleration": [axis.quick_deceleration for axis in c.axes],
+        "cQuickJerk": [axis.quick_jerk for axis in c.axes],
+        "cTravelLow": [axis.travel[0] for axis in c.axes],
+        "cTravelHigh": [axis.travel[1] for axis in c.axes],
+        "cTargetLow": [axis.targets[0] for axis in c.axes],
+        "cTargetHigh": [axis.targets[1] for axis in c.axes],
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveDrift": c.drift or (0.0,),
         "cLiveStep": [c.cycle * c.rates.get(name, 0.0) * (1.0 + ROUNDING) for name in lives],
-        "cFrequency": c.frequencies.ravel(),
-        "cDecay": c.decays.ravel(),
-        "cMatrix": c.matrix.ravel() if c.rates else (0.0,),
+        "cModel": c.model.ravel(),
     }
-    follows = "TRUE" if c.rates else "FALSE"
-    lines = [f"    cFollows : BOOL := {follows}; (* how live parameters change on the way *)"]
-    lines += [f"    {name} : DINT := {value};" for name, value in whole.items()]
-    lines += [f"    {name} : LREAL := {literal(value)};" for name, value in real.items()]
-    lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in arrays.items()]
-    lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))
-    lines.append(_array("cReachSlots", "DINT", [str(v) for v in REACH_SLOTS]))
-    return "\n".join(lines)
 
 
 def _array(name: str, type_: str, values: Sequence[str]) -> str:

@@ -15,37 +15,50 @@ CALMING = """\
                     fDelta := aSwayRateAt[0];
                     IF cModes > 1 THEN
                         fSquare := aFrequency[nMode] * aFrequency[nMode];
-                        fHalf := fSquare - aMatrix[0] + aMatrix[2];
-                        fSum := (aMatrix[2] * aSwayAt[0]
+                        fHalf := fSquare - aMatrix[0] + aMatrix[cModes * (cModes - 1)];
+                        fSum := (aMatrix[cModes * (cModes - 1)] * aSwayAt[0]
                             + (fSquare - aMatrix[0]) * aSwayAt[cModes - 1]) / fHalf;
-                        fDelta := (aMatrix[2] * aSwayRateAt[0]
+                        fDelta := (aMatrix[cModes * (cModes - 1)] * aSwayRateAt[0]
                             + (fSquare - aMatrix[0]) * aSwayRateAt[cModes - 1]) / fHalf;
                     END_IF;
-                    (* Of the acceleration, a sum of hats: the first half of one, and a whole one. *)
+                    (* Of the acceleration, a sum of hats: the second half of one, and whole ones. *)
                     fSquare := 1.0 / (aFrequency[nMode] * aFrequency[nMode] * fSlot);
                     fHalf := 2.0 * (1.0 - fRe) * fSquare;
-                    fValue := (aFuture[1] - aFuture[0]) / fSlot;
-                    fDelta := fDelta + 0.5 * fHalf * fValue - fHalf / fSlot * aFuture[1] * fRe;
-                    fSum := aFrequency[nMode] * fSum + (fIm * fSquare - 1.0 / aFrequency[nMode]) * fValue
-                        + fHalf / fSlot * aFuture[1] * fIm;
-                    fValue := fSlot / (fHalf * 2.0 * (1.0 - fRe));
-                    aLeftRe[nMode] := fValue * (fDelta * (fRe - 1.0) + fSum * fIm);
-                    aLeftIm[nMode] := fValue * (fSum * (fRe - 1.0) - fDelta * fIm);
+                    fValue := (aFuture[nPlanRow + 1] - aFuture[nPlanRow]) / fSlot;
+                    fDelta := fDelta + 0.5 * fHalf * fValue;
+                    fSum := aFrequency[nMode] * fSum + (fIm * fSquare - 1.0 / aFrequency[nMode]) * fValue;
+                    fValue := fSlot / fHalf;
+                    aLeftRe[nMode] := fValue * (fDelta * fRe - fSum * fIm);
+                    aLeftIm[nMode] := fValue * (fSum * fRe + fDelta * fIm);
                 END_FOR;
                 nPart := 0;
                 nPhase := 41;
-            41: (* and with them *)
+            41: (* and with them; from steps of the velocity to the velocity *)
                 fRe := aTurnRe[nPart];
                 fIm := aTurnIm[nPart];
-                fWaveRe := fRe * fRe - fIm * fIm;
-                fWaveIm := -2.0 * fRe * fIm;
-                FOR nIndex := 2 TO nFuture - 1 DO
-                    aLeftRe[nPart] := aLeftRe[nPart] + aFuture[nIndex] * fWaveRe;
-                    aLeftIm[nPart] := aLeftIm[nPart] + aFuture[nIndex] * fWaveIm;
-                    fValue := fWaveRe * fRe + fWaveIm * fIm;
+                fWaveRe := 0.0;
+                fWaveIm := 0.0;
+                fBound := -1.0;
+                IF bOutdated THEN fBound := 1.0E-6 * cVelocity[0]; END_IF;
+                nOther := 0;
+                FOR nTerm := 2 TO nFuture DO
+                    nIndex := nPlanRow + nFuture + 2 - nTerm;
+                    fDelta := aFuture[nIndex] - aFuture[nIndex - 1];
+                    nOther := nOther + 1;
+                    IF ABS(fDelta) > fBound THEN nOther := 0; END_IF;
+                    IF nOther > 1 THEN (* what comes after a while of one velocity is calmed then *)
+                        fWaveRe := 0.0;
+                        fWaveIm := 0.0;
+                    END_IF;
+                    fValue := fWaveRe * fRe + fWaveIm * fIm + fDelta;
                     fWaveIm := fWaveIm * fRe - fWaveRe * fIm;
                     fWaveRe := fValue;
                 END_FOR;
+                fWaveRe := aLeftRe[nPart] + fWaveRe;
+                fWaveIm := aLeftIm[nPart] + fWaveIm;
+                fValue := 0.5 * fIm / (1.0 - fRe);
+                aLeftRe[nPart] := 0.5 * fWaveRe + fValue * fWaveIm;
+                aLeftIm[nPart] := 0.5 * fWaveIm - fValue * fWaveRe;
                 nPart := nPart + 1;
                 IF nPart >= cModes THEN nPhase := 42; END_IF;
             42: (* weights of the pulse's conditions *)
@@ -58,17 +71,16 @@ CALMING = """\
                     fLeft := fLeft + SQRT(2.0 * (1.0 - fRe) * (aLeftRe[nMode] * aLeftRe[nMode]
                         + aLeftIm[nMode] * aLeftIm[nMode])) * fValue * fValue
                         / (2.0 * (1.0 - fRe) * aFrequency[nMode]);
-                    (* It begins one slot later than this one, or at once. *)
-                    fWaveRe := fRe * fRe - fIm * fIm;
-                    fWaveIm := 2.0 * fRe * fIm;
-                    IF nState = 2 THEN
+                    fWaveRe := aLeftRe[nMode];
+                    fWaveIm := aLeftIm[nMode];
+                    IF nState = 2 THEN (* it begins one slot later *)
                         fValue := fWaveRe * fRe - fWaveIm * fIm;
                         fWaveIm := fWaveRe * fIm + fWaveIm * fRe;
                         fWaveRe := fValue;
                     END_IF;
                     nRow := 4 * nMode + 1;
-                    aMiss[nRow] := -(aLeftRe[nMode] * fWaveRe - aLeftIm[nMode] * fWaveIm);
-                    aMiss[nRow + 1] := aLeftRe[nMode] * fWaveIm + aLeftIm[nMode] * fWaveRe;
+                    aMiss[nRow] := -fWaveRe;
+                    aMiss[nRow + 1] := fWaveIm;
                     aMiss[nRow + 2] := 0.0;
                     aMiss[nRow + 3] := 0.0;
                 END_FOR;
@@ -112,4 +124,53 @@ CALMING = """\
                 END_FOR;
                 nJob := 0;
                 bCalming := TRUE;
+"""
+
+FOLLOWING = """\
+
+(* Where nothing is to be planned: the machine of the live parameters of now, and what its plans reach. *)
+IF bNew AND ((nState = 1) OR (nState = 2)) AND ((nJob = 0) OR (bMeasured AND (nJob = 4))) THEN
+    bLook := cFollows AND bReady AND bSettled AND NOT bCalming AND ((nState = 2) OR bSways);
+    IF bLiveGood AND (bStale OR NOT bReady) AND (bMeasured OR (nUnmeasured = 0) OR bLook OR bWaits)
+        AND (bLooked OR NOT bLook) THEN
+        nJob := 1;
+        nPhase := 1;
+        bLooked := FALSE;
+        bPlanned := FALSE;
+    ELSIF bLook THEN
+        nJob := 5;
+        nPhase := 40;
+        nPlanAxis := 0;
+        nPlanRow := 0;
+        nAhead := 0;
+        bLooked := TRUE;
+        bPlanned := FALSE;
+        FOR nIndex := 0 TO cModes - 1 DO
+            aSwayAt[nIndex] := aSway[nIndex];
+            aSwayRateAt[nIndex] := aSwayRate[nIndex];
+        END_FOR;
+    ELSIF (nState = 1) AND (nJob = 0) AND (nUnmeasured > 0) THEN
+        nJob := 4;
+        nPlanAxis := nReachAxis;
+        nSized := cAxes - 1;
+        nPhase := 2;
+        bPlanned := FALSE;
+    END_IF;
+END_IF;
+(* The matrix of the machine followed is renewed every few cycles, where there is room. *)
+nFresh := nFresh + 1;
+nCost := (cLives + 2 * (cRows - 2 * cModes)) * cTerms + (4 * cDegrees + 10) * cLives;
+IF cFollows AND bReady AND bLiveGood AND (nState > 0) AND (nFresh >= cFresh) AND (nWork + nCost <= cWork) THEN
+    nFresh := 0;
+    nWork := nWork + nCost;
+    nFirst := 2 * cModes;
+@model
+END_IF;
+IF (nState = 2) AND bNew THEN
+    FOR nAxis := 0 TO cAxes - 1 DO
+        nBase := nAxis * cFuture;
+        aFrom[nAxis] := aFinal[nAxis]
+            - fSlot * (aFuture[nBase] / 6.0 + 5.0 * aFuture[nBase + 1] / 6.0 + aRest[nAxis]);
+    END_FOR;
+END_IF;
 """

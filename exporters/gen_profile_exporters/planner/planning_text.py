@@ -14,8 +14,8 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
     IF nSlots < nOther THEN nOther := nSlots; END_IF;
     IF nOld > nOther THEN nOther := cChunk; END_IF;
     CASE nPhase OF
-        1: nCost := (cLives + (4 + cMatrices) * cModes) * cTerms + 90 * cModes + 30 * cLives;
-        2: nCost := 120 + 6 * (nFuture + cReaches);
+        1: nCost := (cLives + 2 * cRows) * cTerms + 90 * cModes + 30 * cLives;
+        2: nCost := 125 + 6 * (nFuture + cReaches);
         3: nCost := 25 * nOther + 10;
         5: nCost := 7 * nColumns + 10;
         6, 12: nCost := (2 * nPart + 5) * nColumns;
@@ -28,7 +28,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
         15: nCost := 14 * nColumns + 40;
         16: nCost := 8 * nColumns + 10;
         17: nCost := 3 * nColumns + 60;
-        18: nCost := 28 * nOther + 80;
+        18: nCost := 32 * nOther + 80;
         19: nCost := 22 * nColumns + 60;
         40: nCost := 80 * cModes;
         41: nCost := 10 * nFuture + 20;
@@ -42,41 +42,32 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
             3: nCost := 16 * nOther + 10;
             8: nCost := 11 * nColumns + 35;
             14: nCost := 17 * nColumns + 60;
+            18: nCost := 28 * nOther + 80;
             19: nCost := 15 * nColumns + 40;
         END_CASE;
+    END_IF;
+    IF (nPhase = 10) AND NOT bMirror AND (bTurns OR (nSlots >= cLongest)) THEN
+        nCost := nCost + 3 * nColumns;
     END_IF;
     bRoom := nWork + nCost <= cWork;
     IF bRoom THEN
         nWork := nWork + nCost;
         CASE nPhase OF
             1: (* frequencies of the live parameters *)
+                bOutdated := nState = 2;
                 FOR nIndex := 0 TO cLives - 1 DO
                     aLive[nIndex] := aLiveNow[nIndex];
                     IF nState <> 2 THEN aLiveFollowed[nIndex] := aLive[nIndex]; END_IF;
-@powers
                 END_FOR;
+                nFirst := 0;
+@model
                 FOR nMode := 0 TO cModes - 1 DO
-                    aFrequency[nMode] := 0.0;
-                    aDecay[nMode] := 0.0;
+                    aFrequency[nMode] := aModel[nMode];
                 END_FOR;
                 FOR nIndex := 0 TO cMatrices * cModes - 1 DO
-                    aMatrix[nIndex] := 0.0;
+                    aMatrix[nIndex] := aModel[2 * cModes + nIndex];
                 END_FOR;
-                FOR nTerm := 0 TO cTerms - 1 DO
-                    fValue := 1.0;
-                    FOR nIndex := 0 TO cLives - 1 DO
-                        fValue := fValue * aPower[nIndex * cDegrees + cExponent[nIndex * cTerms + nTerm]];
-                    END_FOR;
-                    FOR nMode := 0 TO cModes - 1 DO
-                        nIndex := nMode * cTerms + nTerm;
-                        aFrequency[nMode] := aFrequency[nMode] + cFrequency[nIndex] * fValue;
-                        aDecay[nMode] := aDecay[nMode] + cDecay[nIndex] * fValue;
-                    END_FOR;
-                    FOR nIndex := 0 TO cMatrices * cModes - 1 DO
-                        aMatrix[nIndex] := aMatrix[nIndex] + cMatrix[nIndex * cTerms + nTerm] * fValue;
-                    END_FOR;
-                END_FOR;
-                IF cModes > 1 THEN
+                IF cModes = 2 THEN
                     fSquare := aFrequency[0];
                     fHalf := 0.5 * (fSquare + SQRT(fSquare * fSquare - 4.0 * aFrequency[cModes - 1]));
                     aFrequency[0] := aFrequency[cModes - 1] / fHalf;
@@ -99,7 +90,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                         * (1.0 - fSquare / 72.0 * (1.0 - fSquare / 110.0 * (1.0 - fSquare / 156.0))))));
                     fRe := 1.0 - fSquare / 2.0 * (1.0 - fSquare / 12.0 * (1.0 - fSquare / 30.0
                         * (1.0 - fSquare / 56.0 * (1.0 - fSquare / 90.0 * (1.0 - fSquare / 132.0)))));
-                    fHalf := 0.125 * aDecay[nMode] * fSlot;
+                    fHalf := 0.125 * aModel[cModes + nMode] * fSlot;
                     fGrowth := 1.0 + fHalf * (1.0 + fHalf / 2.0 * (1.0 + fHalf / 3.0 * (1.0 + fHalf / 4.0
                         * (1.0 + fHalf / 5.0 * (1.0 + fHalf / 6.0 * (1.0 + fHalf / 7.0))))));
                     FOR nIndex := 1 TO 3 DO
@@ -110,7 +101,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                         fIm := fValue;
                         fGrowth := fGrowth * fGrowth;
                     END_FOR;
-                    bDamped := bDamped OR (ABS(aDecay[nMode]) > 1.0E-9 * aFrequency[nMode]);
+                    bDamped := bDamped OR (ABS(aModel[cModes + nMode]) > 1.0E-9 * aFrequency[nMode]);
                     aTurnRe[nMode] := fGrowth * fRe;
                     aTurnIm[nMode] := fGrowth * fIm;
                 END_FOR;
@@ -124,97 +115,11 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
             30: (* a kernel one slot longer *)
                 nSlots := nSlots + 1;
                 nPhase := 4;
-            2: (* what is planned, from which slot on *)
-                bPlanned := FALSE;
-                nOld := 0;
-                nAhead := 0;
-                bMirror := nState <> 2;
-                bUnfolded := FALSE;
-                IF NOT bMirror THEN
-                    nAhead := 2 + 2 * cWayIterations * cColumnWork * cMost / (cWork * nSlot);
-                    nOld := nFuture - nAhead - 2;
-                    IF nOld < 0 THEN nOld := 0; END_IF;
-                END_IF;
-                fScale := fTop;
-                IF nJob = 4 THEN fScale := cVelocity; END_IF;
-                fOldSum := 0.0;
-                fValue := 0.0;
-                fDelta := 0.0;
-                FOR nIndex := 0 TO nFuture - 1 DO
-                    IF ABS(aFuture[nIndex]) > fScale THEN fScale := ABS(aFuture[nIndex]); END_IF;
-                    IF nIndex >= nAhead + 2 THEN
-                        fOldSum := fOldSum + aFuture[nIndex];
-                        IF aFuture[nIndex] > fValue THEN fValue := aFuture[nIndex]; END_IF;
-                        IF aFuture[nIndex] < fDelta THEN fDelta := aFuture[nIndex]; END_IF;
-                    END_IF;
-                END_FOR;
-                fSign := 1.0;
-                IF nJob = 2 THEN
-                    IF fGoal < fFinal THEN fSign := -1.0; END_IF;
-                ELSIF fOldSum > 0.0 THEN
-                    fSign := -1.0;
-                END_IF;
-                IF fSign < 0.0 THEN
-                    fBound := -fDelta;
-                    fDelta := -fValue;
-                    fValue := fBound;
-                    fOldSum := -fOldSum;
-                END_IF;
-                fUpper := 1.0 - cInside;
-                fLower := -1.0 + cInside;
-                IF nJob = 3 THEN
-                    fUpper := fValue / fScale;
-                    fNeed := 1.0E+9;
-                ELSIF nJob = 4 THEN
-                    fLower := 0.0;
-                    fNeed := 1.0E+9;
-                ELSE
-                    fNeed := fSign * (fGoal - fFinal) / (fScale * fSlot);
-                    IF fDelta >= -1.0E-9 * fScale THEN fLower := fDelta / fScale; END_IF;
-                END_IF;
-                fOldSum := fOldSum / fScale;
-                fRate := (1.0 - cInside) * cAcceleration * fSlot / fScale;
-                fCurve := (1.0 - cInside) * cJerk * fSlot * fSlot / fScale;
-                aX[0] := fSign * aFuture[nAhead] / fScale;
-                aX[1] := fSign * aFuture[nAhead + 1] / fScale;
-                (* How many slots it takes: from what is known of motions from rest to rest. *)
-                nSlots := nKernel;
-                IF nJob = 4 THEN nSlots := cReachSlots[nReach]; END_IF;
-                IF nJob = 2 THEN
-                    fWanted := fNeed;
-                    IF fOldSum > 0.0 THEN fWanted := fNeed + fOldSum; END_IF;
-                    nSlots := cLongest;
-                    FOR nTerm := 1 TO cReaches DO
-                        nIndex := cReaches - nTerm;
-                        IF aReach[nIndex] >= fWanted THEN
-                            nSlots := cReachSlots[nIndex];
-                            IF nIndex > 0 THEN
-                                IF aReach[nIndex - 1] > 0.0 THEN
-                                    fBound := (fWanted - aReach[nIndex - 1])
-                                        / (aReach[nIndex] - aReach[nIndex - 1]);
-                                    IF fBound > 0.0 THEN
-                                        nOther := cReachSlots[nIndex - 1];
-                                        fHalf := DINT_TO_LREAL(nSlots - nOther);
-                                        fBound := fBound * fHalf;
-                                        (* Between measured ones, a little more. *)
-                                        fHalf := cSpare * (fHalf - 1.0);
-                                        IF fHalf > 0.8 THEN fHalf := 0.8; END_IF;
-                                        fBound := fBound + fHalf + 0.499;
-                                        IF nOther + LREAL_TO_DINT(fBound) < nSlots THEN
-                                            nSlots := nOther + LREAL_TO_DINT(fBound);
-                                        END_IF;
-                                    END_IF;
-                                END_IF;
-                            END_IF;
-                        END_IF;
-                    END_FOR;
-                    IF nSlots < nOld THEN nSlots := nOld; END_IF;
-                END_IF;
-                nPhase := 4;
+@request
             4: (* which slots are unknowns: those in the middle are one; mirrored, the second half is none *)
                 nGiven := 1 + 4 * cModes;
                 FOR nMode := 0 TO cModes - 1 DO
-                    fValue := aDecay[nMode] * fSlot * DINT_TO_LREAL(nSlots);
+                    fValue := aModel[cModes + nMode] * fSlot * DINT_TO_LREAL(nSlots);
                     IF fValue > cMirrorDecay THEN bMirror := FALSE; END_IF;
                 END_FOR;
                 IF bMirror THEN
@@ -287,7 +192,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                             aE[nRow + 3 * cColumns] := aE[nRow + 3 * cColumns] + fWaveIm * fValue;
                         END_IF;
                         IF nIndex < nOld THEN
-                            fDelta := fSign * aFuture[nIndex + nAhead + 2] / fScale;
+                            fDelta := fSign * aFuture[nPlanRow + nIndex + nAhead + 2] / fScale;
                             nRow := 4 * nPart + 1;
                             aB[nRow] := aB[nRow] + fDelta * fWaveRe;
                             aB[nRow + 1] := aB[nRow + 1] + fDelta * fWaveIm;
@@ -316,7 +221,6 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                     fValue := (DINT_TO_LREAL(nIndex) - fHalf) / (fHalf + 1.0);
                     aX[nIndex + 2] := 1.0 - fValue * fValue;
                 END_FOR;
-                nFirst := 0;
                 nPhase := 6;
 @programme
 @calming
@@ -329,23 +233,31 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                 fSum := fSum - fOldSum;
                 fPlanShare := 1.0;
                 IF fSum > fNeed THEN fPlanShare := fNeed / fSum; END_IF;
+                IF bTurns AND (cAxes > 1) AND (fSum > 0.5 * fNeed) THEN (* all are to arrive together *)
+                    fPlanShare := 0.5 * fNeed / fSum;
+                    fSum := 0.5 * fNeed;
+                END_IF;
                 bGood := fSum > 1.0E-9;
-                fPlanEnd := fFinal - fSign * fScale * fSlot * fOldSum;
-                fPlanned := aX[1];
-                fPlannedBefore := aX[0];
                 nAt := 0;
                 nPhase := 18;
             18: (* hold it against the limits *)
                 nLast := nSlots;
                 IF nOld > nLast THEN nLast := nOld; END_IF;
                 nFirst := nAt;
+                IF nAt = 0 THEN
+                    aPlanEnd[nPlanAxis] := aFinal[nPlanAxis] - fSign * fScale * fSlot * fOldSum;
+                    fPlanned := aX[1];
+                    fPlannedBefore := aX[0];
+                END_IF;
                 nAt := nAt + cChunk;
                 IF nAt > nLast + 2 THEN nAt := nLast + 2; END_IF;
                 FOR nIndex := nFirst TO nAt - 1 DO
                     fDelta := 0.0;
-                    IF nIndex < nOld THEN fDelta := fSign * aFuture[nIndex + nAhead + 2] / fScale; END_IF;
+                    IF nIndex < nOld THEN
+                        fDelta := fSign * aFuture[nPlanRow + nIndex + nAhead + 2] / fScale;
+                    END_IF;
                     fValue := 0.0;
-                    IF nIndex < nSlots THEN
+                    IF (nIndex < nSlots) AND (fPlanShare > 0.0) THEN
                         nColumn := nIndex;
                         IF bMirror AND (2 * nIndex >= nSlots) THEN nColumn := nSlots - 1 - nIndex; END_IF;
                         IF nColumn > nTied THEN
@@ -358,22 +270,27 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                         fValue := aX[nColumn + 2];
                     END_IF;
                     fValue := fDelta + fPlanShare * (fValue - fDelta);
-                    IF NOT (ABS(fValue) <= cVelocity / fScale) THEN bGood := FALSE; END_IF;
+                    IF NOT (ABS(fValue) <= cVelocity[nPlanAxis] / fScale) THEN bGood := FALSE; END_IF;
                     IF NOT (ABS(fValue - fPlanned) <= fRate / (1.0 - cInside)) THEN bGood := FALSE; END_IF;
                     IF NOT (ABS(fValue - 2.0 * fPlanned + fPlannedBefore) <= fCurve / (1.0 - cInside)) THEN
                         bGood := FALSE;
                     END_IF;
-                    fPlanEnd := fPlanEnd + fSign * fScale * fSlot * fValue;
-                    IF NOT (fPlanEnd >= cTravelLow - 1.0E-10) OR NOT (fPlanEnd <= cTravelHigh + 1.0E-10) THEN
-                        IF nJob <> 4 THEN bGood := FALSE; END_IF;
+                    aPlanEnd[nPlanAxis] := aPlanEnd[nPlanAxis] + fSign * fScale * fSlot * fValue;
+                    IF nJob <> 4 THEN
+                        fHalf := aPlanEnd[nPlanAxis];
+                        IF NOT (fHalf >= cTravelLow[nPlanAxis] - 1.0E-10) THEN bGood := FALSE; END_IF;
+                        IF NOT (fHalf <= cTravelHigh[nPlanAxis] + 1.0E-10) THEN bGood := FALSE; END_IF;
                     END_IF;
-                    aPlan[nIndex] := fSign * fScale * fValue;
+                    aPlan[nPlanRow + nIndex] := fSign * fScale * fValue;
                     fPlannedBefore := fPlanned;
                     fPlanned := fValue;
                 END_FOR;
                 IF nAt >= nLast + 2 THEN
                     nAt := 0;
-                    IF bMirror AND NOT bGood AND (nEnough = cIterations) THEN
+                    IF bScaled AND NOT bGood THEN
+                        bScaled := FALSE;
+                        nPhase := 4;
+                    ELSIF (bMirror OR (nJob < 4)) AND NOT bGood AND (nEnough = cIterations) THEN
                         (* Some more iterations. *)
                         nEnough := cIterations + cMoreIterations;
                         FOR nIndex := 2 TO nColumns + 1 DO
@@ -383,19 +300,30 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                         nPart := 0;
                         nPhase := 8;
                     ELSIF nJob = 4 THEN
-                        aReach[nReach] := 0.0;
-                        IF bGood THEN aReach[nReach] := fSum; END_IF;
-                        IF aReach[nReach] > fReached THEN fReached := aReach[nReach]; END_IF;
-                        nReach := nReach + 1;
+                        IF NOT bGood THEN fSum := 0.0; END_IF;
+                        aReach[nPlanReach + nReach] := fSum;
+                        IF fSum > aReached[nPlanAxis] THEN aReached[nPlanAxis] := fSum; END_IF;
+                        nReachAxis := nReachAxis + 1;
+                        IF nReachAxis >= cAxes THEN
+                            nReachAxis := 0;
+                            nReach := nReach + 1;
+                        END_IF;
                         IF nReach >= cReaches THEN
                             nReach := 0;
                             bMeasured := TRUE;
                         END_IF;
                         nUnmeasured := nUnmeasured - 1;
                         nJob := 0;
-                    ELSIF bGood AND ((fSum >= fNeed) OR (nJob = 3) OR (nSlots >= cLongest)) THEN
-                        bPlanned := TRUE;
-                        IF (nJob = 2) AND (fSum >= fNeed) THEN fPlanEnd := fGoal; END_IF;
+                    ELSIF bGood AND ((fSum >= fNeed) OR (nJob = 3) OR bTurns OR (nSlots >= cLongest)) THEN
+                        bBraked := bBraked OR bTurns;
+                        IF (nJob = 2) AND (fSum >= fNeed) THEN
+                            aPlanEnd[nPlanAxis] := aGoal[nPlanAxis];
+                        END_IF;
+                        nFitted := nFitted + 1;
+                        bPlanned := nFitted >= cAxes;
+                        nPlanAxis := nPlanAxis + 1;
+                        IF nPlanAxis >= cAxes THEN nPlanAxis := 0; END_IF;
+                        nPhase := 2;
                     ELSIF nSlots < cLongest THEN
                         (* One slot more carries no farther than full speed does. *)
                         nOther := 1;
@@ -406,6 +334,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                         IF nOther < 1 THEN nOther := 1; END_IF;
                         nSlots := nSlots + nOther;
                         IF nSlots > cLongest THEN nSlots := cLongest; END_IF;
+                        nFitted := 0;
                         bMirror := nState <> 2;
                         bUnfolded := FALSE;
                         nPhase := 4;
@@ -420,13 +349,27 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
 END_WHILE;
 """
 
-POWERS = """\
-fValue := (2.0 * aLiveNow[nIndex] - cLiveLow[nIndex] - cLiveHigh[nIndex])
-    / (cLiveHigh[nIndex] - cLiveLow[nIndex]);
-nFirst := nIndex * cDegrees;
-aPower[nFirst] := 1.0;
-aPower[nFirst + 1] := fValue;
-FOR nTerm := 2 TO cDegrees - 1 DO
-    aPower[nFirst + nTerm] := 2.0 * fValue * aPower[nFirst + nTerm - 1] - aPower[nFirst + nTerm - 2];
+MODEL = """\
+FOR nIndex := 0 TO cLives - 1 DO
+    fValue := (2.0 * aLiveNow[nIndex] - cLiveLow[nIndex] - cLiveHigh[nIndex])
+        / (cLiveHigh[nIndex] - cLiveLow[nIndex]);
+    nOther := nIndex * cDegrees;
+    aPower[nOther] := 1.0;
+    aPower[nOther + 1] := fValue;
+    FOR nTerm := 2 TO cDegrees - 1 DO
+        aPower[nOther + nTerm] := 2.0 * fValue * aPower[nOther + nTerm - 1] - aPower[nOther + nTerm - 2];
+    END_FOR;
+END_FOR;
+FOR nRow := nFirst TO cRows - 1 DO
+    aModel[nRow] := 0.0;
+END_FOR;
+FOR nTerm := 0 TO cTerms - 1 DO
+    fValue := 1.0;
+    FOR nIndex := 0 TO cLives - 1 DO
+        fValue := fValue * aPower[nIndex * cDegrees + cExponent[nIndex * cTerms + nTerm]];
+    END_FOR;
+    FOR nRow := nFirst TO cRows - 1 DO
+        aModel[nRow] := aModel[nRow] + cModel[nRow * cTerms + nTerm] * fValue;
+    END_FOR;
 END_FOR;
 """

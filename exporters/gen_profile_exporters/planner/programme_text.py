@@ -83,21 +83,20 @@ PROGRAMME = """\
                         aKernel[nIndex] := fValue;
                         IF NOT (fValue >= 0.0) THEN bGood := FALSE; END_IF;
                         IF nColumns < cLongKernel THEN
-                            IF fValue * cVelocity > cAcceleration * fSlot THEN bGood := FALSE; END_IF;
-                            IF ABS(fValue - fDelta) * cVelocity > cJerk * fSlot * fSlot THEN
-                                bGood := FALSE;
-                            END_IF;
+                            IF fValue > cRate * fSlot THEN bGood := FALSE; END_IF;
+                            IF ABS(fValue - fDelta) > cCurve * fSlot * fSlot THEN bGood := FALSE; END_IF;
                         END_IF;
                         fDelta := fValue;
                     END_FOR;
                     nPhase := 30;
-                    IF bGood OR (nColumns >= cColumns) THEN
+                    IF bGood OR (nColumns >= cLongestKernel) THEN
                         nKernel := nColumns;
                         FOR nIndex := 0 TO cConditions * cConditions - 1 DO
                             aFactors[nIndex] := aS[nIndex];
                         END_FOR;
                         bReady := TRUE;
-                        nUnmeasured := cReaches;
+                        bTaken := TRUE;
+                        nUnmeasured := cAxes * cReaches;
                         nJob := 0;
                     END_IF;
                 ELSE
@@ -127,7 +126,7 @@ PROGRAMME = """\
                         IF nIndex > nTied THEN nOther := nIndex + nMany - 1; END_IF;
                         aX[nIndex + 2] := 0.0;
                         IF nOther < nOld THEN
-                            aX[nIndex + 2] := fSign * aFuture[nOther + nAhead + 2] / fScale;
+                            aX[nIndex + 2] := fSign * aFuture[nPlanRow + nOther + nAhead + 2] / fScale;
                         END_IF;
                     END_IF;
                 END_FOR;
@@ -231,7 +230,7 @@ PROGRAMME = """\
                 FOR nIndex := 2 TO nColumns + 1 DO
                     fValue := aE[nIndex - 2] / DINT_TO_LREAL(nSlots);
                     (* Where the way is longer than a plan, what comes first counts most. *)
-                    IF (nSlots >= cLongest) AND NOT bMirror THEN
+                    IF ((nSlots >= cLongest) OR bTurns) AND NOT bMirror THEN
                         fValue := fValue * (1.5 - DINT_TO_LREAL(nIndex) / DINT_TO_LREAL(nColumns));
                     END_IF;
                     nRow := cWide + nIndex;

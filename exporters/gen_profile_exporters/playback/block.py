@@ -1,17 +1,25 @@
-"""The playback block's template, filled in for writing and matched for reading."""
+"""The playback block's template, filled in for writing and matched for reading.
+
+The template (``template.st``) is portable IEC 61131-3 Structured Text. ``@name`` is a hole for a value.
+``$name`` is a part that the number of axes or the layout of the table decides; alone on its line, it is whole
+lines. A line that begins with ``%`` stands in blocks of several axes only. ``~`` after a name is the index of
+the axis there, and nothing where there is one axis.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
+from itertools import islice
+from pathlib import Path
 
 import attrs
 
 from gen_profile.errors import ExportError
 from gen_profile_exporters.playback.layouts import LAYOUTS
-from gen_profile_exporters.playback.template import BODY, HEADER, INTERFACE
 
+_TEMPLATE = Path(__file__).with_name("template.st").read_text("ascii")
 _CHECKED = {  # how the value of a constant enters the checksum
     "DINT": "fValue := DINT_TO_LREAL({});",
     "LREAL": "fValue := {};",
@@ -31,15 +39,22 @@ _TOKEN = re.compile(
 
 @attrs.frozen
 class Token:
-    """A piece of program text and the line it begins on."""
+    """A piece of a program's text, its number among the pieces, and the program."""
 
     text: str
-    line: int
+    number: int = 0
+    program: str = ""
+
+    @property
+    def line(self) -> int:
+        """Line on which it begins, counted from 1."""
+        piece = next(islice(_TOKEN.finditer(self.program), self.number, None), None)
+        return 1 + self.program.count("\n", 0, piece.start() if piece else None)
 
 
 def fill(values: Mapping[str, str], layout: str, axes: int) -> str:
     """Write a block: a value for every hole, by its name."""
-    return _HOLE.sub(lambda hole: values[hole[1]], HEADER + _program(layout, axes))
+    return _HOLE.sub(lambda hole: values[hole[1]], _program(layout, axes))
 
 
 def match(text: str, layout: str, axes: int) -> dict[str, Token]:
@@ -50,19 +65,20 @@ def match(text: str, layout: str, axes: int) -> dict[str, Token]:
     ExportError
         The text differs from the template elsewhere, or one value from place to place.
     """
-    found, due = _tokens(text), _due(layout, axes)
-    values: dict[str, Token] = {}
-    for token, expected in zip(found, due, strict=False):
-        hole = _HOLE.fullmatch(expected.text)
-        known = values.setdefault(hole[1], token).text if hole else expected.text
-        if token.text != known and _bare(token.text) != _bare(known):
+    program, due = _without_comments(text), _due(layout, axes)
+    found, values = _TOKEN.findall(program), dict[str, Token]()
+    for number, (piece, (expected, hole)) in enumerate(zip(found, due, strict=False)):
+        known = values.setdefault(hole, Token(piece, number, program)).text if hole else expected
+        if piece != known and _bare(piece) != _bare(known):
             raise ExportError(
-                f"line {token.line}: {token.text[:40]!r} stands where the exported block has {known[:40]!r}; "
-                "only numbers and comments may be edited in it, export it again."
+                f"line {Token(piece, number, program).line}: {piece[:40]!r} stands where the exported block "
+                f"has {known[:40]!r}; only numbers and comments may be edited in it, export it again."
             )
     if len(found) != len(due):
-        line = found[len(due)].line if len(found) > len(due) else max(1, len(text.splitlines()))
-        raise ExportError(f"line {line}: the block breaks off or goes on after its end; export it again.")
+        beyond = Token("", len(due), program).line if len(found) > len(due) else len(text.splitlines())
+        raise ExportError(
+            f"line {max(1, beyond)}: the block breaks off or goes on after its end; export it again."
+        )
     return values
 
 
@@ -93,10 +109,13 @@ def layout_of(text: str) -> str:
 
 
 @cache
-def _due(layout: str, axes: int) -> list[Token]:
-    return _tokens(_program(layout, axes))
+def _due(layout: str, axes: int) -> list[tuple[str, str]]:
+    """List the pieces of the template, each with the name of the hole that it is, if it is one."""
+    pieces = _TOKEN.findall(_without_comments(_program(layout, axes)))
+    return [(piece, hole[1] if (hole := _HOLE.fullmatch(piece)) else "") for piece in pieces]
 
 
+@cache
 def _program(layout: str, axes: int) -> str:
     """Put the layout's parts in, and settle what the number of axes decides."""
     array = f"ARRAY [1..{axes}] OF " if axes > 1 else ""
@@ -115,7 +134,7 @@ def _program(layout: str, axes: int) -> str:
         "per_axis": "{} / cAxes" if axes > 1 else "{}",
         "whole_numbers": f"{array}DINT",
     }
-    text = _LINES.sub(lambda lines: parts[lines[1]], INTERFACE + BODY)
+    text = _LINES.sub(lambda lines: parts[lines[1]], _TEMPLATE)
     text = _PART.sub(lambda part: parts[part[1]].format(part[2]), text)
     lines = text.replace("~", "[nAxis]" if axes > 1 else "").splitlines(keepends=True)
     return "".join(line.replace("%", "", 1) for line in lines if axes > 1 or not line.startswith("%"))
@@ -145,13 +164,6 @@ def _bare(text: str) -> str:
     return "".join(text.split()).lower()
 
 
-def _tokens(text: str) -> list[Token]:
-    """Split program text; comments are left out, but their line ends counted."""
-    program = _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n") or " ", text)
-    tokens = []
-    line, counted = 1, 0
-    for piece in _TOKEN.finditer(program):
-        line += program.count("\n", counted, piece.start())
-        counted = piece.start()
-        tokens.append(Token(text=piece[0], line=line))
-    return tokens
+def _without_comments(text: str) -> str:
+    """Leave out comments, but not their line ends."""
+    return _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n") or " ", text)

@@ -101,17 +101,16 @@ def latest_stop(limits: PathLimits, velocity: Array, acceleration: Array, cycle_
     path, step = begin.astype(np.float64), max(1.0, cycles / STEPS)  # in cycles
     rate, slope = np.ones(len(path)), np.zeros(len(path))
     worth = np.zeros(len(path), dtype=bool)
-    push, forward = acceleration * limits.inverse_velocity, acceleration * velocity > 0.0
+    push, forward = np.abs(acceleration * limits.inverse_velocity), acceleration * velocity > 0.0
     for passed in count(step, step):
         going = ~worth & (passed + MARGIN * step < cycles - begin)
         if not going.any():
             break
         slope = _slope(limits, rate, slope, step * cycle_time)
         at = np.minimum(path.astype(int), cycles)
-        pushes = push[at] * (rate**2)[:, None]
-        room = np.maximum(limits.room - np.abs(pushes), 0.0)
+        room = np.maximum(limits.room - push[at] * (rate * rate)[:, None], 0.0)
         least = np.where(forward[at], limits.room, room).min(axis=1)
-        slope = np.clip(slope, -least, room.min(axis=1))
+        slope = np.minimum(np.maximum(slope, -least), room.min(axis=1))
         before, rate = rate, np.maximum(rate + slope * step * cycle_time, 0.0)
         path = path + 0.5 * step * (before + rate)
         worth |= going & (rate <= 0.0)
@@ -125,5 +124,4 @@ def _slope(limits: PathLimits, rate: Array, slope: Array, time: float) -> Array:
     steps = rate / (step * time)
     pieces = np.maximum(np.rint(0.5 * np.sqrt(1.0 + 8.0 * steps)), 1.0)
     wanted = np.minimum(step * (steps / pieces + 0.5 * (pieces - 1.0)), limits.slope)
-    chosen: Array = np.clip(-wanted, slope - step, slope + step)
-    return chosen
+    return np.minimum(np.maximum(-wanted, slope - step), slope + step)

@@ -88,33 +88,35 @@ def fit(samples: Array, cycle_time: float) -> QuinticSegments:
         s.
     """
     last = samples.shape[1] - 1
-    first, pieces = [0], []
-    length = 1
-    while first[-1] < last:
-        begin = first[-1]
-        length = _longest(samples, begin, min(length, last - begin), last - begin, cycle_time)
-        pieces.append(hermite(samples[:, begin], samples[:, begin + length], length * cycle_time))
-        first.append(begin + length)
+    allowed = samples[::2] / np.array([POSITION_ERROR, ACCELERATION_ERROR])[:, None, None]
+    knots, length = [0], 1
+    while knots[-1] < last:
+        begin = knots[-1]
+        length = _longest(samples, allowed, begin, length, cycle_time)
+        knots.append(begin + length)
+    first = np.array(knots)
+    duration = (np.diff(first) * cycle_time)[:, None]
+    pieces = hermite(samples[:, first[:-1]], samples[:, first[1:]], duration)
     return QuinticSegments(
         cycle_time=cycle_time,
-        first=np.array(first),
-        coefficients=np.array(pieces),
+        first=first,
+        coefficients=np.moveaxis(pieces, 0, 1),
         target=samples[0, -1],
     )
 
 
-def hermite(begin: Array, end: Array, duration: float) -> Array:
+def hermite(begin: Array, end: Array, duration: Array | float) -> Array:
     """Interpolate by a quintic; `begin` and `end` hold position, velocity, acceleration.
 
     Parameters
     ----------
-    begin, end : (3, axes) array
-    duration : float
+    begin, end : (3, …, axes) array
+    duration : float or (…, 1) array
         s.
 
     Returns
     -------
-    (6, axes) array
+    (6, …, axes) array
         Coefficients, lowest power first.
     """
     (p0, v0, a0), (p1, v1, a1) = begin, end
@@ -144,13 +146,17 @@ def horner(coefficients: Array, time: Array) -> tuple[Array, Array, Array]:
     )
 
 
-def _longest(samples: Array, begin: int, guess: int, most: int, cycle_time: float) -> int:
-    """Find the longest segment that fits: tried where its error says, and now and then in between."""
-    fits, fails, trial = 1, most + 1, 0
+def _longest(samples: Array, allowed: Array, begin: int, guess: int, cycle_time: float) -> int:
+    """Find the longest segment that fits: tried where its error says, and now and then in between.
+
+    `allowed` has positions and accelerations in units of their allowed errors.
+    """
+    fits, fails, trial = 1, samples.shape[1] - begin, 0
     while fails - fits > 1:
         trial += 1
         length = min(max(guess, fits + 1), fails - 1)
-        reach = _reach(samples[:, begin : begin + length + 1], cycle_time)
+        ends = np.concatenate([samples[:, begin], samples[:, begin + length]])
+        reach = _reach(ends, allowed[:, begin + 1 : begin + length], cycle_time)
         if reach >= 1.0:
             fits = length
         else:
@@ -159,25 +165,22 @@ def _longest(samples: Array, begin: int, guess: int, most: int, cycle_time: floa
     return fits
 
 
-def _reach(samples: Array, cycle_time: float) -> float:
+def _reach(ends: Array, inside: Array, cycle_time: float) -> float:
     """Predict how many times as long a segment would fit; at least 1 where this one does.
 
     Errors of a quintic's position and acceleration grow with the sixth and fourth power of its length.
     """
-    at_position, at_acceleration = _interpolation(samples.shape[1] - 1, cycle_time)
-    ends = np.concatenate([samples[:, 0], samples[:, -1]])
-    position, acceleration = at_position @ ends, at_acceleration @ ends
-    far = float(np.abs(position - samples[0, 1:-1]).max()) / POSITION_ERROR
-    bent = float(np.abs(acceleration - samples[2, 1:-1]).max()) / ACCELERATION_ERROR
+    missed = _interpolation(inside.shape[1] + 1, cycle_time) @ ends - inside
+    far, bent = np.maximum.reduce(np.abs(missed, out=missed), axis=(1, 2)).tolist()
     return float(1.0 / max(far ** (1 / 6), bent**0.25, LEAST))
 
 
 @lru_cache(maxsize=1024)
-def _interpolation(length: int, cycle_time: float) -> tuple[Array, Array]:
-    """Matrices from what holds at a segment's ends to position and acceleration at the cycles inside it."""
+def _interpolation(length: int, cycle_time: float) -> Array:
+    """Matrices from what holds at a segment's ends to what `_longest` allows inside it."""
     ends, times = np.eye(6), np.arange(1, length, dtype=np.float64) * cycle_time
     position, _, acceleration = horner(hermite(ends[:3], ends[3:], length * cycle_time), times[:, None])
-    return position, acceleration
+    return np.array([position / POSITION_ERROR, acceleration / ACCELERATION_ERROR])
 
 
 def _falling(power: int, order: int) -> float:

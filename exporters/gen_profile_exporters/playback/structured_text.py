@@ -1,6 +1,6 @@
 """Playback function block in IEC 61131-3 Structured Text, for any controller that takes this language.
 
-The block (`gen_profile_exporters.playback.template`) holds the motion as a table, by default as quintic
+The block (``template.st``) holds the motion as a table, by default as quintic
 segments, and issues position, velocity and acceleration every cycle of its task. It keeps to what independent
 compilers have in common: ASCII, ``(* *)`` comments, one-dimensional arrays in ``VAR CONSTANT``, literals such
 as ``-1.5E-7`` that a REAL could hold.
@@ -43,7 +43,8 @@ MOST_CYCLES = 10_000_000  # of a motion that is read
 
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _SWITCH = {"FALSE": "0", "TRUE": "1"}
-_NUMBER = re.compile(r"\s*[-+]?\d+(\.\d+)?([eE][-+]?\d+)?\s*", re.ASCII)
+_FORM = r"\s*[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?\s*"
+_NUMBER, _NUMBERS = re.compile(_FORM, re.ASCII), re.compile(rf"\[?{_FORM}(?:,{_FORM})*\]?", re.ASCII)
 
 
 def encode(profile: Profile, target: Target) -> tuple[File, ...]:
@@ -87,7 +88,7 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
 def block_text(profile: Profile, target: Target) -> str:
     """Write the block, see `encode`."""
     table = tabulate(profile, target)
-    values = _values(table) | _header_values(table, target)
+    values = _table_values(table) | _values(table) | _header_values(table, target)
     return playback_block.fill(values, table.layout, len(table.axes))
 
 
@@ -127,30 +128,30 @@ def plain(name: str) -> str:
 
 
 def _values(table: PlaybackTable) -> dict[str, str]:
-    """Fill every hole of the program that follows from the table."""
+    """Fill every hole of the program but for those of the table itself."""
     return _constants(table) | {"checksum": str(table_checksum(table))}
 
 
 def table_checksum(table: PlaybackTable) -> int:
     """Checksum that a block works out: of the table, then of all other constants, axis by axis."""
     constants = playback_block.constants(_constants(table), table.layout, len(table.axes))
-    numbers = np.array([_array(Token(text, 0)) * np.ones(len(table.axes)) for text in constants])
+    numbers = np.array([_array(Token(text)) * np.ones(len(table.axes)) for text in constants])
     return checksum(np.append(table.values(), numbers.T))
 
 
-def _constants(table: PlaybackTable) -> dict[str, str]:
-    limits = table.limits()
+def _table_values(table: PlaybackTable) -> dict[str, str]:
+    """Fill the holes of the table."""
     write = _whole_numbers if table.layout == "counts" else _literals
     names = SAMPLE_COLUMNS if table.first is None else SEGMENT_COLUMNS
     values = {name: write(column.ravel()) for name, column in zip(names, table.columns, strict=True)}
-    rows = table.columns[0].size
-    if table.first is not None:
-        values |= {
-            "last_segment": str(len(table.first) - 1),
-            "segments": f"[0..{len(table.first) - 1}]",
-            "first": _whole_numbers(table.first),
-        }
-    return values | {
+    return values if table.first is None else values | {"first": _whole_numbers(table.first)}
+
+
+def _constants(table: PlaybackTable) -> dict[str, str]:
+    limits, rows = table.limits(), table.columns[0].size
+    last = 0 if table.first is None else len(table.first) - 1
+    segments = {} if table.first is None else {"last_segment": str(last), "segments": f"[0..{last}]"}
+    return segments | {
         "last": str(table.last),
         "row_count": str(rows),
         "checks": str(table.checks()),
@@ -301,7 +302,7 @@ def _verify(found: Mapping[str, Token], table: PlaybackTable) -> None:
         )
     for name, token in found.items():
         same = token.text == due.get(name, token.text)  # as it was exported: no number need be read
-        if not same and _numbers(token) != _numbers(Token(due[name], 0)):
+        if not same and _numbers(token) != _numbers(Token(due[name])):
             raise ExportError(
                 f"line {token.line}: {token.text[:40]} stands where the table asks for {due[name][:40]}; "
                 "export the block again."
@@ -341,12 +342,12 @@ def initialiser(texts: Sequence[str]) -> str:
 
 def _array(token: Token) -> Array:
     """Read an initialiser, or a single number."""
-    numbers = []
-    line = token.line
-    for text in token.text.strip("[]").split(","):
-        line += text.rstrip().count("\n")
-        numbers.append(_number(text, line))
-    return np.array(numbers)
+    texts = token.text.strip("[]").split(",")
+    if _NUMBERS.fullmatch(token.text) and np.isfinite(numbers := np.array(list(map(float, texts)))).all():
+        return numbers
+    first = token.line
+    lines = first + np.cumsum([text.rstrip().count("\n") for text in texts])
+    return np.array([_number(text, line) for text, line in zip(texts, lines.tolist(), strict=True)])
 
 
 def _numbers(token: Token) -> list[float] | str:

@@ -9,6 +9,7 @@ counts     the same as whole 32-bit drive counts, counts per s and counts per sÂ
 
 from __future__ import annotations
 
+from functools import cached_property
 from math import ceil
 
 import attrs
@@ -104,6 +105,10 @@ class PlaybackTable:
 
     def played(self) -> AxisTable:
         """List what the block issues every cycle when nothing disturbs it, in axis units."""
+        return self._played
+
+    @cached_property
+    def _played(self) -> AxisTable:
         position, velocity, acceleration = (
             self.columns if self.first is None else self._segments().at_cycles()
         )
@@ -122,6 +127,10 @@ class PlaybackTable:
 
     def peaks(self) -> Array:
         """Bound the magnitudes of velocity, acceleration and jerk along the path, shape (3, axes)."""
+        return self._peaks
+
+    @cached_property
+    def _peaks(self) -> Array:
         if self.first is not None:
             return self._segments().peaks()
         _, velocity, acceleration = np.abs(self.columns)

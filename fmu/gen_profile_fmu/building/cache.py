@@ -26,6 +26,7 @@ from gen_profile.private_folder import is_private, make_private, others_may_writ
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CACHE"
 _CHECKSUMS = "checksums.json"
 _logger = logging.getLogger(__name__)
+_known_intact: dict[Path, list[tuple[int, ...]]] = {}  # entries that were read whole, and their files then
 
 
 def cache_folders() -> Iterator[Path]:
@@ -117,16 +118,31 @@ def _warn(refusal: str) -> None:
 
 
 def is_intact(entry: Path) -> bool:
-    """Whether an entry is complete, and every file as it was written, where nobody else may write."""
+    """Whether an entry is complete, and every file as it was written, where nobody else may write.
+
+    Files that have not been touched since this process read them are not read again.
+    """
     try:
         checksums = json.loads((entry / _CHECKSUMS).read_text(encoding="utf-8"))
         if any(others_may_write(entry / name, entry.parent) for name in (_CHECKSUMS, *checksums)):
             return False
-        return bool(checksums) and all(
+        stamp = [_stamp(entry / name) for name in (_CHECKSUMS, *checksums)]
+        if _known_intact.get(entry) == stamp:
+            return True
+        intact = bool(checksums) and all(
             _sha256((entry / name).read_bytes()) == checksum for name, checksum in checksums.items()
         )
     except (OSError, ValueError, AttributeError, TypeError):
         return False
+    if intact:
+        _known_intact[entry] = stamp
+    return intact
+
+
+def _stamp(file: Path) -> tuple[int, ...]:
+    """Tell a file from what it may be replaced by or changed to."""
+    status = file.stat()
+    return status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
 
 
 def write_entry(entry: Path, files: Mapping[str, bytes]) -> None:

@@ -7,6 +7,7 @@ import os
 import shlex
 import subprocess
 import sys
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from platform import machine
@@ -23,8 +24,17 @@ FLAGS = (
     "-O2",
     "-ffp-contract=off",  # fused multiply-add would make results depend on the processor
     "-fno-math-errno",  # sine and cosine of an angle in one call, with the same bits: a third of the time
-    *("-fPIC", "-fvisibility=hidden", "-shared"),
+    *("-fPIC", "-fvisibility=hidden"),
 )
+# else Zig first builds MinGW's runtime, for a minute or two; all we need of it is in the system's library
+WINDOWS_FLAGS = ("-fmath-errno", "-U__CRT__NO_INLINE")  # no sincos; isnan and the like in the header
+WINDOWS_LIBRARIES = ("-nostdlib", "-e", "begin", "-lucrtbase")
+WINDOWS_ENTRY = """\
+int __stdcall begin(void *library, unsigned long reason, void *reserved) {
+    (void)library, (void)reason, (void)reserved;
+    return 1; /* nothing to begin: no constructors, no storage of threads */
+}
+"""
 # names as they are in a shared library; a library of several FMUs linked statically has prefixed ones
 DEFINITIONS = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
 
@@ -37,11 +47,17 @@ class Compiler:
     ----------
     command : tuple of str
         Program and options, without files.
+    libraries : tuple of str
+        What is linked.
+    own_entry : bool
+        Whether a library has `WINDOWS_ENTRY` in the place of a runtime.
     identity : str
         Names version and options: the same sources and identity give the same binary.
     """
 
     command: tuple[str, ...]
+    libraries: tuple[str, ...]
+    own_entry: bool = False
     identity: str
 
 
@@ -67,9 +83,14 @@ def find_compiler(platform: str | None = None) -> Compiler:
 def _named_compiler(text: str) -> Compiler:
     command = (*shlex.split(text), *FLAGS, *DEFINITIONS)
     reported = _run((command[0], "--version"), folder=None, environment=None)
-    return Compiler(command=command, identity="\n".join((text, *FLAGS, sys.platform, machine(), reported)))
+    return Compiler(
+        command=command,
+        libraries=("-lm",),
+        identity="\n".join((text, *FLAGS, sys.platform, machine(), reported)),
+    )
 
 
+@cache
 def _zig_compiler(target: str) -> Compiler:
     spec = importlib.util.find_spec("ziglang")
     if spec is None or not spec.submodule_search_locations:
@@ -78,9 +99,14 @@ def _zig_compiler(target: str) -> Compiler:
             f"or name a C compiler in the environment variable {ENVIRONMENT_VARIABLE}."
         )
     program = Path(spec.submodule_search_locations[0]) / ("zig.exe" if sys.platform == "win32" else "zig")
-    options = ("-target", target, *FLAGS, *DEFINITIONS, "-s")
+    windows = "windows" in target
+    libraries = WINDOWS_LIBRARIES if windows else ("-lm",)
+    options = ("-target", target, *FLAGS, *(WINDOWS_FLAGS if windows else ()), *DEFINITIONS, "-s")
     return Compiler(
-        command=(str(program), "cc", *options), identity="\n".join(("ziglang", version("ziglang"), *options))
+        command=(str(program), "cc", *options),
+        libraries=libraries,
+        own_entry=windows,
+        identity="\n".join(("ziglang", version("ziglang"), *options, *libraries)),
     )
 
 
@@ -109,7 +135,14 @@ def compile_library(compiler: Compiler, folder: Path, source: str, output: str, 
             "ZIG_GLOBAL_CACHE_DIR": str(zig_cache),
             "ZIG_LOCAL_CACHE_DIR": local_cache,
         }
-        _run((*compiler.command, "-I.", "-o", output, source, "-lm"), folder=folder, environment=environment)
+        sources = [source]
+        if compiler.own_entry:
+            # first, for without its runtime Zig takes away the headers, too
+            _run((*compiler.command, "-I.", "-c", "-o", "library.obj", source), folder, environment)
+            (folder / "entry.c").write_text(WINDOWS_ENTRY, encoding="ascii")
+            sources = ["library.obj", "entry.c"]
+        link = (*compiler.command, "-I.", "-shared", "-o", output, *sources, *compiler.libraries)
+        _run(link, folder, environment)
 
 
 def _run(command: tuple[str, ...], folder: Path | None, environment: dict[str, str] | None) -> str:

@@ -12,7 +12,7 @@ import fmpy
 from gen_profile.plants.plant import Plant
 from gen_profile_fmu.building.build import compile_texts, sources_key
 from gen_profile_fmu.building.cache import cached
-from gen_profile_fmu.building.compiler import find_compiler
+from gen_profile_fmu.building.compiler import Compiler, find_compiler
 from gen_profile_fmu.description.fmu_files import SOURCE_FILE, Sources, Version, archive, fmu_files, sources
 from gen_profile_fmu.model.contents import Model, plant_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
@@ -55,13 +55,16 @@ def plant_fmu(plant: Plant, on_build: Callable[[], None] | None = None) -> Plant
     CosimulationError
         When there is no compiler, it fails, or no cache folder can be written.
     """
-    return _cached(_plant_sources(plant), on_build)
+    compiler = find_compiler()
+    return _cached(*_plant_sources(plant, compiler), compiler, on_build)
 
 
 @cache
-def _plant_sources(plant: Plant) -> Sources:
+def _plant_sources(plant: Plant, compiler: Compiler) -> tuple[Sources, str]:
+    """Write the texts of a plant's FMU, and name its binary."""
     machine = PlantInstance(plant=plant, parameters=plant.nominal())
-    return sources(plant_model(machine, InputKind.SETPOINT), Version.FMI2)
+    made = sources(plant_model(machine, InputKind.SETPOINT), Version.FMI2)
+    return made, sources_key(made, compiler)
 
 
 def cached_fmu(model: Model, version: Version) -> PlantFmu:
@@ -69,11 +72,14 @@ def cached_fmu(model: Model, version: Version) -> PlantFmu:
 
     Raises as `plant_fmu` does.
     """
-    return _cached(sources(model, version))
+    made, compiler = sources(model, version), find_compiler()
+    return _cached(made, sources_key(made, compiler), compiler)
 
 
-def _cached(made: Sources, on_build: Callable[[], None] | None = None) -> PlantFmu:
-    model, version, compiler = made.model, made.version, find_compiler()
+def _cached(
+    made: Sources, key: str, compiler: Compiler, on_build: Callable[[], None] | None = None
+) -> PlantFmu:
+    model, version = made.model, made.version
     library = model.identifier + fmpy.sharedLibraryExtension
     platform = fmpy.platform if version is Version.FMI2 else fmpy.platform_tuple
 
@@ -82,7 +88,7 @@ def _cached(made: Sources, on_build: Callable[[], None] | None = None) -> PlantF
         laid = fmu_files(made, {f"binaries/{platform}/{library}": binary}, with_extras=False)
         return {**laid, f"{model.identifier}.fmu": archive(laid)}
 
-    entry = cached(f"{model.identifier}-{sources_key(made, compiler)}", make)
+    entry = cached(f"{model.identifier}-{key}", make)
     return PlantFmu(
         archive=entry / f"{model.identifier}.fmu",
         folder=entry,

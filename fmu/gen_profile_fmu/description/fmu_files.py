@@ -16,7 +16,7 @@ import fmpy
 from gen_profile_fmu.description import fmi2 as fmi2_description
 from gen_profile_fmu.description import fmi3 as fmi3_description
 from gen_profile_fmu.description.terminals import terminals_and_icons
-from gen_profile_fmu.model.c_sources import FOLDER
+from gen_profile_fmu.model.c_sources import hand_written
 from gen_profile_fmu.model.contents import Model
 
 SOURCE_FILE = "fmu.c"  # includes all others
@@ -75,7 +75,7 @@ def sources(model: Model, version: Version) -> Sources:
     """Write a model's C files and description for a version of FMI."""
     code = {
         **model.code,
-        **{name: (FOLDER / name).read_text(encoding="utf-8") for name in (*_COMMON, *version.own_files)},
+        **hand_written("interface", *_COMMON, *version.own_files),
     }
     identity = digest(_describe(model, version, ""), *flat(code))[:32]
     return Sources(

@@ -14,7 +14,7 @@ from gen_profile.problem.dynamics import Dynamics
 from gen_profile.problem.symbolic import Function
 from gen_profile_fmu.model.variables import DERIVATIVES, STATES, FmuVariable, Kind, Type, VariableTable
 
-FOLDER = Path(__file__).parents[1] / "c"
+_FOLDER = Path(__file__).parents[1] / "c"
 FEWEST_POWERS = 4  # so that there is a jerk
 # of CasADi's text: all that it exports, and there the functions that only call the one with the equations
 _EXPORTED = r"^CASADI_SYMBOL_EXPORT [^{\n]*\{(?:[^\n]*\}\n|.*?^\}\n)\n?"
@@ -22,9 +22,14 @@ _LEFT_OVER = r"^static const casadi_int casadi_s\d+\[.*\n|^#define casadi_[fs]\d
 _WRAPPER = r"CASADI_SYMBOL_EXPORT int (\w+)\([^)]*\) ?\{\s*return (casadi_f\d+)\("
 
 
-def hand_written(*names: str) -> dict[str, str]:
-    """Read the hand-written files of these names, and those that every model has."""
-    return {name: (FOLDER / name).read_text(encoding="utf-8") for name in ("model.h", *names)}
+def hand_written(folder: str, *names: str) -> dict[str, str]:
+    """Read hand-written files of a folder by their names; once compiled, all lie side by side."""
+    return {name: (_FOLDER / folder / name).read_text(encoding="utf-8") for name in names}
+
+
+def model_sources(*names: str) -> dict[str, str]:
+    """Read the hand-written files of a model, and those that every model has."""
+    return hand_written("models", "model.h", *names)
 
 
 def equations_source(equations: Dynamics) -> str:

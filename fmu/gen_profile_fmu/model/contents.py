@@ -13,7 +13,7 @@ from gen_profile.plants.plant import Coordinate
 from gen_profile.problem.dynamics import dynamics
 from gen_profile_fmu.model.c_sources import (
     equations_source,
-    hand_written,
+    model_sources,
     motion_table,
     variables_header,
 )
@@ -42,8 +42,7 @@ class Model:
 
     Attributes
     ----------
-    name, identifier, summary : str
-        `identifier` is the name as C takes it: that of the binary.
+    name, summary : str
     variables : VariableTable
     structure : Structure
     interpolates_inputs : bool
@@ -63,18 +62,22 @@ class Model:
     """
 
     name: str
-    identifier: str
     summary: str
     variables: VariableTable
     structure: Structure
-    interpolates_inputs: bool
+    interpolates_inputs: bool = False
     output_order: int = 0
     code: Mapping[str, str]
     order: tuple[str, ...]
     page: Callable[[], str]
     stop_time: float
-    step: float
+    step: float = 0.001
     author: str = AUTHOR
+
+    @property
+    def identifier(self) -> str:
+        """The name as C takes it: that of the binary."""
+        return identifier_of(self.name)
 
 
 def identifier_of(name: str) -> str:
@@ -104,13 +107,12 @@ def plant_model(machine: PlantInstance, kind: InputKind, name: str | None = None
     name = name or plant.type
     return Model(
         name=name,
-        identifier=identifier_of(name),
         summary=plant.summary,
         variables=table,
         structure=plant_structure(equations, table, _drives(table, kind), origins),
         interpolates_inputs=kind is not InputKind.SETPOINT,
         code={
-            **hand_written(*PLANT_FILES, "plant_model.c"),
+            **model_sources(*PLANT_FILES, "plant_model.c"),
             "variables.h": variables_header(
                 table, len(plant.actuated), len(plant.unactuated), _constants(kind, len(plant.actuated))
             ),
@@ -119,7 +121,6 @@ def plant_model(machine: PlantInstance, kind: InputKind, name: str | None = None
         order=("equations.c", "driven_plant.c", "plant_model.c"),
         page=partial(plant_page, name, machine, table, kind),
         stop_time=10.0,
-        step=0.001,
     )
 
 
@@ -154,21 +155,18 @@ def profile_model(name: str, axes: Sequence[Coordinate], profile: Profile) -> Mo
     constants = PLAIN | {"OUTPUT_ORDERS": str(OUTPUT_ORDER)}
     return Model(
         name=name,
-        identifier=identifier_of(name),
         summary="motion of the axes",
         variables=table,
         structure=profile_structure(table),
-        interpolates_inputs=False,
         output_order=OUTPUT_ORDER,
         code={
-            **hand_written(*MOTION_FILES, "profile_model.c"),
+            **model_sources(*MOTION_FILES, "profile_model.c"),
             "variables.h": variables_header(table, len(axes), 0, constants),
             "motion_table.h": motion_table(profile),
         },
         order=("motion.c", "profile_model.c"),
         page=partial(motion_page, name, axes, profile, table),
         stop_time=profile.duration + 1.0,
-        step=0.001,
     )
 
 
@@ -197,13 +195,11 @@ def system_model(name: str, machine: PlantInstance, command: Profile) -> Model:
     constants = {"N_ORDERS": "N_POWERS - 1", **PLAIN}
     return Model(
         name=name,
-        identifier=identifier_of(name),
         summary=f"{plant.summary}, following a motion",
         variables=table,
         structure=plant_structure(equations, table, drives, origins),
-        interpolates_inputs=False,
         code={
-            **hand_written(*PLANT_FILES, *MOTION_FILES, "system_model.c"),
+            **model_sources(*PLANT_FILES, *MOTION_FILES, "system_model.c"),
             "variables.h": variables_header(table, len(plant.actuated), len(plant.unactuated), constants),
             "motion_table.h": motion_table(command),
             "equations.c": equations_source(equations),
@@ -211,5 +207,4 @@ def system_model(name: str, machine: PlantInstance, command: Profile) -> Model:
         order=("equations.c", "motion.c", "driven_plant.c", "system_model.c"),
         page=partial(system_page, name, machine, command, table),
         stop_time=command.duration + 4.0,
-        step=0.001,
     )

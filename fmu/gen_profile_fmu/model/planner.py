@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import attrs
@@ -11,22 +11,22 @@ import attrs
 from gen_profile.problem.dynamics import dynamics
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.st_to_c import StVariable, Translation, translate
-from gen_profile_fmu.model.c_sources import equations_source, hand_written, variables_header
-from gen_profile_fmu.model.contents import PLAIN, PLANT_FILES, Model, identifier_of
+from gen_profile_fmu.model.c_sources import equations_source, model_sources, variables_header
+from gen_profile_fmu.model.contents import PLAIN, PLANT_FILES, Model
 from gen_profile_fmu.model.dependencies import Structure, plant_structure
 from gen_profile_fmu.model.documentation import block_page, planned_system_page
 from gen_profile_fmu.model.plant_variables import PlantInstance, planned_system_variables, time_variable
 from gen_profile_fmu.model.variables import FmuVariable, Kind, Type, VariableTable, require_good_names
 
-UNITS = (
-    "m",
-    "m/s",
-    "m/s^2",
-    "s",
-)  # with which comments of declarations begin, beside those of live parameters
+# with which comments of declarations begin, beside those of live parameters
+UNITS = ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "s")
 TYPES = {"LREAL": Type.REAL, "BOOL": Type.BOOLEAN, "DINT": Type.INTEGER}
 CYCLE = "fCycleTime"  # of the task: fixed, where others are inputs
 STANDS = "fActPosition"
+OWN = (  # inputs and outputs of each axis
+    *("fTarget", "fVelocityCommand", "fVelocityLimit", STANDS),
+    *("fPosition", "fVelocity", "fAcceleration", "fDistanceToGo", "fStopDistance"),
+)
 SETPOINTS = {
     "fPosition": "setpoint",
     "fVelocity": "setpoint_velocity",
@@ -42,8 +42,8 @@ class _PlacedBlock:
     ----------
     source : BlockSource
     code : Translation
-    axis : str
-        That it plans.
+    axes : mapping of str to str
+        Names of those that it plans, by what its inputs and outputs end in.
     live : tuple of str
     inside : tuple of str
         Inputs of the block that are none of the FMU's.
@@ -51,7 +51,7 @@ class _PlacedBlock:
 
     source: BlockSource
     code: Translation
-    axis: str
+    axes: Mapping[str, str]
     live: tuple[str, ...]
     inside: tuple[str, ...]
 
@@ -75,7 +75,7 @@ class _PlacedBlock:
         }
 
 
-def planner_model(name: str, text: str, axis: str, live: tuple[str, ...]) -> Model:
+def planner_model(name: str, text: str, axes: Mapping[str, str], live: tuple[str, ...]) -> Model:
     """Make the FMU's content of a planner block.
 
     Parameters
@@ -83,8 +83,8 @@ def planner_model(name: str, text: str, axis: str, live: tuple[str, ...]) -> Mod
     name : str
     text : str
         The block.
-    axis : str
-        Name of the axis that it plans.
+    axes : mapping of str to str
+        Names of the axes that it plans, by what the names of its inputs and outputs end in.
     live : tuple of str
         Names of the live parameters.
 
@@ -94,21 +94,19 @@ def planner_model(name: str, text: str, axis: str, live: tuple[str, ...]) -> Mod
         The text is no function block.
     """
     block = _PlacedBlock(
-        source=parse_function_block(text), code=translate(text), axis=axis, live=live, inside=(CYCLE,)
+        source=parse_function_block(text), code=translate(text), axes=axes, live=live, inside=(CYCLE,)
     )
     orders, issued = _orders(block), _issued(block)
     table = VariableTable(blocks={**orders, **issued, "TIME": (time_variable(),)})
-    require_good_names("Planner", [axis, *live], table)
+    require_good_names("Planner", [*axes.values(), *live], table)
     at = _references(block, table)
     return Model(
         name=name,
-        identifier=identifier_of(name),
-        summary=f"planner of motions of {axis} that leave no sway",
+        summary=f"planner of motions of {' and '.join(axes.values())} that leave no sway",
         variables=table,
         structure=_structure(block, table, at),
-        interpolates_inputs=False,
         code={
-            **hand_written("planner_model.c"),
+            **model_sources("planner_model.c"),
             "variables.h": variables_header(table, 1, 0, PLAIN | _constants(block)),
             **block.files,
             "planner_block.c": _block_source(block, at),
@@ -120,15 +118,16 @@ def planner_model(name: str, text: str, axis: str, live: tuple[str, ...]) -> Mod
     )
 
 
-def planned_system_model(name: str, text: str, machine: PlantInstance, live: tuple[str, ...]) -> Model:
+def planned_system_model(
+    name: str, text: str, machine: PlantInstance, axes: Mapping[str, str], live: tuple[str, ...]
+) -> Model:
     """Make the FMU's content of a planner block and the plant that it drives.
 
     Parameters
     ----------
-    name, text, live
-        As of `planner_model`.
+    name, text, axes, live
+        As of `planner_model`; axes of the machine.
     machine : PlantInstance
-        Whose first axis the block plans.
 
     Raises
     ------
@@ -138,41 +137,56 @@ def planned_system_model(name: str, text: str, machine: PlantInstance, live: tup
         The plant's names cannot be those of an FMU's variables.
     """
     plant, equations = machine.plant, dynamics(machine.plant)
+    stands = tuple(f"{STANDS}{suffix}" for suffix in axes)
     block = _PlacedBlock(
         source=parse_function_block(text),
         code=translate(text),
-        axis=plant.actuated[0].name,
+        axes=axes,
         live=live,
-        inside=(CYCLE, STANDS),  # the axis stands where it was led to
+        inside=(CYCLE, *stands),  # the axes stand where they were led to
     )
-    table = planned_system_variables(machine, _orders(block), _issued(block))
-    at = _references(block, table) | {STANDS: table.offset("COMMAND")}
+    names = [axis.name for axis in plant.actuated]
+    planned = [names.index(axis) for axis in axes.values()]
+    table = planned_system_variables(machine, planned, _orders(block), _issued(block))
+    led = table.references("COMMAND")[: len(axes)]
+    at = _references(block, table) | dict(zip(stands, led, strict=True))
     tau, velocity, start = (table.references(of) for of in ("TAU", "DQ_A", "START"))
     drives = {axis: {rate, *tau} for axis, rate in enumerate(velocity)}
     of_plant = plant_structure(equations, table, drives, {axis: {place} for axis, place in enumerate(start)})
-    of_block = _structure(block, table, at | {STANDS: start[0]})
-    constants = PLAIN | {"N_ORDERS": "1"} | _constants(block)
+    begins = dict(zip(stands, (start[number] for number in planned), strict=True))
+    of_block = _structure(block, table, at | begins)
+    asked = [led[planned.index(k)] if k in planned else None for k in range(len(names))]
+    others = iter(table.references("OTHERS"))
+    places = [next(others) if place is None else place for place in asked]
+    constants = PLAIN | {"N_ORDERS": "1", "N_LED": str(len(planned))} | _constants(block)
     return Model(
         name=name,
-        identifier=identifier_of(name),
         summary=f"{plant.summary}, following a planner",
         variables=table,
         structure=Structure(
             running=of_plant.running | of_block.running, starting=of_plant.starting | of_block.starting
         ),
-        interpolates_inputs=False,
         code={
-            **hand_written(*PLANT_FILES, "planned_system_model.c"),
+            **model_sources(*PLANT_FILES, "planned_system_model.c"),
             "variables.h": variables_header(table, len(plant.actuated), len(plant.unactuated), constants),
             "equations.c": equations_source(equations),
             **block.files,
-            "planner_block.c": _block_source(block, at),
+            "planner_block.c": _block_source(block, at) + _axes_source(planned, places),
         },
         order=("equations.c", "driven_plant.c", "planner_block.c", "planned_system_model.c"),
         page=partial(planned_system_page, name, machine, _words(block), table),
         stop_time=30.0,
         step=block.cycle,
     )
+
+
+def _axes_source(planned: Sequence[int], places: Sequence[int]) -> str:
+    """Tell which axes the block plans, and where among the values each axis finds its setpoint."""
+    led, asked = (", ".join(map(str, numbers)) for numbers in (planned, places))
+    return f"""
+static const int LED[N_LED] = {{{led}}};
+static const int ASKED[N_A] = {{{asked}}};
+"""
 
 
 def _constants(block: _PlacedBlock) -> dict[str, str]:
@@ -194,10 +208,10 @@ def _orders(block: _PlacedBlock) -> dict[str, tuple[FmuVariable, ...]]:
 
 def _issued(block: _PlacedBlock) -> dict[str, tuple[FmuVariable, ...]]:
     """List the outputs, setpoints apart."""
-    outputs = {v.name: _variable(v, block, Kind.DISCRETE_OUTPUT) for v in _outputs(block.code)}
+    outputs = {v.name: _variable(v, block, Kind.DISCRETE_OUTPUT) for v in _outputs(block)}
     return {
-        "COMMAND": tuple(made for name, made in outputs.items() if name in SETPOINTS),
-        "TOLD": tuple(made for name, made in outputs.items() if name not in SETPOINTS),
+        "COMMAND": tuple(made for name, made in outputs.items() if _rank(name, block) < len(SETPOINTS)),
+        "TOLD": tuple(made for name, made in outputs.items() if _rank(name, block) == len(SETPOINTS)),
     }
 
 
@@ -205,7 +219,7 @@ def _variable(v: StVariable, block: _PlacedBlock, kind: Kind) -> FmuVariable:
     comments = {known.name: known.comment for known in block.source.variables}
     unit, description = _explained(comments[v.name], is_live=_is_live(v, block.live))
     return FmuVariable(
-        name=_name(v, block.axis, block.live),
+        name=_name(v, block),
         description=description or f"{v.name} of the block",
         unit=unit if v.type == "LREAL" else "",
         kind=kind,
@@ -214,15 +228,24 @@ def _variable(v: StVariable, block: _PlacedBlock, kind: Kind) -> FmuVariable:
     )
 
 
-def _name(variable: StVariable, axis: str, live: tuple[str, ...]) -> str:
+def _name(variable: StVariable, block: _PlacedBlock) -> str:
     """Name a variable in FMI's manner: as plants name an axis's setpoint, else in snake case."""
-    name = variable.name
-    if variable.section == "VAR_OUTPUT" and name in SETPOINTS:
-        return f"{axis}.{SETPOINTS[name]}"
-    if _is_live(variable, live):
-        return f"live.{name[1:]}"
-    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name[1:]).lower()
-    return f"{words}_number" if variable.type == "DINT" and not words.endswith("_id") else words
+    stem, axis = _of_axis(variable.name, block.axes)
+    if variable.section == "VAR_OUTPUT" and stem in SETPOINTS:
+        return f"{axis}.{SETPOINTS[stem]}"
+    if _is_live(variable, block.live):
+        return f"live.{variable.name[1:]}"
+    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", stem[1:]).lower()
+    words = f"{words}_number" if variable.type == "DINT" and not words.endswith("_id") else words
+    return f"{axis}.{words}" if stem != variable.name else words
+
+
+def _of_axis(name: str, axes: Mapping[str, str]) -> tuple[str, str]:
+    """Part a variable's name from its ending, and tell whose axis that is."""
+    for suffix, axis in axes.items():
+        if name.endswith(suffix) and name.removesuffix(suffix) in OWN:
+            return name.removesuffix(suffix), axis
+    return name, ""
 
 
 def _is_live(variable: StVariable, live: tuple[str, ...]) -> bool:
@@ -236,9 +259,15 @@ def _explained(comment: str, *, is_live: bool) -> tuple[str, str]:
     return (unit, rest.strip(",; ")) if is_live or unit in UNITS else ("", comment)
 
 
-def _outputs(block: Translation) -> list[StVariable]:
-    """List the outputs in the order of their value references: setpoints first."""
-    return sorted(block.outputs, key=lambda v: v.name not in SETPOINTS)
+def _outputs(block: _PlacedBlock) -> list[StVariable]:
+    """List the outputs in the order of their value references: all positions, other setpoints, the rest."""
+    return sorted(block.code.outputs, key=lambda v: _rank(v.name, block))
+
+
+def _rank(name: str, block: _PlacedBlock) -> int:
+    """Place an output among the setpoints, or behind them."""
+    stem, _ = _of_axis(name, block.axes)
+    return list(SETPOINTS).index(stem) if stem in SETPOINTS else len(SETPOINTS)
 
 
 def _taken_over(block: Translation) -> dict[str, str]:
@@ -250,7 +279,7 @@ def _taken_over(block: Translation) -> dict[str, str]:
 
 def _references(block: _PlacedBlock, table: VariableTable) -> dict[str, int]:
     """Value references by the block's own names."""
-    names = [v.name for v in (*block.given, *_outputs(block.code))]
+    names = [v.name for v in (*block.given, *_outputs(block))]
     return dict(zip(names, table.references("ORDERS", "COMMAND", "TOLD"), strict=True))
 
 

@@ -118,18 +118,26 @@ def system_variables(machine: PlantInstance, motion: Profile) -> VariableTable:
     return table
 
 
-def planned_system_variables(machine: PlantInstance, orders: Blocks, issued: Blocks) -> VariableTable:
+def planned_system_variables(
+    machine: PlantInstance, planned: Sequence[int], orders: Blocks, issued: Blocks
+) -> VariableTable:
     """List the variables of a plant that follows a planner; raises as `plant_variables` does.
 
     Parameters
     ----------
     machine : PlantInstance
+    planned : sequence of int
+        Axes that the block plans.
     orders, issued : dict of str to tuple of FmuVariable
         Inputs and outputs of the block.
     """
     axes = machine.plant.actuated
     words = "position to reach in a cycle, of an axis that the block does not plan"
-    others = _at(machine.position[1:], _per_axis(axes[1:], "setpoint", words, 0, Kind.INPUT))
+    left = [number for number in range(len(axes)) if number not in planned]
+    others = _at(
+        [machine.position[number] for number in left],
+        _per_axis([axes[number] for number in left], "setpoint", words, 0, Kind.INPUT),
+    )
     start = _per_axis(axes, "start", "position at rest at the start", 0, Kind.FIXED_PARAMETER)
     table = VariableTable(
         blocks={

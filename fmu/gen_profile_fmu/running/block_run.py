@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping, Sequence
 from ctypes import POINTER, Structure, byref, c_bool, c_double, c_int, c_long, c_size_t, c_uint, c_void_p
-from types import TracebackType
 from typing import Any, Self
 
 import attrs
@@ -17,7 +16,7 @@ from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.variables import variable_name
 from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops
-from gen_profile_fmu.running.instances import slave
+from gen_profile_fmu.running.instances import instance
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -128,8 +127,6 @@ class BlockRun:
     cycles : int
     stands : int
         Cycle from which the axes stand for good; -1 if they never do.
-    unpromised : int
-        Cycles of motion without the block's promise.
     promise : bool
         At the end.
     error : int
@@ -144,7 +141,6 @@ class BlockRun:
     residual: Array
     cycles: int
     stands: int
-    unpromised: int
     promise: bool
     error: int
     fault: int
@@ -181,7 +177,7 @@ class _History(Structure):
 class _Found(Structure):
     _fields_ = [
         *((name, POINTER(c_double)) for name in ("axes", "on_the_way", "residual", "trace")),
-        *((name, c_long) for name in ("stands", "cycles", "unpromised")),
+        *((name, c_long) for name in ("stands", "cycles")),
         *((name, c_int) for name in ("status", "fault", "error")),
         ("promise", c_bool),
     ]
@@ -205,18 +201,16 @@ class BlockFollower:
         self._references = {variable.name: i for i, variable in enumerate(fmu.variables.variables)}
         self._loads = [v.name for v in fmu.variables.blocks["SWAY"]]
         self._setpoints = [v.name for v in fmu.variables.blocks["INPUTS"]]
-        self._messages: list[str] = []
         self._loop = _loop()
-        self._slave = slave(fmu, Version.FMI2, self._messages)
-        self._fmu = called(self._slave, Version.FMI2)
+        self._instance = instance(fmu, Version.FMI2)
+        self._messages = self._instance.messages
+        self._fmu = called(self._instance.slave, Version.FMI2)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._slave.freeInstance()
+    def __exit__(self, *_: object) -> None:
+        self._instance.give_back()
 
     def run(
         self,
@@ -314,7 +308,7 @@ class BlockFollower:
 
 
 _EXTREMES = [field.name for field in attrs.fields(AxisExtremes)]
-_SIMPLE = ("stands", "cycles", "unpromised", "promise", "error", "fault")
+_SIMPLE = ("stands", "cycles", "promise", "error", "fault")
 
 
 def _called(block: CalledBlock, script: Script) -> _Block:

@@ -14,7 +14,7 @@ from gen_profile_fmu.building.build import compile_texts
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.description.fmu_files import Version, digest, standard_headers
-from gen_profile_fmu.model.c_sources import FOLDER
+from gen_profile_fmu.model.c_sources import hand_written
 
 _HEADER, _SOURCE, _NAME = "called_fmu.h", "loops.c", "loops"
 _LOOPS = ("many_runs", "sampled_run", "block_run")  # each a C file and the function in it
@@ -58,8 +58,7 @@ def called(slave: Any, version: Version) -> CalledFmu:
 
 def loop_sources() -> dict[str, str]:
     """Read the loops of this package and their header, by file name; `loops.c` includes all."""
-    files = (_HEADER, *(f"{name}.c" for name in _LOOPS))
-    texts = {file: (FOLDER / file).read_text(encoding="utf-8") for file in files}
+    texts = hand_written("loops", _HEADER, *(f"{name}.c" for name in _LOOPS))
     return {**texts, _SOURCE: "".join(f'#include "{name}.c"\n' for name in _LOOPS)}
 
 

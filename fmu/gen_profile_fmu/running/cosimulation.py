@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint, sizeof
-from types import TracebackType
 from typing import Any, Self
 
 import attrs
@@ -22,7 +21,7 @@ from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
 from gen_profile_fmu.model.variables import variable_name
 from gen_profile_fmu.running.called_fmu import called, compiled_loops
-from gen_profile_fmu.running.instances import slave
+from gen_profile_fmu.running.instances import Instance, instance
 
 # blocks of variables that are read after every step, and what a Response calls them
 _OBSERVED = {
@@ -84,8 +83,8 @@ class PlantCosimulation:
     def __init__(self, plant: Plant, on_build: Callable[[], None] | None = None) -> None:
         self._plant = plant
         self._fmu = plant_fmu(plant, on_build)
-        self._messages: list[str] = []
-        self._slave = slave(self._fmu, Version.FMI2, self._messages)
+        self._instance: Instance | None = instance(self._fmu, Version.FMI2)
+        self._slave, self._messages = self._instance.slave, self._instance.messages
         self._called = called(self._slave, Version.FMI2)
         variables = self._fmu.variables
         self._setpoints = _references(variables.references("INPUTS"))
@@ -95,16 +94,14 @@ class PlantCosimulation:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
         """Free the instance; it cannot be run again."""
-        if self._slave is not None:
-            self._slave.freeInstance()
-            self._slave = None
+        if self._instance is not None:
+            self._instance.give_back()
+            self._instance = self._slave = None
 
     def run(
         self,

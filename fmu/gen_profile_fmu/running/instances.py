@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+from contextlib import suppress
 from typing import Any
 
+import attrs
 from fmpy import calloc, free
 from fmpy.fmi2 import (
     FMU2Slave,
@@ -24,8 +26,47 @@ from gen_profile_fmu.description.fmu_files import Version
 _logger = logging.getLogger(__name__)
 
 
-def slave(fmu: PlantFmu, version: Version, messages: list[str]) -> Any:
-    """Load an FMU and make an instance for co-simulation.
+@attrs.frozen(kw_only=True, eq=False)
+class Instance:
+    """An FMU's instance for co-simulation.
+
+    Attributes
+    ----------
+    fmu : PlantFmu
+    version : Version
+        That the FMU is of.
+    slave : FMU2Slave or FMU3Slave
+        Of FMPy.
+    messages : list of str
+        What the instance has said of failures since this was last cleared.
+    logs : bool
+        Whether it tells of all that happens in it.
+    """
+
+    fmu: PlantFmu
+    version: Version
+    slave: Any
+    messages: list[str]
+    logs: bool
+
+    def give_back(self) -> None:
+        """Leave the instance to whoever next wants one of the same FMU; those of others are freed."""
+        while _idle and not _idle[-1].is_like(self.fmu, self.version, logs=self.logs):
+            _idle.pop().slave.freeInstance()
+        _idle.append(self)
+
+    def is_like(self, fmu: PlantFmu, version: Version, *, logs: bool) -> bool:
+        """Whether it is what `instance` would make."""
+        asked = (fmu.folder, fmu.guid, version, logs)
+        return (self.fmu.folder, self.fmu.guid, self.version, self.logs) == asked
+
+
+# all of one FMU: loading it takes longer than a run, and every run begins by a reset
+_idle: list[Instance] = []
+
+
+def instance(fmu: PlantFmu, version: Version) -> Instance:
+    """Take an idle instance for co-simulation, or load the FMU and make one.
 
     Parameters
     ----------
@@ -33,18 +74,20 @@ def slave(fmu: PlantFmu, version: Version, messages: list[str]) -> Any:
         Of this computer.
     version : Version
         That the FMU is of.
-    messages : list of str
-        Takes what the instance says of failures, then and later.
-
-    Returns
-    -------
-    FMU2Slave or FMU3Slave
 
     Raises
     ------
     CosimulationError
         It cannot be loaded.
     """
+    logs = _logger.isEnabledFor(logging.DEBUG)
+    with suppress(IndexError):
+        idle = _idle.pop()
+        if idle.is_like(fmu, version, logs=logs):
+            idle.messages.clear()
+            return idle
+        idle.give_back()
+    messages: list[str] = []
 
     def log(environment: object, status: int, category: bytes, message: bytes) -> None:
         del environment
@@ -64,14 +107,14 @@ def slave(fmu: PlantFmu, version: Version, messages: list[str]) -> Any:
             unzipDirectory=str(fmu.folder),
             instanceName=fmu.model_identifier,
         )
-        made.instantiate(loggingOn=_logger.isEnabledFor(logging.DEBUG), **reports)
+        made.instantiate(loggingOn=logs, **reports)
     except Exception as error:  # FMPy raises nothing more special
         reason = " ".join(messages) or str(error)
         raise CosimulationError(
             f"The FMU in {fmu.folder} cannot be loaded: {reason} "
             f"If programs must not be loaded from there, name another folder in {ENVIRONMENT_VARIABLE}."
         ) from error
-    return made
+    return Instance(fmu=fmu, version=version, slave=made, messages=messages, logs=logs)
 
 
 def _callbacks(log: Any) -> Any:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint
-from types import TracebackType
 from typing import Any, Self
 
 import attrs
@@ -17,7 +16,7 @@ from gen_profile_fmu.building.plant_fmu import PlantFmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.variables import variable_name
 from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops
-from gen_profile_fmu.running.instances import slave
+from gen_profile_fmu.running.instances import instance
 
 
 class _PerRun(Structure):
@@ -63,9 +62,7 @@ class ManyRuns:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for worker in self._workers:
             worker.close()
 
@@ -126,8 +123,11 @@ class ManyRuns:
         """Let the workers fill the rows of what is to be found."""
         edges = np.linspace(0, len(found), len(self._workers) + 1, dtype=int).tolist()
         shares = list(zip(self._workers, edges, edges[1:], strict=False))
-        with ThreadPoolExecutor(len(shares)) as pool:
-            reached = list(pool.map(lambda share: share[0].run(plan, *share[1:], found), shares))
+        if len(shares) == 1:
+            reached = [self._workers[0].run(plan, 0, len(found), found)]
+        else:
+            with ThreadPoolExecutor(len(shares)) as pool:
+                reached = list(pool.map(lambda share: share[0].run(plan, *share[1:], found), shares))
         for run, (worker, _, end) in zip(reached, shares, strict=True):
             if run < end:
                 reason = " ".join(worker.messages)
@@ -148,10 +148,10 @@ class _Worker:
     """An instance with the loop over its functions."""
 
     def __init__(self, fmu: PlantFmu, version: Version) -> None:
-        self.messages: list[str] = []
         self._loop = _loop()
-        self._slave = slave(fmu, version, self.messages)
-        self._fmu = called(self._slave, version)
+        self._instance = instance(fmu, version)
+        self.messages = self._instance.messages
+        self._fmu = called(self._instance.slave, version)
 
     def run(self, plan: _Plan, first: int, end: int, found: Array) -> int:
         """Fill rows of what is to be found; the first bad run, or `end`."""
@@ -160,8 +160,8 @@ class _Worker:
         return int(self._loop(byref(self._fmu), byref(plan), first, end, _doubles(room), _doubles(found)))
 
     def close(self) -> None:
-        """Free the instance."""
-        self._slave.freeInstance()
+        """Give the instance back."""
+        self._instance.give_back()
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import version
 from typing import Any
 
 import attrs
@@ -16,7 +18,14 @@ FILENAME = "manifest.json"
 FORMAT = "gen-profile manifest"
 FORMAT_VERSION = 1
 UNVERIFIED = "unverified"
+LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")  # that shape the numbers
 SEAL = "manifest_sha256"  # of everything else in it, so that nobody changes a limit or a verdict by hand
+
+
+@cache
+def versions() -> tuple[tuple[str, str], ...]:
+    """List the libraries that shape the numbers, with their versions installed here."""
+    return tuple((library, version(library)) for library in LIBRARIES)
 
 
 @attrs.frozen(kw_only=True)

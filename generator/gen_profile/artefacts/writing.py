@@ -14,7 +14,7 @@ class Staging:
     """A hidden folder beside the files to come; made by `staged`."""
 
     def __init__(self, folder: Path, destination: Path) -> None:
-        self._folder, self._destination = folder, destination
+        self._folder, self.destination = folder, destination
         self._names: list[str] = []
 
     def write(self, name: str, content: bytes) -> bytes:
@@ -27,7 +27,7 @@ class Staging:
     def deliver(self) -> None:
         """Move the files to their destination, in the order in which they were written."""
         for name in self._names:
-            (self._folder / name).replace(self._destination / name)
+            (self._folder / name).replace(self.destination / name)
 
 
 @contextmanager

@@ -37,10 +37,10 @@ class Shown:
     style: Style
 
 
-def select_machines(evaluation: MotionEvaluation) -> list[Shown]:
+def select_machines(evaluation: MotionEvaluation, samples: int = RESIDUAL_SAMPLES) -> list[Shown]:
     """Choose the nominal machine and those that leave the most sway, in the check's order."""
     duration = evaluation.motion.duration
-    after = evaluation.swing.at(np.linspace(duration, duration + evaluation.watch, RESIDUAL_SAMPLES))
+    after = evaluation.swing.at(np.linspace(duration, duration + evaluation.watch, samples))
     end_load = evaluation.swing.plant.end_load
     residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in after]
     by_rank = [0, *sorted(range(1, len(residuals)), key=lambda index: -residuals[index])][: TWINS + 1]
@@ -55,18 +55,17 @@ def select_machines(evaluation: MotionEvaluation) -> list[Shown]:
     ]
 
 
-def motion_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
+def motion_figure(spec: Spec, evaluation: MotionEvaluation, samples: int = SAMPLES) -> Figure:
     """Draw what the drives are asked for, and its derivatives, with limits that are near."""
     lagging = evaluation.command is not evaluation.motion
     panels = []
     for column, axis in enumerate(spec.machine().actuated):
         place, factor = place_unit(spec, column)
         for order, (quantity, unit) in enumerate(ORDERS):
-            lines = [derivative_line("command", evaluation.command, order, column)]
+            lines = [derivative_line("command", evaluation.command, order, column, samples=samples)]
             if lagging:
-                lines.append(
-                    derivative_line("motion of the axis", evaluation.motion, order, column, FOLLOWED)
-                )
+                followed = ("motion of the axis", evaluation.motion, order, column, FOLLOWED)
+                lines.append(derivative_line(*followed, samples=samples))
             levels = tuple(near_limits(spec, column, order, extent(lines)))
             if order == 0:
                 lines = [attrs.evolve(line, y=factor * line.y) for line in lines]
@@ -102,9 +101,15 @@ def spectrum_figure(spec: Spec, evaluation: MotionEvaluation) -> Figure:
     )
 
 
-def sway_figure(spec: Spec, evaluation: MotionEvaluation, shown: Sequence[Shown], arrival: float) -> Figure:
+def sway_figure(
+    spec: Spec,
+    evaluation: MotionEvaluation,
+    shown: Sequence[Shown],
+    arrival: float,
+    samples: int = SAMPLES,
+) -> Figure:
     """Draw the sway of every load on the nominal machine and on perturbed ones."""
-    times = np.linspace(0.0, evaluation.motion.duration + evaluation.watch, SAMPLES)
+    times = np.linspace(0.0, evaluation.motion.duration + evaluation.watch, samples)
     responses = evaluation.swing.at(times)
     left_out = len(evaluation.machines) - len(shown)
     more = f" {left_out} machines that sway less after the move are not drawn." if left_out else ""

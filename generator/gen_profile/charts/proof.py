@@ -54,32 +54,11 @@ def draw(spec: Spec, text: str, proof: Proof, path: Path, progress: Progress = u
 
 def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
     """Draw place, velocity, acceleration and sway over time, and shade what is not promised."""
-    own, issued = spec.limits.of(0), found.issued
-    assert own.velocity and own.acceleration and own.travel
     few = slice(None, None, -(-len(found.times) // SAMPLES))
     times, limit = found.times[few], 1e3 * list(proof.limit.values())[-1]
-    drawn = (
-        ("Position", "m", "fPosition", own.travel, "position"),
-        ("Velocity", "m/s", "fVelocity", (-own.velocity, own.velocity), "velocity"),
-        ("Acceleration", "m/s²", "fAcceleration", (-own.acceleration, own.acceleration), ""),
-    )
     signs = (1.0, -1.0) if spec.machine().directions == 1 else (1.0,)
     bands = [*_unpromised(found)]
-    stops = [Band(low=time, high=time) for time in _stops(found)]
-    panels = [
-        Panel(
-            title=title,
-            x_label=TIME,
-            y_label=f"{title.lower()} ({unit})",
-            lines=[
-                Line(name="setpoint", x=times, y=issued[output][few], style=SETPOINT),
-                *_commanded(found, command),
-            ],
-            levels=[Level(value=level) for level in levels],
-            bands=[*bands, *stops],
-        )
-        for title, unit, output, levels, command in drawn
-    ]
+    panels = [panel for place in range(len(found.history.axes)) for panel in _axis_panels(spec, found, place)]
     styles = [Style(colour=INK, width=2.0), *(Style(colour=colour, width=1.2) for colour in PALETTE[2:])]
     panels.append(
         Panel(
@@ -99,6 +78,32 @@ def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
         panels=panels,
         columns=1,
     )
+
+
+def _axis_panels(spec: Spec, found: Trace, place: int) -> Iterator[Panel]:
+    """Draw what an axis was told and led to, within its limits."""
+    number, axis = list(found.history.axes.items())[place]
+    own, few = spec.limits.of(number), slice(None, None, -(-len(found.times) // SAMPLES))
+    assert own.velocity and own.acceleration and own.travel
+    of = f" of {axis.name}" if axis.name else ""
+    bands = [*_unpromised(found), *(Band(low=time, high=time) for time in _stops(found))]
+    for title, unit, output, levels, command in (
+        ("Position", axis.unit, "fPosition", own.travel, "position"),
+        ("Velocity", f"{axis.unit}/s", "fVelocity", (-own.velocity, own.velocity), "velocity"),
+        ("Acceleration", f"{axis.unit}/s²", "fAcceleration", (-own.acceleration, own.acceleration), ""),
+    ):
+        setpoints = found.issued[axis.of(output)][few]
+        yield Panel(
+            title=title + of,
+            x_label=TIME,
+            y_label=f"{title.lower()} ({unit})",
+            lines=[
+                Line(name="setpoint", x=found.times[few], y=setpoints, style=SETPOINT),
+                *_commanded(found, command, place),
+            ],
+            levels=[Level(value=level) for level in levels],
+            bands=bands,
+        )
 
 
 def map_figure(spec: Spec, proof: Proof) -> Figure:
@@ -159,7 +164,7 @@ def _stops(found: Trace) -> list[float]:
     return [one.time for one in found.history.commands if one.command not in {"position", "velocity"}]
 
 
-def _commanded(found: Trace, kind: str) -> list[Line]:
+def _commanded(found: Trace, kind: str, place: int) -> list[Line]:
     """Draw targets or the stick while they hold, with gaps between."""
     commands = found.history.commands
     ends = [*[command.time for command in commands[1:]], float(found.times[-1])]
@@ -167,7 +172,7 @@ def _commanded(found: Trace, kind: str) -> list[Line]:
     if not held:
         return []
     x = np.array([[one.time, end, end] for one, end in held]).ravel()
-    y = np.array([[one.value, one.value, np.nan] for one, _ in held]).ravel()
+    y = np.array([[one.values[place], one.values[place], np.nan] for one, _ in held]).ravel()
     return [Line(name="command", x=x, y=y, style=COMMAND)]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import debug_option, json_option
+from gen_profile.cli.options import Count, output_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
@@ -30,13 +30,11 @@ def can() -> None:
 @click.option("--channel", metavar="NAME", help="Ask on this channel of it which nodes are there.")
 @click.option(
     "--bitrate",
-    metavar="N",
-    type=click.IntRange(10_000, 1_000_000),
+    type=Count(10_000, 1_000_000),
     default=500_000,
     help="Of the channel in bit/s, where no system sets it; 500000 by default.",
 )
-@json_option
-@debug_option
+@output_options
 def list_(interface: str | None, channel: str | None, bitrate: int, as_json: bool) -> None:
     """List CAN interfaces, their channels, and the nodes that answer.
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,22 +12,25 @@ import click
 
 from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import (
+    Count,
+    InputFile,
     OutputFile,
-    as_overrides,
+    SpecChoice,
     block_plot_option,
-    chosen_spec,
     complete_presets,
-    debug_option,
     export_option,
-    json_option,
+    folder_option,
+    output_options,
     plot_option,
     require_formats,
+    scheduler_option,
     spec_options,
 )
-from gen_profile.cli.outcome import fail, print_outcome, warn
+from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
+    from gen_profile.certificate.document import Certificate
     from gen_profile.proof.check import BlockJudgement
     from gen_profile.spec.model import Spec
     from gen_profile.verification.check import Judgement
@@ -43,14 +48,7 @@ def cli() -> None:
 @cli.command(epilog="Example: gen-profile --preset paper --export plc --export can --out deploy")
 @spec_options
 @export_option("Format to write")
-@click.option(
-    "--out",
-    "folder",
-    metavar="DIR",
-    type=click.Path(path_type=Path),
-    default=Path("gen-profile-out"),
-    help="Folder to write to; ./gen-profile-out by default.",
-)
+@folder_option
 @click.option("--cycle-time", metavar="SECONDS", help="Cycle of the controller, and SYNC period of the bus.")
 @click.option("--plc-layout", metavar="LAYOUT", help="Table of a PLC block: segments, samples or counts.")
 @click.option("--csv-dialect", metavar="NAME", help="rfc4180, excel-de, sew, kollmorgen or lenze.")
@@ -60,12 +58,9 @@ def cli() -> None:
 @click.option("--method", metavar="NAME", help="Solver (auto, indirect or direct), or a shaper such as zvd.")
 @click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
-@json_option
-@debug_option
+@output_options
 def design(
-    spec_path: Path | None,
-    preset: str | None,
-    overrides: tuple[str, ...],
+    chosen: SpecChoice,
     formats: tuple[str, ...],
     folder: Path,
     cycle_time: str | None,
@@ -79,17 +74,15 @@ def design(
 ) -> None:
     """Design, export and verify (the default)."""
     columns = None if csv_columns is None else [name.strip() for name in csv_columns.split(",")]
-    overrides += as_overrides(
-        {
-            "export.cycle_time": cycle_time,
-            "can.sync_period": cycle_time,
-            "export.plc_layout": plc_layout,
-            "export.csv_dialect": csv_dialect,
-            "export.csv_columns": columns,
-            "solver.method": method,
-        }
-    )
-    spec = chosen_spec(spec_path, preset, overrides)
+    stated = {
+        "export.cycle_time": cycle_time,
+        "can.sync_period": cycle_time,
+        "export.plc_layout": plc_layout,
+        "export.csv_dialect": csv_dialect,
+        "export.csv_columns": columns,
+        "solver.method": method,
+    }
+    spec = chosen.changed(stated).spec()
     require_formats(formats)
     from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
@@ -114,30 +107,24 @@ def design(
     type=click.Choice(["quintic", "septic", "jerk-limited"]),
     help="What the shapers are fed with, in place of solver.base; jerk-limited needs limits.jerk.",
 )
-@json_option
-@debug_option
+@output_options
 def compare(
-    spec_path: Path | None,
-    preset: str | None,
-    overrides: tuple[str, ...],
+    chosen: SpecChoice,
     picture: Path | None,
     base: str | None,
     as_json: bool,
 ) -> None:
     """Compare optimal profiles with shapers."""
-    spec = chosen_spec(spec_path, preset, overrides + as_overrides({"solver.base": base}))
+    spec = chosen.changed({"solver.base": base}).spec()
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
     from gen_profile.comparison.compare import compare as run
 
-    if picture is not None:
-        from gen_profile.charts.picture import require_drawable
-        from gen_profile.charts.plot import plot
-
-        require_drawable(picture)
     with progress() as tell:
         comparison = run(spec, tell)
         if picture is not None:
+            from gen_profile.charts.plot import plot
+
             tell("drawing")
             plot(comparison, picture)
     print_outcome(comparison.to_dict(), words.comparison(comparison), as_json)
@@ -146,12 +133,7 @@ def compare(
 @cli.command(epilog="Example: gen-profile check deploy/paper.st")
 @click.argument("artefact", type=click.Path(path_type=Path))
 @spec_options
-@click.option(
-    "--samples",
-    metavar="N",
-    type=click.IntRange(0, 1_000_000),
-    help="Draw N machines, in place of check.samples.",
-)
+@click.option("--samples", type=Count(0, 1_000_000), help="Draw N machines, in place of check.samples.")
 @click.option("--scenario", metavar="N", type=int, help="Try only the scenario of this number (row).")
 @click.option("--strict", is_flag=True, help="Let faults in the timing of setpoints count as well.")
 @click.option(
@@ -172,28 +154,23 @@ def compare(
     multiple=True,
     help="Judge the motion begun elsewhere along an axis, in m or rad. Repeatable.",
 )
+@click.option("--csv", "table_path", type=OutputFile(), help="Write all scenarios as a table, one row each.")
 @click.option(
-    "--csv",
-    "table_path",
-    metavar="FILE",
-    type=OutputFile(),
-    help="Write all scenarios as a table, one row each.",
+    "--certify", is_flag=True, help="Prove it for all machines in the ranges, and write a certificate."
 )
+@click.option("--certificate", type=InputFile(), help="Check a certificate again, and nothing else.")
 @click.option(
     "--histories",
-    metavar="N",
-    type=click.IntRange(1, 1_000_000),
+    type=Count(1, 1_000_000),
     help="Prove a planner block on N histories of commands.",
 )
 @click.option("--history", metavar="N", type=int, help="Run only this history of a planner block's proof.")
+@scheduler_option("run a planner block's histories")
 @block_plot_option
-@json_option
-@debug_option
+@output_options
 def check(
     artefact: Path,
-    spec_path: Path | None,
-    preset: str | None,
-    overrides: tuple[str, ...],
+    chosen: SpecChoice,
     *,
     as_json: bool,
     **options: Any,
@@ -202,30 +179,39 @@ def check(
 
     The spec comes from the manifest beside the artefact unless one is named.
     """
-    given = spec_path is not None or preset is not None
-    if overrides and not given:
+    if chosen.overrides and not chosen.stated:
         raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")
-    spec = chosen_spec(spec_path, preset, overrides) if given else None
+    spec = chosen.spec() if chosen.stated else None
     from gen_profile.cli import words
     from gen_profile.proof.check import is_planner_block
 
     judgement: Judgement | BlockJudgement
+    unproved: Sequence[str] = ()
+    if options["certificate"] is not None:
+        _require_only(options, ("certificate",), "a check by co-simulation, without --certificate")
+        _repeat_proof(artefact, spec, options["certificate"], as_json=as_json)
+        return
     if is_planner_block(artefact):
         _require_only(options, BLOCK_OPTIONS, "a motion, and this is a planner block")
         judgement = _check_block(artefact, spec, **{name: options[name] for name in BLOCK_OPTIONS})
-        text = words.block_judgement(judgement)
+        text, document = words.block_judgement(judgement), judgement.to_dict()
     else:
-        _require_only(options, MOTION_OPTIONS, "a planner block, and this is none")
+        _require_only(options, (*MOTION_OPTIONS, "certify"), "a planner block, and this is none")
         judgement = _check_motion(artefact, spec, **{name: options[name] for name in MOTION_OPTIONS})
-        text = words.judgement(judgement)
-    print_outcome(judgement.to_dict(), text, as_json)
+        certificate = _certified(judgement, spec) if options["certify"] else None
+        text, document = words.judgement(judgement, certificate), judgement.to_dict()
+        document["certificate"] = None if certificate is None else certificate.to_dict()
+        unproved = () if certificate is None else certificate.reasons()
+    print_outcome(document, text, as_json)
     warn(judgement.check)
     if not judgement.check.passed:
         fail(judgement.check.reasons(), "Do not deploy it.")
+    if unproved:
+        leave_unproved(unproved)
 
 
 MOTION_OPTIONS = ("samples", "scenario", "strict", "scale", "mirror", "offset", "table_path")
-BLOCK_OPTIONS = ("histories", "history", "picture")
+BLOCK_OPTIONS = ("histories", "history", "scheduler", "picture")
 
 
 def _require_only(options: Mapping[str, Any], known: Sequence[str], other: str) -> None:
@@ -239,13 +225,11 @@ def _require_only(options: Mapping[str, Any], known: Sequence[str], other: str) 
 def _check_motion(
     artefact: Path, spec: Spec | None, *, scenario: int | None, table_path: Path | None, **options: Any
 ) -> Judgement:
-    from gen_profile.artefacts.writing import deliver, require_place
+    from gen_profile.artefacts.writing import deliver
     from gen_profile.cli.progress import progress
     from gen_profile.verification.check import check_artefact
     from gen_profile.verification.scenario_table import table
 
-    if table_path is not None:
-        require_place(table_path)
     with progress() as tell:
         tell("checking by co-simulation")
         judgement = check_artefact(
@@ -261,27 +245,100 @@ def _check_motion(
     return judgement
 
 
+def _certified(judgement: Judgement, spec: Spec | None) -> Certificate | None:
+    """Prove what a check has found, unless it failed."""
+    from gen_profile.certificate.from_file import certify_artefact
+    from gen_profile.cli.progress import progress
+
+    if judgement.variant is not None:
+        raise SpecError("--certify: is for the motion as planned, without --scale, --mirror and --offset.")
+    if not judgement.check.passed:
+        return None
+    with progress() as tell:
+        return certify_artefact(
+            judgement.path,
+            spec,
+            progress=lambda done, total: tell("proving it for boxes of machines", done, total),
+        )
+
+
+def _repeat_proof(artefact: Path, spec: Spec | None, certificate: Path, *, as_json: bool) -> None:
+    from gen_profile.certificate.from_file import check_certificate
+    from gen_profile.cli import words
+    from gen_profile.cli.progress import progress
+
+    with progress() as tell:
+        found = check_certificate(
+            artefact,
+            certificate,
+            spec,
+            progress=lambda done, total: tell("proving it again for boxes of machines", done, total),
+        )
+    print_outcome({"certificate": found.to_dict()}, words.certificate(artefact, found), as_json)
+
+
 def _check_block(
-    artefact: Path, spec: Spec | None, *, histories: int | None, history: int | None, picture: Path | None
+    artefact: Path, spec: Spec | None, *, picture: Path | None, **options: Any
 ) -> BlockJudgement:
     from gen_profile.cli.progress import progress
     from gen_profile.proof.check import check_block
 
-    if picture is not None:
-        from gen_profile.charts.picture import require_drawable
-        from gen_profile.charts.proof import draw
-
-        require_drawable(picture)
     with progress() as tell:
-        judgement = check_block(artefact, spec, histories=histories, history=history, progress=tell)
+        judgement = check_block(artefact, spec, **options, progress=tell)
         if picture is not None:
+            from gen_profile.charts.proof import draw
+
             draw(judgement.spec, judgement.text, judgement.check, picture, tell)
     return judgement
 
 
+@cli.command(epilog="Example: gen-profile studio bay-3.toml")
+@spec_options
+@click.option(
+    "--port",
+    type=Count(0, 65535),
+    default=0,
+    help="Port on the loopback interface; any that is free by default.",
+)
+@click.option("--no-browser", is_flag=True, help="Open no browser; print the address only.")
+@output_options
+def studio(
+    chosen: SpecChoice,
+    port: int,
+    *,
+    no_browser: bool,
+    as_json: bool,
+) -> None:
+    """Turn every knob of a spec in the browser, and see the swing at once."""
+    if find_spec("tornado") is None:
+        raise OutputError("gen-profile studio needs Tornado: pip install 'gen-profile[studio]'.")
+    from gen_profile.studio.state import changed_start
+
+    text, source, folder = chosen.text()
+    words = ("--preset", source) if chosen.path is None else (source,)
+    start = changed_start(words, text, chosen.overrides, folder)
+    if not start.programs:  # else the page asks first
+        chosen.spec()
+    from gen_profile.studio.server import serve
+
+    def ready(address: str) -> None:
+        if as_json:
+            click.echo(json.dumps({"address": address}, indent=2))
+        else:
+            click.echo(f"Studio at {address}\nCtrl-C ends it.", err=True)
+        if not no_browser:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    try:
+        serve(start, port, ready)
+    except KeyboardInterrupt:
+        click.echo("The studio is closed.", err=True)
+
+
 @cli.command(epilog="Example: gen-profile formats")
-@json_option
-@debug_option
+@output_options
 def formats(as_json: bool) -> None:
     """List the export formats."""
     from gen_profile_exporters.registry import formats as known
@@ -293,8 +350,7 @@ def formats(as_json: bool) -> None:
 
 
 @cli.command(epilog="Example: gen-profile plants")
-@json_option
-@debug_option
+@output_options
 def plants(as_json: bool) -> None:
     """List the machines with their axes, loads and parameters."""
     from gen_profile.plants.registry import find_plant, plant_types
@@ -328,15 +384,8 @@ def plants(as_json: bool) -> None:
 
 @cli.command(epilog="Example: gen-profile presets double-pendulum-crane --out bay-4.toml")
 @click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_presets)
-@click.option(
-    "--out",
-    "path",
-    metavar="FILE",
-    type=OutputFile(),
-    help="Write it to a new file, in place of stdout.",
-)
-@json_option
-@debug_option
+@click.option("--out", "path", type=OutputFile(), help="Write it to a new file, in place of stdout.")
+@output_options
 def presets(name: str | None, path: Path | None, as_json: bool) -> None:
     """List the built-in specs, or print one to begin your own with."""
     from gen_profile.spec.reading import preset_text

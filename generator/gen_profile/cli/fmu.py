@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import OutputFile, chosen_spec, debug_option, json_option, spec_options
+from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
@@ -32,24 +32,20 @@ PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86
 @click.option(
     "--platform",
     type=click.Choice(PLATFORMS),
-    help="What to compile for; this computer by default. The first time, Windows takes a minute.",
+    help="What to compile for; this computer by default.",
 )
 @click.option("--source-only", is_flag=True, help="Put no binary in, for TwinCAT and real-time targets.")
 @click.option(
     "--out",
     "path",
-    metavar="FILE",
     type=OutputFile(),
     help="FMU or SSP to write; named after the spec in this folder by default.",
 )
 @click.option("--author", metavar="NAME", help="Who made the model; gen-profile by default.")
-@json_option
-@debug_option
+@output_options
 def fmu(
     kind: str,
-    spec_path: Path | None,
-    preset: str | None,
-    overrides: tuple[str, ...],
+    chosen: SpecChoice,
     version: str,
     input_name: str | None,
     platform: str | None,
@@ -63,7 +59,7 @@ def fmu(
         raise SpecError(f"--input: the inputs of a {kind} are its own; leave it out, or write a plant.")
     if source_only and platform is not None:
         raise SpecError("--source-only puts no binary in: leave it out, or --platform.")
-    spec = chosen_spec(spec_path, preset, overrides)
+    spec = chosen.spec()
     from gen_profile.cli.progress import progress
     from gen_profile.designs.fmu import export_fmu, platform_names
     from gen_profile_fmu.description.fmu_files import Version

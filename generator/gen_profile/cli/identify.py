@@ -7,14 +7,7 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import (
-    OutputFile,
-    chosen_text,
-    debug_option,
-    json_option,
-    plot_option,
-    spec_options,
-)
+from gen_profile.cli.options import OutputFile, SpecChoice, output_options, plot_option, spec_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
@@ -75,18 +68,14 @@ from gen_profile.errors import SpecError
 )
 @click.option(
     "--out",
-    metavar="FILE",
     type=OutputFile(),
     default=Path("identified.toml"),
     help="Spec to write; ./identified.toml by default.",
 )
 @plot_option
-@json_option
-@debug_option
+@output_options
 def identify(
-    spec_path: Path | None,
-    preset: str | None,
-    overrides: tuple[str, ...],
+    chosen: SpecChoice,
     *,
     readings: tuple[str, ...],
     periods: tuple[str, ...],
@@ -103,7 +92,6 @@ def identify(
     as_json: bool,
 ) -> None:
     """Find parameters from measurements on site, and write a spec."""
-    from gen_profile.charts.picture import require_drawable
     from gen_profile.charts.plot import plot
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
@@ -113,12 +101,10 @@ def identify(
     from gen_profile.spec.reading import parse_spec
     from gen_profile.spec.text import changed_text
 
-    text, source, folder = chosen_text(spec_path, preset)
-    spec = parse_spec(text, overrides, source, folder)
-    if picture is not None:
-        require_drawable(picture)
-        if log is None:
-            raise SpecError("--plot: draws a log and what is left of it: name one (--swing).")
+    text, source, folder = chosen.text()
+    spec = parse_spec(text, chosen.overrides, source, folder)
+    if picture is not None and log is None:
+        raise SpecError("--plot: draws a log and what is left of it: name one (--swing).")
     measurements: list[Measurement] = [*map(parse_reading, readings), *map(parse_period, periods)]
     with progress() as tell:
         if log is not None:
@@ -140,7 +126,7 @@ def identify(
         if picture is not None:
             tell("drawing")
             plot(found, picture)
-        write_spec(found.spec, out, changed_text(text, overrides, spec, found.spec, folder))
+        write_spec(found.spec, out, changed_text(text, chosen.overrides, spec, found.spec, folder))
     print_outcome({**found.to_dict(), "path": str(out)}, words.identification(found, out), as_json)
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import attrs
 import click
 from click.shell_completion import CompletionItem
 
@@ -20,11 +22,27 @@ DEFAULT_PRESET = "paper"
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
-class OutputFile(click.Path):
-    """A file to write, in a folder that exists; refused before there is any work to lose."""
+class Count(click.IntRange):
+    """A whole number within bounds."""
+
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """Call it N in the help."""
+        return "N"
+
+
+class InputFile(click.Path):
+    """A file to read."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
+
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """Call it FILE in the help."""
+        return "FILE"
+
+
+class OutputFile(InputFile):
+    """A file to write, in a folder that exists; refused before there is any work to lose."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Take the path.
@@ -46,6 +64,73 @@ class OutputFile(click.Path):
         return path
 
 
+class PictureFile(OutputFile):
+    """A picture to draw; refused where it cannot be drawn."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Take the path.
+
+        Raises
+        ------
+        OutputError
+            As of `OutputFile`; or Matplotlib is not installed, or the suffix is none of a picture.
+        """
+        from gen_profile.charts.picture import require_drawable
+
+        path = super().convert(value, param, ctx)
+        if ctx is None or not ctx.resilient_parsing:
+            require_drawable(path)
+        return path
+
+
+@attrs.frozen(kw_only=True)
+class SpecChoice:
+    """The spec that a command line names, a file or a preset, and what it changes of that."""
+
+    path: Path | None
+    preset: str | None
+    overrides: tuple[str, ...]
+
+    @property
+    def stated(self) -> bool:
+        """Whether one is named."""
+        return self.path is not None or self.preset is not None
+
+    def changed(self, values: Mapping[str, object]) -> SpecChoice:
+        """Add options that stand for keys of the spec, as --set would; None is for one that was not given."""
+        more = (f"{key}={value}" for key, value in values.items() if value is not None)
+        return attrs.evolve(self, overrides=(*self.overrides, *more))
+
+    def spec(self) -> Spec:
+        """Read it; doubt its values aloud."""
+        from gen_profile.spec.plausibility import doubts
+        from gen_profile.spec.reading import parse_spec
+
+        text, source, folder = self.text()
+        spec = parse_spec(text, self.overrides, source, folder)
+        beware(doubts(spec))
+        return spec
+
+    def text(self) -> tuple[str, str, Path]:
+        """Read its text; also give its source, and the folder that its files are relative to."""
+        from gen_profile.spec.reading import HERE, preset_text, read_text
+
+        path = self.path
+        if path is not None and self.preset is not None:
+            raise SpecError("--preset: name either a spec file or a preset, not both.")
+        if path is None:
+            name = self.preset or DEFAULT_PRESET
+            return preset_text(name), name, HERE
+        try:
+            return read_text(path), str(path), path.parent
+        except OutputError as error:
+            root = click.get_current_context().find_root().command
+            if isinstance(root, click.Group) and str(path) in root.commands:
+                meant = f"a command comes before its options: gen-profile {path} …"
+                raise OutputError(f"{str(error).rstrip('.')}; {meant}") from error
+            raise
+
+
 def _complete_formats(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     from gen_profile_exporters.registry import formats
 
@@ -65,26 +150,40 @@ def complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> 
     ]
 
 
-def spec_options(command: Command) -> Command:
-    """Add what every command that takes a spec takes."""
-    for decorate in (
-        click.option(
-            "--set",
-            "overrides",
-            metavar="KEY=VALUE",
-            multiple=True,
-            help="Override a key of the spec, such as plant.L1=0.5. Repeatable.",
-        ),
-        click.option(
-            "--preset",
-            metavar="NAME",
-            shell_complete=complete_presets,
-            help="Use a built-in spec (see gen-profile presets).",
-        ),
-        click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=click.Path(path_type=Path)),
-    ):
-        command = decorate(command)
-    return command
+def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add what every command that takes a spec takes; the command gets it as `chosen`."""
+
+    @click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=click.Path(path_type=Path))
+    @click.option(
+        "--preset",
+        metavar="NAME",
+        shell_complete=complete_presets,
+        help="Use a built-in spec (see gen-profile presets).",
+    )
+    @click.option(
+        "--set",
+        "overrides",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="Override a key of the spec, such as plant.L1=0.5. Repeatable.",
+    )
+    @wraps(command)
+    def choosing(
+        *, spec_path: Path | None, preset: str | None, overrides: tuple[str, ...], **options: Any
+    ) -> Any:
+        chosen = SpecChoice(path=spec_path, preset=preset, overrides=overrides)
+        return command(chosen=chosen, **options)
+
+    return choosing
+
+
+def scheduler_option(work: str) -> Callable[..., Any]:
+    """Name the Dask scheduler whose workers do some work."""
+    return click.option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help=f"Dask scheduler whose workers {work}, such as tcp://10.0.0.1:8786, in place of this computer.",
+    )
 
 
 def export_option(what: str) -> Callable[[Command], Command]:
@@ -113,56 +212,28 @@ def require_formats(names: Iterable[str]) -> None:
         find_exporter(name)
 
 
-plot_option = click.option(
-    "--plot",
-    "picture",
-    metavar="FILE",
-    type=OutputFile(),
-    help="Draw it (png, svg or pdf).",
+folder_option = click.option(
+    "--out",
+    "folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    default=Path("gen-profile-out"),
+    help="Folder to write to; ./gen-profile-out by default.",
 )
+plot_option = click.option("--plot", "picture", type=PictureFile(), help="Draw it (png, svg or pdf).")
 block_plot_option = click.option(
     "--plot",
     "picture",
-    metavar="FILE",
-    type=OutputFile(),
+    type=PictureFile(),
     help="Draw a planner block's worst history (or --history), and the worst over the live parameters.",
 )
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")
-debug_option = click.option(
-    "--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."
-)
 
 
-def as_overrides(values: Mapping[str, object]) -> tuple[str, ...]:
-    """Write options that stand for keys of the spec as --set would; None is for one that was not given."""
-    return tuple(f"{key}={value}" for key, value in values.items() if value is not None)
-
-
-def chosen_spec(path: Path | None, preset: str | None, overrides: tuple[str, ...]) -> Spec:
-    """Read the spec that the command line names, or the default preset; doubt its values aloud."""
-    from gen_profile.spec.plausibility import doubts
-    from gen_profile.spec.reading import parse_spec
-
-    text, source, folder = chosen_text(path, preset)
-    spec = parse_spec(text, overrides, source, folder)
-    beware(doubts(spec))
-    return spec
-
-
-def chosen_text(path: Path | None, preset: str | None) -> tuple[str, str, Path]:
-    """Read the text of that spec; also give its source, and the folder that its files are relative to."""
-    from gen_profile.spec.reading import HERE, preset_text, read_text
-
-    if path is not None and preset is not None:
-        raise SpecError("--preset: name either a spec file or a preset, not both.")
-    if path is None:
-        name = preset or DEFAULT_PRESET
-        return preset_text(name), name, HERE
-    try:
-        return read_text(path), str(path), path.parent
-    except OutputError as error:
-        root = click.get_current_context().find_root().command
-        if isinstance(root, click.Group) and str(path) in root.commands:
-            meant = f"a command comes before its options: gen-profile {path} …"
-            raise OutputError(f"{str(error).rstrip('.')}; {meant}") from error
-        raise
+def output_options(command: Command) -> Command:
+    """Add how every command says what came of it."""
+    for decorate in (
+        click.option("--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."),
+        click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout."),
+    ):
+        command = decorate(command)
+    return command

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from gen_profile.errors import CheckFailed, GenProfileError, OutputError
+from gen_profile.errors import CertificateError, CheckFailed, GenProfileError, OutputError
 
 if TYPE_CHECKING:
     from gen_profile.proof.verdict import Proof
@@ -58,6 +58,14 @@ def fail(reasons: Sequence[str], consequence: str = "") -> NoReturn:
     if consequence:
         click.echo(consequence, err=True)
     sys.exit(CheckFailed.exit_code)
+
+
+def leave_unproved(reasons: Sequence[str]) -> NoReturn:
+    """Say why there is no certificate, though the check passed, and end the program."""
+    for sentence in reasons:
+        click.echo(f"Not proved: {sentence}", err=True)
+    click.echo("The check by co-simulation passed; no certificate was written.", err=True)
+    sys.exit(CertificateError.exit_code)
 
 
 def print_error(error: Exception, as_json: bool) -> int:

@@ -14,11 +14,14 @@ from click.shell_completion import CompletionItem
 from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import (
+    Count,
+    InputFile,
     OutputFile,
+    SpecChoice,
     block_plot_option,
-    chosen_spec,
-    debug_option,
-    json_option,
+    folder_option,
+    output_options,
+    scheduler_option,
     spec_options,
 )
 from gen_profile.cli.outcome import fail, print_outcome, warn
@@ -61,39 +64,30 @@ def planner() -> None:
     shell_complete=_complete_forms,
     help="Form of the block: plc, another format that carries blocks, or c. Repeatable; plc by default.",
 )
-@click.option(
-    "--out",
-    "folder",
-    metavar="DIR",
-    type=click.Path(path_type=Path),
-    default=Path("gen-profile-out"),
-    help="Folder to write to; ./gen-profile-out by default.",
-)
+@folder_option
 @click.option(
     "--histories",
-    metavar="N",
-    type=click.IntRange(1, 1_000_000),
+    type=Count(1, 1_000_000),
     help="Prove it on N histories of commands; on 200 by default.",
 )
+@scheduler_option("run the histories")
 @click.option("--no-check", is_flag=True, help="Skip the proof; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the block even where the proof fails.")
 @block_plot_option
-@json_option
-@debug_option
+@output_options
 def write(
-    spec_path: Path | None,
-    preset: str | None,
-    overrides: tuple[str, ...],
+    chosen: SpecChoice,
     formats: tuple[str, ...],
     folder: Path,
     histories: int | None,
+    scheduler: str | None,
     no_check: bool,
     keep_failed: bool,
     picture: Path | None,
     as_json: bool,
 ) -> None:
     """Write the planner block of a machine, proved by co-simulation."""
-    spec = chosen_spec(spec_path, preset, overrides)
+    spec = chosen.spec()
     if picture is not None and no_check:
         raise SpecError("--plot: draws what the proof found; leave --no-check out.")
     from gen_profile.artefacts.manifest import FILENAME
@@ -104,12 +98,6 @@ def write(
     from gen_profile.proof.prove import HISTORIES
 
     require_forms(formats)
-
-    if picture is not None:
-        from gen_profile.charts.picture import require_drawable
-        from gen_profile.charts.proof import draw
-
-        require_drawable(picture)
     with progress() as tell:
         outcome = deploy_planner(
             spec,
@@ -118,9 +106,12 @@ def write(
             histories=histories or HISTORIES,
             check=not no_check,
             keep_failed=keep_failed,
+            scheduler=scheduler,
             progress=tell,
         )
         if picture is not None and outcome.proof is not None:
+            from gen_profile.charts.proof import draw
+
             draw(spec, outcome.block.text, outcome.proof, picture, tell)
     print_outcome(outcome.to_dict(), words.deployment(outcome), as_json)
     warn(outcome.proof)
@@ -137,21 +128,18 @@ def write(
 @click.option(
     "--commands",
     "commands_path",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=InputFile(),
     required=True,
-    help="CSV with time_s, command, value and live parameters; a row holds until the next.",
+    help="CSV with time_s, command, value (or value_AXIS) and live parameters; a row holds until the next.",
 )
 @click.option(
     "--out",
     "path",
-    metavar="FILE",
     type=OutputFile(),
     required=True,
     help="CSV of the setpoints to write, one row per cycle.",
 )
-@json_option
-@debug_option
+@output_options
 def play(block: Path, commands_path: Path, path: Path, as_json: bool) -> None:
     """Execute a written planner block under a table of commands."""
     from gen_profile.artefacts.writing import deliver
@@ -194,8 +182,7 @@ def planner_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--commands",
             "commands_path",
-            metavar="FILE",
-            type=click.Path(path_type=Path),
+            type=InputFile(),
             help="CSV of commands for --planner, as of planner play; without it, the keyboard.",
         ),
         click.option(
@@ -249,8 +236,10 @@ def planned(
         As `gen_profile.streaming.stream.verified_block` and
         `gen_profile.streaming.planned_motion.PlannedMotion`; or there is no terminal.
     """
-    from gen_profile.planner.commands import live_inputs, read_commands
-    from gen_profile.streaming.keyboard import HELP, Keyboard
+    from gen_profile.planner.commands import read_commands
+    from gen_profile.planner.interface import live_inputs
+    from gen_profile.planner.machine import planned_axes
+    from gen_profile.streaming.keyboard import Keyboard
     from gen_profile.streaming.outcome import Source
     from gen_profile.streaming.planned_motion import CommandList, Operator, PlannedMotion
     from gen_profile.streaming.stream import verified_block
@@ -261,12 +250,11 @@ def planned(
     spec, block = verified_block(block_path, accept_unverified=accept_unverified)
     cycle = block.inputs["fCycleTime"]
     if commands_path is None:
-        greatest = spec.limits.of(0).velocity
-        assert greatest is not None  # or there would be no block
-        operator = Keyboard(sys.stdin.fileno(), greatest, cycle)
-        click.echo(HELP, err=True)
+        limits = [spec.limits.of(number).velocity or 0.0 for number in planned_axes(spec)]
+        operator = Keyboard(sys.stdin.fileno(), block.axes, limits, cycle)
+        click.echo(operator.help, err=True)
     else:
-        commands = read_commands(_read(commands_path), tuple(live_inputs(block.inputs)))
+        commands = read_commands(_read(commands_path), block.axes, live_inputs(block.inputs, block.axes))
         operator = CommandList(commands, cycle)
     return Source(spec=spec, plan=PlannedMotion(spec, block, operator, _numbers(live_parameters)))
 

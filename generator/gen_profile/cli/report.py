@@ -10,14 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import (
-    OutputFile,
-    chosen_spec,
-    debug_option,
-    export_option,
-    json_option,
-    spec_options,
-)
+from gen_profile.cli.options import OutputFile, SpecChoice, export_option, output_options, spec_options
 from gen_profile.cli.outcome import fail, print_outcome
 from gen_profile.errors import OutputError, SpecError
 
@@ -30,7 +23,6 @@ if TYPE_CHECKING:
 @click.option(
     "--out",
     "path",
-    metavar="FILE",
     type=OutputFile(),
     help="File to write, .html or .pdf; an .html named after the spec in this folder by default.",
 )
@@ -63,12 +55,9 @@ if TYPE_CHECKING:
     help="Which column of the log holds what, as in time_ms=Zeit,payload_sway_mm=4; by names by default.",
 )
 @click.option("--no-compare", is_flag=True, help="Leave other methods out, which takes less time.")
-@json_option
-@debug_option
+@output_options
 def report(
-    spec_path: Path | None,
-    preset: str | None,
-    overrides: tuple[str, ...],
+    chosen: SpecChoice,
     path: Path | None,
     fields: tuple[str, ...],
     formats: tuple[str, ...],
@@ -84,10 +73,10 @@ def report(
     from gen_profile.report.print import printed, require_browser
 
     made_of = (
-        _of_block(spec_path)
-        if spec_path is not None and _holds_block(spec_path)
+        _of_block(chosen.path)
+        if chosen.path is not None and _holds_block(chosen.path)
         else _of_design(
-            chosen_spec(spec_path, preset, overrides),
+            chosen.spec(),
             formats,
             log=log,
             log_start=log_start,

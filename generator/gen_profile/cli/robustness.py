@@ -7,14 +7,7 @@ from pathlib import Path
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import (
-    OutputFile,
-    chosen_spec,
-    debug_option,
-    json_option,
-    plot_option,
-    spec_options,
-)
+from gen_profile.cli.options import Count, OutputFile, SpecChoice, output_options, plot_option, spec_options
 from gen_profile.cli.outcome import print_outcome
 
 
@@ -43,18 +36,14 @@ from gen_profile.cli.outcome import print_outcome
 )
 @click.option(
     "--points",
-    metavar="N",
-    type=click.IntRange(3, 1001),
+    type=Count(3, 1001),
     help="Errors tried per parameter; 61 of a curve, 25 of a map by default.",
 )
 @plot_option
-@click.option("--csv", "path", metavar="FILE", type=OutputFile(), help="Write the numbers as a table.")
-@json_option
-@debug_option
+@click.option("--csv", "path", type=OutputFile(), help="Write the numbers as a table.")
+@output_options
 def robustness(
-    spec_path: Path | None,
-    preset: str | None,
-    overrides: tuple[str, ...],
+    chosen: SpecChoice,
     *,
     parameters: tuple[str, ...],
     methods: tuple[str, ...],
@@ -65,18 +54,12 @@ def robustness(
     as_json: bool,
 ) -> None:
     """Show residual sway over one or two parameters, optimal motions beside shapers."""
-    spec = chosen_spec(spec_path, preset, overrides)
-    from gen_profile.artefacts.writing import deliver, require_place
-    from gen_profile.charts.picture import require_drawable
+    spec = chosen.spec()
+    from gen_profile.artefacts.writing import deliver
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
     from gen_profile.comparison.robustness import robustness as run
-    from gen_profile.comparison.robustness_table import table
 
-    if picture is not None:
-        require_drawable(picture)
-    if path is not None:
-        require_place(path)
     with progress() as tell:
         found = run(spec, parameters, methods=methods, points=points, half_range=half_range, progress=tell)
         if picture is not None:
@@ -85,5 +68,5 @@ def robustness(
             tell("drawing")
             plot(found, picture)
         if path is not None:
-            deliver(path, table(found).encode("utf-8"))
+            deliver(path, found.table().encode("utf-8"))
     print_outcome(found.to_dict(), words.robustness(found), as_json)

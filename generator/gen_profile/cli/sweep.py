@@ -8,11 +8,12 @@ import click
 
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import (
+    Count,
     OutputFile,
-    chosen_text,
-    debug_option,
+    SpecChoice,
     export_option,
-    json_option,
+    output_options,
+    scheduler_option,
     spec_options,
 )
 from gen_profile.cli.outcome import print_outcome
@@ -36,28 +37,21 @@ from gen_profile.cli.outcome import print_outcome
 @click.option(
     "--out",
     "folder",
-    metavar="DIR",
+    metavar="DIR|FILE.sqlite",
     type=click.Path(path_type=Path),
     default=Path("gen-profile-sweep"),
-    help="Folder to write to; ./gen-profile-sweep by default. A sweep begun there goes on.",
+    help="Folder to write to, or one file for everything; ./gen-profile-sweep by default. A sweep begun "
+    "there goes on.",
 )
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Dask scheduler whose workers do it, such as tcp://10.0.0.1:8786, in place of this computer.",
-)
+@scheduler_option("do it")
 @click.option(
     "--workers",
-    metavar="N",
-    type=click.IntRange(min=1),
+    type=Count(min=1),
     help="Processes of this computer; one per processor by default.",
 )
-@json_option
-@debug_option
+@output_options
 def sweep(
-    spec_path: Path | None,
-    preset: str | None,
-    overrides: tuple[str, ...],
+    chosen: SpecChoice,
     *,
     axes: tuple[str, ...],
     formats: tuple[str, ...],
@@ -80,8 +74,8 @@ def sweep(
     require_libraries()
     from gen_profile.sweep.run import sweep as run
 
-    text = chosen_text(spec_path, preset)
-    store = prepare(text, overrides, parse_grid(axes), formats, folder)
+    text = chosen.text()
+    store = prepare(text, chosen.overrides, parse_grid(axes), formats, folder)
     with progress() as tell:
         done = run(
             store,
@@ -98,10 +92,15 @@ def sweep(
     epilog="Example: gen-profile lookup library --move.distance 0.73 --plant.L1 5.2",
     context_settings={"ignore_unknown_options": True},
 )
-@click.argument("words", metavar="DIR --KEY VALUE …", nargs=-1, type=click.UNPROCESSED)
-@json_option
-@debug_option
-def lookup(words: tuple[str, ...], as_json: bool) -> None:
+@click.argument("words", metavar="DIR|FILE --KEY VALUE …", nargs=-1, type=click.UNPROCESSED)
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder to write the profile to, with its manifest; it stays where it is by default.",
+)
+@output_options
+def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
     """Find the nearest safe profile of a sweep.
 
     Every key that was varied is an option here. Nearness counts in steps of the grid: what is more than one
@@ -116,22 +115,20 @@ def lookup(words: tuple[str, ...], as_json: bool) -> None:
 
     folder, asked = _folder_and_values(words)
     with progress() as tell:
-        found = run(folder, asked, tell)
+        found = run(folder, asked, tell, out=out)
     print_outcome(found.to_dict(), tables.found_profile(found), as_json)
 
 
 @cli.command(epilog="Example: gen-profile library swept --out crane.st")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("folder", metavar="DIR|FILE", type=click.Path(path_type=Path))
 @click.option(
     "--out",
     "path",
-    metavar="FILE",
     type=OutputFile(),
     default=Path("library.st"),
     help="File to write: its name is the block's, its suffix tells the format; ./library.st by default.",
 )
-@json_option
-@debug_option
+@output_options
 def library(folder: Path, path: Path, as_json: bool) -> None:
     """Put a sweep's PLC blocks into one.
 
@@ -165,5 +162,7 @@ def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:
             raise click.UsageError(f"--{key} is stated twice.")
         asked[key] = value
     if len(folders) != 1:
-        raise click.UsageError("name one folder that was swept to, and a value for every key varied there.")
+        raise click.UsageError(
+            "name one folder or file that was swept to, and a value for every key varied there."
+        )
     return Path(folders[0]), asked

@@ -10,11 +10,13 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from gen_profile.evaluation.phrases import mm, named, number
+from gen_profile.certificate.document import certificate_path
+from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, named, number
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from gen_profile.certificate.document import Certificate
     from gen_profile.comparison.compare import Comparison
     from gen_profile.comparison.robustness import Robustness
     from gen_profile.designs.design import Design
@@ -31,16 +33,10 @@ if TYPE_CHECKING:
     from gen_profile.verification.check import Judgement
     from gen_profile.verification.verdict import Check
 
-MANIFEST_WORDS = {
-    "matches": "the file is the one that was exported",
-    "differs": "the file is NOT the one that was exported",
-    "none": "no manifest of this spec beside the file",
-}
 
 MOTION_LIMITS = ("velocity", "acceleration", "jerk")
 COSTLY_LAG = 2.0  # times the motion's acceleration from which a warning is due
 COSTLY_OVERSHOOT = 0.1  # of the sway on the way, likewise
-NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
 RESTS = 0.5  # of a half-range, from which on 1 % of another parameter is worth a word
 
 # head → unit, figure, how many of the unit make one of the figure's
@@ -87,8 +83,8 @@ def design(outcome: Design) -> str:
     return _block(outcome.spec.name, rows)
 
 
-def judgement(found: Judgement) -> str:
-    """Tell how an artefact was judged."""
+def judgement(found: Judgement, certificate: Certificate | None = None) -> str:
+    """Tell how an artefact was judged, and what is proved of it."""
     check = found.check
     findings = [
         (finding.scenario.name, ", ".join(f"{load} {mm(sway)}" for load, sway in finding.residual.items()))
@@ -102,13 +98,31 @@ def judgement(found: Judgement) -> str:
         *findings,
         *_groups(check),
         ("check", _verdict(check)),
+        *([] if certificate is None else _proved(certificate)),
+        *([("wrote", str(certificate_path(found.path)))] if certificate and certificate.proved else []),
     ]
     return _block(str(found.path), rows)
 
 
+def certificate(path: Path, found: Certificate) -> str:
+    """Tell what a certificate proves."""
+    return _block(str(path), list(_proved(found)))
+
+
+def _proved(found: Certificate) -> Iterator[tuple[str, str]]:
+    """Say what is proved, and of which machines."""
+    machines = ", ".join(f"{name} from {low:.6g} to {high:.6g}" for name, (low, high) in found.ranges.items())
+    share = "" if found.share == 1.0 else f"{100.0 * found.share:.3g} % of "
+    yield "machines", f"{share}all with {machines}" if machines else "the nominal one"
+    bounds = ", ".join(f"{load} {mm(bound)}" for load, bound in found.bounds.items())
+    said = f"at most {bounds}, from {found.arrival:.4g} s on" if bounds else "no bound"
+    yield "proved" if found.proved else "not proved", said
+
+
 def deployment(outcome: Deployment) -> str:
     """Tell what planner block was written, and how it was judged."""
-    rows = [("machine", f"{outcome.spec.plant.type}, {outcome.block.modes} modes")]
+    count = outcome.block.modes
+    rows = [("machine", f"{outcome.spec.plant.type}, {count} {'mode' if count == 1 else 'modes'}")]
     rows += [] if outcome.proof is None else _proof(outcome.proof)
     if outcome.proof is None:
         rows.append(("proof", "skipped"))
@@ -123,12 +137,11 @@ def block_judgement(found: BlockJudgement) -> str:
         return _block(str(found.path), [*rows, *_proof(found.check)])
     worst = found.check.worst
     commands = (
-        f"{command.time:.3g} s {command.command}"
-        + (f" {command.value:.4g}" if command.command in ("position", "velocity") else "")
+        f"{command.time:.3g} s {command.command}" + "".join(f" {value:.4g}" for value in command.values)
         for command in worst.history.commands
     )
     rows += [
-        ("history", f"{worst.number}, {worst.group}, from {worst.history.places[0]:.4g} m"),
+        ("history", f"{worst.number}, {worst.group}, from {worst.history.start_words}"),
         ("told", ", ".join(f"{name} {value:.4g}" for name, value in worst.history.live.items())),
         ("commands", "; ".join(commands)),
         ("residual sway", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.residual.items())),
@@ -149,7 +162,11 @@ def _proof(proof: Proof) -> list[tuple[str, str]]:
         )
         for group in document["groups"]
     ]
-    limits = ", ".join(f"{name} {100.0 * document['limits'][name]:.4g} %" for name in MOTION_LIMITS)
+    limits = ", ".join(
+        f"{axis.name} {name} {100.0 * document['limits'][axis.prefix + name]:.4g} %".lstrip()
+        for axis in proof.worst.history.axes.values()
+        for name in MOTION_LIMITS
+    )
     return [
         *groups,
         ("limits", limits),
@@ -234,42 +251,12 @@ def identification(found: Identification, path: Path) -> str:
         size = f"{read:.6g} ± {row['uncertainty']:.2g} {row['unit']}"
         rows.append((f"read {what}", f"{size}, {off:+.1f} σ off the model"))
     for row in document["logs"]:
-        rows += _swing(row)
-    if found.estimate.contradiction > 1.0:
-        widened = (
-            f"the readings contradict one another; ranges widened {found.estimate.contradiction:.2g} times"
-        )
-        rows.append(("BEWARE", widened))
+        sizes = f"swing ±{row['swing']:.2g} {row['unit']}, noise {row['noise']:.2g} {row['unit']}"
+        rows.append((f"log of {row['load']}", f"{row['samples']} samples of its {row['quantity']}, {sizes}"))
+    rows += [("BEWARE", sentence) for sentence in found.warnings()]
     rows += [*_stated_ranges(found), *_rests(found)]
     rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]
     return _block(found.spec.name, rows)
-
-
-def _swing(row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Tell of a logged swing, and what is wrong with it."""
-    from gen_profile.identification.estimation import UNREST
-
-    unit, name = row["unit"], f"log of {row['load']}"
-    sizes = f"swing ±{row['swing']:.2g} {unit}, noise {row['noise']:.2g} {unit}"
-    yield name, f"{row['samples']} samples of its {row['quantity']}, {sizes}"
-    if row["unrest"] > UNREST:
-        yield (
-            "BEWARE",
-            f"the {name} is {row['unrest']:.2g} times farther off the model at first; "
-            "leave out what was logged before the axes stood still (--after)",
-        )
-    if (left := row["misfit"]) is not None:
-        yield (
-            "BEWARE",
-            f"a swing of {left['rms']:.2g} {unit} RMS at {left['frequency_rad_per_s']:.3g} rad/s is left of "
-            f"the {name}, which no parameter of this machine explains; ranges that follow from it are "
-            f"{left['widened']:.2g} times wider (--plot shows it)",
-        )
-    if row["noise"] > NOISY * row["swing"]:
-        yield (
-            "BEWARE",
-            f"its noise is {row['noise'] / row['swing']:.0%} of the swing; look at --unit and --signal",
-        )
 
 
 def _stated_ranges(found: Identification) -> Iterator[tuple[str, str]]:
@@ -295,7 +282,11 @@ def sweep(done: Sweep) -> str:
     """Tell how many cases ended how, with an example of each failure."""
     rows = [("varied", ", ".join(f"{axis.key} ({len(axis.values)})" for axis in done.store.grid.axes))]
     rows += [
-        (status, f"{count} of {len(done.store.grid)}" + _example(done.reasons.get(status)))
+        (
+            status,
+            f"{count} of {len(done.store.grid)}"
+            + (f"; {done.reasons[status]}" if status in done.reasons else ""),
+        )
         for status, count in done.statuses.items()
     ]
     if done.kept:
@@ -331,10 +322,6 @@ def library(written: Library) -> str:
         ("", f"{written.index} tells which is which"),
     ]
     return _block(written.path.stem, rows)
-
-
-def _example(reason: str | None) -> str:
-    return "" if reason is None else f"; {reason}"
 
 
 def report(made: Report, path: Path) -> str:

@@ -17,8 +17,6 @@ from gen_profile.motion.profile import Profile
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.impulses import SHAPERS
-from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.direct import worst_case
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.spec.model import Spec
 
@@ -132,8 +130,7 @@ def _optimal_within(spec: Spec, own: Callable[[], Profile | GenProfileError]) ->
     command = lag_compensated(motion, spec.actuator.tau)
     taken = max(greatest(command, 2, axis) for axis in range(command.axes))
     problem = problem_of(attrs.evolve(spec, limits=attrs.evolve(spec.limits, acceleration=taken)))
-    solve = direct.solve if problem.worst_case is None else worst_case.solve
-    solution = transient_sway.kept_by_all(spec, problem, solve)
+    solution = transient_sway.kept_by_all(spec, problem, "direct")
     if solution.optimum is None:
         unit = spec.machine().actuated[0].unit
         raise InfeasibleProblem(

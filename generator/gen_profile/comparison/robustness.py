@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from types import MappingProxyType
 from typing import Any
 
@@ -24,9 +26,8 @@ POINTS = {1: 61, 2: 25}  # per parameter, of a curve and of a map
 USUAL_RANGE = 0.3  # relative, of a parameter that the spec takes for certain
 BEYOND = 1.5  # of a parameter's own range, which the curve covers
 WIDEST = 0.9
-STEP_PHASE = (
-    0.05  # rad of the fastest mode between setpoints: linear interpolation errs by some 10⁻⁴ of the sway
-)
+# rad of the fastest mode between setpoints: linear interpolation errs by some 10⁻⁴ of the sway
+STEP_PHASE = 0.05
 STEPS_PER_MOVE = 300
 
 
@@ -109,6 +110,21 @@ class Robustness:
             ],
             "left_out": [{"method": method, "reason": why} for method, why in self.left_out.items()],
         }
+
+    def table(self) -> str:
+        """Write a row per machine as CSV: relative errors, then every load's residual sway in m by method."""
+        loads = self.spec.machine().loads
+        head = [*(f"{name}_error" for name in self.errors)]
+        head += [f"{method}_{load}_m" for method in self.residual for load in loads]
+        grid = np.meshgrid(*self.errors.values(), indexing="ij")
+        columns = [values.ravel() for values in grid]
+        for sway in self.residual.values():
+            columns += list(sway.reshape(-1, len(loads)).T)
+        text = StringIO()
+        rows = csv.writer(text, lineterminator="\n")
+        rows.writerow(head)
+        rows.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
+        return text.getvalue()
 
 
 def _crossing(errors: Array, share: Array) -> float:

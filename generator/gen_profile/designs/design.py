@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256
+from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256, versions
 from gen_profile.artefacts.writing import Staging, staged
 from gen_profile.designs.plan import Plan, plan
 from gen_profile.errors import OutputError
@@ -21,7 +19,7 @@ from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
-from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
+from gen_profile.verification.cosimulation import cosimulate, judge, judged_from, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import with_further
 from gen_profile.verification.verdict import Check
@@ -29,7 +27,8 @@ from gen_profile.verification.worst_machines import worst_machines
 from gen_profile_exporters.exporter import Exporter, target_of
 from gen_profile_exporters.registry import find_exporter, format_named, require_end
 
-_LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")
+if TYPE_CHECKING:
+    from gen_profile.proof.verdict import Proof  # SciPy's statistics take longer to load than the main job
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -158,29 +157,37 @@ def design(
         progress("exporting")
         artefacts, replayed = _export(spec, planned.evaluation.command, exporters, staging)
         worst = _check(spec, planned, replayed, by_fmpy, progress) if check else None
-        accompany(spec, staging)
-        manifest = _manifest(spec, planned, artefacts, worst)
-        staging.write(FILENAME, after_earlier_ones(manifest, folder / FILENAME).to_json())
-        delivered = worst is None or worst.passed or keep_failed
-        if delivered:
-            staging.deliver()
-    kept = artefacts if delivered else ()
+        digest = planned.evaluation.command.payload_hash()
+        kept = deliver_judged(staging, spec, artefacts, worst, profile_sha256=digest, keep_failed=keep_failed)
     return Design(spec=spec, plan=planned, check=worst, artefacts=kept, folder=folder)
 
 
-@cache
-def versions() -> tuple[tuple[str, str], ...]:
-    """List the libraries that shape the numbers, with their versions installed here."""
-    return tuple((library, version(library)) for library in _LIBRARIES)
-
-
-def accompany(spec: Spec, staging: Staging) -> None:
-    """Put beside the manifest what the spec in it names: an own machine, a foreign judge."""
-    if spec.plant.file is not None:
-        staging.write(spec.plant.file.name, spec.plant.file.content)
-    judge = spec.check.foreign
-    if judge is not None:
-        staging.write(judge.name, judge.path.read_bytes())
+def deliver_judged(
+    staging: Staging,
+    spec: Spec,
+    artefacts: tuple[Artefact, ...],
+    judged: Check | Proof | None,
+    *,
+    profile_sha256: str,
+    keep_failed: bool,
+) -> tuple[Artefact, ...]:
+    """Write the manifest and the files that its spec names; deliver all unless it failed; list what was."""
+    for name, content in spec.files().items():
+        staging.write(name, content)
+    manifest = Manifest(
+        name=spec.name,
+        spec=spec.to_dict(),
+        spec_sha256=spec.sha256(),
+        profile_sha256=profile_sha256,
+        versions=dict(versions()),
+        artefacts=artefacts,
+        check=None if judged is None else judged.to_dict(),
+    )
+    staging.write(FILENAME, _after_earlier_ones(manifest, staging.destination / FILENAME).to_json())
+    if judged is not None and not judged.passed and not keep_failed:
+        return ()
+    staging.deliver()
+    return artefacts
 
 
 def _export(
@@ -242,7 +249,8 @@ def _judged(
     found = cosimulate(
         spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, on_build=_compiling(progress)
     )
-    expected = evaluation.followed(found[0].times, machines[len(evaluation.machines) :])
+    compared = found[0].times[found[0].times >= judged_from(spec, setpoints)]
+    expected = evaluation.followed(compared, machines[len(evaluation.machines) :])
     return with_further(
         spec,
         setpoints,
@@ -256,19 +264,7 @@ def _compiling(progress: Progress) -> Callable[[], None]:
     return lambda: progress("compiling the plant's FMU, once")
 
 
-def _manifest(spec: Spec, planned: Plan, artefacts: tuple[Artefact, ...], check: Check | None) -> Manifest:
-    return Manifest(
-        name=spec.name,
-        spec=spec.to_dict(),
-        spec_sha256=spec.sha256(),
-        profile_sha256=planned.evaluation.command.payload_hash(),
-        versions=dict(versions()),
-        artefacts=artefacts,
-        check=None if check is None else check.to_dict(),
-    )
-
-
-def after_earlier_ones(manifest: Manifest, path: Path) -> Manifest:
+def _after_earlier_ones(manifest: Manifest, path: Path) -> Manifest:
     """Keep what the manifest in the output folder says of files that stay; replace a damaged one."""
     if not path.is_file():
         return manifest

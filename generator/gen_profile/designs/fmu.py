@@ -15,6 +15,7 @@ from gen_profile.designs.plan import plan
 from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError
 from gen_profile.motion.profile import Profile
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
@@ -144,16 +145,22 @@ def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Progress) -> 
         return plant_model(_machine(spec, _rough_nominals(spec)), input_kind, name)
     if kind == "planner":
         progress("finding the modes over the live ranges")
-        axis = spec.machine().actuated[0].name
-        return planner_model(name, planner_block(spec).text, axis, tuple(spec.planner.live))
+        return planner_model(name, planner_block(spec).text, _planned(spec), tuple(spec.planner.live))
     if kind == "planned-system":
         progress("finding the modes over the live ranges")
         machine = _machine(spec, _rough_nominals(spec))
-        return planned_system_model(name, planner_block(spec).text, machine, tuple(spec.planner.live))
+        text, live = planner_block(spec).text, tuple(spec.planner.live)
+        return planned_system_model(name, text, machine, _planned(spec), live)
     evaluation = plan(spec, progress=progress).evaluation
     if kind == "profile":
         return profile_model(name, spec.machine().actuated, evaluation.command)
     return system_model(name, _machine(spec, _nominals(spec, evaluation.motion)), evaluation.command)
+
+
+def _planned(spec: Spec) -> dict[str, str]:
+    """Name the axes that a planner block plans, by what the names of its inputs and outputs end in."""
+    axes = spec.machine().actuated
+    return {axis.suffix: axes[number].name for number, axis in planned_axes(spec).items()}
 
 
 def _machine(spec: Spec, nominal: Mapping[str, float]) -> PlantInstance:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from functools import partial
+from contextlib import suppress
+from functools import cache, partial
 
 import attrs
 import numpy as np
@@ -15,21 +16,44 @@ from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate,
 from gen_profile.motion.profile import Profile, grid_length, grid_times
 from gen_profile.problem.limits import SWAY_TOLERANCE, breaches, rounded_up
 from gen_profile.problem.linearization import linearize
-from gen_profile.problem.problem import problem_of
+from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.minimum_time import least_beyond
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
-from gen_profile.work import OutOfWork, budget
+from gen_profile.work import OutOfWork, budget, left, spend
 
 SLOW = 5.0  # periods of the slowest mode, which are time enough where no duration keeps the limits
 CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
 EXPLAINING = "looking for what would do"
-SEARCHING = 20.0  # s of work to find the shortest duration
+SEARCHING = 18.0  # s of work to find the shortest duration
+SPREADING = 0.6  # of the work that is left for it to find the shortest duration, all machines considered
 SPREADS = 2  # times that it is measured how much more than the nominal machine others sway on the way
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Draft:
+    """A motion that was tried on no machine, or none.
+
+    Attributes
+    ----------
+    spec : Spec
+        With a duration.
+    solution : Solution or None
+        What the solver found, or why it found nothing; None where a shaper made the motion.
+    motion : Profile or None
+        Of the axes.
+    solver_time : float
+        s.
+    """
+
+    spec: Spec
+    solution: Solution | None
+    motion: Profile | None
+    solver_time: float
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -84,30 +108,36 @@ def timed(spec: Spec, progress: Progress = untold) -> Spec:
     if spec.solver.shaper is not None:
         return _lasting(spec, shaped_motion(spec, spec.solver.shaper).duration)
     try:
-        with budget(SEARCHING * choice.patience(problem_of(spec))):
+        with budget(SEARCHING):
             return _shortest(spec, progress)
     except OutOfWork as error:
+        spend(0.0)
+        enough = choice.sufficient_duration(_slow(spec), partial(transient_sway.as_asked_next, spec))
+        cure = f"Allow about {enough} s (move.duration)" if enough else "State a duration in s"
         raise SolverDiverged(
-            "move.duration: the search for the shortest duration was given up, for it took too long; "
-            "state a duration in s, or fewer limits."
+            "move.duration: the search for the shortest duration was given up, for it took too long. "
+            f"{cure}, or fewer limits."
         ) from error
 
 
 def _shortest(spec: Spec, progress: Progress) -> Spec:
     problem = problem_of(spec)
     shortest = choice.minimum_time(problem, progress)
-    for _ in range(SPREADS):
-        if shortest is None:
-            break
-        more = transient_sway.measured_spread(_lasting(spec, shortest), problem.sway_spread)
-        if more <= problem.sway_spread:
-            break
-        problem = attrs.evolve(problem, sway_spread=more)
-        shortest = choice.minimum_time(problem, progress)
+    with suppress(OutOfWork), budget(SPREADING * left()):
+        for _ in range(SPREADS):
+            if shortest is None:
+                break
+            lasting = attrs.evolve(problem, duration=_lasting(spec, shortest).move.duration)
+            more = transient_sway.measured_spread(spec, lasting)
+            if more <= problem.sway_spread:
+                break
+            problem = attrs.evolve(problem, sway_spread=more)
+            shortest = choice.minimum_time(problem, progress, beyond=shortest)
     if shortest is None:
-        slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
-        slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * 2.0 * np.pi / slowest)))
-        cure = choice.requirements(transient_sway.with_usual_spread(spec, slow)) or "Widen the limits."
+        cure = (
+            choice.requirements(_slow(spec), partial(transient_sway.as_asked_next, spec))
+            or "Widen the limits, or see whether all numbers of the spec are in its units."
+        )
         raise InfeasibleProblem(
             f"move.duration: no duration keeps the limits and brings the load to rest. {cure}"
         )
@@ -115,17 +145,28 @@ def _shortest(spec: Spec, progress: Progress) -> Spec:
     if _calms(quickest, problem.sway_spread):
         return quickest
 
+    @cache  # for many a duration ends on the same cycle
     def calms(duration: float) -> bool:
         progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
         return _calms(_lasting(spec, duration), problem.sway_spread)
 
-    calm = least_beyond(calms, shortest, LONGEST * shortest)
+    calm = least_beyond(
+        lambda duration: calms(_lasting(spec, duration).move.duration), shortest, LONGEST * shortest
+    )
     if calm is None:
         raise InfeasibleProblem(
             "check.residual_sway: no duration leaves so little sway on every machine of "
             "robustness.uncertain; allow more, or narrow the ranges."
         )
     return _lasting(spec, calm)
+
+
+def _slow(spec: Spec) -> Problem:
+    """Give a problem so much time that it is not the time that it lacks, and the machines' usual spread."""
+    problem = problem_of(spec)
+    slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
+    slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * 2.0 * np.pi / slowest)))
+    return transient_sway.with_usual_spread(spec, slow)
 
 
 def _lasting(spec: Spec, duration: float) -> Spec:
@@ -162,42 +203,81 @@ def plan(spec: Spec, progress: Progress = untold) -> Plan:
     """
     try:
         with budget(*choice.ANSWER):
-            return _planned(timed(spec, progress), progress)
+            return judged(draft(spec, progress), progress)
     except OutOfWork:
         choice.given_up(problem_of(spec)).raise_for_status()
         raise
 
 
-def _planned(spec: Spec, progress: Progress) -> Plan:
-    """Plan a spec that has a duration.
+def draft(spec: Spec, progress: Progress = untold) -> Draft:
+    """Solve a spec, or shape a move for it, and look no further.
 
     Raises
     ------
+    InfeasibleProblem, SolverDiverged
+        No duration, or no shaped move, was found.
     OutOfWork
         Nothing is left of a budget.
     """
+    spec = timed(spec, progress)
     progress("solving")
     began = time.perf_counter()
-    solution, motion = _designed(spec, progress)
-    solver_time = time.perf_counter() - began
-    evaluation = evaluate(spec, motion)
-    found = evaluation.figures
-    swing = max(found["sway_transient_peak_m"], found["sway_transient_worst_m"] / SWAY_TOLERANCE)
+    solution: Solution | None = None
+    motion: Profile | None = None
+    if spec.solver.shaper is not None:
+        motion = shaped_motion(spec, spec.solver.shaper)
+    else:
+        solution = transient_sway.attempt(spec, progress)
+        if solution.optimum is not None:
+            motion = optimal_profile(solution)
+    return Draft(spec=spec, solution=solution, motion=motion, solver_time=time.perf_counter() - began)
+
+
+def judged(found: Draft, progress: Progress = untold) -> Plan:
+    """Try a drafted motion on all machines; say what would help where there is none within the limits.
+
+    Raises
+    ------
+    InfeasibleProblem, SolverDiverged, LimitViolation
+    OutOfWork
+        Nothing is left of a budget.
+    """
+    spec = found.spec
+    evaluation = evaluate(spec, _motion(found, progress))
+    figures = evaluation.figures
+    swing = max(figures["sway_transient_peak_m"], figures["sway_transient_worst_m"] / SWAY_TOLERANCE)
     broken = breaches(spec.limits, evaluation.command, swing)
     if broken:
         sentences = [breach.sentence() for breach in broken]
         progress(EXPLAINING)
-        cure = choice.remedy(problem_of(spec), spec.solver.solver, partial(_is_calm, spec))
+        cure = choice.remedy(
+            problem_of(spec),
+            spec.solver.solver,
+            partial(_is_calm, spec),
+            partial(transient_sway.as_asked_next, spec),
+        )
         raise LimitViolation("\n".join([*sentences, cure]).strip())
-    return Plan(spec=spec, solution=solution, solver_time=solver_time, evaluation=evaluation, figures=found)
+    return Plan(
+        spec=spec,
+        solution=found.solution,
+        solver_time=found.solver_time,
+        evaluation=evaluation,
+        figures=figures,
+    )
 
 
-def _designed(spec: Spec, progress: Progress) -> tuple[Solution | None, Profile]:
-    """Solve a spec that has a duration, or find out what would help; or shape a move for it."""
-    if spec.solver.shaper is not None:
-        return None, shaped_motion(spec, spec.solver.shaper)
-    attempt = transient_sway.attempt(spec, progress)
-    if attempt.optimum is None:
-        progress(EXPLAINING)
-    solution = choice.diagnosed(attempt, spec.solver.solver, partial(_is_calm, spec))
-    return solution, optimal_profile(solution)
+def _motion(found: Draft, progress: Progress) -> Profile:
+    """Take a draft's motion, or find out what would help."""
+    if found.motion is not None:
+        return found.motion
+    assert found.solution is not None  # a shaper has a motion, or raises
+    progress(EXPLAINING)
+    spec = found.spec
+    return optimal_profile(
+        choice.diagnosed(
+            found.solution,
+            spec.solver.solver,
+            partial(_is_calm, spec),
+            partial(transient_sway.as_asked_next, spec),
+        )
+    )

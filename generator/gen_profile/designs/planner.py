@@ -9,9 +9,9 @@ from typing import Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, sha256
+from gen_profile.artefacts.manifest import Artefact, sha256
 from gen_profile.artefacts.writing import staged
-from gen_profile.designs.design import accompany, after_earlier_ones, versions
+from gen_profile.designs.design import deliver_judged
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
 from gen_profile.progress import Progress, untold
@@ -69,6 +69,7 @@ def deploy_planner(
     histories: int = HISTORIES,
     check: bool = True,
     keep_failed: bool = False,
+    scheduler: str | None = None,
     progress: Progress = untold,
 ) -> Deployment:
     """Write a planner block, prove what was written, and deliver what passes.
@@ -86,6 +87,8 @@ def deploy_planner(
         Without it the manifest says ``"unverified"``.
     keep_failed : bool
         Deliver even what failed, marked so in the manifest.
+    scheduler : str, optional
+        Address of a Dask scheduler, whose workers run the histories.
     progress : callable
         Told what is being done.
 
@@ -101,14 +104,14 @@ def deploy_planner(
     with staged(folder) as staging:
         written = {file.filename: staging.write(file.filename, file.content) for file in files}
         text = _executed(block, written)
-        proof = prove(spec, text, histories=histories, progress=progress) if check else None
-        accompany(spec, staging)
-        manifest = _manifest(spec, written, proof)
-        staging.write(FILENAME, after_earlier_ones(manifest, folder / FILENAME).to_json())
-        delivered = proof is None or proof.passed or keep_failed
-        if delivered:
-            staging.deliver()
-    kept = manifest.artefacts if delivered else ()
+        proof = None
+        if check:
+            proof = prove(spec, text, histories=histories, scheduler=scheduler, progress=progress)
+        artefacts = tuple(
+            Artefact(format=FORMAT, path=name, sha256=sha256(content), bytes=len(content))
+            for name, content in written.items()
+        )
+        kept = deliver_judged(staging, spec, artefacts, proof, profile_sha256="", keep_failed=keep_failed)
     return Deployment(spec=spec, block=block, proof=proof, folder=folder, files=kept)
 
 
@@ -116,18 +119,3 @@ def _executed(block: PlannerBlock, written: Mapping[str, bytes]) -> str:
     """Read the text that is proved out of the first file that holds it; C is its translation."""
     texts = (block_in(Path(name), content) for name, content in written.items() if not is_c(name))
     return next(texts, block.text)
-
-
-def _manifest(spec: Spec, written: Mapping[str, bytes], proof: Proof | None) -> Manifest:
-    return Manifest(
-        name=spec.name,
-        spec=spec.to_dict(),
-        spec_sha256=spec.sha256(),
-        profile_sha256="",  # it holds no motion
-        versions=dict(versions()),
-        artefacts=tuple(
-            Artefact(format=FORMAT, path=name, sha256=sha256(content), bytes=len(content))
-            for name, content in written.items()
-        ),
-        check=None if proof is None else proof.to_dict(),
-    )

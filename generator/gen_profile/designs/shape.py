@@ -10,6 +10,7 @@ from gen_profile.motion.profile import Profile, grid_length, grid_times
 from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches, rounded_up
 from gen_profile.problem.linearization import linearize
+from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.shaped_move import ShapedMove, shaped_move
 from gen_profile.spec.model import Spec
@@ -78,5 +79,5 @@ def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:
     broken = breaches(attrs.evolve(spec.limits, sway=None), command, 0.0)
     if broken or spec.limits.sway is None:
         return broken
-    nominal, worst = sways(spec, motion)
+    nominal, worst = sways(spec, problem_of(spec), motion)
     return breaches(spec.limits, command, max(nominal, worst / SWAY_TOLERANCE))

@@ -6,10 +6,14 @@ is hardly depends on the motion: it is measured on one, and tried on the next.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 
 import attrs
 
+from gen_profile.errors import SpecError
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.evaluation.simulation import greatest_sway
 from gen_profile.motion.profile import Profile
@@ -17,14 +21,20 @@ from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
+from gen_profile.solvers.direct.relaxation import Relaxation
+from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Solution
+from gen_profile.solvers.solution import Solution, Status
 from gen_profile.spec.model import Spec
+from gen_profile.spec.plausibility import refuse_implausible
+from gen_profile.spec.values import SolverName
 from gen_profile.work import OutOfWork, budget
 
-ROUNDS = 3  # of measuring and solving again
+ROUNDS = 4  # of measuring and solving again
 ENOUGH = 1.005  # times the limit that the worst machine may sway
+NEARLY_ENOUGH = 1.008  # likewise where solving again takes long
 MARGIN = 1.002  # for what lies between the machines and the times looked at
+AT_ONCE = 3.0  # s of work, in which a motion without limits is found, or is not worth the while
 ACCURACY = 1e-6  # of the machines' integration, relative
 SAMPLES = 1001
 
@@ -33,27 +43,23 @@ def solve(spec: Spec) -> Solution:
     """Solve a spec so that all machines keep its limits; where that fails, find out what would help."""
     try:
         with budget(*choice.ANSWER):
-            return choice.diagnosed(attempt(spec), spec.solver.solver)
+            return choice.diagnosed(attempt(spec), spec.solver.solver, tried=partial(as_asked_next, spec))
     except OutOfWork:
         return choice.given_up(problem_of(spec))
 
 
-def measured_spread(spec: Spec, spread: float) -> float:
-    """Tell how many times as much as the nominal machine the worst one sways, where that breaks the limit.
+def measured_spread(spec: Spec, problem: Problem) -> float:
+    """Tell how many times as much as the nominal machine the worst one sways, by motions on few intervals.
 
-    Returns
-    -------
-    float
-        The spread that was supposed where all keep the limit with it, and where nothing is known.
+    Parameters
+    ----------
+    spec : Spec
+    problem : Problem
+        Whose spread is supposed, and returned where all keep the limit with it or nothing is known.
     """
-    limit = spec.limits.sway
-    if limit is None or not spec.checked_ranges():
-        return spread
-    solution = choice.attempt(attrs.evolve(problem_of(spec), sway_spread=spread), spec.solver.solver)
-    if solution.optimum is None:
-        return spread
-    nominal, worst = sways(spec, optimal_profile(solution))
-    return spread if worst <= max(ENOUGH * limit, nominal) else MARGIN * worst / nominal
+    if not _limited(spec, problem):
+        return problem.sway_spread
+    return _kept(spec, problem, partial(choice.attempt, method="direct", coarse=True)).problem.sway_spread
 
 
 def attempt(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Solution:
@@ -72,62 +78,112 @@ def attempt(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Sol
     Solution
         Without an optimum where there is none; its problem says how much less the nominal machine is allowed.
     """
-    problem, method, limit = problem_of(spec), spec.solver.solver, spec.limits.sway
-    if limit is None or not spec.checked_ranges():
-        return choice.attempt(problem, method)
-    if problem.worst_case is not None:  # the least residual of the worst machine takes longest to find
-        quick = attempt(attrs.evolve(spec, robustness=attrs.evolve(spec.robustness, method="none")))
-        spread = max(spread, quick.problem.sway_spread)
-    problem = attrs.evolve(problem, sway_spread=spread)
-    solution = kept_by_all(spec, problem, lambda asked: choice.attempt(asked, method), progress)
+    problem = attrs.evolve(problem_of(spec), sway_spread=spread)
+    solution = _attempt(spec, problem, spec.solver.solver, progress)
     if solution.optimum is None and solution.problem.sway_spread == 1.0:
         return attrs.evolve(solution, problem=with_usual_spread(spec, problem))
     return solution
 
 
-def kept_by_all(
-    spec: Spec, problem: Problem, solve: Callable[[Problem], Solution], progress: Progress = untold
-) -> Solution:
-    """Solve a problem again with less sway of the nominal machine, until all of a spec's keep its limit.
+def _attempt(spec: Spec, problem: Problem, method: SolverName, progress: Progress = untold) -> Solution:
+    if problem.worst_case is not None:  # whose least residual takes longest to find
+        problem = attrs.evolve(problem, sway_spread=measured_spread(spec, problem))
+    return kept_by_all(spec, problem, method, progress)
+
+
+def as_asked_next(spec: Spec, problem: Problem) -> Solution:
+    """Solve a problem as if a spec had its duration and limits, which may not be plausible."""
+    move = attrs.evolve(spec.move, duration=problem.duration, shortest=False)
+    try:
+        refuse_implausible(attrs.evolve(spec, move=move, limits=problem.limits))
+    except SpecError:
+        return choice.given_up(problem)
+    problem = attrs.evolve(problem, sway_spread=1.0)
+    if spec.solver.solver != "direct" and problem.worst_case is None:
+        with suppress(OutOfWork), budget(AT_ONCE):
+            smooth = choice.attempt(problem, "indirect")
+            if choice.keeps_limits(smooth) and _spread(spec, smooth, ENOUGH) is None:
+                return smooth
+    return _attempt(spec, problem, "direct")
+
+
+def kept_by_all(spec: Spec, problem: Problem, method: SolverName, progress: Progress = untold) -> Solution:
+    """Solve a problem again with less sway of the nominal machine, until all of a spec's keep the limit.
+
+    How much less is measured on motions on few intervals first.
 
     Parameters
     ----------
     spec : Spec
     problem : Problem
-        Of that spec, whatever else it asks for.
-    solve : callable
+        Of that spec, or with other limits, another duration, or whatever else it asks for.
+    method : str
     progress : Progress
     """
-    solution, limit = solve(problem), spec.limits.sway
-    if limit is None or not spec.checked_ranges():
-        return solution
+    if not _limited(spec, problem):
+        return choice.attempt(problem, method)
+    if problem.worst_case is None:
+        if method == "indirect":  # which knows no limits
+            return choice.attempt(problem, method)
+        coarse = _kept(spec, problem, partial(choice.attempt, method=method, coarse=True))
+        if coarse.optimum is not None and coarse.method == indirect.METHOD:
+            return coarse
+        problem = attrs.evolve(problem, sway_spread=coarse.problem.sway_spread)
+    return _kept(spec, problem, choice.directly, NEARLY_ENOUGH, progress)
+
+
+def _limited(spec: Spec, problem: Problem) -> bool:
+    return problem.limits.sway is not None and bool(spec.checked_ranges())
+
+
+def _kept(
+    spec: Spec,
+    problem: Problem,
+    solve: Callable[[Problem], Solution],
+    enough: float = ENOUGH,
+    progress: Progress = untold,
+) -> Solution:
+    """Solve a problem again until the worst machine sways no more than enough times its limit."""
+    solution = solve(problem)
     for _ in range(ROUNDS):
         if solution.optimum is None:
             break
-        nominal, worst = sways(spec, optimal_profile(solution))
-        if worst <= max(ENOUGH * limit, nominal):
+        spread = _spread(spec, solution, enough)
+        if spread == math.inf:
+            return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
+        if spread is None:
             break
-        spread = MARGIN * worst / nominal
         progress("solving", remark=f"for the machine that sways {spread:.3g} times as much on the way")
         solution = solve(attrs.evolve(problem, sway_spread=spread))
     return solution
 
 
+def _spread(spec: Spec, solution: Solution, enough: float) -> float | None:
+    """Tell how many times as much as the nominal machine the worst one sways where that is too much."""
+    if not _limited(spec, solution.problem):
+        return None
+    nominal, worst = sways(spec, solution.problem, optimal_profile(solution))
+    if worst <= max(enough * (solution.problem.limits.sway or 0.0), nominal) < math.inf:
+        return None
+    return MARGIN * worst / nominal if worst < math.inf else math.inf
+
+
 def with_usual_spread(spec: Spec, problem: Problem) -> Problem:
-    """Tell a problem without a motion what spread one without the limit has, for what is named to help."""
-    if spec.limits.sway is None or not spec.checked_ranges():
+    """Tell a problem without a motion what spread one with wider limits has, for what is named to help."""
+    if not _limited(spec, problem):
         return problem
-    limits = attrs.evolve(problem.limits, sway=None)
-    free = choice.attempt(attrs.evolve(problem, limits=limits, worst_case=None), "direct")
-    if free.optimum is None:
+    easiest = Relaxation(problem).least(tuple(problem.limits.stated()))
+    if easiest is None or easiest.solution.optimum is None:
         return problem
-    nominal, worst = sways(spec, optimal_profile(free))
-    return attrs.evolve(problem, sway_spread=MARGIN * worst / nominal) if nominal > 0.0 else problem
+    nominal, worst = sways(spec, problem, optimal_profile(easiest.solution))
+    if not 0.0 < nominal <= worst < math.inf:
+        return problem
+    return attrs.evolve(problem, sway_spread=MARGIN * worst / nominal)
 
 
-def sways(spec: Spec, motion: Profile) -> tuple[float, float]:
+def sways(spec: Spec, problem: Problem, motion: Profile) -> tuple[float, float]:
     """Find the greatest sway of the end load during a motion in m: nominal, and of the worst machine."""
-    inside = machines_inside(problem_of(spec), spec.checked_ranges())
+    inside = machines_inside(problem, spec.checked_ranges())
     machines = [*(row.parameters for row in scenarios(spec)), *inside]
     found = greatest_sway(
         spec.machine(), motion, machines, spec.move.initial, accuracy=ACCURACY, samples=SAMPLES

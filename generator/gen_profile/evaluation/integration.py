@@ -1,8 +1,9 @@
-"""Many machines integrated at once by Gauss collocation: all nodes of a step in one call.
+"""Many machines integrated at once by Gauss collocation: all nodes of all steps in one call.
 
-Over a step the accelerations are a polynomial through Gauss's nodes, which is integrated twice exactly. They
-are found by a Newton iteration with the stiffness and damping of the machines at rest, which small swings
-need three or four times. (E. Hairer, S. Nørsett, G. Wanner, Solving ordinary differential equations I, II.7.)
+Over a step the accelerations are a polynomial through Gauss's nodes, which is integrated twice exactly. Those
+of all steps are found by one Newton iteration with the stiffness and damping of the machines at rest, which
+small swings need some six times; where large ones need more, the steps that are settled are kept, and the
+others begun anew. (E. Hairer, S. Nørsett, G. Wanner, Solving ordinary differential equations I, II.7.)
 """
 
 from __future__ import annotations
@@ -13,13 +14,15 @@ from itertools import pairwise
 import attrs
 import numpy as np
 from numpy.polynomial import legendre
+from numpy.typing import NDArray
 
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 
 NODES = 12
-PHASE = 3.0  # rad of a machine's fastest mode that a step covers at first
-MOST_ITERATIONS = 12  # after which a step is halved
+PHASE, ACCURACY = 3.0, 1e-6  # rad of a machine's fastest mode that a step covers at first, for an accuracy
+WIDEST, MOST = 64, 2048  # steps that are solved at once, and coordinates of all machines in them
+MOST_ITERATIONS = 12  # after which the first step is halved, if not even that one is settled
 SHORTEST = 1e-9  # of the whole time: a step that must be shorter fails
 TAIL = 2  # highest coefficients of a step's polynomial, which tell how well it converges
 
@@ -37,8 +40,10 @@ TIMES: Array = 0.5 * (_POINTS + 1.0)  # of the nodes, in steps
 _TO_COEFFICIENTS = np.linalg.inv(legendre.legvander(_POINTS, NODES - 1))
 _ONCE = _integrals(NODES) @ _TO_COEFFICIENTS  # accelerations → coefficients of the velocity
 _TWICE = _integrals(NODES + 1) @ _ONCE  # accelerations → coefficients of the position
-_VELOCITY = legendre.legvander(_POINTS, NODES) @ _ONCE  # accelerations → velocities at the nodes
-_POSITION = legendre.legvander(_POINTS, NODES + 1) @ _TWICE
+_VELOCITY = np.asarray(
+    legendre.legvander(_POINTS, NODES) @ _ONCE, dtype=np.float64
+)  # accelerations → velocities at the nodes
+_POSITION: Array = legendre.legvander(_POINTS, NODES + 1) @ _TWICE
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -106,84 +111,178 @@ def integrate(
     CosimulationError
         It fails, as when a load is thrown over.
     """
-    step = _CollocationStep(accelerations, linear, accuracy, least)
+    window = _Window(accelerations, linear, accuracy, least)
+    phase = PHASE * (accuracy / ACCURACY) ** (1.0 / NODES)
     waiting = [
         pair
         for first, last in pairwise(stretches.tolist())
-        for pair in pairwise(np.linspace(first, last, 2 + int((last - first) * fastest / PHASE)).tolist())
+        for pair in pairwise(np.linspace(first, last, 2 + int((last - first) * fastest / phase)).tolist())
     ]
     waiting.reverse()
     shortest = SHORTEST * float(stretches[-1] - stretches[0])
-    knots, pieces, (q, v) = [float(stretches[0])], [], start
+    widest = max(min(WIDEST, MOST // start.shape[1]), 1)
+    knots, pieces, state, width = [float(stretches[0])], [], start, widest
     while waiting:
-        begin, end = waiting.pop()
+        tried = waiting[-width:][::-1]
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is halved
-            found = step.take(begin, end - begin, q, v)
-        if found is None:
+            found, fine = window.take(np.array(tried), state)
+        del waiting[-len(fine) :]
+        for (begin, end), well in reversed(list(zip(tried, fine.tolist(), strict=False))[len(found) :]):
             middle = 0.5 * (begin + end)
-            if end - begin < shortest:
-                raise CosimulationError(f"The {what} cannot be integrated beyond {begin:.4g} s.")
-            waiting += [(middle, end), (begin, middle)]
-            continue
-        knots.append(end)
-        pieces.append(found)
-        q, v = (coefficients.sum(axis=0) for coefficients in found)  # Legendre polynomials end at 1
+            waiting += [(begin, end)] if well else [(middle, end), (begin, middle)]
+        if found:
+            pieces += found
+            knots += [end for _, end in tried[: len(found)]]
+            state = np.array([coefficients.sum(axis=0) for coefficients in found[-1]])  # Legendre's end at 1
+        elif end - begin < shortest:
+            raise CosimulationError(f"The {what} cannot be integrated beyond {begin:.4g} s.")
+        width = min(2 * len(fine) + 1, widest)
     position, velocity = map(np.array, zip(*pieces, strict=True))
     return Trajectories(knots=np.array(knots), position=position, velocity=velocity)
 
 
-class _CollocationStep:
-    """One step, tried; what a Newton step needs is kept for others of the same length."""
+@attrs.frozen(eq=False)
+class _Newton:
+    """Newton's matrices of a step, one per machine; a state is coordinates, then rates, at its begin.
+
+    Attributes
+    ----------
+    inverse : (machines, NODES n_u, NODES n_u) array
+        Of I + h² A² K + h A C.
+    given : (machines, NODES n_u, 2 n_u) array
+        What a state adds to the restoring acceleration at the nodes.
+    end : (machines, 2 n_u, NODES n_u) array
+        What accelerations add to the state at the end.
+    onward : (machines, 2 n_u, 2 n_u) array
+        What a state at the begin makes of the state at the end.
+    """
+
+    inverse: Array
+    given: Array
+    end: Array
+    onward: Array
+
+    @classmethod
+    def of(cls, length: float, stiffness: Array, damping: Array) -> _Newton:
+        """Work them out for a step's length in s, and (machines, n_u, n_u) terms."""
+        machines, n_u = stiffness.shape[:2]
+        size, unit = NODES * n_u, np.eye(n_u)
+
+        def spread(nodes: Array, terms: Array) -> Array:
+            joined = np.einsum("ij,muv->miujv", nodes, terms)
+            return np.asarray(joined.reshape(machines, len(nodes) * n_u, -1))
+
+        matrix = spread(length**2 * _POSITION, stiffness) + spread(length * _VELOCITY, damping)
+        inverse = np.asarray(np.linalg.inv(np.eye(size) + matrix), dtype=np.float64)
+        ones, times = np.ones((NODES, 1)), length * TIMES[:, None]
+        given = np.concatenate(
+            [spread(ones, stiffness), spread(times, stiffness) + spread(ones, damping)], axis=2
+        )
+        ends = np.stack([length**2 * _TWICE.sum(axis=0), length * _ONCE.sum(axis=0)])
+        end = np.einsum("ej,uv->eujv", ends, unit).reshape(2 * n_u, size) @ inverse
+        free = np.kron([[1.0, length], [0.0, 1.0]], unit)
+        return cls(inverse, given, end, free - end @ given)
+
+
+_Alike = tuple[slice | list[int], _Newton]  # numbers of steps, and what they share
+
+
+class _Window:
+    """Steps one after the other, solved all at once; what a Newton step needs is kept for others like it."""
 
     def __init__(self, accelerations: Accelerations, linear: Linear, accuracy: float, least: float) -> None:
         self._accelerations, self._linear = accelerations, linear
         self._accuracy, self._least = accuracy, least
-        self._asked: Array = np.empty(0)
-        self._inverse: Array = np.empty(0)
+        self._known: dict[bytes, _Newton] = {}
 
-    def take(self, begin: float, length: float, q: Array, v: Array) -> tuple[Array, Array] | None:
-        """Find the coefficients of coordinates and rates, each (powers, machines n_u); None if in vain."""
-        self._prepare(begin + 0.5 * length, length)
-        accelerations = self._accelerations(begin + length * TIMES)
-        drift = q + (length * TIMES)[:, None] * v
-        allowed = self._least + self._accuracy * float(np.abs(q).max() + length * np.abs(v).max())
-        twice, once = length**2 * _POSITION, length * _VELOCITY
-        a = np.zeros((NODES, len(q)))
+    def take(self, steps: Array, start: Array) -> tuple[list[tuple[Array, Array]], NDArray[np.bool_]]:
+        """Find the coefficients of coordinates and rates, each (powers, machines n_u), of the first steps.
+
+        Of steps (k, 2) from begin to end in s, those are returned before the first one that is too long; and
+        of those that are settled, at least one, whether they are short enough.
+        """
+        length = np.diff(steps, axis=1)[:, 0]
+        alike = self._alike(steps, length)
+        accelerations = self._accelerations((steps[:, 0] + np.multiply.outer(TIMES, length)).ravel())
+        a = np.zeros((NODES, len(steps), start.shape[1]))
+        h, nodes = length[:, None], TIMES[:, None, None]
+        done = 0
         for _ in range(MOST_ITERATIONS):
-            change = self._solved(accelerations(drift + twice @ a, v + once @ a) - a)
+            q, v = _states(a, h, start)
+            at = (q + nodes * h * v + h**2 * _along(_POSITION, a), v + h * _along(_VELOCITY, a))
+            found = accelerations(*(part.reshape(NODES * len(steps), -1) for part in at)).reshape(a.shape)
+            change = _solved(found - a, alike)
             a += change
-            moved = length**2 * float(np.abs(change).max())
-            if not moved < np.inf:
-                return None
-            if moved <= 0.1 * allowed:
+            allowed = self._least + self._accuracy * (np.abs(q).max(axis=1) + length * np.abs(v).max(axis=1))
+            accurate = length**2 * np.abs(change).max(axis=(0, 2)) <= 0.1 * allowed
+            done = _leading(accurate)
+            if done == len(steps):
                 break
-        else:
-            return None
-        position, velocity = length**2 * _TWICE @ a, length * _ONCE @ a
-        if float(np.abs(position[-TAIL:]).max()) > allowed:
-            return None
-        position[0] += q + 0.5 * length * v
-        position[1] += 0.5 * length * v
+        q, v = _states(a, h, start)
+        position, velocity = h**2 * _along(_TWICE, a), h * _along(_ONCE, a)
+        fine = np.abs(position[-TAIL:]).max(axis=(0, 2)) <= allowed
+        position[0] += q + 0.5 * h * v
+        position[1] += 0.5 * h * v
         velocity[0] += v
-        return position, velocity
+        fine = fine[:done] if done else np.array([False])
+        return [(position[:, step], velocity[:, step]) for step in range(_leading(fine))], fine
 
-    def _prepare(self, time: float, length: float) -> None:
-        """Invert the Newton matrix I + h² A² K + h A C of every machine, unless that is known."""
-        stiffness, damping = self._linear(time)
-        length = float(np.float32(length))  # lengths of one stretch differ by rounding
-        asked = np.concatenate([[length], stiffness.ravel(), damping.ravel()])
-        if np.array_equal(asked, self._asked):
-            return
-        machines, n_u = stiffness.shape[:2]
-        size = NODES * n_u
-        matrix = np.einsum("ij,muv->miujv", length**2 * _POSITION, stiffness)
-        matrix += np.einsum("ij,muv->miujv", length * _VELOCITY, damping)
-        self._inverse = np.linalg.inv(np.eye(size) + matrix.reshape(machines, size, size))
-        self._asked = asked
+    def _alike(self, steps: Array, length: Array) -> list[_Alike]:
+        """Gather the steps that share their Newton matrices."""
+        gathered: dict[bytes, list[int]] = {}
+        terms: tuple[Array, ...] = ()
+        rounded = length.astype(np.float32)  # lengths of one stretch differ by rounding
+        for step, (middle, short) in enumerate(zip(steps.mean(axis=1).tolist(), rounded, strict=True)):
+            if (found := self._linear(middle)) is not terms:
+                terms, told = found, b"".join(term.tobytes() for term in found)
+            key = short.tobytes() + told
+            gathered.setdefault(key, []).append(step)
+            if key not in self._known:
+                self._known[key] = _Newton.of(float(short), *found)
+        self._known = {key: self._known[key] for key in gathered}
+        return [(_numbered(steps_alike), self._known[key]) for key, steps_alike in gathered.items()]
 
-    def _solved(self, residual: Array) -> Array:
-        """Solve for the change of all machines' accelerations."""
-        machines = len(self._inverse)
-        flat = residual.reshape(NODES, machines, -1).swapaxes(0, 1).reshape(machines, -1, 1)
-        solved = (self._inverse @ flat).reshape(machines, NODES, -1)
-        return np.asarray(solved.swapaxes(0, 1).reshape(residual.shape))
+
+def _along(matrix: Array, values: Array) -> Array:
+    """Apply a matrix along the first axis."""
+    return np.asarray((matrix @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:]))
+
+
+def _states(a: Array, h: Array, start: Array) -> tuple[Array, Array]:
+    """Coordinates and rates at the begin of every step, each of shape (steps, machines n_u)."""
+    once, twice = (_along(ends[None], a)[0] for ends in (_ONCE.sum(axis=0), _TWICE.sum(axis=0)))
+    v = np.cumsum(np.concatenate([start[1:], h * once]), axis=0)[:-1]
+    q = np.cumsum(np.concatenate([start[:1], h * v + h**2 * twice]), axis=0)[:-1]
+    return q, v
+
+
+def _numbered(steps: list[int]) -> slice | list[int]:
+    """Write numbers as a range where they are one, which copies nothing."""
+    return slice(steps[0], steps[-1] + 1) if steps[-1] - steps[0] == len(steps) - 1 else steps
+
+
+def _solved(residual: Array, alike: list[_Alike]) -> Array:
+    """Solve for the change of accelerations, (NODES, steps, machines n_u) as what they lack."""
+    nodes, steps, width = residual.shape
+    machines = len(alike[0][1].inverse)
+    lacking = residual.reshape(nodes, steps, machines, -1).transpose(2, 0, 3, 1).reshape(machines, -1, steps)
+    ends = np.empty((steps, machines, 2 * width // machines, 1))
+    onward = np.empty((steps, *alike[0][1].onward.shape))
+    for numbers, newton in alike:
+        ends[numbers, :, :, 0] = (newton.end @ lacking[:, :, numbers]).transpose(2, 0, 1)
+        onward[numbers] = newton.onward
+    states = np.zeros_like(ends)
+    for step in range(1, steps):
+        states[step] = onward[step - 1] @ states[step - 1] + ends[step - 1]
+    begun = states[..., 0].transpose(1, 2, 0)
+    for numbers, newton in alike:
+        lacking[:, :, numbers] = newton.inverse @ (
+            lacking[:, :, numbers] - newton.given @ begun[:, :, numbers]
+        )
+    solved = lacking.reshape(machines, nodes, -1, steps).transpose(1, 3, 0, 2)
+    return np.ascontiguousarray(solved).reshape(residual.shape)
+
+
+def _leading(sound: NDArray[np.bool_]) -> int:
+    """Count the first ones that are all sound."""
+    return int(np.argmin(np.append(sound, False)))

@@ -22,6 +22,7 @@ from gen_profile.spec.model import Spec
 
 COARSE_SAMPLES = 501  # of machines all over the ranges, between which the greatest is a parabola's
 ACCURACY = 1e-6  # of their integration, relative
+PICTURED = 1e-4  # likewise where nothing but a picture is made of it
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -81,17 +82,7 @@ def evaluate(spec: Spec, motion: Profile) -> MotionEvaluation:
     InfeasibleProblem
         It goes on to where the machine cannot be.
     """
-    plant, machines = spec.machine(), scenarios(spec)
-    if motion.axes != len(plant.actuated):
-        names = ", ".join(axis.name for axis in plant.actuated)
-        raise SpecError(
-            f"The motion moves {motion.axes} axes, and the machine has {len(plant.actuated)} ({names})."
-        )
-    tau = spec.actuator.tau
-    watch = observation_time(spec)
-    settle = 2.0 * max(spec.export.cycle_time, spec.can.sync_period) + STANDSTILL * (tau or 0.0)
-    until = motion.duration + settle + watch
-    _require_room(spec, until)
+    plant, machines, until = spec.machine(), scenarios(spec), _watched_until(spec, motion)
     swing = PlantSimulation(plant, motion, [m.parameters for m in machines], until, spec.move.initial)
     known = np.array([list(machine.parameters.values()) for machine in machines])
     inside = [
@@ -102,14 +93,52 @@ def evaluate(spec: Spec, motion: Profile) -> MotionEvaluation:
     everywhere = swing
     if inside:
         everywhere = PlantSimulation(plant, motion, inside, until, spec.move.initial, accuracy=ACCURACY)
+    return _evaluation(spec, motion, swing, everywhere)
+
+
+def sketch(spec: Spec, motion: Profile) -> MotionEvaluation:
+    """Integrate the machines of a spec under a motion as exactly as a picture needs, and no others.
+
+    Parameters
+    ----------
+    spec : Spec
+    motion : Profile
+
+    Raises
+    ------
+    SpecError, InfeasibleProblem
+        As `evaluate` does.
+    """
+    parameters, until = [m.parameters for m in scenarios(spec)], _watched_until(spec, motion)
+    swing = PlantSimulation(spec.machine(), motion, parameters, until, spec.move.initial, accuracy=PICTURED)
+    return _evaluation(spec, motion, swing, swing)
+
+
+def _evaluation(
+    spec: Spec, motion: Profile, swing: PlantSimulation, everywhere: PlantSimulation
+) -> MotionEvaluation:
     return MotionEvaluation(
         motion=motion,
-        command=lag_compensated(motion, tau),
-        machines=machines,
+        command=lag_compensated(motion, spec.actuator.tau),
+        machines=scenarios(spec),
         swing=swing,
         everywhere=everywhere,
-        watch=watch,
+        watch=observation_time(spec),
     )
+
+
+def _watched_until(spec: Spec, motion: Profile) -> float:
+    """Tell until when in s the machines are looked at; refuse a motion that is not one of theirs."""
+    plant = spec.machine()
+    if motion.axes != len(plant.actuated):
+        names = ", ".join(axis.name for axis in plant.actuated)
+        raise SpecError(
+            f"The motion moves {motion.axes} axes, and the machine has {len(plant.actuated)} ({names})."
+        )
+    settle = 2.0 * max(spec.export.cycle_time, spec.can.sync_period) + STANDSTILL * (spec.actuator.tau or 0.0)
+    until = motion.duration + settle + observation_time(spec)
+    _require_room(spec, until)
+    return until
 
 
 def _require_room(spec: Spec, until: float) -> None:
@@ -130,29 +159,29 @@ def _require_room(spec: Spec, until: float) -> None:
 def keeps_residual_sway(spec: Spec, evaluation: MotionEvaluation, share: float = 1.0) -> bool:
     """Whether every load keeps a share of its limit of residual sway on all machines."""
     limits = share * np.array(list(spec.check.residual_sway.values()))
-    return all(bool((peak(response.sway) <= limits).all()) for response in _afterwards(evaluation))
+    return all(bool((peak(sway) <= limits).all()) for sway in _afterwards(evaluation))
 
 
-def _afterwards(evaluation: MotionEvaluation) -> tuple[Response, ...]:
-    """Response after the motion of the evaluation's machines, and of others all over the ranges."""
+def _afterwards(evaluation: MotionEvaluation) -> list[Array]:
+    """Sway after the motion of the evaluation's machines, and of others all over the ranges."""
     begin, watch = evaluation.motion.duration, evaluation.watch
-    named = evaluation.swing.at(np.linspace(begin, begin + watch, RESIDUAL_SAMPLES))
-    others = evaluation.everywhere.at(np.linspace(begin, begin + watch, COARSE_SAMPLES))
-    return (*named, *others)
+    named = evaluation.swing.sway(np.linspace(begin, begin + watch, RESIDUAL_SAMPLES))
+    others = evaluation.everywhere.sway(np.linspace(begin, begin + watch, COARSE_SAMPLES))
+    return [*named, *others]
 
 
 def _figures(evaluation: MotionEvaluation) -> dict[str, float]:
     motion, command, duration = evaluation.motion, evaluation.command, evaluation.motion.duration
     end_load = evaluation.swing.plant.end_load
     on_the_way = [
-        length(response.sway[:, end_load])
-        for response in (
-            *evaluation.swing.at(np.linspace(0.0, duration, TRANSIENT_SAMPLES)),
-            *evaluation.everywhere.at(np.linspace(0.0, duration, COARSE_SAMPLES)),
+        length(sway[:, end_load])
+        for sway in (
+            *evaluation.swing.sway(np.linspace(0.0, duration, TRANSIENT_SAMPLES)),
+            *evaluation.everywhere.sway(np.linspace(0.0, duration, COARSE_SAMPLES)),
         )
     ]
     during = on_the_way[0]
-    residuals = [float(peak(length(response.sway[:, end_load]))[0]) for response in _afterwards(evaluation)]
+    residuals = [float(peak(length(sway[:, end_load]))[0]) for sway in _afterwards(evaluation)]
     names = ("velocity", "acceleration", "jerk")
     units = ("m_per_s", "m_per_s2", "m_per_s3")
     table = {"duration_s": duration}

@@ -8,6 +8,11 @@ from collections.abc import Mapping
 from gen_profile.spec.model import Spec
 from gen_profile.units import UNITS
 
+MANIFEST_WORDS = {
+    "matches": "the file is the one that was exported",
+    "differs": "the file is NOT the one that was exported",
+    "none": "no manifest of this spec beside the file",
+}
 SMALLEST, LARGEST = 1e-4, 1e4  # beyond, four digits would need a power of ten
 
 

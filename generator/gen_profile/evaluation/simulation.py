@@ -9,7 +9,7 @@ from types import MappingProxyType
 import attrs
 import numpy as np
 
-from gen_profile.errors import InfeasibleProblem
+from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.evaluation.integration import NODES, Accelerations, integrate
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, Profile
@@ -17,7 +17,7 @@ from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_column
 from gen_profile.problem.initial_state import initial_state
-from gen_profile.problem.linearization import eigenvalues, linear_terms, linearize
+from gen_profile.problem.linearization import eigenvalues, eigenvalues_at, linear_terms, linearize
 from gen_profile.problem.symbolic import Function
 from gen_profile.work import spend
 
@@ -92,12 +92,12 @@ class PlantSimulation:
         *,
         accuracy: float = RELATIVE_TOLERANCE,
     ) -> None:
-        self._outputs = _functions(plant)[1]
+        self._outputs = equations_of(plant)[1]
         self.plant, self.initial, self._profile = plant, initial, profile
         self._p = p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
         start, motion = initial_state(plant, initial).reshape(2, -1), _motion(profile)
-        ends = [profile(np.zeros(1)).position[0], profile.target]
-        rates = np.array([eigenvalues(plant, p, q_a) for q_a in ends])
+        ends = [profile.start, profile.target]
+        rates = np.array(eigenvalues_at(plant, p, ends))
         fastest = float(np.abs(rates).max())
         for growing in np.flatnonzero((rates.real > GROWTH * fastest).any(axis=(0, 2))).tolist():
             linearize(plant, machines[growing], profile.target.tolist())  # which says what is wrong
@@ -119,26 +119,36 @@ class PlantSimulation:
             what=f"{plant.type}'s motion",
         )
 
+    def states(self, times: Array) -> Array:
+        """Coordinates and rates at rising times in s, shape (2, machines, times, n_u)."""
+        found = self._solution(times).reshape(2, len(times), len(self._p), -1)
+        return np.ascontiguousarray(found.swapaxes(1, 2))
+
     def at(self, times: Array) -> tuple[Response, ...]:
         """Evaluate every machine at rising times in s."""
-        states = self._solution(times).reshape(2, len(times), len(self._p), -1).swapaxes(1, 2)
-        axes = self._profile(times)
-        loads = len(self.plant.loads)
-        responses = []
-        for q_u, dq_u, machine in zip(*np.ascontiguousarray(states), self._p[:, None], strict=True):
-            seen = self._outputs(q_u, axes.position, machine)[:, :, 0]
-            responses.append(
-                Response(
-                    times=times,
-                    position=axes.position,
-                    velocity=axes.velocity,
-                    q_u=q_u,
-                    dq_u=dq_u,
-                    sway=seen[:, :loads],
-                    angle=seen[:, loads:],
-                )
+        states, loads = self.states(times), len(self.plant.loads)
+        position, velocity = (self._profile.derivative(times, order) for order in (0, 1))
+        return tuple(
+            Response(
+                times=times,
+                position=position,
+                velocity=velocity,
+                q_u=q_u,
+                dq_u=dq_u,
+                sway=seen[:, :loads],
+                angle=seen[:, loads:],
             )
-        return tuple(responses)
+            for q_u, dq_u, seen in zip(*states, self._seen(states[0], position), strict=True)
+        )
+
+    def sway(self, times: Array) -> Array:
+        """Sway of every load in m at rising times in s, shape (machines, times, loads)."""
+        seen = self._seen(self.states(times)[0], self._profile.derivative(times, 0))
+        return seen[:, :, : len(self.plant.loads)]
+
+    def _seen(self, q_u: Array, position: Array) -> Array:
+        """Sway, then angle, of every load, shape (machines, times, 2 loads)."""
+        return self._outputs(q_u, position, self._p[:, None])[..., 0]
 
 
 def greatest_sway(
@@ -150,10 +160,16 @@ def greatest_sway(
     accuracy: float = RELATIVE_TOLERANCE,
     samples: int = TRANSIENT_SAMPLES,
 ) -> Array:
-    """Find the greatest sway of every machine's end load during a motion, in m, shape (machines,)."""
-    swing = PlantSimulation(plant, motion, machines, motion.duration, initial, accuracy=accuracy)
-    responses = swing.at(np.linspace(0.0, motion.duration, samples))
-    return np.array([float(peak(length(found.sway[:, plant.end_load]))[0]) for found in responses])
+    """Find the greatest sway of every machine's end load during a motion, in m, shape (machines,).
+
+    Infinite where the loads swing so far that they cannot be followed.
+    """
+    try:
+        swing = PlantSimulation(plant, motion, machines, motion.duration, initial, accuracy=accuracy)
+        found = swing.sway(np.linspace(0.0, motion.duration, samples))
+    except CosimulationError:
+        return np.full(len(machines), np.inf)
+    return np.array([float(peak(length(sway[:, plant.end_load]))[0]) for sway in found])
 
 
 def free_swing(
@@ -195,8 +211,8 @@ def free_swing(
         what=f"{plant.type}'s swing",
     )
     q_u = np.ascontiguousarray(swing(times)[0].reshape(len(times), len(machines), -1).swapaxes(0, 1))
-    outputs, loads = _functions(plant)[1], len(plant.loads)
-    seen = np.stack([outputs(q, position, p[None])[:, :, 0] for q, p in zip(q_u, machines, strict=True)])
+    outputs, loads = equations_of(plant)[1], len(plant.loads)
+    seen = outputs(q_u, position, machines[:, None])[..., 0]
     return seen[:, :, :loads], seen[:, :, loads:]
 
 
@@ -208,17 +224,18 @@ def _stretches(profile: Profile, until: float) -> Array:
 
 
 def _accelerations(plant: Plant, p: Array, motion: Callable[[Array], Array]) -> Accelerations:
-    """Evaluate q̈_u of all machines at the nodes of a step."""
-    acceleration, machines = _functions(plant)[0], np.tile(p, (NODES, 1))
-    work, flat = RATE + POINT * len(machines), (len(machines), len(plant.unactuated))
+    """Evaluate q̈_u of all machines at the nodes of steps."""
+    acceleration = equations_of(plant)[0]
 
     def at(times: Array) -> Callable[[Array, Array], Array]:
-        axes = np.repeat(motion(times), len(p), axis=0)
+        axes, each = motion(times), (len(times), len(p), len(plant.unactuated))
+        work = RATE * len(times) / NODES + POINT * len(times) * len(p)
 
         def evaluate(q_u: Array, dq_u: Array) -> Array:
             spend(work)
-            found = acceleration(q_u.reshape(flat), dq_u.reshape(flat), axes, machines)
-            return found.reshape(q_u.shape)
+            states = (values.reshape(each).swapaxes(0, 1) for values in (q_u, dq_u))
+            found = acceleration(*states, axes, p[:, None])[..., 0]
+            return found.swapaxes(0, 1).reshape(q_u.shape)
 
         return evaluate
 
@@ -234,8 +251,8 @@ def _require_pace(plant: Plant, fastest: float, until: float) -> None:
 
 
 @cache
-def _functions(plant: Plant) -> tuple[Function, Function]:
-    """q̈_u of (q_u, q̇_u, axes' motion, p), and sway and angle of (q_u, q_a, p)."""
+def equations_of(plant: Plant) -> tuple[Function, Function]:
+    """Compile q̈_u of (q_u, q̇_u, axes' motion, p), and sway and angle of (q_u, q_a, p)."""
     d = dynamics(plant)
     axes = sym.column([d.q_a, d.dq_a, d.ddq_a])
     acceleration = Function("acceleration", {"q_u": d.q_u, "dq_u": d.dq_u, "axes": axes, "p": d.p}, d.ddq_u)

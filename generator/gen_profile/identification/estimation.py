@@ -100,15 +100,26 @@ def estimate(
     unknowns, noise = fit.solve()
     progress("looking at what the fit leaves")
     around, found = uncertainty(fit, unknowns, noise), misfits(fit, unknowns)
-    if any(found):
-        progress("looking for parameters that explain it")
-        _require_unexplained(fit, found)
+    if not any(found):
+        return _estimate(around, noise, found, noise, progress)
+    progress("looking for parameters that explain it")
+    _require_unexplained(fit, found)
     effective = [
         sigma if one is None else one.widened(sigma, len(model.log.times))
         for one, sigma, model in zip(found, noise.tolist(), fit.models, strict=True)
     ]
-    if any(found):
-        around = uncertainty(fit, unknowns, np.array(effective))
+    return _estimate(uncertainty(fit, unknowns, np.array(effective)), noise, found, effective, progress)
+
+
+def _estimate(
+    around: Uncertainty,
+    noise: Array,
+    found: tuple[Misfit | None, ...],
+    effective: Sequence[float] | Array,
+    progress: Progress,
+) -> Estimate:
+    """Tell the ranges that hold all parameters at once, and what they follow from."""
+    fit, unknowns = around.fit, around.unknowns
     factor = float(norm.ppf((1.0 + CONFIDENCE ** (1.0 / len(fit.names))) / 2.0))
     progress("finding the ranges")
     half_ranges = around.half_ranges(factor)
@@ -125,7 +136,7 @@ def estimate(
         unrest=around.unrest(),
         contradiction=around.contradiction,
         misfits=found,
-        widened=tuple(wide / sigma for wide, sigma in zip(effective, noise.tolist(), strict=True)),
+        widened=tuple(float(wide / sigma) for wide, sigma in zip(effective, noise, strict=True)),
         rests_on=_rests_on(around),
         swings=tuple(
             model.log.values + left for model, left in zip(fit.models, fit.left(unknowns), strict=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,12 @@ import tomli_w
 
 from gen_profile.artefacts.writing import staged
 from gen_profile.errors import InfeasibleProblem, SpecError
-from gen_profile.identification.estimation import CONFIDENCE, Estimate, estimate
+from gen_profile.identification.estimation import CONFIDENCE, UNREST, Estimate, estimate
 from gen_profile.identification.fit import SwingingMachine
 from gen_profile.identification.log_table import read_text
 from gen_profile.identification.measurements import (
     GREATEST,
+    SI_UNITS,
     DirectReading,
     Measurement,
     Period,
@@ -32,6 +33,7 @@ from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}  # how many of them make a second
+NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -55,6 +57,13 @@ class Identification:
     logs: tuple[SwingLog, ...]
     estimate: Estimate
     q_a: tuple[float, ...]
+
+    def warnings(self) -> tuple[str, ...]:
+        """Say what is wrong with the measurements, though parameters were found; a sentence each."""
+        logs = (sentence for row in self.to_dict()["logs"] for sentence in _doubts(row))
+        if (factor := self.estimate.contradiction) == 1.0:
+            return tuple(logs)
+        return (*logs, f"the readings contradict one another; ranges widened {factor:.2g} times")
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -142,13 +151,12 @@ def read_swing(
     loads = spec.machine().loads
     quantity, _, named = signal.partition(":")
     load = named or loads[0]
-    si_units = {"angle": "rad", "sway": "m"}
-    if quantity not in si_units:
-        raise SpecError(f"signal: unknown signal {quantity!r}{suggestion(quantity, si_units)}")
+    if quantity not in SI_UNITS:
+        raise SpecError(f"signal: unknown signal {quantity!r}{suggestion(quantity, SI_UNITS)}")
     if load not in loads:
         raise SpecError(f"signal: unknown load {load!r}{suggestion(load, loads)}")
-    per_unit = _per_unit(unit or si_units[quantity], quantity, si_units[quantity])
-    log = parse_swing(
+    per_unit = _per_unit(unit or SI_UNITS[quantity], quantity, SI_UNITS[quantity])
+    return parse_swing(
         read_text(Path(path), "swing"),
         str(path),
         columns=columns,
@@ -158,11 +166,6 @@ def read_swing(
         quantity=quantity,
         load=load,
     )
-    if quantity == "angle" and (span := float(np.ptp(log.values))) > math.pi:
-        raise SpecError(
-            f"unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?"
-        )
-    return log
 
 
 def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
@@ -256,6 +259,25 @@ def write_spec(spec: Spec, path: Path, text: str | None = None) -> None:
             staging.write(spec.plant.file.name, spec.plant.file.content)
         staging.write(path.name, (text or tomli_w.dumps(spec.to_dict())).encode("utf-8"))
         staging.deliver()
+
+
+def _doubts(row: Mapping[str, Any]) -> Iterator[str]:
+    """Say what is wrong with a logged swing."""
+    name, unit = f"the log of {row['load']}", row["unit"]
+    if row["unrest"] > UNREST:
+        yield (
+            f"{name} is {row['unrest']:.2g} times farther off the model at first; "
+            "leave out what was logged before the axes stood still"
+        )
+    if (left := row["misfit"]) is not None:
+        yield (
+            f"a swing of {left['rms']:.2g} {unit} RMS at {left['frequency_rad_per_s']:.3g} rad/s is left of "
+            f"{name}, which no parameter of this machine explains; ranges that follow from it are "
+            f"{left['widened']:.2g} times wider"
+        )
+    if row["noise"] > NOISY * row["swing"]:
+        share = row["noise"] / row["swing"]
+        yield f"the noise in {name} is {share:.0%} of the swing; are unit and signal right?"
 
 
 def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], asked: set[str]) -> None:

@@ -135,14 +135,20 @@ def read_text(path: Path, option: str) -> str:
         content = path.read_bytes()
     except OSError as error:
         raise OutputError(f"{option}: cannot read the log {path}: {error.strerror}.") from error
+    return decoded(content, f"{option} {path}")
+
+
+def decoded(content: bytes, source: str) -> str:
+    """Decode what a logger wrote: UTF-16 or UTF-8 if it is, else Windows' Western European.
+
+    Raises
+    ------
+    OutputError
+        It is no text.
+    """
     for mark, words in OTHERS.items():
         if content.startswith(mark):
-            raise OutputError(f"{option} {path}: this is {words}.")
-    return decoded(content)
-
-
-def decoded(content: bytes) -> str:
-    """Decode what a logger wrote: UTF-16 or UTF-8 if it is, else Windows' Western European."""
+            raise OutputError(f"{source}: this is {words}.")
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return content.decode("utf-16", errors="replace")
     try:

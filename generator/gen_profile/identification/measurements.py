@@ -173,12 +173,40 @@ def parse_swing(
     head = next((row for row in range(len(cells.rows)) if named & set(cells.rows[row])), 0)
     places = [cells.place(head, column, source) for column in columns]
     table = cells.numbers(head, places, source) / (per_second, per_unit)
-    table = table[table[:, 0] >= after]
-    if len(table) < LEAST_SAMPLES:
-        raise OutputError(f"{source}: a swing needs at least {LEAST_SAMPLES} samples, found {len(table)}.")
-    if not (np.diff(table[:, 0]) > 0.0).all():
+    return cut_swing(table[:, 0], table[:, 1], source, after=after, quantity=quantity, load=load)
+
+
+def cut_swing(
+    times: Array, values: Array, source: str, *, after: float, quantity: str, load: str
+) -> SwingLog:
+    """Leave out of a log what was logged before the axes stood still.
+
+    Parameters
+    ----------
+    times, values : (samples,) arrays
+        s, and rad or m.
+    source : str
+        Where it comes from, for errors.
+    after : float
+        Time in s from which on the axes stood still.
+    quantity, load : str
+        What the value is; see `SwingLog`.
+
+    Raises
+    ------
+    OutputError
+        What is left is no swing.
+    """
+    times, values = times[times >= after], values[times >= after]
+    if len(times) < LEAST_SAMPLES:
+        raise OutputError(f"{source}: a swing needs at least {LEAST_SAMPLES} samples, found {len(times)}.")
+    if not (np.diff(times) > 0.0).all():
         raise OutputError(f"{source}: the times must rise from row to row.")
-    return SwingLog(times=table[:, 0] - table[0, 0], values=table[:, 1], quantity=quantity, load=load)
+    if quantity == "angle" and (span := float(np.ptp(values))) > np.pi:
+        raise SpecError(
+            f"unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?"
+        )
+    return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
 
 
 def _positive(where: str, what: str, value: float) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.polynomial import legendre, polynomial
 
@@ -37,13 +39,19 @@ def overshoot(profile: Profile) -> float:
 def root_mean_square(profile: Profile, order: int) -> float:
     """Root mean square of the first axis' derivative over the move, by a quadrature that is exact for it."""
     size = profile.coefficients.shape[1]
-    nodes, weights = legendre.leggauss(size)
+    nodes, weights = _quadrature(size)
     lengths = np.diff(profile.knots)
     coefficients = polynomial.polyder(profile.coefficients[:, :, 0].T, order)
     local = lengths[:, None] * (nodes + 1.0) / 2.0
     values = np.asarray(polynomial.polyval(local, coefficients[:, :, None], tensor=False))
     mean = (values**2 @ weights / 2.0) @ lengths / profile.duration
     return float(np.sqrt(mean))
+
+
+@cache
+def _quadrature(points: int) -> tuple[Array, Array]:
+    """Nodes and weights of Gauss's quadrature on [-1, 1]."""
+    return legendre.leggauss(points)
 
 
 def length(components: Array) -> Array:

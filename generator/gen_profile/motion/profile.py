@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from decimal import ROUND_CEILING, Decimal
+from functools import lru_cache
 from typing import Any, Protocol
 
 import attrs
@@ -134,16 +135,17 @@ class Profile:
     def derivative(self, times: Array, order: int) -> Array:
         """Evaluate a derivative by its order (0 = position), right-continuous, shape (times, axes)."""
         times = np.asarray(times, dtype=np.float64)
-        segment = np.clip(np.searchsorted(self.knots, times, side="right") - 1, 0, len(self.knots) - 2)
-        coefficients = polynomial.polyder(np.moveaxis(self.coefficients, 1, 0), order)
-        local = times - self.knots[segment]
-        values = np.asarray(polynomial.polyval(local[:, None], coefficients[:, segment], tensor=False))
         beyond = (times - self.duration)[:, None]
         ahead = (self.target + beyond * self.final_velocity, self.final_velocity)
-        after = ahead[order] if order < len(ahead) else np.zeros(self.axes)
-        rest = self.start if order == 0 else np.zeros(self.axes)
-        values = np.where(beyond >= 0.0, after, values)
-        return np.where((times < 0.0)[:, None], rest, values)
+        values = np.zeros((len(times), self.axes))
+        values[:] = ahead[order] if order < len(ahead) else 0.0
+        values[times < 0.0] = self.start if order == 0 else 0.0
+        moving = (times >= 0.0) & (beyond[:, 0] < 0.0)
+        if moving.any():
+            segment = np.searchsorted(self.knots, times[moving], side="right") - 1
+            local = (times[moving] - self.knots[segment])[:, None]
+            values[moving] = polynomial.polyval(local, self._derived(order)[:, segment], tensor=False)
+        return values
 
     def __call__(self, times: Array) -> Motion:
         """Evaluate position, velocity, acceleration and jerk at times in s."""
@@ -160,10 +162,18 @@ class Profile:
         """
         length = np.diff(self.knots)[:, None]
         local = length * np.linspace(0.0, 1.0, points)
-        coefficients = polynomial.polyder(np.moveaxis(self.coefficients, 1, 0), order)[:, :, None, :]
+        coefficients = self._derived(order)[:, :, None, :]
         values: Array = np.asarray(polynomial.polyval(local[:, :, None], coefficients, tensor=False))
         times: Array = self.knots[:-1, None] + local
         return times.ravel(), values.reshape(-1, self.axes)
+
+    def _derived(self, order: int) -> Array:
+        """Coefficients of a derivative, at least one, shape (powers, segments, axes)."""
+        found = self.coefficients
+        for _ in range(min(order, found.shape[1])):
+            found = found[:, 1:] * np.arange(1.0, found.shape[1])[:, None]
+        powers = np.moveaxis(found, 1, 0)
+        return powers if len(powers) else np.zeros((1, *powers.shape[1:]))
 
     def payload_hash(self) -> str:
         """SHA-256 of the numbers, in hexadecimal: the identity of the motion, whatever format carries it."""
@@ -180,13 +190,14 @@ def grid_length(duration: float, cycle_time: float) -> int:
     return int(quotient.to_integral_value(rounding=ROUND_CEILING))
 
 
+@lru_cache(maxsize=16)
 def grid_times(cycles: int, cycle_time: float) -> Array:
     """List the times ``k * cycle_time`` for k = 0 … cycles, each the double nearest to the decimal product.
 
-    Python's division of two integers is correctly rounded, whatever their size.
+    Python's division of two integers is correctly rounded, whatever their size. The array is read-only.
     """
     numerator, denominator = Decimal(repr(float(cycle_time))).as_integer_ratio()
-    return np.array([k * numerator / denominator for k in range(cycles + 1)])
+    return read_only([k * numerator / denominator for k in range(cycles + 1)])
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import attrs
@@ -14,20 +14,11 @@ import numpy as np
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.interface import BlockAxis, live_inputs
 
 COMMANDS = ("position", "velocity", "stop", "quick-stop")
-FIRST = ("time_s", "command", "value")
-COLUMNS = {
-    "position_m": "fPosition",
-    "velocity_m_per_s": "fVelocity",
-    "acceleration_m_per_s2": "fAcceleration",
-    "busy": "bBusy",
-    "done": "bDone",
-    "error_id": "nErrorId",
-    "promise": "bPromise",
-    "stop_distance_m": "fStopDistance",
-}
-WHOLE = ("busy", "done", "error_id", "promise")
+FIRST = ("time_s", "command")
+WHOLE = ("bBusy", "bDone", "nErrorId", "bPromise")
 CHUNK = 10_000  # cycles between looks at whether the axis stands
 LONGEST = 3600.0  # s, of what follows the last command
 STILL = 0.5  # s of standing after which nothing more is expected
@@ -43,37 +34,40 @@ class Command:
         s.
     command : str
         One of `COMMANDS`.
-    value : float
-        m or m/s.
+    values : tuple of float
+        Of each axis, in m or m/s (or rad); none of a stop.
     live : mapping of str to float
         Live parameters that change.
     override : float
         Of the greatest velocity.
-    velocity_limit : float
-        m/s; 0 for none but the machine's.
+    velocity_limits : tuple of float
+        Of each axis; 0, or none given, for none but the machine's.
     """
 
     time: float
     command: str
-    value: float = 0.0
+    values: tuple[float, ...] = ()
     live: Mapping[str, float] = attrs.field(factory=dict)
     override: float = 1.0
-    velocity_limit: float = 0.0
+    velocity_limits: tuple[float, ...] = ()
 
     def begin(self, cycle: float) -> int:
         """Tell in which cycle, of so many seconds, it begins."""
         return math.ceil(self.time / cycle - 1e-9)
 
 
-def read_commands(text: str, live: tuple[str, ...]) -> tuple[Command, ...]:
+def read_commands(text: str, axes: Sequence[BlockAxis], live: Collection[str]) -> tuple[Command, ...]:
     """Read the table of commands.
 
     Parameters
     ----------
     text : str
-        CSV with the columns ``time_s, command, value`` and one for each live parameter that changes.
-    live : tuple of str
+        CSV with the columns ``time_s, command``, ``value`` (of several axes, one each: ``value_x``), and one
+        for each live parameter that changes.
+    axes : sequence of BlockAxis
         The block's.
+    live : collection of str
+        Likewise.
 
     Raises
     ------
@@ -82,15 +76,16 @@ def read_commands(text: str, live: tuple[str, ...]) -> tuple[Command, ...]:
     """
     rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
     names = [name.strip() for name in rows.fieldnames or ()]
-    if missing := [name for name in FIRST if name not in names]:
+    required = (*FIRST, *(axis.of("value") for axis in axes))
+    if missing := [name for name in required if name not in names]:
         raise SpecError(
-            f"commands: there is no column {missing[0]}; the first line must name {', '.join(FIRST)}."
+            f"commands: there is no column {missing[0]}; the first line must name {', '.join(required)}."
         )
-    if unknown := [name for name in names if name not in (*FIRST, *live)]:
+    if unknown := [name for name in names if name not in (*required, *live)]:
         known = ", ".join(live) or "none"
         raise SpecError(f"commands: the block has no live parameter {unknown[0]!r}; it has {known}.")
     rows.fieldnames = names
-    commands = [_command(row, number, live) for number, row in enumerate(rows, start=2)]
+    commands = [_command(row, number, axes, live) for number, row in enumerate(rows, start=2)]
     if not commands:
         raise SpecError("commands: there is no row; write one such as 0.0,position,1.0.")
     for number, (before, after) in enumerate(pairwise(commands), start=3):
@@ -101,7 +96,9 @@ def read_commands(text: str, live: tuple[str, ...]) -> tuple[Command, ...]:
     return tuple(commands)
 
 
-def _command(row: Mapping[str, str | None], line: int, live: tuple[str, ...]) -> Command:
+def _command(
+    row: Mapping[str, str | None], line: int, axes: Sequence[BlockAxis], live: Collection[str]
+) -> Command:
     command = (row["command"] or "").strip()
     if command not in COMMANDS:
         known = ", ".join(COMMANDS)
@@ -109,10 +106,10 @@ def _command(row: Mapping[str, str | None], line: int, live: tuple[str, ...]) ->
     time = _number(row["time_s"], "time_s", line)
     if not 0.0 <= time <= 1e6:
         raise SpecError(f"commands, line {line}: time_s must lie between 0 and 1e6 s, found {time:g}.")
-    valued = command in ("position", "velocity")
-    value = _number(row["value"], "value", line) if valued else 0.0
+    valued = [axis.of("value") for axis in axes] if command in ("position", "velocity") else []
+    values = tuple(_number(row[name], name, line) for name in valued)
     given = {name: _number(text, name, line) for name in live if (text := row.get(name)) and text.strip()}
-    return Command(time=time, command=command, value=value, live=given)
+    return Command(time=time, command=command, values=values, live=given)
 
 
 def _number(text: str | None, name: str, line: int) -> float:
@@ -156,47 +153,45 @@ def play(text: str, commands_text: str) -> IssuedSetpoints:
     ExportError, SpecError, CosimulationError
     """
     block = BlockInstance(text)
-    initial = block.inputs
-    commands = read_commands(commands_text, tuple(live_inputs(initial)))
-    cycle = initial["fCycleTime"]
+    commands = read_commands(commands_text, block.axes, live_inputs(block.inputs, block.axes))
+    cycle = block.inputs["fCycleTime"]
     issued = np.vstack(list(_issued(block, commands, cycle)))
-    places = {name: block.outputs.index(output) for name, output in COLUMNS.items()}
-    lines = ["time_s," + ",".join(COLUMNS)]
+    columns = _columns(block.axes)
+    places = {name: block.outputs.index(output) for name, output in columns.items()}
+    lines = ["time_s," + ",".join(columns)]
     for number, row in enumerate(issued):
-        cells = (str(int(row[at])) if name in WHOLE else repr(float(row[at])) for name, at in places.items())
+        cells = (
+            str(int(row[places[name]])) if output in WHOLE else repr(float(row[places[name]]))
+            for name, output in columns.items()
+        )
         lines.append(f"{number * cycle:.9g}," + ",".join(cells))
     shown = issued[:, places["error_id"]].astype(int).tolist()
     errors = tuple(error for error in dict.fromkeys(shown) if error)
     return IssuedSetpoints(table="\n".join(lines) + "\n", cycles=len(issued), errors=errors)
 
 
-STANDARD = (
-    *("bEnable", "bExecute", "bVelocity", "bStop", "bQuickStop", "fTarget", "fVelocityCommand"),
-    *("fVelocityLimit", "rOverride", "fActPosition", "fCycleTime"),
-)
-
-
-def live_inputs(inputs: Mapping[str, float]) -> dict[str, str]:
-    """Tell which inputs of a planner block are live parameters, by the parameters' names.
-
-    Raises
-    ------
-    SpecError
-        It is no planner block.
-    """
-    if missing := [name for name in STANDARD if name not in inputs]:
-        raise SpecError(f"The function block has no input {missing[0]}, so it is no planner block.")
-    return {name[1:]: name for name in inputs if name not in STANDARD}
+def _columns(axes: Sequence[BlockAxis]) -> dict[str, str]:
+    """Name the columns of the setpoints, and the block's outputs that stand in them."""
+    columns: dict[str, str] = {}
+    for axis in axes:
+        columns |= {
+            f"{axis.prefix}position_{axis.unit}": axis.of("fPosition"),
+            f"{axis.prefix}velocity_{axis.unit}_per_s": axis.of("fVelocity"),
+            f"{axis.prefix}acceleration_{axis.unit}_per_s2": axis.of("fAcceleration"),
+        }
+    columns |= {"busy": "bBusy", "done": "bDone", "error_id": "nErrorId", "promise": "bPromise"}
+    return columns | {f"{axis.prefix}stop_distance_{axis.unit}": axis.of("fStopDistance") for axis in axes}
 
 
 def input_rows(
-    commands: Sequence[Command], values: Mapping[str, float], cycle: float
+    commands: Sequence[Command], axes: Sequence[BlockAxis], values: Mapping[str, float], cycle: float
 ) -> tuple[list[int], Array]:
     """Turn commands into inputs that hold from a cycle to the next.
 
     Parameters
     ----------
     commands : sequence of Command
+    axes : sequence of BlockAxis
     values : mapping of str to float
         All inputs by name, in the block's order, as they are before the first command.
     cycle : float
@@ -211,7 +206,7 @@ def input_rows(
     values = dict(values)
     rows = {0: list(values.values())}
     for command in commands:
-        values |= inputs_of(command)
+        values |= inputs_of(command, axes)
         begin = command.begin(cycle)
         rows[begin] = list(values.values())
         values["bExecute"] = 0.0  # an edge, so that the next command makes another
@@ -219,36 +214,38 @@ def input_rows(
     return list(rows), np.array(list(rows.values()), dtype=np.float64)
 
 
-def inputs_of(command: Command) -> dict[str, float]:
+def inputs_of(command: Command, axes: Sequence[BlockAxis]) -> dict[str, float]:
     """Turn a command into the inputs that it changes, by name; bExecute is an edge, for one cycle only."""
+    told = "fTarget" if command.command == "position" else "fVelocityCommand"
+    limits = command.velocity_limits or (0.0,) * len(axes)
     return {
         **{f"f{name}": value for name, value in command.live.items()},
         "bVelocity": float(command.command == "velocity"),
         "bStop": float(command.command == "stop"),
         "bQuickStop": float(command.command == "quick-stop"),
         "bExecute": float(command.command == "position"),
-        "fTarget" if command.command == "position" else "fVelocityCommand": command.value,
+        **{axis.of(told): value for axis, value in zip(axes, command.values, strict=False)},
         "rOverride": command.override,
-        "fVelocityLimit": command.velocity_limit,
+        **{axis.of("fVelocityLimit"): limit for axis, limit in zip(axes, limits, strict=True)},
     }
 
 
 def _issued(block: BlockInstance, commands: tuple[Command, ...], cycle: float) -> Iterator[Array]:
     """Give the outputs, row of inputs by row of inputs."""
-    begins, rows = input_rows(commands, block.inputs | {"bEnable": 1.0}, cycle)
+    begins, rows = input_rows(commands, block.axes, block.inputs | {"bEnable": 1.0}, cycle)
     for row, begin, end in zip(rows, begins, begins[1:], strict=False):
         yield block.call(np.tile(row, (end - begin, 1)))
     yield from _until_still(block, rows[-1], cycle)
 
 
 def _until_still(block: BlockInstance, row: Array, cycle: float) -> Iterator[Array]:
-    busy, velocity = (block.outputs.index(name) for name in ("bBusy", "fVelocity"))
+    telling = [block.outputs.index(name) for name in ("bBusy", *(a.of("fVelocity") for a in block.axes))]
     still = math.ceil(STILL / cycle)
     most = math.ceil(LONGEST / cycle)
     done = 0
     while done < most:
         issued = block.call(np.tile(row, (min(CHUNK, most - done), 1)))
-        moving = (issued[:, busy] > 0.0) | (issued[:, velocity] != 0.0)
+        moving = (issued[:, telling] != 0.0).any(axis=1)
         last = int(np.flatnonzero(moving)[-1]) + 1 if moving.any() else 0
         if last + still <= len(issued):
             yield issued[: last + still]

@@ -10,9 +10,9 @@ import numpy as np
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
-from gen_profile.planner.machine import LiveModes, frequencies, live_modes
+from gen_profile.planner.machine import LiveModes, frequencies, live_modes, planned_axes
 from gen_profile.spec.model import Spec
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, PlannerConstants, block_text
+from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, AxisConstants, PlannerConstants, block_text
 
 FEWEST_CYCLES = 4  # in a slot
 STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
@@ -49,37 +49,30 @@ def planner_block(spec: Spec) -> PlannerBlock:
         A limit is not stated, or the block does not take this machine.
     """
     found = live_modes(spec)
-    velocity, acceleration, jerk, travel = _limits(spec)
+    planned = planned_axes(spec)
+    if faults := [fault for number, axis in planned.items() for fault in _faults(spec, number, axis.suffix)]:
+        raise SpecError(*faults)
+    axes = tuple(_axis(spec, number, axis.suffix) for number, axis in planned.items())
     fastest = max(_rates(found, point)[0][0] for point in _corners(found))
     if 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * spec.export.cycle_time) < FEWEST_CYCLES:
         most = 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * FEWEST_CYCLES)
         raise SpecError(f"export.cycle_time: at most {most:.2g} s for a machine that swings this fast.")
     interpolant = found.interpolant
-    coefficients = interpolant.coefficients
     constants = PlannerConstants(
         name=spec.name,
         machine=spec.machine().type,
-        axis=spec.machine().actuated[0].name,
-        start=spec.move.start[0],
+        axes=axes,
         cycle=spec.export.cycle_time,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=jerk,
-        quick_deceleration=quick_limits(spec)[0],
-        quick_jerk=quick_limits(spec)[1],
-        travel=travel,
         live=found.live,
         units=tuple(_unit(spec, name) for name in found.live),
         nominal=tuple(_nominal(spec, name) for name in found.live),
         drift=tuple(STEADY * high for _, high in found.live.values()),
         rates=spec.planner.live_rate,
         calm=CALM * min(spec.check.residual_sway.values()),
-        targets=target_range(spec),
         degrees=int(interpolant.exponents.max(initial=0)) + 1,
         exponents=interpolant.exponents,
-        frequencies=coefficients[: found.modes],
-        decays=coefficients[found.modes : 2 * found.modes],
-        matrix=coefficients[2 * found.modes :],
+        modes=found.modes,
+        model=interpolant.coefficients,
     )
     return PlannerBlock(
         filename=f"{spec.name}.st",
@@ -89,9 +82,9 @@ def planner_block(spec: Spec) -> PlannerBlock:
     )
 
 
-def quick_limits(spec: Spec) -> tuple[float, float]:
-    """Deceleration and jerk of a quick stop, where the limits are stated, in m and s."""
-    own = spec.limits.of(0)
+def quick_limits(spec: Spec, axis: int) -> tuple[float, float]:
+    """Deceleration and jerk of an axis's quick stop, where its limits are stated, in m (or rad) and s."""
+    own = spec.limits.of(axis)
     assert own.acceleration and own.jerk
     return (
         spec.planner.quick_stop or QUICK * own.acceleration,
@@ -99,29 +92,49 @@ def quick_limits(spec: Spec) -> tuple[float, float]:
     )
 
 
-def target_range(spec: Spec) -> tuple[float, float]:
-    """Least and greatest target in m, where the travel is stated: room is left for calming."""
-    travel = spec.limits.of(0).travel
+def target_range(spec: Spec, axis: int) -> tuple[float, float]:
+    """Least and greatest target of an axis, where its travel is stated: room is left for calming."""
+    travel = spec.limits.of(axis).travel
     assert travel is not None
     margin = MARGIN * min(spec.check.residual_sway.values()) if spec.planner.live_rate else 0.0
     return travel[0] + margin, travel[1] - margin
 
 
-def _limits(spec: Spec) -> tuple[float, float, float, tuple[float, float]]:
-    own = spec.limits.of(0)
-    for name in ("velocity", "acceleration", "jerk", "travel"):
-        if getattr(own, name) is None:
-            raise SpecError(f"limits.{name}: required for a planner block, which keeps it in every motion.")
+def _faults(spec: Spec, number: int, suffix: str) -> list[str]:
+    """Say which limits of an axis are not stated, or above those of its quick stop."""
+    own, quick, quick_jerk = spec.limits.of(number), spec.planner.quick_stop, spec.planner.quick_stop_jerk
+    of = f" of {spec.machine().actuated[number].name}" if suffix else ""
+    faults = [
+        f"limits.{name}: required{of} for a planner block, which keeps it in every motion."
+        for name in ("velocity", "acceleration", "jerk", "travel")
+        if getattr(own, name) is None
+    ]
+    if quick and own.acceleration and quick < own.acceleration:
+        faults.append(
+            f"planner.quick_stop: at least limits.acceleration ({own.acceleration:g}), found {quick:g}."
+        )
+    if quick_jerk and own.jerk and quick_jerk < own.jerk:
+        faults.append(f"planner.quick_stop_jerk: at least limits.jerk ({own.jerk:g}), found {quick_jerk:g}.")
+    return faults
+
+
+def _axis(spec: Spec, number: int, suffix: str) -> AxisConstants:
+    axis, own = spec.machine().actuated[number], spec.limits.of(number)
     velocity, acceleration, jerk, travel = own.velocity, own.acceleration, own.jerk, own.travel
     assert velocity and acceleration and jerk and travel
-    quick, quick_jerk = spec.planner.quick_stop, spec.planner.quick_stop_jerk
-    if quick is not None and quick < acceleration:
-        raise SpecError(
-            f"planner.quick_stop: at least limits.acceleration ({acceleration:g}), found {quick:g}."
-        )
-    if quick_jerk is not None and quick_jerk < jerk:
-        raise SpecError(f"planner.quick_stop_jerk: at least limits.jerk ({jerk:g}), found {quick_jerk:g}.")
-    return velocity, acceleration, jerk, travel
+    return AxisConstants(
+        name=axis.name,
+        unit=axis.unit,
+        suffix=suffix,
+        start=spec.move.start[number],
+        velocity=velocity,
+        acceleration=acceleration,
+        jerk=jerk,
+        quick_deceleration=quick_limits(spec, number)[0],
+        quick_jerk=quick_limits(spec, number)[1],
+        travel=travel,
+        targets=target_range(spec, number),
+    )
 
 
 def _unit(spec: Spec, name: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from ctypes import POINTER, c_char_p, c_double, c_int, c_long, c_void_p
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 
 import fmpy
@@ -12,15 +13,13 @@ import numpy as np
 
 from gen_profile.errors import ExportError
 from gen_profile.planner.chebyshev import Array
+from gen_profile.planner.interface import ISSUED, STATES, BlockAxis, block_axes
 from gen_profile_exporters.st_to_c import FAULTS, Translation, translate
 from gen_profile_fmu.building.build import compile_texts
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import find_compiler
 from gen_profile_fmu.description.fmu_files import digest
 from gen_profile_fmu.running.block_run import CalledBlock
-
-AXIS = ("fPosition", "fVelocity", "fAcceleration")
-STATES = ("bBusy", "bPromise", "nErrorId")
 
 
 class BlockInstance:
@@ -40,6 +39,7 @@ class BlockInstance:
     """
 
     def __init__(self, text: str) -> None:
+        self._text = text
         self._translation, self._library = _loaded(text)
         self._memory = ctypes.create_string_buffer(self._library.instance_size())
         self._library.instance_init(self._memory)
@@ -54,6 +54,11 @@ class BlockInstance:
         """Names of the outputs."""
         return [v.name for v in self._translation.outputs]
 
+    @property
+    def axes(self) -> tuple[BlockAxis, ...]:
+        """Those that it plans; raises ExportError where it is no planner block."""
+        return block_axes(self._text)
+
     def called(self) -> CalledBlock:
         """Give a fresh instance to a loop that is compiled, too.
 
@@ -63,12 +68,13 @@ class BlockInstance:
             The text is no planner block's.
         """
         names = self.outputs
-        if missing := [name for name in (*AXIS, *STATES) if name not in names]:
+        axes = [[axis.of(name) for name in ISSUED] for axis in self.axes]
+        if missing := [name for name in (*chain(*axes), *STATES) if name not in names]:
             raise ExportError(f"The function block has no output {missing[0]}, so it is no planner block.")
         memory = ctypes.create_string_buffer(len(self._memory))
         self._library.instance_init(memory)
         play = ctypes.cast(self._library.instance_play, c_void_p).value or 0
-        return CalledBlock(play=play, memory=memory, outputs=names, axes=[AXIS], states=STATES)
+        return CalledBlock(play=play, memory=memory, outputs=names, axes=axes, states=STATES)
 
     def call(self, inputs: Array) -> Array:
         """Call the block once for every row of inputs.

@@ -11,15 +11,18 @@ import numpy as np
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array, Interpolant, interpolate
+from gen_profile.planner.interface import BlockAxis
 from gen_profile.problem.linearization import Linearization, linearize
 from gen_profile.spec.model import Spec
 
-MOST_MODES = 2
+MOST_MODES = 3
+SYMMETRIC = 2  # modes whose frequencies come from sum and product of their squares
 MOST_RATIO = 9.0  # of the fastest mode to the slowest, whose period makes the slots
 MOST_LIVE = 2
 DEGREES = (3, 6, 9, 12)
 ACCURACY = 1e-5  # relative, of the frequencies over the live ranges
 MOST_TERMS = 60
+STILL = 1e-9  # acceleration of a coordinate, relative to an axis's, that counts as none
 NEGLIGIBLE = 1e-7  # coefficient, relative to the largest of its function
 
 
@@ -30,11 +33,12 @@ class LiveModes:
     Attributes
     ----------
     modes : int
+        Of different frequencies.
     live : mapping of str to (float, float)
     interpolant : Interpolant
-        Of the live parameters, each mapped to −1 … 1: the elementary symmetric polynomials of the squared
-        frequencies (which have no branch point where two modes come near each other), then the decays; and
-        where live parameters change on the way, the matrix of the loads' sway in 1/s², row by row.
+        Of the live parameters, each mapped to −1 … 1: the squared frequencies (of two modes, their sum and
+        product, which have no branch point where these come near each other), then the decays; and where
+        live parameters change on the way, the matrix of the loads' sway in 1/s², row by row.
     error : float
         Greatest relative error of a frequency found between the points of interpolation.
     """
@@ -59,19 +63,18 @@ def live_modes(spec: Spec) -> LiveModes:
 
     def invariants(point: Sequence[float]) -> Array:
         found = _linearized(spec, point)
-        squares = found.frequencies**2
+        squares = found.distinct_frequencies**2
         return np.array(
             [
-                squares.sum(),
-                *[squares.prod()][: len(squares) - 1],
-                *(found.damping_ratios * found.frequencies),
+                *([squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares),
+                *(found.distinct_damping_ratios * found.distinct_frequencies),
                 *(_sway_matrix(found).ravel() if spec.planner.live_rate else ()),
             ]
         )
 
-    modes = len(_linearized(spec, [0.0] * len(live)).frequencies)
+    modes = len(_linearized(spec, [0.0] * len(live)).distinct_frequencies)
     between = list(product(np.linspace(-1.0, 1.0, 6), repeat=len(live)))
-    exact = [_linearized(spec, point).frequencies for point in between]
+    exact = [_linearized(spec, point).distinct_frequencies for point in between]
     for degree in DEGREES if live else (0,):
         interpolant = interpolate(invariants, len(live), degree).without(NEGLIGIBLE)
         found = [frequencies(interpolant(point)[:modes]) for point in between]
@@ -93,12 +96,20 @@ def live_modes(spec: Spec) -> LiveModes:
 
 
 def frequencies(invariants: Array) -> Array:
-    """Find one or two frequencies from their squares' sum (and product), as the block does."""
-    if len(invariants) == 1:
+    """Find frequencies from their squares or, of two, from sum and product of these, as the block does."""
+    if len(invariants) != SYMMETRIC:
         return np.asarray(np.sqrt(invariants))
     total, product_ = invariants
     larger = 0.5 * (total + np.sqrt(total * total - 4.0 * product_))
     return np.asarray(np.sqrt([product_ / larger, larger]))
+
+
+def planned_axes(spec: Spec) -> dict[int, BlockAxis]:
+    """Find the axes that make a load sway by their numbers: these the block plans, and no others."""
+    middle, axes = _linearized(spec, [0.0] * len(spec.planner.live)), spec.machine().actuated
+    numbers = np.flatnonzero(np.abs(middle.input).max(axis=0) > STILL).tolist()
+    several = len(numbers) > 1
+    return {k: BlockAxis(name=axes[k].name if several else "", unit=axes[k].unit) for k in numbers}
 
 
 def _linearized(spec: Spec, point: Sequence[float]) -> Linearization:
@@ -137,6 +148,11 @@ def _refuse_rates(spec: Spec) -> None:
             "planner.live_rate: the planner block follows machines without damping only; set the damping "
             "to 0, which is the worse case."
         )
+    if len(planned_axes(spec)) > 1:
+        raise SpecError(
+            "planner.live_rate: the planner block takes parameters that change on the way for one axis only; "
+            "leave it out, and the promise drops where they do."
+        )
     if plant.bodies != plant.loads or middle.sway_gain.shape[0] != middle.sway_gain.shape[1]:
         raise SpecError(f"planner.live_rate: the loads of a {plant.type} do not hang on ropes alone.")
     for name in rates:
@@ -163,27 +179,17 @@ def _is_length(spec: Spec, name: str) -> bool:
 def _refuse_others(spec: Spec) -> None:
     """Refuse machines that the planner block does not take yet."""
     plant = spec.machine()
-    if plant.actuated[0].unit != "m":
-        raise SpecError(
-            f"plant: the planner block moves an axis in metres, and {plant.actuated[0].name} turns; "
-            "export a profile instead."
-        )
     if len(spec.planner.live) > MOST_LIVE:
         raise SpecError(f"planner.live: at most {MOST_LIVE} parameters can be live; fix the others.")
     middle = _linearized(spec, [0.0] * len(spec.planner.live))
-    for number, axis in enumerate(plant.actuated[1:], start=1):
-        if np.abs(middle.input[:, number]).max() > 1e-9:
+    for number, axis in enumerate(plant.actuated):
+        if axis.name in spec.planner.live and number in planned_axes(spec):
             raise SpecError(
-                f"plant: the planner block plans one axis, and {axis.name} makes the load of a "
-                f"{plant.type} sway, too; export a profile instead."
+                f"planner.live.{axis.name}: this axis makes the load sway, so the block plans it, and its "
+                "place is no live parameter."
             )
-    if len(middle.frequencies) > MOST_MODES:
+    if len(middle.distinct_frequencies) > MOST_MODES:
         raise SpecError(
-            f"plant: the machine has {len(middle.frequencies)} modes, and the planner block takes "
+            f"plant: the machine has {len(middle.distinct_frequencies)} modes, and the planner block takes "
             f"{MOST_MODES} at most; export a profile instead."
-        )
-    if len(middle.distinct_frequencies) < len(middle.frequencies):
-        raise SpecError(
-            "plant: two modes have the same frequency, and the planner block does not take that; "
-            "export a profile instead."
         )

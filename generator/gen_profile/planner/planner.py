@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,23 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
-from gen_profile.planner.commands import live_inputs
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import read_block
+from gen_profile.planner.interface import BlockAxis, live_inputs
 from gen_profile.spec.model import Spec
 from gen_profile.suggestion import suggestion
 
-OUTPUTS = {
+OWN = {  # of each axis
     "position": "fPosition",
     "velocity": "fVelocity",
     "acceleration": "fAcceleration",
-    "busy": "bBusy",
-    "done": "bDone",
-    "promise": "bPromise",
-    "error_id": "nErrorId",
     "stop_distance": "fStopDistance",
 }
+COMMON = {"busy": "bBusy", "done": "bDone", "promise": "bPromise", "error_id": "nErrorId"}
 KINDS = {"b": np.bool_, "n": np.int64}  # by the first letter of an output's name; others are real
 
 
@@ -38,32 +35,32 @@ class Setpoint:
 
     Attributes
     ----------
-    position, velocity, acceleration : float
-        m, m/s and m/s².
+    position, velocity, acceleration : float or (axes,) array
+        m, m/s and m/s² (or rad); a number where there is one axis.
     busy, done, promise : bool
         The axis moves; stands at the target; no sway remains after the motion.
     error_id : int
         0 for none; the block's header explains the others.
-    stop_distance : float
+    stop_distance : float or (axes,) array
         m, which a stop without sway takes at most.
     outputs : mapping of str to float, int or bool
         All of the block's outputs by their names there.
     """
 
-    position: float
-    velocity: float
-    acceleration: float
+    position: float | Array
+    velocity: float | Array
+    acceleration: float | Array
     busy: bool
     done: bool
     promise: bool
     error_id: int
-    stop_distance: float
+    stop_distance: float | Array
     outputs: Mapping[str, Any] = attrs.field(repr=False)
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class SetpointHistory:
-    """What a planner issued in many cycles: as `Setpoint`, each a (cycles,) array."""
+    """What a planner issued in many cycles: as `Setpoint`, each a (cycles,) array, or (cycles, axes)."""
 
     position: Array
     velocity: Array
@@ -80,26 +77,27 @@ class SetpointHistory:
 class _Orders:
     """What a caller gave; None is for what goes on as it was."""
 
-    target: float | None
+    target: ArrayLike | None
     velocity: ArrayLike | None
     stop: bool
     quick_stop: bool
     live: Mapping[str, ArrayLike] | None
     override: float | None
-    velocity_limit: float | None
+    velocity_limit: ArrayLike | None
 
 
 class Planner:
     """Plan motions that leave no sway, by the planner block of a spec.
 
-    A command holds until the next one; a target may change on the way, and so may the kind of command.
+    A command holds until the next one; a target may change on the way, and so may the kind of command. Where
+    there are several axes, a number for each takes the place of a number: they move together.
 
     Parameters
     ----------
     source : Spec, Path or str
         A spec, or the path of a written block in any container.
-    position : float, optional
-        m, where the axis stands before the first cycle; the start of the spec's move if not given.
+    position : float or (axes,) array, optional
+        m (or rad), where the axis stands before the first cycle; the start of the spec's move if not given.
 
     Raises
     ------
@@ -111,11 +109,14 @@ class Planner:
         There is no C compiler.
     """
 
-    def __init__(self, source: Spec | Path | str, position: float | None = None) -> None:
+    def __init__(self, source: Spec | Path | str, position: ArrayLike | None = None) -> None:
         self._text = planner_block(source).text if isinstance(source, Spec) else read_block(Path(source))
-        self._inputs = BlockInstance(self._text).inputs  # as they are in the next cycle
-        self._live = live_inputs(self._inputs)
-        self.restart(self._inputs["fActPosition"] if position is None else position)
+        self._block = BlockInstance(self._text)
+        self._axes = self._block.axes
+        self._inputs = self._block.inputs  # as they are in the next cycle
+        self._live = live_inputs(self._inputs, self._axes)
+        stands = [self._inputs[axis.of("fActPosition")] for axis in self._axes]
+        self.restart(position if position is not None else stands if len(stands) > 1 else stands[0])
 
     @property
     def cycle_time(self) -> float:
@@ -123,43 +124,52 @@ class Planner:
         return self._inputs["fCycleTime"]
 
     @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes in the order of every array; an empty one where there is but one axis."""
+        return tuple(axis.name for axis in self._axes)
+
+    @property
     def live(self) -> dict[str, float]:
         """The live parameters by name, as they are taken for."""
         return {name: self._inputs[given] for name, given in self._live.items()}
 
-    def restart(self, position: float) -> None:
+    def restart(self, position: ArrayLike) -> None:
         """Begin anew where the axis stands and the load hangs still, as after a quick stop.
 
         Parameters
         ----------
-        position : float
-            m.
+        position : float or (axes,) array
+            m (or rad).
         """
-        stand = float(_column("position", position, 1)[0])
+        stands = _columns_of("fActPosition", "position", position, self._axes, 1)
         self._block = BlockInstance(self._text)
         idle = dict.fromkeys(("bVelocity", "bStop", "bQuickStop"), 0.0)
-        self._inputs |= {"bEnable": 1.0, "fActPosition": stand, **idle}
-        self._target: float | None = None  # of the command that holds
+        self._inputs |= {
+            "bEnable": 1.0,
+            **{name: float(column[0]) for name, column in stands.items()},
+            **idle,
+        }
+        self._target: list[float] | None = None  # of the command that holds
         self._is_due = self._was_given = False  # the rising edge of bExecute; whether it is high
 
     def step(
         self,
         *,
-        target: float | None = None,
-        velocity: float | None = None,
+        target: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
         stop: bool = False,
         quick_stop: bool = False,
         live: Mapping[str, float] | None = None,
         override: float | None = None,
-        velocity_limit: float | None = None,
+        velocity_limit: ArrayLike | None = None,
     ) -> Setpoint:
         """Issue the setpoint of the next cycle.
 
         Parameters
         ----------
-        target : float, optional
-            m, to move to.
-        velocity : float, optional
+        target : float or (axes,) array, optional
+            m (or rad), to move to.
+        velocity : float or (axes,) array, optional
             m/s, to follow, as of a stick.
         stop : bool
             Whether to stop without sway.
@@ -170,7 +180,7 @@ class Planner:
             Live parameters that change, by name, in their SI units.
         override : float, optional
             Share of the greatest velocity. It holds, and so does the next.
-        velocity_limit : float, optional
+        velocity_limit : float or (axes,) array, optional
             m/s; 0 for none but the machine's.
 
         Raises
@@ -188,20 +198,24 @@ class Planner:
             override=override,
             velocity_limit=velocity_limit,
         )
-        issued = {name: column.item() for name, column in self._issue(orders, 1).items()}
-        return Setpoint(**{name: issued[output] for name, output in OUTPUTS.items()}, outputs=issued)
+        issued = self._issue(orders, 1)
+        outputs = {name: column.item() for name, column in issued.items()}
+        own = {name: self._own(output, issued)[0] for name, output in OWN.items()}
+        if len(self._axes) == 1:
+            own = {name: float(value) for name, value in own.items()}
+        return Setpoint(**own, **{name: outputs[told] for name, told in COMMON.items()}, outputs=outputs)
 
     def hold(
         self,
         seconds: float,
         *,
-        target: float | None = None,
+        target: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         stop: bool = False,
         quick_stop: bool = False,
         live: Mapping[str, ArrayLike] | None = None,
         override: float | None = None,
-        velocity_limit: float | None = None,
+        velocity_limit: ArrayLike | None = None,
     ) -> SetpointHistory:
         """Issue the setpoints of many cycles, in a compiled loop.
 
@@ -211,8 +225,8 @@ class Planner:
             For how long, in whole cycles.
         target, stop, quick_stop, override, velocity_limit
             As of `step`.
-        velocity : float or (cycles,) array, optional
-            m/s; an array is the history of a stick.
+        velocity : float, (cycles,) array, or (axes,) or (cycles, axes) array, optional
+            m/s; over the cycles it is the history of a stick.
         live : mapping of str to float or (cycles,) array, optional
             As of `step`; an array changes on the way.
 
@@ -234,7 +248,16 @@ class Planner:
             velocity_limit=velocity_limit,
         )
         issued = self._issue(orders, cycles)
-        return SetpointHistory(**{name: issued[output] for name, output in OUTPUTS.items()}, outputs=issued)
+        return SetpointHistory(
+            outputs=issued,
+            **{name: self._own(output, issued) for name, output in OWN.items()},
+            **{name: issued[output] for name, output in COMMON.items()},
+        )
+
+    def _own(self, output: str, issued: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+        """Put an output of all axes side by side, or give that of the only one."""
+        columns = [issued[axis.of(output)] for axis in self._axes]
+        return np.stack(columns, axis=1) if len(columns) > 1 else columns[0]
 
     def _issue(self, orders: _Orders, cycles: int) -> dict[str, NDArray[Any]]:
         """Call the block; nothing has changed where the orders are refused."""
@@ -256,34 +279,37 @@ class Planner:
         commands = (orders.target is not None, orders.velocity is not None, orders.stop, orders.quick_stop)
         if sum(commands) > 1:
             raise SpecError("Planner: give one of target, velocity, stop and quick_stop, not several.")
-        given = {
+        own = {
             "fTarget": ("target", orders.target),
             "fVelocityCommand": ("velocity", orders.velocity),
-            "rOverride": ("override", orders.override),
             "fVelocityLimit": ("velocity_limit", orders.velocity_limit),
         }
+        columns: dict[str, Array] = {}
+        for name, (what, value) in own.items():
+            if value is not None:
+                columns |= _columns_of(name, what, value, self._axes, cycles)
+        if orders.override is not None:
+            columns["rOverride"] = _column("override", orders.override, cycles)
         for name, value in (orders.live or {}).items():
             if name not in self._live:
                 raise SpecError(
                     f"live: the planner has no live parameter {name!r}{suggestion(name, self._live)}"
                 )
-            given[self._live[name]] = (f"live.{name}", value)
-        return {
-            name: _column(what, value, cycles) for name, (what, value) in given.items() if value is not None
-        }
+            columns[self._live[name]] = _column(f"live.{name}", value, cycles)
+        return columns
 
     def _command(self, orders: _Orders, columns: dict[str, Array]) -> None:
         """Let another command take the place of the one that holds."""
-        if "fTarget" in columns:
-            target = float(columns["fTarget"][0])
+        if orders.target is not None:
+            target = [float(columns[axis.of("fTarget")][0]) for axis in self._axes]
             self._is_due = self._is_due or target != self._target
             self._target = target
-        elif "fVelocityCommand" in columns or orders.stop or orders.quick_stop:
+        elif orders.velocity is not None or orders.stop or orders.quick_stop:
             self._is_due, self._target = False, None
         else:
             return
         moves = {
-            "bVelocity": "fVelocityCommand" in columns,
+            "bVelocity": orders.velocity is not None,
             "bStop": orders.stop,
             "bQuickStop": orders.quick_stop,
         }
@@ -297,6 +323,23 @@ class Planner:
             execute[at], self._is_due = 1.0, False
         self._was_given = bool(execute[-1])
         return execute
+
+
+def _columns_of(
+    name: str, what: str, value: ArrayLike, axes: Sequence[BlockAxis], cycles: int
+) -> dict[str, Array]:
+    """Give an input of every axis, a value per cycle."""
+    if len(axes) == 1:
+        return {axes[0].of(name): _column(what, value, cycles)}
+    shape = np.shape(np.asarray(value, dtype=object))
+    if shape not in ((len(axes),), (cycles, len(axes))):
+        named = ", ".join(axis.name for axis in axes)
+        raise SpecError(f"{what}: must be a number for each axis ({named}), found {value!r}.")
+    rows = np.asarray(value, dtype=object).reshape(-1, len(axes)).T.tolist()
+    return {
+        axis.of(name): _column(f"{what} of {axis.name}", row[0] if len(row) == 1 else row, cycles)
+        for axis, row in zip(axes, rows, strict=True)
+    }
 
 
 def _column(what: str, value: ArrayLike, cycles: int) -> Array:

@@ -15,22 +15,15 @@ c1 and c2 are viscous moments at the cart's and the hook's joint (zero in the pa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
 from gen_profile.plants.drawing import Drawing, Pose, hanging, level
-from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Vector
 
 
-def equations(
-    q_u: Sequence[Scalar],
-    dq_u: Sequence[Scalar],
-    q_a: Sequence[Scalar],
-    dq_a: Sequence[Scalar],
-    p: SimpleNamespace,
-) -> Equations:
+def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the two ropes' equations of motion (module docstring)."""
     del q_a, dq_a  # the ropes feel the cart's acceleration only
     (theta1, theta2), (dtheta1, dtheta2) = q_u, dq_u
@@ -51,7 +44,7 @@ def equations(
     )
 
 
-def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Sway relative to the cart, height below it and rope angle, of hook and payload."""
     del q_a
     theta1, theta2 = q_u
@@ -64,7 +57,7 @@ def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) ->
     )
 
 
-def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place hook and payload below the cart."""
     seen, (cart,) = outputs(q_u, q_a, p), q_a
     places = [(cart - sway, 0.0, height) for sway, height in zip(seen.sway, seen.height, strict=True)]
@@ -80,26 +73,13 @@ PLANT = Plant(
     type="double-pendulum-crane",
     summary="cart, hook and payload on two ropes",
     parameters=(
-        Parameter(name="m1", unit="kg", description="hook mass", nominal=0.192, lower=1e-4, upper=1e6),
-        Parameter(name="m2", unit="kg", description="payload mass", nominal=0.203, lower=1e-4, upper=1e6),
-        Parameter(
-            name="L1", unit="m", description="rope from cart to hook", nominal=0.470, lower=1e-2, upper=200.0
-        ),
-        Parameter(
-            name="L2",
-            unit="m",
-            description="rope from hook to payload",
-            nominal=0.391,
-            lower=1e-2,
-            upper=200.0,
-        ),
-        Parameter(name="g", unit="m/s^2", description="gravity", nominal=9.81, lower=0.1, upper=30.0),
-        Parameter(
-            name="c1", unit="N m s/rad", description="damping at the cart", nominal=0.0, lower=0.0, upper=1e6
-        ),
-        Parameter(
-            name="c2", unit="N m s/rad", description="damping at the hook", nominal=0.0, lower=0.0, upper=1e6
-        ),
+        Parameter("m1", "kg", "hook mass", nominal=0.192, lower=1e-4, upper=1e6),
+        Parameter("m2", "kg", "payload mass", nominal=0.203, lower=1e-4, upper=1e6),
+        Parameter("L1", "m", "rope from cart to hook", nominal=0.470, lower=1e-2, upper=200.0),
+        Parameter("L2", "m", "rope from hook to payload", nominal=0.391, lower=1e-2, upper=200.0),
+        Parameter("g", "m/s^2", "gravity", nominal=9.81, lower=0.1, upper=30.0),
+        Parameter("c1", "N m s/rad", "damping at the cart", nominal=0.0, lower=0.0, upper=1e6),
+        Parameter("c2", "N m s/rad", "damping at the hook", nominal=0.0, lower=0.0, upper=1e6),
     ),
     actuated=(Coordinate(name="cart", unit="m"),),
     unactuated=(Coordinate(name="theta1", unit="rad"), Coordinate(name="theta2", unit="rad")),

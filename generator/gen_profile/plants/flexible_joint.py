@@ -12,37 +12,30 @@ motor's side driven.)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, stacked
-from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Vector
 
 
-def equations(
-    q_u: Sequence[Scalar],
-    dq_u: Sequence[Scalar],
-    q_a: Sequence[Scalar],
-    dq_a: Sequence[Scalar],
-    p: SimpleNamespace,
-) -> Equations:
+def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the arm's equation of motion (module docstring)."""
     del q_a, dq_a  # the arm feels the hub's acceleration only
     (alpha,), (rate,) = q_u, dq_u
     return Equations(M_uu=[[p.J]], M_au=[[-p.J]], K_u=[-p.k * alpha], G_u=[-p.c * rate])
 
 
-def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Arc by which the arm's tip trails the hub, in m, and the joint's angle."""
     del q_a
     (alpha,) = q_u
     return Outputs(sway=[p.R * alpha], height=[0.0], angle=[alpha])
 
 
-def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place a mass at the tip that has the arm's moment of inertia."""
     (alpha,), (hub,) = q_u, q_a
     place = (p.R * np.cos(hub - alpha), p.R * np.sin(hub - alpha), 0.0)
@@ -75,21 +68,10 @@ PLANT = Plant(
     type="flexible-joint",
     summary="arm behind a torsion spring on a driven hub",
     parameters=(
-        Parameter(
-            name="J",
-            unit="kg m^2",
-            description="moment of inertia of the arm",
-            nominal=0.0035,
-            lower=1e-9,
-            upper=1e9,
-        ),
-        Parameter(
-            name="k", unit="N m/rad", description="joint stiffness", nominal=1.3, lower=1e-6, upper=1e12
-        ),
-        Parameter(
-            name="c", unit="N m s/rad", description="joint damping", nominal=0.004, lower=0.0, upper=1e9
-        ),
-        Parameter(name="R", unit="m", description="from hub to tip", nominal=0.3, lower=1e-3, upper=100.0),
+        Parameter("J", "kg m^2", "moment of inertia of the arm", nominal=0.0035, lower=1e-9, upper=1e9),
+        Parameter("k", "N m/rad", "joint stiffness", nominal=1.3, lower=1e-6, upper=1e12),
+        Parameter("c", "N m s/rad", "joint damping", nominal=0.004, lower=0.0, upper=1e9),
+        Parameter("R", "m", "from hub to tip", nominal=0.3, lower=1e-3, upper=100.0),
     ),
     actuated=(Coordinate(name="hub", unit="rad"),),
     unactuated=(Coordinate(name="alpha", unit="rad"),),

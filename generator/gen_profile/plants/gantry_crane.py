@@ -12,23 +12,16 @@ acceleration. Lagrange's equations with a viscous moment c on the rope's angular
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, hanging, level, stacked, travel
-from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Vector
 
 
-def equations(
-    q_u: Sequence[Scalar],
-    dq_u: Sequence[Scalar],
-    q_a: Sequence[Scalar],
-    dq_a: Sequence[Scalar],
-    p: SimpleNamespace,
-) -> Equations:
+def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the payload's equations of motion (module docstring)."""
     del q_a, dq_a  # the rope feels the trolley's acceleration only
     (theta_x, theta_y), (rate_x, rate_y) = q_u, dq_u
@@ -45,7 +38,7 @@ def equations(
     )
 
 
-def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Sway of the payload in both directions, its height below the trolley, and the rope's two angles."""
     del q_a
     theta_x, theta_y = q_u
@@ -57,7 +50,7 @@ def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) ->
     )
 
 
-def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place the payload below the trolley."""
     seen, (x, y) = outputs(q_u, q_a, p), q_a
     return Mechanics(mass=[p.m], place=[(x - seen.sway[0], y - seen.sway[1], seen.height[0])], gravity=p.g)
@@ -103,17 +96,10 @@ PLANT = Plant(
     type="gantry-crane",
     summary="bridge and trolley, and a payload that swings in both directions",
     parameters=(
-        Parameter(name="m", unit="kg", description="payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
-        Parameter(name="L", unit="m", description="rope", nominal=5.0, lower=1e-2, upper=200.0),
-        Parameter(name="g", unit="m/s^2", description="gravity", nominal=9.81, lower=0.1, upper=30.0),
-        Parameter(
-            name="c",
-            unit="N m s/rad",
-            description="damping at the trolley",
-            nominal=0.0,
-            lower=0.0,
-            upper=1e9,
-        ),
+        Parameter("m", "kg", "payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
+        Parameter("L", "m", "rope", nominal=5.0, lower=1e-2, upper=200.0),
+        Parameter("g", "m/s^2", "gravity", nominal=9.81, lower=0.1, upper=30.0),
+        Parameter("c", "N m s/rad", "damping at the trolley", nominal=0.0, lower=0.0, upper=1e9),
     ),
     actuated=(Coordinate(name="x", unit="m"), Coordinate(name="y", unit="m")),
     unactuated=(Coordinate(name="theta_x", unit="rad"), Coordinate(name="theta_y", unit="rad")),

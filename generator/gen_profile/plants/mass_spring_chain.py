@@ -12,12 +12,21 @@ vibrations with one end fixed and one free).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import pairwise
 from types import SimpleNamespace
 
-from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import (
+    Coordinate,
+    Equations,
+    Mechanics,
+    Outputs,
+    Parameter,
+    Plant,
+    Scalar,
+    Vector,
+)
 
 LARGEST = 24
 
@@ -39,7 +48,7 @@ def member(masses: int) -> Plant:
         summary=(
             f"springs and masses behind a driven axis, {masses} of each (or another number: it ends the type)"
         ),
-        parameters=tuple(parameter(number) for parameter in (_mass, _spring, _damper) for number in numbers),
+        parameters=tuple(_parameters(numbers)),
         actuated=(Coordinate(name="axis", unit="m"),),
         unactuated=tuple(Coordinate(name=f"d{number}", unit="m") for number in numbers),
         loads=tuple(f"mass{number}" for number in numbers),
@@ -50,45 +59,20 @@ def member(masses: int) -> Plant:
     )
 
 
-def _mass(number: int) -> Parameter:
-    return Parameter(
-        name=f"m{number}", unit="kg", description=f"mass {number}", nominal=1.0, lower=1e-6, upper=1e6
-    )
-
-
-def _spring(number: int) -> Parameter:
-    return Parameter(
-        name=f"k{number}",
-        unit="N/m",
-        description=f"spring before mass {number}",
-        nominal=100.0,
-        lower=1e-6,
-        upper=1e12,
-    )
-
-
-def _damper(number: int) -> Parameter:
-    return Parameter(
-        name=f"c{number}",
-        unit="N s/m",
-        description=f"damper beside spring {number}",
-        nominal=0.0,
-        lower=0.0,
-        upper=1e9,
-    )
+def _parameters(numbers: range) -> Iterator[Parameter]:
+    for i in numbers:
+        yield Parameter(f"m{i}", "kg", f"mass {i}", nominal=1.0, lower=1e-6, upper=1e6)
+    for i in numbers:
+        yield Parameter(f"k{i}", "N/m", f"spring before mass {i}", nominal=100.0, lower=1e-6, upper=1e12)
+    for i in numbers:
+        yield Parameter(f"c{i}", "N s/m", f"damper beside spring {i}", nominal=0.0, lower=0.0, upper=1e9)
 
 
 def _equations(masses: int) -> Callable[..., Equations]:
     """Terms of the masses' equations of motion (module docstring)."""
     numbers = range(1, masses + 1)
 
-    def equations(
-        q_u: Sequence[Scalar],
-        dq_u: Sequence[Scalar],
-        q_a: Sequence[Scalar],
-        dq_a: Sequence[Scalar],
-        p: SimpleNamespace,
-    ) -> Equations:
+    def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
         del q_a, dq_a  # the chain feels the axis' acceleration only
         mass, stiffness, damping = ([getattr(p, f"{name}{i}") for i in numbers] for name in "mkc")
         springs, dampers = _forces(stiffness, q_u), _forces(damping, dq_u)
@@ -102,24 +86,24 @@ def _equations(masses: int) -> Callable[..., Equations]:
     return equations
 
 
-def _forces(gains: Sequence[Scalar], values: Sequence[Scalar]) -> list[Scalar]:
+def _forces(gains: Vector, values: Vector) -> list[Scalar]:
     """List the forces of all links, and of the missing one behind the last mass."""
     return [gain * step for gain, step in zip(gains, _steps(values), strict=True)] + [0.0]
 
 
-def _steps(values: Sequence[Scalar]) -> list[Scalar]:
+def _steps(values: Vector) -> list[Scalar]:
     """Difference of each link's ends."""
     return [after - before for before, after in zip([0.0, *values[:-1]], values, strict=True)]
 
 
-def _outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+def _outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Distance by which every mass trails its place behind the axis."""
     del q_a, p
     nothing = [0.0 for _ in q_u]
     return Outputs(sway=list(q_u), height=nothing, angle=nothing)
 
 
-def _mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+def _mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place the masses along the axis."""
     numbers, (axis,) = range(1, len(q_u) + 1), q_a
     links = zip(numbers, _steps(q_u), strict=True)

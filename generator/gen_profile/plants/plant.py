@@ -22,9 +22,10 @@ from gen_profile.plants.drawing import Drawing, Pose
 
 # A float, or a symbol that NumPy functions accept.
 Scalar = Any
+Vector = Sequence[Scalar]
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen
 class Parameter:
     """A physical constant of a machine.
 
@@ -41,9 +42,9 @@ class Parameter:
     name: str
     unit: str
     description: str
-    nominal: float
-    lower: float
-    upper: float
+    nominal: float = attrs.field(kw_only=True)
+    lower: float = attrs.field(kw_only=True)
+    upper: float = attrs.field(kw_only=True)
 
 
 @attrs.frozen(kw_only=True)
@@ -77,10 +78,10 @@ class Equations:
         Rows may be scaled by any positive factor, M_uu need not be symmetric.
     """
 
-    M_uu: Sequence[Sequence[Scalar]]
-    M_au: Sequence[Sequence[Scalar]]
-    K_u: Sequence[Scalar]
-    G_u: Sequence[Scalar]
+    M_uu: Sequence[Vector]
+    M_au: Sequence[Vector]
+    K_u: Vector
+    G_u: Vector
 
 
 @attrs.frozen(kw_only=True)
@@ -98,9 +99,9 @@ class Outputs:
         Of the rope that carries the load, from the vertical; 0 where nothing hangs.
     """
 
-    sway: Sequence[Scalar]
-    height: Sequence[Scalar]
-    angle: Sequence[Scalar]
+    sway: Vector
+    height: Vector
+    angle: Vector
 
 
 @attrs.frozen(kw_only=True)
@@ -117,7 +118,7 @@ class Mechanics:
         What all springs together have stored.
     """
 
-    mass: Sequence[Scalar]
+    mass: Vector
     place: Sequence[tuple[Scalar, Scalar, Scalar]]
     gravity: Scalar = 0.0
     springs: Scalar = 0.0
@@ -129,7 +130,7 @@ class Mechanics:
         return sum(weights, self.springs)
 
 
-def _no_bodies(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+def _no_bodies(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     del q_u, q_a, p
     return Mechanics(mass=[], place=[])
 
@@ -171,12 +172,10 @@ class Plant:
     unactuated: tuple[Coordinate, ...]
     loads: tuple[str, ...]
     directions: int = 1
-    equations: Callable[
-        [Sequence[Scalar], Sequence[Scalar], Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Equations
-    ]
-    outputs: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Outputs]
+    equations: Callable[[Vector, Vector, Vector, Vector, SimpleNamespace], Equations]
+    outputs: Callable[[Vector, Vector, SimpleNamespace], Outputs]
     bodies: tuple[str, ...] = ()
-    mechanics: Callable[[Sequence[Scalar], Sequence[Scalar], SimpleNamespace], Mechanics] = _no_bodies
+    mechanics: Callable[[Vector, Vector, SimpleNamespace], Mechanics] = _no_bodies
     small_sway: Callable[[SimpleNamespace], float] | None = None
     picture: Callable[[Pose], tuple[Drawing, ...]] | None = None
 

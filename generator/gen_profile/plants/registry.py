@@ -8,54 +8,26 @@ from __future__ import annotations
 import re
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from typing import cast
+from typing import Any, cast
 
 from gen_profile.errors import SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.soundness import faults_of
 from gen_profile.plugins import CURE, load_plugin
 
-# type → (module that holds PLANT, summary); modules load only when their machine is asked for
-BUILT_IN: dict[str, tuple[str, str]] = {
-    "double-pendulum-crane": (
-        "gen_profile.plants.double_pendulum_crane",
-        "cart, hook and payload on two ropes",
-    ),
-    "flexible-joint": ("gen_profile.plants.flexible_joint", "arm behind a torsion spring on a driven hub"),
-    "gantry-crane": (
-        "gen_profile.plants.gantry_crane",
-        "bridge and trolley, and a payload that swings in both directions",
-    ),
-    "single-pendulum-crane": (
-        "gen_profile.plants.single_pendulum_crane",
-        "cart with a hoist, and a payload on the rope",
-    ),
-    "slosh-tank": (
-        "gen_profile.plants.slosh_tank",
-        "liquid in a rectangular tank that is moved along its length",
-    ),
-    "tower-crane": (
-        "gen_profile.plants.tower_crane",
-        "slewing jib with a trolley, and a payload that swings along and across it",
-    ),
-}
-# family → (module whose `member` makes a machine of a number, a number to show, its summary)
-FAMILIES: dict[str, tuple[str, int, str]] = {
-    "mass-spring-chain": (
-        "gen_profile.plants.mass_spring_chain",
-        2,
-        "springs and masses behind a driven axis, 2 of each (or another number: it ends the type)",
-    ),
-}
+# a machine's module is named after its type, and loads only when it is asked for
+BUILT_IN = (
+    *("double-pendulum-crane", "flexible-joint", "gantry-crane"),
+    *("single-pendulum-crane", "slosh-tank", "tower-crane"),
+)
+FAMILIES = {"mass-spring-chain": 2}  # whose module has a `member` of each number; one of them to show
 GROUP = "gen_profile.plants"
 
 
-def plant_types() -> dict[str, str]:
-    """Every known type with its summary, sorted; of a family one member."""
-    known = {entry.name: f"from {entry.value}" for entry in entry_points(group=GROUP)}
-    known |= {name: summary for name, (_, summary) in BUILT_IN.items()}
-    known |= {f"{family}-{number}": summary for family, (_, number, summary) in FAMILIES.items()}
-    return dict(sorted(known.items()))
+def plant_types() -> list[str]:
+    """List every known type, sorted; of a family one member."""
+    shown = (f"{family}-{number}" for family, number in FAMILIES.items())
+    return sorted({*BUILT_IN, *shown, *(entry.name for entry in entry_points(group=GROUP))})
 
 
 def find_plant(type_: str) -> Plant:
@@ -69,13 +41,17 @@ def find_plant(type_: str) -> Plant:
         Another distribution's machine cannot be loaded.
     """
     if type_ in BUILT_IN:
-        return cast(Plant, import_module(BUILT_IN[type_][0]).PLANT)
+        return cast(Plant, _module(type_).PLANT)
     family, _, number = type_.rpartition("-")
     if family in FAMILIES and re.fullmatch("[1-9][0-9]{0,3}", number):
-        return cast(Plant, import_module(FAMILIES[family][0]).member(int(number)))
+        return cast(Plant, _module(family).member(int(number)))
     for entry in entry_points(group=GROUP, name=type_):
         return _plant_of(entry)
     raise KeyError(type_)
+
+
+def _module(name: str) -> Any:
+    return import_module(f"gen_profile.plants.{name.replace('-', '_')}")
 
 
 def _plant_of(entry: EntryPoint) -> Plant:

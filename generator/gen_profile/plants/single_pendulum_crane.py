@@ -13,22 +13,15 @@ Abdel-Rahman, A. H. Nayfeh, Z. N. Masoud, Dynamics and control of cranes: a revi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
 from gen_profile.plants.drawing import Drawing, Pose, hanging, level
-from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Vector
 
 
-def equations(
-    q_u: Sequence[Scalar],
-    dq_u: Sequence[Scalar],
-    q_a: Sequence[Scalar],
-    dq_a: Sequence[Scalar],
-    p: SimpleNamespace,
-) -> Equations:
+def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the payload's equation of motion (module docstring)."""
     (phi,), (dphi,) = q_u, dq_u
     (_, hoist), (_, hoist_rate) = q_a, dq_a
@@ -41,14 +34,14 @@ def equations(
     )
 
 
-def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Sway relative to the cart, height below it and rope angle of the payload."""
     (phi,), (_, hoist) = q_u, q_a
     rope = p.L0 + hoist
     return Outputs(sway=[rope * np.sin(phi)], height=[-rope * np.cos(phi)], angle=[phi])
 
 
-def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place the payload below the cart."""
     seen, (cart, _) = outputs(q_u, q_a, p), q_a
     return Mechanics(mass=[p.m], place=[(cart - seen.sway[0], 0.0, seen.height[0])], gravity=p.g)
@@ -63,19 +56,12 @@ PLANT = Plant(
     type="single-pendulum-crane",
     summary="cart with a hoist, and a payload on the rope",
     parameters=(
-        Parameter(name="m", unit="kg", description="payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
+        Parameter("m", "kg", "payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
         Parameter(
-            name="L0",
-            unit="m",
-            description="from cart to payload with the hoist at 0",
-            nominal=2.0,
-            lower=1e-2,
-            upper=200.0,
+            "L0", "m", "from cart to payload with the hoist at 0", nominal=2.0, lower=1e-2, upper=200.0
         ),
-        Parameter(name="g", unit="m/s^2", description="gravity", nominal=9.81, lower=0.1, upper=30.0),
-        Parameter(
-            name="c", unit="N m s/rad", description="damping at the cart", nominal=0.0, lower=0.0, upper=1e9
-        ),
+        Parameter("g", "m/s^2", "gravity", nominal=9.81, lower=0.1, upper=30.0),
+        Parameter("c", "N m s/rad", "damping at the cart", nominal=0.0, lower=0.0, upper=1e9),
     ),
     actuated=(Coordinate(name="cart", unit="m"), Coordinate(name="hoist", unit="m", lower=0.0)),
     unactuated=(Coordinate(name="phi", unit="rad"),),

@@ -20,27 +20,29 @@ m = 8 ρ a³ b / (((2n − 1) π)⁴ L), which is Dodge's, too; the rest of the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, stacked, travel
-from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.plant import (
+    Coordinate,
+    Equations,
+    Mechanics,
+    Outputs,
+    Parameter,
+    Plant,
+    Scalar,
+    Vector,
+)
 
 ODD = (1, 3)  # 2n − 1 of the modes
 SMALL = 0.1  # of the tank's length and of the fill height, for waves of the linear theory
 SURFACE = 17  # points of the liquid's drawn surface
 
 
-def equations(
-    q_u: Sequence[Scalar],
-    dq_u: Sequence[Scalar],
-    q_a: Sequence[Scalar],
-    dq_a: Sequence[Scalar],
-    p: SimpleNamespace,
-) -> Equations:
+def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the pendulums' equations of motion (module docstring)."""
     del q_a, dq_a  # the liquid feels the tank's acceleration only
     lengths, dampings = zip(*(_pendulum(odd, p) for odd in ODD), strict=True)
@@ -65,14 +67,14 @@ def _pendulum(odd: int, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
     return length, 2.0 * ratio * omega * length
 
 
-def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
     """Rise of the liquid at the trailing wall, and the first mode's angle."""
     del q_a
     rise = sum(4.0 * p.a / (odd * np.pi) ** 2 * np.sin(theta) for odd, theta in zip(ODD, q_u, strict=True))
     return Outputs(sway=[rise], height=[rise], angle=[q_u[0]])
 
 
-def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place the modes' pendulums below their pivots: the part of the liquid that sloshes."""
     (tank,) = q_a
     mass, place = [], []
@@ -134,16 +136,12 @@ PLANT = Plant(
     type="slosh-tank",
     summary="liquid in a rectangular tank that is moved along its length",
     parameters=(
-        Parameter(
-            name="a", unit="m", description="tank length along the move", nominal=0.5, lower=1e-2, upper=100.0
-        ),
-        Parameter(name="b", unit="m", description="tank width across", nominal=0.3, lower=1e-2, upper=100.0),
-        Parameter(name="h", unit="m", description="fill height", nominal=0.25, lower=1e-3, upper=100.0),
-        Parameter(name="rho", unit="kg/m^3", description="density", nominal=998.0, lower=100.0, upper=2e4),
-        Parameter(
-            name="mu", unit="Pa s", description="dynamic viscosity", nominal=1.0e-3, lower=0.0, upper=1e3
-        ),
-        Parameter(name="g", unit="m/s^2", description="gravity", nominal=9.81, lower=0.1, upper=30.0),
+        Parameter("a", "m", "tank length along the move", nominal=0.5, lower=1e-2, upper=100.0),
+        Parameter("b", "m", "tank width across", nominal=0.3, lower=1e-2, upper=100.0),
+        Parameter("h", "m", "fill height", nominal=0.25, lower=1e-3, upper=100.0),
+        Parameter("rho", "kg/m^3", "density", nominal=998.0, lower=100.0, upper=2e4),
+        Parameter("mu", "Pa s", "dynamic viscosity", nominal=1.0e-3, lower=0.0, upper=1e3),
+        Parameter("g", "m/s^2", "gravity", nominal=9.81, lower=0.1, upper=30.0),
     ),
     actuated=(Coordinate(name="tank", unit="m"),),
     unactuated=(Coordinate(name="theta1", unit="rad"), Coordinate(name="theta2", unit="rad")),

@@ -22,23 +22,17 @@ A steady slew alone pulls the load outward, α̇² x, which only the trolley can
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.plants.drawing import Drawing, Pose, Shape, drawn, hanging, stacked
-from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Parameter, Plant, Scalar
+from gen_profile.plants.gantry_crane import outputs  # the payload hangs on the same joint
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Parameter, Plant, Vector
 
 
-def equations(
-    q_u: Sequence[Scalar],
-    dq_u: Sequence[Scalar],
-    q_a: Sequence[Scalar],
-    dq_a: Sequence[Scalar],
-    p: SimpleNamespace,
-) -> Equations:
+def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
     """Terms of the payload's equations of motion (module docstring)."""
     (theta_r, theta_t), (rate_r, rate_t) = q_u, dq_u
     (_, radius), (slew_rate, radius_rate) = q_a, dq_a
@@ -60,19 +54,7 @@ def equations(
     )
 
 
-def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
-    """Sway of the payload along and across the jib, its height below it, and the rope's two angles."""
-    del q_a
-    theta_r, theta_t = q_u
-    height = -p.L * np.cos(theta_r) * np.cos(theta_t)
-    return Outputs(
-        sway=[p.L * np.sin(theta_r) * np.cos(theta_t), p.L * np.sin(theta_t)],
-        height=[height, height],
-        angle=[theta_r, theta_t],
-    )
-
-
-def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place the payload below the trolley; at a slew angle of 0 the jib points along x."""
     seen, (slew, radius) = outputs(q_u, q_a, p), q_a
     along, across = radius - seen.sway[0], -seen.sway[1]
@@ -122,17 +104,10 @@ PLANT = Plant(
     type="tower-crane",
     summary="slewing jib with a trolley, and a payload that swings along and across it",
     parameters=(
-        Parameter(name="m", unit="kg", description="payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
-        Parameter(name="L", unit="m", description="rope", nominal=10.0, lower=1e-2, upper=200.0),
-        Parameter(name="g", unit="m/s^2", description="gravity", nominal=9.81, lower=0.1, upper=30.0),
-        Parameter(
-            name="c",
-            unit="N m s/rad",
-            description="damping at the trolley",
-            nominal=0.0,
-            lower=0.0,
-            upper=1e9,
-        ),
+        Parameter("m", "kg", "payload mass", nominal=1000.0, lower=1e-4, upper=1e6),
+        Parameter("L", "m", "rope", nominal=10.0, lower=1e-2, upper=200.0),
+        Parameter("g", "m/s^2", "gravity", nominal=9.81, lower=0.1, upper=30.0),
+        Parameter("c", "N m s/rad", "damping at the trolley", nominal=0.0, lower=0.0, upper=1e9),
     ),
     actuated=(Coordinate(name="slew", unit="rad"), Coordinate(name="trolley", unit="m", lower=0.0)),
     unactuated=(Coordinate(name="theta_r", unit="rad"), Coordinate(name="theta_t", unit="rad")),

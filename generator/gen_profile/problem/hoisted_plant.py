@@ -17,7 +17,7 @@ from types import SimpleNamespace
 import attrs
 
 from gen_profile.plants.drawing import Pose
-from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Plant, Scalar
+from gen_profile.plants.plant import Coordinate, Equations, Mechanics, Outputs, Plant, Vector
 from gen_profile.problem import symbolic as sym
 
 
@@ -42,22 +42,16 @@ def hoisted(plant: Plant, driven: tuple[str, ...]) -> Plant:
     known = {parameter.name: parameter for parameter in plant.parameters}
     axes = len(plant.actuated)
 
-    def told(q_a: Sequence[Scalar], p: SimpleNamespace) -> tuple[Sequence[Scalar], SimpleNamespace]:
+    def told(q_a: Vector, p: SimpleNamespace) -> tuple[Vector, SimpleNamespace]:
         return q_a[:axes], SimpleNamespace(**(vars(p) | dict(zip(driven, q_a[axes:], strict=True))))
 
-    def outputs(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Outputs:
+    def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
         return plant.outputs(q_u, *told(q_a, p))
 
-    def mechanics(q_u: Sequence[Scalar], q_a: Sequence[Scalar], p: SimpleNamespace) -> Mechanics:
+    def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
         return plant.mechanics(q_u, *told(q_a, p))
 
-    def equations(
-        q_u: Sequence[Scalar],
-        dq_u: Sequence[Scalar],
-        q_a: Sequence[Scalar],
-        dq_a: Sequence[Scalar],
-        p: SimpleNamespace,
-    ) -> Equations:
+    def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
         return _lagrange(mechanics(q_u, q_a, p), [q_u, q_a], [dq_u, dq_a])
 
     def picture(pose: Pose) -> tuple[()]:
@@ -82,7 +76,7 @@ def hoisted(plant: Plant, driven: tuple[str, ...]) -> Plant:
     )
 
 
-def _lagrange(bodies: Mechanics, q: Sequence[Sequence[Scalar]], dq: Sequence[Sequence[Scalar]]) -> Equations:
+def _lagrange(bodies: Mechanics, q: Sequence[Vector], dq: Sequence[Vector]) -> Equations:
     """Write the equations of the first coordinates, the others being driven."""
     (q_u, q_a), (dq_u, dq_a) = (map(sym.column, columns) for columns in (q, dq))
     everything, rates = sym.column([q_u, q_a]), sym.column([dq_u, dq_a])

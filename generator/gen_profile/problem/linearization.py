@@ -98,12 +98,35 @@ def eigenvalues(plant: Plant, machines: Array, q_a: Sequence[float] | Array) -> 
     q_a : (m,) sequence of float
         Where the axes stand.
     """
-    stiffness, damping = linear_terms(plant, machines, q_a)
+    return eigenvalues_at(plant, machines, [q_a])[0]
+
+
+def eigenvalues_at(
+    plant: Plant, machines: Array, places: Sequence[Sequence[float] | Array]
+) -> list[NDArray[np.complex128]]:
+    """Find the eigenvalues of many machines at rest at some places of the axes, each as `eigenvalues`."""
     n_u = len(plant.unactuated)
-    state = np.zeros((len(machines), 2 * n_u, 2 * n_u))
-    state[:, :n_u, n_u:] = np.eye(n_u)
-    state[:, n_u:, :n_u], state[:, n_u:, n_u:] = -stiffness, -damping
-    return np.asarray(np.linalg.eigvals(state), dtype=np.complex128)
+    found: list[NDArray[np.complex128]] = []
+    before: Array | None = None
+    for q_a in places:
+        stiffness, damping = linear_terms(plant, machines, q_a)
+        terms = np.concatenate([-stiffness, -damping], axis=2)
+        if before is None or not np.array_equal(terms, before):  # most machines are the same everywhere
+            state = np.zeros((len(machines), 2 * n_u, 2 * n_u))
+            state[:, :n_u, n_u:] = np.eye(n_u)
+            state[:, n_u:] = terms
+            rates = _undamped(stiffness) if not damping.any() else np.linalg.eigvals(state)
+            found.append(np.asarray(rates, dtype=np.complex128))
+        else:
+            found.append(found[-1])
+        before = terms
+    return found
+
+
+def _undamped(stiffness: Array) -> NDArray[np.complex128]:
+    """Find the eigenvalues ±√−k of machines without damping, from those of their stiffness."""
+    roots = np.sqrt(np.asarray(np.linalg.eigvals(-stiffness), dtype=np.complex128))
+    return np.concatenate([roots, -roots], axis=1)
 
 
 def linear_terms(plant: Plant, machines: Array, q_a: Sequence[float] | Array) -> tuple[Array, Array]:

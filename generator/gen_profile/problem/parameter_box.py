@@ -10,6 +10,7 @@ A place is a row of shares from 0 to 1, one per range: from its least value to i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from itertools import product
 
 import attrs
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.plants.plant import Plant
-from gen_profile.problem.linearization import eigenvalues
+from gen_profile.problem.linearization import eigenvalues_at
 from gen_profile.problem.problem import Problem
 from gen_profile.problem.symbolic import Array
 
@@ -92,12 +93,19 @@ class Box:
 
         Frequencies are the mean of those at both ends.
         """
-        machines, modes = self.machines(places), len(self.plant.unactuated)
-        found = [np.sort(eigenvalues(self.plant, machines, q_a).imag, axis=1) for q_a in self.ends]
-        return np.asarray(self.duration * np.mean(found, axis=0)[:, modes:])
+        ends = tuple(tuple(map(float, q_a)) for q_a in self.ends)
+        return self.duration * _frequencies(self.plant, self.machines(places).tobytes(), ends)
 
     def _names(self) -> list[str]:
         return [parameter.name for parameter in self.plant.parameters]
+
+
+@lru_cache(maxsize=4)  # the plan and the check look at the same box
+def _frequencies(plant: Plant, machines: bytes, ends: tuple[tuple[float, ...], ...]) -> Array:
+    """Find the frequencies of many machines in rad/s, the mean of those at some places of the axes."""
+    rows, modes = np.frombuffer(machines).reshape(-1, len(plant.parameters)), len(plant.unactuated)
+    found = [np.sort(rates.imag, axis=1)[:, modes:] for rates in eigenvalues_at(plant, rows, ends)]
+    return np.asarray(np.mean(found, axis=0))
 
 
 def box_of(problem: Problem, ranges: Mapping[str, tuple[float, float]]) -> Box | None:

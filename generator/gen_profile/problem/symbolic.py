@@ -6,8 +6,11 @@ Typing stops at `Symbol`; everything that comes out is a NumPy array or C text.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache, cached_property
+from math import prod
 from typing import Any
 
+import attrs
 import casadi
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +78,11 @@ def gradient(expression: Symbol, variables: Symbol) -> Symbol:
     return casadi.gradient(expression, variables)
 
 
+def depends(expression: Symbol, variables: Symbol) -> bool:
+    """Tell whether any entry of an expression has any of some variables in it."""
+    return bool(casadi.depends_on(casadi.simplify(expression), variables))
+
+
 def substitute(expression: Symbol, variables: Symbol, values: Symbol) -> Symbol:
     """Replace variables in an expression."""
     return casadi.substitute(expression, variables, values)
@@ -111,6 +119,60 @@ def entries(expression: Symbol) -> set[tuple[int, int]]:
     return set(zip(rows, columns, strict=True))
 
 
+_MANY = 160  # points from which on NumPy is quicker, operation by operation, than CasADi point by point
+_OPERATIONS: Mapping[str, Callable[..., Array]] = {
+    "ADD": np.add,
+    "SUB": np.subtract,
+    "MUL": np.multiply,
+    "DIV": np.divide,
+    "NEG": np.negative,
+    "INV": np.reciprocal,
+    "SQ": np.square,
+    "TWICE": lambda x: x + x,
+    "SQRT": np.sqrt,
+    "POW": np.power,
+    "CONSTPOW": np.power,
+    "EXP": np.exp,
+    "LOG": np.log,
+    "SIN": np.sin,
+    "COS": np.cos,
+    "TAN": np.tan,
+    "TANH": np.tanh,
+    "ATAN": np.arctan,
+    "ATAN2": np.arctan2,
+    "FABS": np.abs,
+    "FMIN": np.fmin,
+    "FMAX": np.fmax,
+}
+
+
+@attrs.frozen(kw_only=True, slots=True)
+class Instruction:
+    """One scalar operation of a compiled expression.
+
+    Attributes
+    ----------
+    operation : str
+        Such as ``"ADD"`` or ``"SIN"``. ``"INPUT"`` reads a row of a column, ``"OUTPUT"`` writes an entry of a
+        matrix, counted column by column; all else is in memory.
+    arguments, results : tuple of int
+        Numbers in memory that are read and written.
+    constant : float
+        What a ``"CONST"`` writes.
+    """
+
+    operation: str
+    arguments: tuple[int, ...]
+    results: tuple[int, ...]
+    constant: float = 0.0
+
+
+@cache
+def _operation_names() -> dict[int, str]:
+    codes = (name for name in dir(casadi) if name.startswith("OP_"))
+    return {getattr(casadi, name): name.removeprefix("OP_") for name in codes}
+
+
 class Function:
     """A compiled expression, evaluated at many points in one call.
 
@@ -135,23 +197,71 @@ class Function:
         self._shape: tuple[int, int] = outputs[0].shape
         self._evaluators: dict[int, Callable[[Sequence[Array]], Array]] = {}
 
+    @cached_property
+    def _operations(self) -> list[_Operation]:
+        return _operations(self.instructions())
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the first output."""
+        return self._shape
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """List what is computed, one scalar operation after the other."""
+        f, names = self._function, _operation_names()
+        codes = [f.instruction_id(k) for k in range(f.n_instructions())]
+        return tuple(
+            Instruction(
+                operation=names[code],
+                arguments=tuple(f.instruction_input(k)),
+                results=tuple(f.instruction_output(k)),
+                constant=f.instruction_constant(k) if code == casadi.OP_CONST else 0.0,
+            )
+            for k, code in enumerate(codes)
+        )
+
     def __call__(self, *arguments: Array) -> Array:
         """Evaluate.
 
         Parameters
         ----------
-        *arguments : (points, rows) arrays
-            One per input; an input with one point is used for all.
+        *arguments : (…, rows) arrays
+            One per input; their leading axes are broadcast, so what is alike along one need be given once.
 
         Returns
         -------
-        (points, output rows, output columns) array
+        (…, output rows, output columns) array
             In Fortran order within a point, so that a one-column output is contiguous.
         """
-        points = max(len(argument) for argument in arguments)
+        shape = np.broadcast_shapes(*[argument.shape[:-1] for argument in arguments])
+        points = prod(shape)
+        if points >= _MANY and self._operations:
+            return self._by_operations(shape, arguments)
         if points not in self._evaluators:
             self._evaluators[points] = self._evaluator(points)
-        return self._evaluators[points](arguments)
+        if len(shape) > 1:
+            whole = [np.broadcast_to(argument, (*shape, argument.shape[-1])) for argument in arguments]
+            arguments = tuple(argument.reshape(points, -1) for argument in whole)
+        return self._evaluators[points](arguments).reshape(*shape, *self._shape)
+
+    def _by_operations(self, shape: tuple[int, ...], arguments: Sequence[Array]) -> Array:
+        """Carry out every operation for all points; along an axis that no input of it has, once."""
+        columns = [_first(np.asarray(argument)) for argument in arguments]
+        rows, width = self._shape
+        result = np.zeros((width * rows, *shape))
+        known: dict[int, Any] = {}
+        with np.errstate(all="ignore"):
+            for name, operation, places, place in self._operations:
+                if operation is not None:
+                    known[place] = operation(*[known[one] for one in places])
+                elif name == "INPUT":
+                    known[place] = columns[places[0]][places[1]]
+                elif name == "OUTPUT":
+                    result[place] = known[places[0]]
+                else:
+                    known[place] = places[0]
+        points = np.ascontiguousarray(np.moveaxis(result, 0, -1)).reshape(*shape, width, rows)
+        return points.swapaxes(-1, -2)
 
     def _evaluator(self, points: int) -> Callable[[Sequence[Array]], Array]:
         """Bind a mapped function to fixed buffers: CasADi's own conversions cost more than its evaluation."""
@@ -172,6 +282,26 @@ class Function:
             return result.transpose(0, 2, 1).copy()
 
         return evaluate
+
+
+def _first(argument: Array) -> Array:
+    """Put the last axis first, each of its entries in one piece."""
+    return np.ascontiguousarray(np.moveaxis(argument, -1, 0))
+
+
+_Operation = tuple[str, "Callable[..., Array] | None", tuple[Any, ...], int]
+
+
+def _operations(instructions: Sequence[Instruction]) -> list[_Operation]:
+    """List operations of the first output, with the places read and written; none where NumPy lacks one."""
+    found: list[_Operation] = []
+    for step in instructions:
+        name, reads, operation = step.operation, step.arguments, _OPERATIONS.get(step.operation)
+        if operation is None and name not in ("CONST", "INPUT", "OUTPUT"):
+            return []
+        if name != "OUTPUT" or step.results[0] == 0:
+            found.append((name, operation, (step.constant,) if name == "CONST" else reads, step.results[-1]))
+    return found
 
 
 def c_source(*functions: Function) -> str:

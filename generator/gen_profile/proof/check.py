@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,7 @@ def check_block(
     *,
     histories: int | None = None,
     history: int | None = None,
+    scheduler: str | None = None,
     progress: Progress = untold,
 ) -> BlockJudgement:
     """Prove a file again, or replay one history of its proof, and compare it with its manifest.
@@ -99,6 +101,8 @@ def check_block(
         How many, in place of those that the manifest tells of.
     history : int, optional
         Number of the only one to run.
+    scheduler : str, optional
+        Address of a Dask scheduler, whose workers run the histories.
     progress : callable
         Told what is being done.
 
@@ -123,11 +127,12 @@ def check_block(
     slowed = known.get("slowed", not known)
     if history is not None and not 0 <= history < count:
         raise SpecError(f"history {history}: the histories are numbered from 0 to {count - 1}.")
+    proof = partial(prove, spec, text, histories=count, slowed=slowed, scheduler=scheduler, progress=progress)
     if history is None:
-        found = prove(spec, text, histories=count, slowed=slowed, progress=progress)
+        found = proof()
     else:
         if known.get("histories") != count:  # the search's histories depend on what it has found
-            known = prove(spec, text, histories=count, slowed=slowed, progress=progress).to_dict()
+            known = proof().to_dict()
         seed, parents = known["seed"], known["search_parents"]
         numbering = Numbering.of(Histories.of(spec, slowed=slowed), count, seed, parents)
         found = replay(spec, text, numbering, history, progress)

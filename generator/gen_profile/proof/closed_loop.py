@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -77,9 +76,7 @@ class ClosedLoop:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._open.close()
 
     @property
@@ -117,7 +114,7 @@ class ClosedLoop:
                 self._block.called(),
                 self._script(history),
                 self._values(history, max_step or self.max_step),
-                led=(0,),
+                led=tuple(self._histories.axes),
                 hoists=self._hoists(history),
                 rows=rows,
             )
@@ -135,7 +132,8 @@ class ClosedLoop:
         traced = self.run(history, rows=cycles).trace
         assert traced is not None
         position = np.tile(self._places(history), (len(traced) + 1, 1))
-        position[1:, 0] = traced[:, self.outputs.index("fPosition")]
+        for number, axis in self._histories.axes.items():
+            position[1:, number] = traced[:, self.outputs.index(axis.of("fPosition"))]
         script = self._script(history)
         row = np.searchsorted(script.begins, np.arange(len(traced)), side="right") - 1
         for hoist in self._hoists(history):
@@ -152,12 +150,15 @@ class ClosedLoop:
         return float(np.abs(response.sway[1:] - traced[:, len(self.outputs) :]).max())
 
     def _script(self, history: History) -> Script:
-        values = self._block.inputs | {"bEnable": 1.0, "fActPosition": history.places[0]}
+        axes, places = self._histories.axes, history.places
+        stands = {axis.of("fActPosition"): places[number] for number, axis in axes.items()}
+        values = self._block.inputs | {"bEnable": 1.0, **stands}
         values |= {f"f{name}": value for name, value in history.live.items()}
-        begins, inputs = self._hoisted(history, *input_rows(history.commands, values, self.cycle))
-        limits, period = self._spec.limits.of(0), self._histories.period
-        assert limits.velocity and limits.travel
-        patience = PATIENCE * period + (limits.travel[1] - limits.travel[0]) / limits.velocity
+        begins, inputs = self._hoisted(
+            history, *input_rows(history.commands, [*axes.values()], values, self.cycle)
+        )
+        period = self._histories.period
+        patience = PATIENCE * period + max(map(self._crossing, axes))
         watch = max(SHORTEST_WATCH, WATCHED * period)
         settle = STANDSTILL * (self._spec.actuator.tau or 0.0)
         longest, settled, watched = (math.ceil(time / self.cycle) for time in (patience, settle, watch))
@@ -169,6 +170,12 @@ class ClosedLoop:
             settle=settled,
             watch=watched,
         )
+
+    def _crossing(self, axis: int) -> float:
+        """Find the time in s that an axis needs from end to end at its greatest velocity."""
+        limits = self._spec.limits.of(axis)
+        assert limits.velocity and limits.travel
+        return (limits.travel[1] - limits.travel[0]) / limits.velocity
 
     def _hoisted(self, history: History, begins: list[int], inputs: Array) -> tuple[Sequence[int], Array]:
         """Give a row to every cycle in which live parameters change."""

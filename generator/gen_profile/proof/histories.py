@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate, islice, pairwise, product
-from typing import Self
+from typing import Any, Self
 
 import attrs
 import numpy as np
@@ -19,6 +19,8 @@ from scipy.stats import qmc
 from gen_profile.motion.profile import Array
 from gen_profile.planner.commands import Command
 from gen_profile.planner.design import target_range
+from gen_profile.planner.interface import BlockAxis
+from gen_profile.planner.machine import planned_axes
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
@@ -32,10 +34,11 @@ MOST_COMMANDS = 16
 MANNERS = ((0.85, 0.05, 0.1), (0.05, 0.9, 0.05), (0.4, 0.4, 0.2))  # shares of positions, a stick, and stops
 MOST_CORNERS = 10  # ranges up to which all corners are tried where histories are enough
 SLOWEST = 0.3  # override, and velocity limit as a share of the machine's
+ALONE = 0.1  # half the share of stick commands that leave one of several axes alone
 LEGS = 8  # of one speed each, in which a live parameter changes on the way
 HOISTED_ON = 2.0  # periods after the last command in which it still may
 
-_PER_COMMAND = 3  # choices: which, its value, how long; and how slowly, where that is varied
+_PER_COMMAND = 2  # choices: which, how long; its values; and how slowly, where that is varied
 _PER_LEG = 2  # choices: speed, how long
 
 
@@ -52,6 +55,8 @@ class History:
     places : tuple of float
         Where the machine's axes stand at first, in m (or rad).
     commands : tuple of Command
+    axes : mapping of int to BlockAxis
+        Which of the machine's axes the block plans.
     hoisting : mapping of str to tuple of (float, float)
         What the block is told of live parameters that change on the way: corners (time in s, value) of a
         line, which begins with the value in `live` and ends constant.
@@ -61,7 +66,37 @@ class History:
     parameters: Mapping[str, float]
     places: tuple[float, ...]
     commands: tuple[Command, ...]
+    axes: Mapping[int, BlockAxis] = {0: BlockAxis(name="")}
     hoisting: Mapping[str, tuple[tuple[float, float], ...]] = attrs.field(factory=dict)
+
+    @property
+    def starts(self) -> dict[str, float]:
+        """Where the planned axes stand at first, by names with their units."""
+        return {f"{axis.prefix}start_{axis.unit}": self.places[number] for number, axis in self.axes.items()}
+
+    @property
+    def start_words(self) -> str:
+        """Where they stand, in words."""
+        return ", ".join(
+            f"{axis.name} {self.places[number]:.4g} {axis.unit}".lstrip()
+            for number, axis in self.axes.items()
+        )
+
+    def described(self, command: Command) -> dict[str, Any]:
+        """Nest plain values of a command for JSON."""
+        axes = list(self.axes.values())
+        values = command.values or (0.0,) * len(axes)
+        limits = command.velocity_limits or (0.0,) * len(axes)
+        return {
+            "time_s": command.time,
+            "command": command.command,
+            **{axis.of("value"): value for axis, value in zip(axes, values, strict=True)},
+            "override": command.override,
+            **{
+                f"{axis.prefix}velocity_limit_{axis.unit}_per_s": limit
+                for axis, limit in zip(axes, limits, strict=True)
+            },
+        }
 
     @property
     def brakes(self) -> bool:
@@ -76,6 +111,8 @@ class Histories:
     Attributes
     ----------
     spec : Spec
+    axes : mapping of int to BlockAxis
+        That the block plans.
     uncertain : mapping of str to (float, float)
         Ranges of the machine's parameters; of a live one, of its ratio to what the block is told.
     period : float
@@ -87,6 +124,7 @@ class Histories:
     """
 
     spec: Spec
+    axes: Mapping[int, BlockAxis]
     uncertain: Mapping[str, tuple[float, float]]
     period: float
     fastest: float
@@ -110,7 +148,14 @@ class Histories:
             found.append(linearize(spec.machine(), *_machine(spec, told, errors)).frequencies)
         slowest, fastest = float(np.min(found)), float(np.max(found))
         period = 2.0 * np.pi / slowest
-        return cls(spec=spec, uncertain=ranges, period=period, fastest=fastest, slowed=slowed)
+        return cls(
+            spec=spec,
+            axes=planned_axes(spec),
+            uncertain=ranges,
+            period=period,
+            fastest=fastest,
+            slowed=slowed,
+        )
 
     @property
     def driven(self) -> tuple[str, ...]:
@@ -134,11 +179,16 @@ class Histories:
 
     @property
     def _per_command(self) -> int:
-        return _PER_COMMAND + self.slowed
+        return _PER_COMMAND + len(self.axes) + self.slowed
+
+    @property
+    def _first_command(self) -> int:
+        """Number of choices before: where it starts, the box, when and how it is commanded, and its end."""
+        return len(self.axes) + self.box + 3 + len(self.axes)
 
     @property
     def _first_leg(self) -> int:
-        return 5 + self.box + self._per_command * MOST_COMMANDS
+        return self._first_command + self._per_command * MOST_COMMANDS
 
     @property
     def _ends(self) -> int:
@@ -164,7 +214,8 @@ class Histories:
         every = 2 ** min(self._ends, 62)
         numbers = np.arange(every) if every == corners else random.integers(every, size=corners)
         ends = (numbers[:, None] >> np.arange(self._ends)) & 1
-        drawn[:corners, 1 : 1 + self.box] = ends[:, : self.box]
+        first = len(self.axes)
+        drawn[:corners, first : first + self.box] = ends[:, : self.box]
         for number, end in enumerate(ends[:, self.box :].T):
             first = self._first_leg + number * LEGS * _PER_LEG
             drawn[:corners, first : first + LEGS * _PER_LEG : _PER_LEG] = end[:, None]
@@ -177,24 +228,27 @@ class Histories:
 
     def history(self, choices: Array) -> History:
         """Make the history of some choices, shape (choices,)."""
-        start, *box, first, manner, amount, ending = choices[: 5 + self.box].tolist()
-        live, uncertain = self.spec.planner.live, self.uncertain
+        axes, live, uncertain = len(self.axes), self.spec.planner.live, self.uncertain
+        parts = np.split(choices[: self._first_command], np.cumsum([axes, self.box, 3]))
+        starts, box, (first, manner, amount), ending = (part.tolist() for part in parts)
         told = {name: _between(ends, share) for (name, ends), share in zip(live.items(), box, strict=False)}
         errors = {
             name: _between(ends, share)
             for (name, ends), share in zip(uncertain.items(), box[len(live) :], strict=True)
         }
         parameters, places = _machine(self.spec, told, errors)
-        travel = self.spec.limits.of(0).travel
-        assert travel is not None
-        places[0] = _between(travel, _widened(start))
-        rows = choices[5 + self.box : self._first_leg].reshape(MOST_COMMANDS, self._per_command)
+        for number, start in zip(self.axes, starts, strict=True):
+            travel = self.spec.limits.of(number).travel
+            assert travel is not None
+            places[number] = _between(travel, _widened(start))
+        rows = choices[self._first_command : self._first_leg].reshape(MOST_COMMANDS, self._per_command)
         commands = tuple(self._commands(rows[: int(amount * MOST_COMMANDS)], first, manner, ending))
         return History(
             live=told,
             parameters=parameters,
             places=tuple(places),
             commands=commands,
+            axes=self.axes,
             hoisting=self._hoisting(choices[self._first_leg :], told, commands[-1].time),
         )
 
@@ -217,48 +271,56 @@ class Histories:
         """Parameters of a machine that differs by some errors from what the block is told in a history."""
         return _machine(self.spec, history.live, errors)[0]
 
-    def _commands(self, rows: Array, first: float, manner: float, ending: float) -> Iterator[Command]:
+    def _commands(
+        self, rows: Array, first: float, manner: float, ending: Sequence[float]
+    ) -> Iterator[Command]:
         """Follow the rows until their time is over, then come to rest."""
         within = max(COMMANDED, PERIODS * self.period)
         likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
-        time = first * SOONEST
-        for which, value, lasts, *slow in rows.tolist():
+        time, last = first * SOONEST, 1 + len(self.axes)
+        for row in rows.tolist():
             if time > within:
                 break
-            command = self._command(time, int(np.searchsorted(np.cumsum(likely), which)), value)
-            yield self._slowed(command, *slow)
-            time += self.period * SHORTEST * (LONGEST / SHORTEST) ** lasts
+            command = self._command(time, int(np.searchsorted(np.cumsum(likely), row[0])), row[1:last])
+            yield self._slowed(command, *row[last + 1 :])
+            time += self.period * SHORTEST * (LONGEST / SHORTEST) ** row[last]
         time = min(time, within)
-        if ending < 0.05:
-            yield Command(time=time, command="quick-stop", value=0.0, live={})
+        how, *others = ending
+        if how < 0.05:
+            yield Command(time=time, command="quick-stop")
         else:
-            yield self._command(time, 0 if ending < 0.5 else 2, (ending - 0.05) / 0.45)
+            yield self._command(time, 0 if how < 0.5 else 2, [(how - 0.05) / 0.45, *others])
 
     def _slowed(self, command: Command, choice: float = 0.0) -> Command:
         """Limit one command in four by the override, and one in four by the velocity limit."""
-        limit = self.spec.limits.of(0).velocity
-        assert limit
         if choice < 0.5:
             return command
         if choice < 0.75:
             return attrs.evolve(command, override=_between((SLOWEST, 1.0), 4.0 * choice - 2.0))
-        return attrs.evolve(command, velocity_limit=limit * _between((SLOWEST, 1.0), 4.0 * choice - 3.0))
+        share = _between((SLOWEST, 1.0), 4.0 * choice - 3.0)
+        return attrs.evolve(command, velocity_limits=tuple(share * self._velocity(k) for k in self.axes))
 
-    def _command(self, time: float, which: int, value: float) -> Command:
-        limits = self.spec.limits.of(0)
-        assert limits.velocity
+    def _command(self, time: float, which: int, values: Sequence[float]) -> Command:
         match which:
             case 0:
-                targets = target_range(self.spec)
-                return Command(
-                    time=time, command="position", value=_between(targets, _widened(value)), live={}
-                )
+                targets = (target_range(self.spec, number) for number in self.axes)
+                places = (_between(ends, _widened(v)) for ends, v in zip(targets, values, strict=True))
+                return Command(time=time, command="position", values=tuple(places))
             case 1:
-                ends = (-limits.velocity, limits.velocity)
-                return Command(
-                    time=time, command="velocity", value=_between(ends, _widened(value, 0.25)), live={}
-                )
-        return Command(time=time, command="stop", value=0.0, live={})
+                ends = ((-self._velocity(number), self._velocity(number)) for number in self.axes)
+                speeds = (_between(between, self._stick(v)) for between, v in zip(ends, values, strict=True))
+                return Command(time=time, command="velocity", values=tuple(speeds))
+        return Command(time=time, command="stop")
+
+    def _velocity(self, axis: int) -> float:
+        limit = self.spec.limits.of(axis).velocity
+        assert limit
+        return limit
+
+    def _stick(self, choice: float) -> float:
+        """Choose a share from end to end; of several axes, each is left alone now and then."""
+        alone = len(self.axes) > 1 and abs(choice - 0.5) < ALONE
+        return 0.5 if alone else _widened(choice, 0.25)
 
 
 def _between(ends: tuple[float, float], share: float) -> float:

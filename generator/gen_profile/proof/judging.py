@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from gen_profile.planner.design import quick_limits
+from gen_profile.planner.interface import BlockAxis
 from gen_profile.proof.histories import History
+from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.verdict import JudgedHistory
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.st_to_c import FAULTS
-from gen_profile_fmu.running.block_run import BlockRun
+from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
 
 ROUNDING = 1e-9  # by which setpoints may miss a limit, in m and s
 STEADY = 1e-9  # m, by which setpoints may move while the axis stands
+
+Judge = Callable[[Numbering, Sequence[int]], list[JudgedHistory]]
 
 
 def judge_run(
@@ -49,36 +53,49 @@ def judge_run(
 
 
 def _shares(spec: Spec, history: History, run: BlockRun) -> dict[str, float]:
-    own, (axis,) = spec.limits.of(0), run.axes
-    assert own.velocity and own.acceleration and own.jerk and own.travel
-    acceleration, jerk = quick_limits(spec) if history.brakes else (own.acceleration, own.jerk)
-    low, high = own.travel
-    return {
-        "velocity": axis.velocity / own.velocity,
-        "acceleration": axis.acceleration / acceleration,
-        "jerk": axis.jerk / jerk,
-        "beyond_travel_m": max(low - axis.lowest, axis.highest - high, 0.0),
-    }
+    """Shares of the limits that are taken, by quantity, and by axis where there are several."""
+    shares: dict[str, float] = {}
+    for (number, named), axis in zip(history.axes.items(), run.axes, strict=True):
+        own = spec.limits.of(number)
+        assert own.velocity and own.acceleration and own.jerk and own.travel
+        acceleration, jerk = quick_limits(spec, number) if history.brakes else (own.acceleration, own.jerk)
+        low, high = own.travel
+        shares |= {
+            f"{named.prefix}velocity": axis.velocity / own.velocity,
+            f"{named.prefix}acceleration": axis.acceleration / acceleration,
+            f"{named.prefix}jerk": axis.jerk / jerk,
+            f"{named.prefix}beyond_travel_{named.unit}": max(low - axis.lowest, axis.highest - high, 0.0),
+        }
+    return shares
 
 
 def _faults(history: History, run: BlockRun, limits: dict[str, float]) -> Iterator[str]:
     """Say what is wrong, each in words that end a sentence."""
-    (axis,) = run.axes
     if run.fault:
         yield f"the block {FAULTS[run.fault]}"
         return
-    for name in ("velocity", "acceleration", "jerk"):
-        if not limits[name] <= 1.0 + ROUNDING:
-            yield f"the {name} is above its limit by {100.0 * (limits[name] - 1.0):.3g} %"
-    if not limits["beyond_travel_m"] <= ROUNDING:
-        yield f"the axis leaves its travel by {limits['beyond_travel_m']:.3g} m"
-    if not axis.gap <= ROUNDING and not history.brakes:  # a quick stop ends within a cycle
-        yield f"a setpoint jumps by {axis.gap:.3g} m"
+    for named, axis in zip(history.axes.values(), run.axes, strict=True):
+        yield from _axis_faults(history, named, axis, limits)
     if run.stands < 0:
-        yield "the axis does not come to rest"
-    elif not axis.creep <= STEADY:
-        yield f"the axis moves on at rest by {axis.creep:.3g} m"
+        yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
     if run.error:
         yield f"the block shows error {run.error}"
     if not run.promise and not history.brakes:
         yield "the block takes its promise back"
+
+
+def _axis_faults(
+    history: History, named: BlockAxis, axis: AxisExtremes, limits: dict[str, float]
+) -> Iterator[str]:
+    of, which = (f" of {named.name}", f"axis {named.name}") if named.name else ("", "axis")
+    for name in ("velocity", "acceleration", "jerk"):
+        share = limits[f"{named.prefix}{name}"]
+        if not share <= 1.0 + ROUNDING:
+            yield f"the {name}{of} is above its limit by {100.0 * (share - 1.0):.3g} %"
+    beyond = limits[f"{named.prefix}beyond_travel_{named.unit}"]
+    if not beyond <= ROUNDING:
+        yield f"the {which} leaves its travel by {beyond:.3g} {named.unit}"
+    if not axis.gap <= ROUNDING and not history.brakes:  # a quick stop ends within a cycle
+        yield f"a setpoint{of} jumps by {axis.gap:.3g} {named.unit}"
+    if not axis.creep <= STEADY:
+        yield f"the {which} moves on at rest by {axis.creep:.3g} {named.unit}"

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, ExitStack
+from functools import partial
 
 import numpy as np
 
+from gen_profile.errors import OutputError
 from gen_profile.progress import Progress, untold
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories
-from gen_profile.proof.judging import judge_run
+from gen_profile.proof.judging import Judge, judge_run
 from gen_profile.proof.numbering import KEPT, Numbering
 from gen_profile.proof.verdict import JudgedHistory, Proof
 from gen_profile.spec.model import Spec
@@ -30,6 +33,7 @@ def prove(
     histories: int = HISTORIES,
     slowed: bool = True,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Progress = untold,
 ) -> Proof:
     """Prove a written block on many histories, which the spec's `check.seed` draws.
@@ -45,6 +49,8 @@ def prove(
         As of `Histories`.
     workers : int, optional
         Processors to use; all that there are by default. What is found does not depend on it.
+    scheduler : str, optional
+        Address of a Dask scheduler, whose workers run the histories instead.
     progress : callable
         Told what is being done.
 
@@ -54,14 +60,24 @@ def prove(
         It is no planner block's text.
     CosimulationError
         Something cannot be compiled or loaded.
+    SpecError
+        No worker of the scheduler answers, or they cannot do it.
+    OutputError
+        Dask is not installed.
     """
     numbering = Numbering.of(Histories.of(spec, slowed=slowed), histories, spec.check.seed)
-    with closed_loop(spec, text, numbering.histories, workers, progress) as loop:
-        judged = _judge(spec, loop, numbering, range(len(numbering.drawn)), progress)
+    with ExitStack() as stack:
+        judge: Judge | None = None
+        if scheduler is not None:  # before anything takes its time
+            on_cluster = _on_cluster(spec, text, numbering.histories, scheduler, progress)
+            judge = stack.enter_context(on_cluster)
+        loop = stack.enter_context(closed_loop(spec, text, numbering.histories, workers, progress))
+        judge = judge or partial(_judge, spec, loop, progress)
+        judged = judge(numbering, range(len(numbering.drawn)))
         for numbers in numbering.rounds:
             worst = sorted(judged, key=lambda one: _share(spec, one), reverse=True)[:KEPT]
             numbering = numbering.after_round([one.number for one in worst])
-            judged += _judge(spec, loop, numbering, numbers, progress)
+            judged += judge(numbering, numbers)
         return _verdict(spec, loop, numbering, judged, progress)
 
 
@@ -81,7 +97,7 @@ def replay(spec: Spec, text: str, numbering: Numbering, number: int, progress: P
         That judges nothing else, with the history's trace.
     """
     with closed_loop(spec, text, numbering.histories, 1, progress) as loop:
-        judged = _judge(spec, loop, numbering, [number], progress)
+        judged = _judge(spec, loop, progress, numbering, [number])
         return _verdict(spec, loop, numbering, judged, progress)
 
 
@@ -94,7 +110,7 @@ def closed_loop(
 
 
 def _judge(
-    spec: Spec, loop: ClosedLoop, numbering: Numbering, numbers: Sequence[int], progress: Progress
+    spec: Spec, loop: ClosedLoop, progress: Progress, numbering: Numbering, numbers: Sequence[int]
 ) -> list[JudgedHistory]:
     """Run the histories of some numbers."""
     histories = [numbering.history(number) for number in numbers]
@@ -106,6 +122,17 @@ def _judge(
             if number % TOLD == 0:
                 progress("proving", number, numbering.count)
     return judged
+
+
+def _on_cluster(
+    spec: Spec, text: str, histories: Histories, scheduler: str, progress: Progress
+) -> AbstractContextManager[Judge]:
+    """Let the workers of a Dask scheduler judge."""
+    try:
+        from gen_profile.proof.on_cluster import judged_on_cluster  # noqa: PLC0415  # Dask is an extra
+    except ModuleNotFoundError as error:
+        raise OutputError("A scheduler needs Dask: pip install 'gen-profile[sweep]'.") from error
+    return judged_on_cluster(spec, text, histories, scheduler, progress)
 
 
 def _share(spec: Spec, judged: JudgedHistory) -> float:

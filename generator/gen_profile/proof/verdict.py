@@ -8,9 +8,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.errors import CheckFailed
 from gen_profile.proof.histories import History
 from gen_profile.proof.numbering import CORNERS, DRAWS, SEARCH
+from gen_profile.verification.verdict import Examination
 
 GROUPS = {
     CORNERS: "ends of all live and uncertain ranges at once",
@@ -40,8 +40,8 @@ class JudgedHistory:
     residual, on_the_way : mapping of str to float
         Greatest sway of every load in m: once the axes stand, and at any time.
     limits : mapping of str to float
-        Greatest velocity, acceleration and jerk, each as a share of its limit, and by how much, in m, the
-        travel was left.
+        Of every axis the greatest velocity, acceleration and jerk, each as a share of its limit, and by how
+        much, in m (or rad), the travel was left.
     faults : tuple of str
         What else is wrong, in words that end a sentence.
     """
@@ -68,19 +68,10 @@ class JudgedHistory:
         return {
             "number": self.number,
             "group": self.group,
-            "start_m": self.history.places[0],
+            **self.history.starts,
             "live": dict(self.history.live),
             "parameters": dict(self.history.parameters),
-            "commands": [
-                {
-                    "time_s": command.time,
-                    "command": command.command,
-                    "value": command.value,
-                    "override": command.override,
-                    "velocity_limit_m_per_s": command.velocity_limit,
-                }
-                for command in self.history.commands
-            ],
+            "commands": [self.history.described(command) for command in self.history.commands],
             "hoisting": {
                 name: [{"time_s": time, "value": value} for time, value in corners]
                 for name, corners in self.history.hoisting.items()
@@ -95,7 +86,7 @@ class JudgedHistory:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Proof:
+class Proof(Examination):
     """Verdict on a planner block.
 
     Attributes
@@ -132,22 +123,6 @@ class Proof:
     apart: float
     sway_limit: float | None = None
     faults: tuple[str, ...] = ()
-
-    @property
-    def passed(self) -> bool:
-        """Whether every history keeps every limit, and FMPy agrees."""
-        return not self.reasons()
-
-    def raise_for_failure(self) -> None:
-        """Do nothing where the proof passed.
-
-        Raises
-        ------
-        CheckFailed
-            With the reasons.
-        """
-        if not self.passed:
-            raise CheckFailed("\n".join(self.reasons()))
 
     def share(self, judged: JudgedHistory) -> float:
         """Share of the limit of residual sway that a history takes up, the error bound included."""

@@ -61,13 +61,18 @@ class Animation:
     actors: Sequence[Actor]
     kind = "animation"
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self, bounds: Sequence[Sequence[float]] | None = None) -> dict[str, Any]:
         """Nest plain values for the page's script.
 
         Places at rest and swings away from them are whole numbers of a unit each, which are short to write.
+
+        Parameters
+        ----------
+        bounds : sequence of (left, bottom, width, height), optional
+            What every view shows, in m; all that the machines need by default.
         """
         views = len(self.actors[0].drawings)
-        bounds = [self._bounds(view) for view in range(views)]
+        bounds = bounds or [self._bounds(view) for view in range(views)]
         return {
             "step": float(self.times[-1]) / (len(self.times) - 1),
             "frames": len(self.times),

@@ -9,9 +9,9 @@ from typing import Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import sha256
+from gen_profile.artefacts.manifest import sha256, versions
 from gen_profile.comparison.compare import Comparison, compare
-from gen_profile.designs.design import Design, design, versions
+from gen_profile.designs.design import Design, design
 from gen_profile.evaluation.phrases import move, uncertain
 from gen_profile.progress import Progress, untold
 from gen_profile.report.content import Page
@@ -115,11 +115,7 @@ def report(
         measured = compare_measured(outcome.spec, outcome.plan.evaluation, read, arrival, log_start)
     comparison = compare(spec, progress) if compared else None
     progress("writing the report")
-    page = attrs.evolve(
-        _page(outcome, comparison, measured),
-        papers=[(name, value) for name, value in fields if value],
-        signatures=[name for name, value in fields if not value],
-    )
+    page = _page(outcome, comparison, measured).with_fields(fields)
     return Report(design=outcome, comparison=comparison, measured=measured, content=render(page))
 
 

@@ -155,6 +155,11 @@ class Page:
     papers: Sequence[tuple[str, str]] = ()
     signatures: Sequence[str] = ()
 
+    def with_fields(self, fields: Sequence[tuple[str, str]]) -> Page:
+        """Say what else the page shall hold: names and their values, or lines to sign where there is none."""
+        papers = [field for field in fields if field[1]]
+        return attrs.evolve(self, papers=papers, signatures=[name for name, value in fields if not value])
+
     @property
     def figures(self) -> list[Figure]:
         """All figures, in their order."""

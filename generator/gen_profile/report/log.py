@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import attrs
@@ -24,11 +24,11 @@ import numpy as np
 
 from gen_profile.errors import OutputError
 from gen_profile.identification.log_table import LogTable, read_table, read_text
+from gen_profile.identification.measurements import LEAST_SAMPLES, SI_UNITS
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.spec.model import Spec
 from gen_profile.units import COUNTS, UNITS
 
-LEAST_SAMPLES = 16
 # what loggers in some countries write, `gen-profile stream --log` among them: in English, German, French,
 # Italian and Spanish; the longest first, lest a part of one be taken for another
 WORDS = {
@@ -45,7 +45,6 @@ _COLUMN = re.compile(
     r"(?:[ _]?[\[(]?(?P<unit>s|ms|m|mm|um|rad|deg|counts)[\])]?)?",
     re.IGNORECASE,
 )
-_SI = {"sway": "m", "angle": "rad"}
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -116,34 +115,23 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
     OutputError
         It is no such table.
     """
-    table = read_table(text, f"measured {source}")
-    head = _head(table, spec, source, {} if columns is None else _chosen(columns))
-    names = list(table.rows[head])
-    if columns is None:
-        units = table.rows[head + 1] if head + 1 < len(table.rows) else []
-        told = {name: _column(_with_unit(name, unit), spec, source) for name, unit in _pairs(names, units)}
-        known = {name: column for name, column in told.items() if column is not None}
-        _require(known, names, spec, source)
-        places = [names.index(name) for name in known]
-    else:
-        chosen = _chosen(columns)
-        known = {meaning: _required(meaning, spec, source) for meaning in chosen}
-        _require(known, list(chosen), spec, source)
-        places = [table.place(head, column, f"measured {source}") for column in chosen.values()]
-    order = sorted(range(len(places)), key=lambda place: list(known.values())[place].quantity != "time")
-    numbers = table.numbers(head, [places[place] for place in order], f"measured {source}")
+    where = f"measured {source}"
+    table = read_table(text, where)
+    head, known = _known_columns(table, spec, where, columns)
+    known.sort(key=lambda pair: pair[1].quantity != "time")
+    places = [place for place, _ in known]
+    numbers = table.numbers(head, places, where)
     signals = {
-        (column.quantity, column.owner): numbers[:, order.index(place)] / column.divisor
-        for place, column in enumerate(known.values())
+        (column.quantity, column.owner): values / column.divisor
+        for (_, column), values in zip(known, numbers.T, strict=True)
     }
     times = signals.pop(("time", ""))
     if len(times) < LEAST_SAMPLES:
-        raise OutputError(f"measured {source}: needs at least {LEAST_SAMPLES} samples, found {len(times)}.")
+        raise OutputError(f"{where}: needs at least {LEAST_SAMPLES} samples, found {len(times)}.")
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
         raise OutputError(
-            f"measured {source}: the times must rise from row to row, and do not after "
-            f"{times[back[0]]:.6g} s."
+            f"{where}: the times must rise from row to row, and do not after {times[back[0]]:.6g} s."
         )
     by_quantity: dict[str, dict[str, Array]] = {"position": {}, "sway": {}, "angle": {}}
     for (quantity, owner), values in signals.items():
@@ -154,8 +142,66 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
         positions=by_quantity["position"],
         sways=by_quantity["sway"],
         angles=by_quantity["angle"],
-        ignored=tuple(name for place, name in enumerate(names) if place not in places),
+        ignored=tuple(name for place, name in enumerate(table.rows[head]) if place not in places),
     )
+
+
+def _known_columns(
+    table: LogTable, spec: Spec, where: str, columns: str | None
+) -> tuple[int, list[tuple[int, _Column]]]:
+    """Find the row of names, and the places of columns of this machine with what they hold."""
+    if columns is None:
+        head = _head(table, ())
+        names = list(table.rows[head])
+        told = {name: _column(_with_unit(name, unit), spec, where) for name, unit in _headings(table, head)}
+        known = {name: column for name, column in told.items() if column is not None}
+        places = [names.index(name) for name in known]
+    else:
+        chosen = _chosen(columns)
+        head, names = _head(table, chosen.values()), list(chosen)
+        known = {meaning: _required(meaning, spec, where) for meaning in chosen}
+    _require(known, names, spec, where)
+    if columns is not None:
+        places = [table.place(head, column, where) for column in chosen.values()]
+    return head, list(zip(places, known.values(), strict=True))
+
+
+def column_meanings(text: str, source: str, spec: Spec) -> list[tuple[str, str]]:
+    """List the columns of a table: their names, and what they hold as far as their names tell.
+
+    Parameters
+    ----------
+    text, source, spec
+        See `parse_log`.
+
+    Returns
+    -------
+    list of (str, str)
+        Such as ``("Last [mm]", "payload_sway_mm")``; the second is empty where a name tells nothing.
+
+    Raises
+    ------
+    OutputError
+        It is no table.
+    """
+    where = f"measured {source}"
+    table = read_table(text, where)
+    head = _head(table, ())
+    return [
+        (name if table.is_head(head) else "", _meaning(_with_unit(name, unit), spec, where))
+        for name, unit in _headings(table, head)
+    ]
+
+
+def _meaning(name: str, spec: Spec, where: str) -> str:
+    """Write what a column holds in the words of `read_log`."""
+    try:
+        found, column = _COLUMN.fullmatch(name), _column(name, spec, where)
+    except OutputError:  # in a unit of something else, which `parse_log` tells
+        return ""
+    if found is None or column is None:
+        return ""
+    return "_".join(filter(None, (column.owner, column.quantity, (found["unit"] or "").lower())))
 
 
 def _chosen(columns: str) -> dict[str, str]:
@@ -168,8 +214,8 @@ def _chosen(columns: str) -> dict[str, str]:
     return {meaning.strip(): column.strip() for meaning, _, column in pairs}
 
 
-def _required(meaning: str, spec: Spec, source: str) -> _Column:
-    found = _column(meaning, spec, source)
+def _required(meaning: str, spec: Spec, where: str) -> _Column:
+    found = _column(meaning, spec, where)
     if found is None:
         plant = spec.machine()
         raise OutputError(
@@ -180,22 +226,24 @@ def _required(meaning: str, spec: Spec, source: str) -> _Column:
     return found
 
 
-def _head(table: LogTable, spec: Spec, source: str, chosen: Mapping[str, str]) -> int:
-    """Find the row of names, below whatever a logger wrote above it."""
+def _head(table: LogTable, chosen: Collection[str]) -> int:
+    """Find the row of names, chosen or known ones, below what a logger wrote above it."""
+    stated = {column for column in chosen if not column.isdecimal()}
     for row, cells in enumerate(table.rows):
-        if chosen:
-            found = len(set(cells) & set(chosen.values()))
-        else:
-            found = sum(_COLUMN.fullmatch(cell) is not None for cell in cells) - 1
-        if found > 0:
+        known = sum(_COLUMN.fullmatch(cell) is not None for cell in cells)
+        if stated & set(cells) or (not chosen and known > 1):
             return row
         if row > 0 and table.is_head(row - 1) and not table.is_head(row):
             break
     return 0
 
 
-def _pairs(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, str]]:
-    return [(name, units[place] if place < len(units) else "") for place, name in enumerate(names)]
+def _headings(table: LogTable, head: int) -> list[tuple[str, str]]:
+    """List the names of a row, and what stands in the row below each, which may be its unit."""
+    below = head + 1 < len(table.rows)
+    return [
+        (name, table.cell(head + 1, place) if below else "") for place, name in enumerate(table.rows[head])
+    ]
 
 
 def _with_unit(name: str, below: str) -> str:
@@ -206,7 +254,7 @@ def _with_unit(name: str, below: str) -> str:
     return f"{name}_{unit}"
 
 
-def _column(name: str, spec: Spec, source: str) -> _Column | None:
+def _column(name: str, spec: Spec, where: str) -> _Column | None:
     """Tell what a column holds from its name; None where it is somebody else's."""
     found = _COLUMN.fullmatch(name)
     if found is None:
@@ -229,10 +277,10 @@ def _column(name: str, spec: Spec, source: str) -> _Column | None:
         owner = owner or (owners[-1] if plant.directions == 1 else "")
     if owner not in owners:
         return None
-    si = plant.actuated[owners.index(owner)].unit if quantity == "position" else _SI[quantity]
+    si = plant.actuated[owners.index(owner)].unit if quantity == "position" else SI_UNITS[quantity]
     divisor = _divisor(spec, owner if quantity == "position" else "", unit or "", si)
     if divisor is None:
-        raise OutputError(f"measured {source}: column {name!r} is in {unit}, which does not measure it.")
+        raise OutputError(f"{where}: column {name!r} is in {unit}, which does not measure it.")
     return _Column(quantity=quantity, owner=owner, divisor=divisor)
 
 
@@ -253,24 +301,24 @@ def _divisor(spec: Spec, axis: str, unit: str, si: str) -> float | None:
     return sign * UNITS[unit][1]
 
 
-def _require(known: Mapping[str, _Column], names: Sequence[str], spec: Spec, source: str) -> None:
+def _require(known: Mapping[str, _Column], names: Sequence[str], spec: Spec, where: str) -> None:
     """Hold the columns to what a comparison needs: a time, and something that was measured, each once."""
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise OutputError(f"measured {source}: two columns are called {twice!r}; rename one.")
+        raise OutputError(f"{where}: two columns are called {twice!r}; rename one.")
     held = [(column.quantity, column.owner) for column in known.values()]
     for name, column in known.items():
         if held.count((column.quantity, column.owner)) > 1:
-            raise OutputError(f"measured {source}: column {name!r} is there twice, in two units; remove one.")
+            raise OutputError(f"{where}: column {name!r} is there twice, in two units; remove one.")
     plant = spec.machine()
     examples = f"{plant.actuated[0].name}_position, {plant.loads[-1]}_sway, {plant.loads[-1]}_angle"
     if ("time", "") not in held:
         raise OutputError(
-            f"measured {source}: there is no column time_s (or time_ms); found {', '.join(names)[:200]}; "
+            f"{where}: there is no column time_s (or time_ms); found {', '.join(names)[:200]}; "
             "name the column of times, as columns time_s=1 does."
         )
     if len(held) < 2:
         raise OutputError(
-            f"measured {source}: there is no column of this machine ({examples}, with units behind "
+            f"{where}: there is no column of this machine ({examples}, with units behind "
             f"such as _mm or _deg); found {', '.join(names)[:200]}."
         )

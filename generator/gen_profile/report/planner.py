@@ -9,11 +9,12 @@ from typing import Any
 import attrs
 import tomli_w
 
-from gen_profile.artefacts.manifest import sha256
+from gen_profile.artefacts.manifest import sha256, versions
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.charts.proof import history_figure, map_figure
-from gen_profile.designs.design import versions
-from gen_profile.evaluation.phrases import mm, number
+from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, number
+from gen_profile.planner.commands import Command
+from gen_profile.planner.interface import BlockAxis
 from gen_profile.progress import Progress, untold
 from gen_profile.proof.check import BlockJudgement, check_block
 from gen_profile.proof.histories import Histories, History
@@ -22,12 +23,6 @@ from gen_profile.proof.verdict import LISTED, JudgedHistory, Proof
 from gen_profile.report.content import Listing, Page, Section, Share, Table, TableRow, Terms, Verdict
 from gen_profile.report.page import render, require_pages
 from gen_profile.spec.model import Spec
-
-MANIFEST = {
-    "matches": "the file is the one that its manifest vouches for",
-    "differs": "the file is not the one that its manifest vouches for",
-    "none": "no manifest of this spec",
-}
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -71,11 +66,7 @@ def planner_report(
     spec, worst = judgement.spec, judgement.check.worst
     followed = trace(spec, judgement.text, Histories.of(spec), worst.history, progress)
     progress("writing the report")
-    page = attrs.evolve(
-        _page(judgement, followed),
-        papers=[(name, value) for name, value in fields if value],
-        signatures=[name for name, value in fields if not value],
-    )
+    page = _page(judgement, followed).with_fields(fields)
     return PlannerReport(judgement=judgement, content=render(page))
 
 
@@ -135,7 +126,7 @@ def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
     yield Section(
         title="The worst history",
         words=(
-            f"History {worst.number}: {commands} commands from {number(worst.history.places[0])} m on"
+            f"History {worst.number}: {commands} commands from {worst.history.start_words} on"
             + (f"; the block is told {told}." if told else "."),
         ),
         blocks=[
@@ -154,7 +145,7 @@ def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
             Terms(
                 rows=[
                     (f"{judgement.path.name}, SHA-256", digest),
-                    ("Manifest", MANIFEST[judgement.manifest]),
+                    ("Manifest", MANIFEST_WORDS[judgement.manifest]),
                     ("Spec, SHA-256", spec.sha256()),
                 ]
             ),
@@ -170,12 +161,17 @@ def _worst_load(proof: Proof) -> str:
 
 def _commands(history: History) -> str:
     """Write a history's commands as the table that `planner play` reads."""
+    axes = list(history.axes.values())
     rows = [
-        f"{command.time:.6g},{command.command},"
-        + (f"{command.value:.6g}" if command.command in ("position", "velocity") else "")
+        ",".join([f"{command.time:.6g}", command.command, *_cells(command, axes)])
         for command in history.commands
     ]
-    return "\n".join(["time_s,command,value", *rows])
+    return "\n".join([",".join(["time_s", "command", *(axis.of("value") for axis in axes)]), *rows])
+
+
+def _cells(command: Command, axes: Sequence[BlockAxis]) -> list[str]:
+    """Write a command's values, empty where it has none."""
+    return [f"{value:.6g}" for value in command.values] or [""] * len(axes)
 
 
 def _ranking(proof: Proof) -> Table:
@@ -195,12 +191,15 @@ def _ranking(proof: Proof) -> Table:
 
 def _limits(spec: Spec, proof: Proof) -> Table:
     """Hold every limit against what all histories together take of it."""
-    own = spec.limits.of(0)
     rows = []
-    for name, unit in (("velocity", "m/s"), ("acceleration", "m/s²"), ("jerk", "m/s³")):
-        share, limit = max(one.limits[name] for one in proof.judged), getattr(own, name)
-        cells = (name, f"{number(share * limit)} {unit}", f"{number(limit)} {unit}", Share(share))
-        rows.append(TableRow(cells=cells, mark="passed" if share <= 1.0 + 1e-9 else "failed"))
+    for column, axis in proof.worst.history.axes.items():
+        own = spec.limits.of(column)
+        for name, per in (("velocity", "/s"), ("acceleration", "/s²"), ("jerk", "/s³")):
+            share = max(one.limits[f"{axis.prefix}{name}"] for one in proof.judged)
+            limit, unit = getattr(own, name), f"{axis.unit}{per}"
+            title = f"{name} of {axis.name}" if axis.name else name
+            cells = (title, f"{number(share * limit)} {unit}", f"{number(limit)} {unit}", Share(share))
+            rows.append(TableRow(cells=cells, mark="passed" if share <= 1.0 + 1e-9 else "failed"))
     for load, limit in proof.limit.items():
         worst = max(one.residual[load] for one in proof.judged if one.promise) + proof.error_bound
         cells = (f"residual sway of the {load}, error included", mm(worst), mm(limit), Share(worst / limit))
@@ -219,5 +218,6 @@ def _groups(proof: Proof) -> Table:
 
 def _proved(proof: Proof) -> Iterator[tuple[str, str]]:
     yield "Seed", f"{proof.seed}, which makes every history again"
-    yield "Co-simulated by FMPy, too", f"{len(proof.by_fmpy)} histories, apart by {proof.apart:.1e} m at most"
+    same = f"apart by {proof.apart:.1e} m at most" if proof.apart else "the same to the last bit"
+    yield "Co-simulated by FMPy, too", f"{len(proof.by_fmpy)} histories, {same}"
     yield "Numerical error", f"below {mm(proof.error_bound)}, counted against the margin"

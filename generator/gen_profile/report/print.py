@@ -12,15 +12,8 @@ from tempfile import TemporaryDirectory
 from gen_profile.errors import OutputError
 
 BROWSERS = (
-    *(
-        "chromium",
-        "chromium-browser",
-        "google-chrome",
-        "google-chrome-stable",
-        "chrome",
-        "microsoft-edge",
-        "msedge",
-    ),
+    *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"),
+    *("microsoft-edge", "msedge"),
     "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
     "/Applications/Microsoft Edge.app/Contents/MacOS/Microsoft Edge",
     r"C:\Program Files\Google\Chrome\Application\chrome.exe",
@@ -28,13 +21,8 @@ BROWSERS = (
 )
 FLAGS = (
     *("--headless", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
-    *(
-        "--disable-component-update",
-        "--disable-sync",
-        "--no-pdf-header-footer",
-        "--virtual-time-budget=120000",
-    ),
-    "--host-resolver-rules=MAP * ~NOTFOUND",
+    *("--disable-component-update", "--disable-sync", "--no-pdf-header-footer"),
+    *("--virtual-time-budget=120000", "--host-resolver-rules=MAP * ~NOTFOUND"),
 )
 PATIENCE = 300.0  # s
 CLOCK = re.compile(rb"/(CreationDate|ModDate) \(D:[0-9]{14}")  # would make every copy another one

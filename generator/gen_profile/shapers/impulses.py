@@ -49,25 +49,12 @@ class Impulses:
         """Time of the last impulse in s: what the shaper adds to any motion."""
         return float(self.times[-1])
 
-    def vibration(self, frequency: float, damping_ratio: float = 0.0) -> float:
-        """Find what a mode swings with after the last impulse, in units of what one unit impulse causes.
-
-        Parameters
-        ----------
-        frequency : float
-            Undamped, in rad/s.
-        damping_ratio : float
-        """
-        pole = frequency * _unit_pole(damping_ratio)
-        return float(abs(np.exp(pole * (self.times - self.delay)) @ self.amplitudes))
-
 
 class Shaper(Protocol):
     """What makes a train for one mode."""
 
     def __call__(self, frequency: float, damping_ratio: float = 0.0) -> Impulses:
         """Make it for an undamped frequency in rad/s and a damping ratio."""
-        ...
 
 
 def evenly_spaced(

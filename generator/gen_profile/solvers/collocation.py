@@ -16,9 +16,9 @@ from functools import lru_cache
 
 import attrs
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.linalg import lapack
-from scipy.special import roots_jacobi
 
 from gen_profile.motion.profile import Array
 from gen_profile.one_thread import one_thread
@@ -83,12 +83,18 @@ def _scheme(name: str, c: Array) -> Scheme:
 
 
 def _gauss(name: str, stages: int) -> Scheme:
-    return _scheme(name, (roots_jacobi(stages, 0.0, 0.0)[0] + 1.0) / 2.0)
+    return _scheme(name, (legendre.leggauss(stages)[0] + 1.0) / 2.0)
+
+
+def _radau(name: str, stages: int) -> Scheme:
+    """Collocate at the zeros of two neighbouring Legendre polynomials' difference, the last of which is 1."""
+    zeros = legendre.legroots([0.0] * (stages - 1) + [1.0, -1.0])
+    return _scheme(name, np.append((zeros[:-1] + 1.0) / 2.0, 1.0))
 
 
 GAUSS = _gauss("Gauss", STAGES)
 LONG_GAUSS = _gauss("Gauss, long intervals", 9)
-RADAU = _scheme("Radau", np.append((roots_jacobi(STAGES - 1, 1.0, 0.0)[0] + 1.0) / 2.0, 1.0))
+RADAU = _radau("Radau", STAGES)
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -8,65 +8,82 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 
 from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.direct.relaxation import Relaxation, least_duration
-from gen_profile.solvers.direct.transcription import Iterate
-from gen_profile.solvers.solution import Solution
+from gen_profile.solvers.solution import Solution, Status
 from gen_profile.work import OutOfWork, budget, left, spend
 
-FACTORS = (1.01, 1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
+FACTORS = (1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
 NEAR = 1.05  # how many times a value that will not do the one that is named may be
 WORK = 20.0  # s to look for all cures
-SHARE = 0.5  # of the work that is left, which one cure may take
-MOST = 0.7  # likewise a longer move, where no limit by itself is to blame
+SHARE = 0.5  # of the work that is left, which one cure may take, and one duration tried
+MOST = 0.8  # likewise a longer move, which nearly always does
+AMPLE = 1.3  # times the least value: where nearer ones take too much work, a smooth motion may do
 FARTHER = 1.7  # times the least value with a solution, up to which one that is welcome is looked for
 
+Found = TypeVar("Found")
 
-@attrs.frozen(kw_only=True)
+
+@attrs.frozen
 class CandidateTest:
     """How values are tried.
 
     Attributes
     ----------
-    solve : Problem, Iterate or None → Solution
-        Where nothing is found from rest, from a motion that was found to be most easily within the limits.
+    solve : Problem → Solution
     keeps : Solution → bool
         Whether it is one that will do.
     welcome : Solution → bool
         Whether it is one that is better named than others near by.
     """
 
-    solve: Callable[[Problem, Iterate | None], Solution]
+    solve: Callable[[Problem], Solution]
     keeps: Callable[[Solution], bool]
     welcome: Callable[[Solution], bool]
 
     def pleases(self, problem: Problem) -> bool:
         """Whether a problem has a solution that will do and is welcome."""
-        solution = self.solve(problem, None)
+        solution = self.solve(problem)
         return self.keeps(solution) and self.welcome(solution)
 
-    def least(self, changed: Callable[[float], Problem], easiest: Iterate | None = None) -> float | None:
-        """Find the least factor of a change that will do, as near as the work that is left allows."""
+    def least(self, changed: Callable[[float], Problem], share: float = 1.0) -> float | None:
+        """Find the least factor of a change that will do, as near as the work that is left allows.
+
+        Parameters
+        ----------
+        changed : float → Problem
+        share : float
+            Of the work that is left, which one factor may take.
+        """
         found: list[float] = []
         try:
-            found.extend(self._ever_better(changed, easiest))
+            found.extend(self._ever_better(changed, share))
         except OutOfWork:
             if not found:
                 raise
         return found[-1] if found else None
 
-    def _ever_better(self, changed: Callable[[float], Problem], easiest: Iterate | None) -> Iterator[float]:
+    def _ever_better(self, changed: Callable[[float], Problem], share: float) -> Iterator[float]:
         """Try factors, the first of which nearly always does: one that is welcome, then lesser ones."""
+        least = 1.0
 
         @cache
         def kept(factor: float) -> Solution | None:
-            solution = self.solve(changed(factor), easiest)
-            return solution if self.keeps(solution) else None
+            nonlocal least
+            problem = changed(factor)
+            solution = _in_time(partial(self.solve, problem), share)
+            if solution is not None and self.keeps(solution):
+                return solution
+            if solution is None or solution.status is Status.GIVEN_UP:
+                least = max(least, AMPLE)
+            if solution is not None:  # the spread may be to blame
+                least = max(least, factor * solution.problem.sway_spread / problem.sway_spread)
+            return None
 
         def does(factor: float) -> bool:
             return kept(factor) is not None
@@ -75,7 +92,7 @@ class CandidateTest:
             solution = kept(factor)
             return solution is not None and self.welcome(solution)
 
-        first = next(filter(does, FACTORS), None)
+        first = next((factor for factor in FACTORS if factor >= least and does(factor)), None)
         if first is None:
             return
         yield first
@@ -101,26 +118,31 @@ def cures(problem: Problem, trial: CandidateTest, *, in_time: bool = False) -> s
     in_time : bool
         Look for what would do in the duration asked for only.
     """
-    longer, instead, sentences = "", list[str](), list[str]()
+    duration, instead, sentences = None, list[str](), list[str]()
     stated, relaxation = problem.limits.stated(), Relaxation(problem)
     alone = (partial(_widened, relaxation, trial, {place: value}) for place, value in stated.items())
     together = [partial(_widened, relaxation, trial, stated)] if len(stated) > 1 else []
     try:
         with budget(WORK):
-            instead.extend(filter(None, map(_in_time, alone)))
             if not in_time:
-                longer = _in_time(partial(_longer, relaxation, trial), 1.0 if instead else MOST)
+                duration = longer(problem, trial, relaxation)
+            instead.extend(filter(None, map(_in_time, alone)))
             for last_resort in (*together, partial(_less_robust, problem, trial)):
                 if not instead:
                     instead.extend(filter(None, [_in_time(last_resort)]))
     except OutOfWork:  # of the budget for the whole answer: what was found so far is told
         pass
-    if longer:
+    if duration:
         within = "With these limits it" if stated else "It"
-        sentences.append(f"{within} takes at least {longer} s (move.duration).")
+        sentences.append(f"{within} takes at least {duration} s (move.duration).")
     if instead:
         sentences.append(f"In {problem.duration:g} s it would do with {', or with '.join(instead)}.")
     return " ".join(sentences)
+
+
+def longer(problem: Problem, trial: CandidateTest, relaxation: Relaxation | None = None) -> str | None:
+    """Find the least duration in s that will do, in most of the work that is left."""
+    return _in_time(partial(_longer, relaxation or Relaxation(problem), trial), MOST)
 
 
 def _longer(relaxation: Relaxation, trial: CandidateTest) -> str:
@@ -132,7 +154,7 @@ def _longer(relaxation: Relaxation, trial: CandidateTest) -> str:
     def lasting(factor: float) -> Problem:
         return attrs.evolve(relaxation.problem, duration=float(rounded_up(factor * enough)))
 
-    factor = trial.least(lasting)
+    factor = trial.least(lasting, SHARE)
     return "" if factor is None else rounded_up(factor * enough)
 
 
@@ -149,7 +171,7 @@ def _widened(relaxation: Relaxation, trial: CandidateTest, limits: Mapping[str, 
     def widened(factor: float) -> Problem:
         return attrs.evolve(problem, limits=problem.limits.changed(wider(factor)))
 
-    factor = trial.least(widened, easiest.iterate)
+    factor = trial.least(widened)
     if factor is None:
         return ""
     return " and ".join(f"{place} = {_written(value)}" for place, value in wider(factor).items())
@@ -164,14 +186,14 @@ def _less_robust(problem: Problem, trial: CandidateTest) -> str:
     return ""
 
 
-def _in_time(find: Callable[[], str], share: float = SHARE) -> str:
-    """Find words for a cure in a share of the work that is left; none where that is not enough."""
+def _in_time(find: Callable[[], Found], share: float = SHARE) -> Found | None:
+    """Find something in a share of the work that is left; nothing where that is not enough."""
     try:
         with budget(share * left()):
             return find()
     except OutOfWork:
         spend(0.0)
-        return ""
+        return None
 
 
 def _times(value: Any, share: float) -> Any:

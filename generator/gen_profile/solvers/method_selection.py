@@ -15,10 +15,9 @@ from gen_profile.progress import Progress, untold
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct import worst_case
 from gen_profile.solvers.direct.relaxation import Relaxation
-from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way
 from gen_profile.solvers.indirect import solver as indirect
-from gen_profile.solvers.infeasibility import CandidateTest, cures
+from gen_profile.solvers.infeasibility import CandidateTest, cures, longer
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
@@ -27,9 +26,19 @@ from gen_profile.spec.values import SolverName
 from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]
+Trial = Callable[[Problem], Solution]  # of a problem by the direct method, as the next run would solve it
 SHORTEST = "looking for the shortest duration"
-ANSWER = 24.0, 30.0  # s of work for all that a spec asks for or would do instead, and of the processor
-SOLVING = 8.0  # s of work for one method; twice that where there is no other
+ANSWER = 24.0, 28.0  # s of work for all that a spec asks for or would do instead, and of the processor
+SOLVING = 8.0  # s of work for a method
+DIRECTLY = 12.0  # likewise for the direct one
+NEARLY = 1.1  # times the limits that the motion most easily within them may take, for it costs a little, too
+OTHERWISE = 'Set solver.method = "auto"'
+WIDER = "Allow more time (move.duration), or wider limits."
+IN_VAIN = (
+    "Longer moves, wider limits and less robustness were tried as far as the work allows, and none was found "
+    "to do. Not tried: fewer limits, or fewer parameters in robustness.uncertain. See whether all numbers of "
+    "the spec are in its units."
+)
 RANGE = 2.0  # times the work for a whole range
 
 
@@ -49,7 +58,36 @@ def solve(problem: Problem, method: SolverName = "auto") -> Solution:
         return given_up(problem)
 
 
-def diagnosed(solution: Solution, method: SolverName = "auto", welcome: Judge = lambda _: True) -> Solution:
+def attempt(problem: Problem, method: SolverName = "auto", *, coarse: bool = False) -> Solution:
+    """Solve a problem without finding out what would help where that fails.
+
+    Parameters
+    ----------
+    problem : Problem
+    method : str
+    coarse : bool
+        Where limits bind, on few intervals only, for the nominal machine, and from rest.
+    """
+    if problem.worst_case is not None and not coarse:
+        return _in_time(_over_a_range, problem, DIRECTLY)
+    solve = partial(_direct, coarse=coarse)
+    if method == "direct" or problem.worst_case is not None:
+        return _in_time(solve, attrs.evolve(problem, worst_case=None), DIRECTLY)
+    solution = _in_time(indirect.solve, problem, SOLVING)
+    if method == "indirect" or keeps_limits(solution):
+        return solution
+    other = _in_time(solve, problem, DIRECTLY)
+    return solution if other.optimum is None and solution.optimum is None else other
+
+
+def directly(problem: Problem) -> Solution:
+    """Solve by the direct method: where it finds a motion, so does "auto", and it is the quicker to fail."""
+    return attempt(problem, "direct")
+
+
+def diagnosed(
+    solution: Solution, method: SolverName, welcome: Judge = lambda _: True, tried: Trial = directly
+) -> Solution:
     """Find out what would help where a solve failed.
 
     Parameters
@@ -59,51 +97,33 @@ def diagnosed(solution: Solution, method: SolverName = "auto", welcome: Judge = 
         By which it was looked for.
     welcome : Solution → bool
         Whether a value is better named than others near by, by its solution.
+    tried : Problem → Solution
+        How a problem with another value is solved.
     """
+    limited = bool(solution.problem.limits.stated())
     # the indirect method, which knows the linear angle, tells by itself what helps where there are no limits
-    told = solution.method == indirect.METHOD and (
-        method == "indirect" or not solution.problem.limits.stated()
-    )
-    if solution.optimum is not None or told:
+    if solution.optimum is not None or (solution.method == indirect.METHOD and not limited):
         return solution
-    # where the direct method finds a motion, so does "auto", and the direct method is the quicker to fail
-    return attrs.evolve(solution, cure=remedy(solution.problem, "direct", welcome) or solution.cure)
+    return attrs.evolve(solution, cure=remedy(solution.problem, method, welcome, tried) or IN_VAIN)
 
 
-def remedy(problem: Problem, method: SolverName = "auto", welcome: Judge = lambda _: True) -> str:
+def remedy(problem: Problem, method: SolverName, welcome: Judge, tried: Trial) -> str:
     """Say which other values would let a method find a motion within the limits; nothing where none will."""
-    trial = CandidateTest(
-        solve=lambda other, easiest: attempt(other, method, easiest=easiest),
-        keeps=keeps_limits,
-        welcome=welcome,
-    )
-    found = cures(problem, trial)
-    elsewhere = method == "indirect" and problem.worst_case is None
+    trial = CandidateTest(tried, keeps_limits, welcome)
+    if method != "indirect" or problem.worst_case is not None:
+        return cures(problem, trial)
     try:
-        if elsewhere and keeps_limits(_in_time(_direct, problem, SOLVING)):
-            return f'With solver.method = "auto" the limits are kept. {found}'.strip()
+        if keeps_limits(tried(problem)):
+            return f"{OTHERWISE}, which finds a motion."
     except OutOfWork:  # of the budget for the whole answer
-        pass
-    return found
+        return ""
+    found = cures(problem, trial)
+    return found and f"{OTHERWISE}. {found}"
 
 
 def patience(problem: Problem) -> float:
     """Tell how many times the usual work a problem may take."""
     return 1.0 if problem.worst_case is None else RANGE
-
-
-def attempt(problem: Problem, method: SolverName = "auto", easiest: Iterate | None = None) -> Solution:
-    """Solve a problem without finding out what would help where that fails."""
-    directly = partial(_direct, easiest=easiest)
-    if problem.worst_case is not None:
-        return _in_time(worst_case.solve, problem, 2.0 * SOLVING)
-    if method == "direct":
-        return _in_time(directly, problem, 2.0 * SOLVING)
-    solution = _in_time(indirect.solve, problem, SOLVING)
-    if method == "indirect" or keeps_limits(solution):
-        return solution
-    other = _in_time(directly, problem, SOLVING)
-    return solution if other.optimum is None and solution.optimum is None else other
 
 
 def _in_time(solve: Callable[[Problem], Solution], problem: Problem, seconds: float) -> Solution:
@@ -129,37 +149,55 @@ def given_up(problem: Problem) -> Solution:
     )
 
 
-def _direct(problem: Problem, easiest: Iterate | None = None) -> Solution:
+def _direct(problem: Problem, *, coarse: bool) -> Solution:
     """Begin at rest, and where that misleads, at the motion that is most easily within the limits."""
-    solution = direct.solve(problem)
-    if keeps_limits(solution) or not problem.limits.stated():
+    solution = direct.solve(problem, coarse=coarse)
+    if coarse or keeps_limits(solution) or not problem.limits.stated():
         return solution
-    if easiest is None:
-        found = Relaxation(problem).least(tuple(problem.limits.stated()))
-        easiest = None if found is None or found.share > 1.0 else found.iterate
-    return solution if easiest is None else direct.solve(problem, easiest)
+    easiest = Relaxation(problem).least(tuple(problem.limits.stated()))
+    if easiest is None or easiest.share > NEARLY:
+        return solution
+    return direct.solve(problem, easiest.iterate)
 
 
-def requirements(problem: Problem) -> str:
+def _over_a_range(problem: Problem) -> Solution:
+    """Look for the least worst case only where the nominal machine's motion can keep the limits."""
+    places = tuple(problem.limits.stated())
+    easiest = Relaxation(problem).least(places) if places else None
+    if easiest is None or easiest.share <= NEARLY:
+        return worst_case.solve(problem)
+    return attrs.evolve(easiest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, cure=WIDER)
+
+
+def requirements(problem: Problem, tried: Trial) -> str:
     """Say which limits would have to be wider for a motion in the duration of a problem that has none."""
-    trial = CandidateTest(
-        solve=lambda other, easiest: attempt(other, "direct", easiest=easiest),
-        keeps=keeps_limits,
-        welcome=lambda _: True,
-    )
-    return cures(problem, trial, in_time=True)
+    return cures(problem, CandidateTest(tried, keeps_limits, welcome=lambda _: True), in_time=True)
 
 
-def minimum_time(problem: Problem, progress: Progress = untold) -> float | None:
-    """Find the shortest duration in s for a problem's limits and robustness; None where none was found."""
-    solve = direct.solve if problem.worst_case is None else worst_case.solve_within_limits
+def sufficient_duration(problem: Problem, tried: Trial) -> str:
+    """Name a duration in s, no shorter than a problem's, that will do; empty where none is found."""
+    return longer(problem, CandidateTest(tried, keeps_limits, welcome=lambda _: True)) or ""
+
+
+def minimum_time(problem: Problem, progress: Progress = untold, beyond: float | None = None) -> float | None:
+    """Find the shortest duration in s for a problem's limits and robustness; None where none was found.
+
+    Parameters
+    ----------
+    problem : Problem
+    progress : Progress
+    beyond : float, optional
+        A duration in s than which none is shorter.
+    """
+    coarse = partial(direct.solve, coarse=True)
+    solve = coarse if problem.worst_case is None else worst_case.solve_within_limits
     tries = count(1)
 
     def attempted(other: Problem) -> Solution:
         progress(SHORTEST, remark=f"trying {other.duration:.3g} s ({next(tries)})")
         return _in_time(solve, other, SOLVING)
 
-    return shortest_duration(problem, attempted)
+    return shortest_duration(problem, attempted, beyond)
 
 
 def keeps_limits(solution: Solution) -> bool:

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 
 import attrs
 
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.solution import Solution
+from gen_profile.work import OutOfWork, budget, left
 
 PRECISION = 1e-3  # relative, of the duration; what is returned is the feasible end
 LONGEST = 1e3  # slowest periods, after which the search gives up
 STRIDE = 1.5
+BISECTING = 0.6  # share of the work that is left
 LONGER = 8.0  # from stride to stride away from a duration that is too short
 
 
-def shortest_duration(problem: Problem, solve: Callable[[Problem], Solution]) -> float | None:
+def shortest_duration(
+    problem: Problem, solve: Callable[[Problem], Solution], beyond: float | None = None
+) -> float | None:
     """Bisect the duration.
 
     Parameters
@@ -26,6 +31,8 @@ def shortest_duration(problem: Problem, solve: Callable[[Problem], Solution]) ->
         Whose duration does not matter.
     solve : Problem → Solution
         A solver that keeps limits.
+    beyond : float, optional
+        A duration in s than which none is shorter.
 
     Returns
     -------
@@ -38,11 +45,16 @@ def shortest_duration(problem: Problem, solve: Callable[[Problem], Solution]) ->
 
     slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
     period = 2.0 * math.pi / float(slowest)
+    if beyond is not None:
+        return least_beyond(feasible, beyond, LONGEST * period)
     return least(feasible, period, LONGEST * period)
 
 
 def least(
-    feasible: Callable[[float], bool], guess: float, most: float, precision: float = PRECISION
+    feasible: Callable[[float], bool],
+    guess: float,
+    most: float,
+    precision: float = PRECISION,
 ) -> float | None:
     """Bisect for the least value that will do, where every greater one does.
 
@@ -63,8 +75,9 @@ def least(
     """
     if feasible(guess):
         enough, short = guess, guess / STRIDE
-        while feasible(short):
-            enough, short = short, short / STRIDE
+        with suppress(OutOfWork):
+            while feasible(short):
+                enough, short = short, short / STRIDE
     else:
         enough, short = STRIDE * guess, guess
         while not feasible(enough):
@@ -99,8 +112,9 @@ def least_beyond(feasible: Callable[[float], bool], short: float, most: float) -
 
 
 def _between(feasible: Callable[[float], bool], short: float, enough: float, precision: float) -> float:
-    """Bisect, and return the feasible end."""
-    while enough - short > precision * enough:
-        middle = (enough + short) / 2.0
-        enough, short = (middle, short) if feasible(middle) else (enough, middle)
+    """Bisect as far as a share of the work that is left allows, and return the feasible end."""
+    with suppress(OutOfWork), budget(BISECTING * left()):
+        while enough - short > precision * enough:
+            middle = (enough + short) / 2.0
+            enough, short = (middle, short) if feasible(middle) else (enough, middle)
     return enough

@@ -437,6 +437,12 @@ class Spec(Checked):
             document["move"]["duration"] = "minimum"
         return document
 
+    def files(self) -> dict[str, bytes]:
+        """Read the files that it names, by their names: an own machine, somebody else's FMU."""
+        own, judge = self.plant.file, self.check.foreign
+        files = {} if own is None else {own.name: own.content}
+        return files if judge is None else files | {judge.name: judge.path.read_bytes()}
+
     def sha256(self) -> str:
         """Hash of the whole spec, defaults included, in hexadecimal."""
         text = json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=True)

@@ -5,17 +5,19 @@ from __future__ import annotations
 import os
 import select
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command
+from gen_profile.planner.interface import BlockAxis
 
 SHARE = 0.1  # of the greatest velocity, by which an arrow changes that of the stick
 PAUSE = 0.25  # s between two reports
 PROMISES = {0: "no sway", 1: "may sway", 2: "may sway", 3: "not ready"}  # by nPromise
-HELP = "Keys: ← → velocity, space stop, q quick stop, a position and Enter, x end."
-RIGHT, LEFT = (b"\x1b[C", b"\x1bOC"), (b"\x1b[D", b"\x1bOD")  # cursor keys, and in application mode
+ARROWS = "← →", "↓ ↑"  # of the first axis and the second
+CURSOR = {b"C": (0, 1), b"D": (0, -1), b"A": (1, 1), b"B": (1, -1)}  # keys' last bytes: axis, tenths more
+CURSOR_KEY = 3  # bytes of an escape sequence, also in application mode
 ENTER, ERASE, END = b"\r\n", b"\x7f\x08", b"xX\x04"
 
 
@@ -24,22 +26,25 @@ class Keys:
 
     Parameters
     ----------
-    greatest : float
-        m/s, of the stick.
+    axes : sequence of BlockAxis
+        Two of which have arrows.
+    greatest : (axes,) sequence of float
+        m/s (or rad/s), of the stick.
 
     Attributes
     ----------
     typed : str
-        Position that is being typed.
+        Positions that are being typed, with commas between.
     shown : str
         The command that holds, in words.
     over : bool
         Whether the end was asked for.
     """
 
-    def __init__(self, greatest: float) -> None:
+    def __init__(self, axes: Sequence[BlockAxis], greatest: Sequence[float]) -> None:
         self.typed, self.shown, self.over = "", "stands", False
-        self._greatest, self._tenths, self._rest = greatest, 0, b""
+        self._axes, self._greatest, self._rest = axes, greatest, b""
+        self._tenths = [0] * len(axes)
 
     def take(self, sent: bytes) -> Iterator[Command]:
         """Turn what was typed into commands."""
@@ -55,38 +60,51 @@ class Keys:
                 yield command
 
     def _command(self, key: bytes) -> Command | None:
-        if key in RIGHT or key in LEFT:
-            self._tenths = max(-10, min(10, self._tenths + (1 if key in RIGHT else -1)))
-            value = self._tenths * SHARE * self._greatest
-            return self._given("velocity", value, f"stick at {value:.3g} m/s")
+        axis, more = CURSOR.get(key[-1:], (0, 0)) if len(key) == CURSOR_KEY else (0, 0)
+        if more and axis < len(self._axes):
+            self._tenths[axis] = max(-10, min(10, self._tenths[axis] + more))
+            pairs = zip(self._tenths, self._greatest, strict=True)
+            values = tuple(tenths * SHARE * greatest for tenths, greatest in pairs)
+            return self._given("velocity", values, f"stick at {in_units(values, self._axes, '{:.3g}', '/s')}")
         if key in END:
             self.over = True
         if key == b" " or self.over:
-            return self._given("stop", 0.0, "stop")
+            return self._given("stop", (), "stop")
         if key in b"qQ":
-            return self._given("quick-stop", 0.0, "quick stop")
+            return self._given("quick-stop", (), "quick stop")
         if key in ENTER and self.typed:
             return self._target()
         if key in ERASE:
             self.typed = self.typed[:-1]
-        elif key in b"0123456789.-":
+        elif key in b"0123456789.-" or (key == b"," and len(self._axes) > 1):
             self.typed += key.decode("ascii")
         return None
 
     def _target(self) -> Command | None:
         text, self.typed = self.typed, ""
         try:
-            value = float(text)
+            values = tuple(float(part) for part in text.split(","))
         except ValueError:
             self.shown = f"{text} is no number"
             return None
-        return self._given("position", value, f"to {value:g} m")
+        if len(values) != len(self._axes):
+            self.shown = f"{text}: a position for each of {len(self._axes)} axes, please"
+            return None
+        return self._given("position", values, f"to {in_units(values, self._axes, '{:g}')}")
 
-    def _given(self, command: str, value: float, words: str) -> Command:
+    def _given(self, command: str, values: tuple[float, ...], words: str) -> Command:
         if command != "velocity":
-            self._tenths = 0
+            self._tenths = [0] * len(self._axes)
         self.typed, self.shown = "", words
-        return Command(time=0.0, command=command, value=value)
+        return Command(time=0.0, command=command, values=values)
+
+
+def in_units(values: Iterable[float], axes: Iterable[BlockAxis], form: str, per: str = "") -> str:
+    """Write a value of each axis with its name, where it has one, and its unit."""
+    return ", ".join(
+        f"{axis.name} {form.format(value)} {axis.unit}{per}".lstrip()
+        for value, axis in zip(values, axes, strict=True)
+    )
 
 
 def _in_foreground(terminal: int) -> bool:
@@ -100,7 +118,7 @@ def _length(left: bytes) -> int:
     """Count the bytes of the first key: an escape sequence is three of them."""
     if left[:1] != b"\x1b" or left[1:2] not in (b"", b"[", b"O"):
         return 1
-    return 3
+    return CURSOR_KEY
 
 
 class Keyboard:
@@ -110,8 +128,8 @@ class Keyboard:
     ----------
     terminal : int
         Its file descriptor.
-    greatest : float
-        m/s, of the stick.
+    axes, greatest
+        As of `Keys`.
     cycle : float
         The block's, in s.
 
@@ -121,14 +139,25 @@ class Keyboard:
         It is no terminal in the foreground.
     """
 
-    def __init__(self, terminal: int, greatest: float, cycle: float) -> None:
+    def __init__(
+        self, terminal: int, axes: Sequence[BlockAxis], greatest: Sequence[float], cycle: float
+    ) -> None:
         if not _in_foreground(terminal):
             raise SpecError(
                 "The keyboard: standard input is no terminal in the foreground (of Linux or macOS); give a "
                 "file of commands."
             )
-        self._terminal, self._keys = terminal, Keys(greatest)
+        self._terminal, self._axes, self._keys = terminal, axes, Keys(axes, greatest)
         self._pause, self._reported, self._told = round(PAUSE / cycle), 0, ""
+
+    @property
+    def help(self) -> str:
+        """Which keys there are."""
+        several = len(self._axes) > 1
+        arrows = zip(ARROWS, self._axes, strict=False)
+        sticks = ", ".join(f"{keys} velocity{f' of {a.name}' if several else ''}" for keys, a in arrows)
+        place = f"positions ({','.join(a.name for a in self._axes)})" if several else "a position"
+        return f"Keys: {sticks}, space stop, q quick stop, {place} and Enter, x end."
 
     @property
     def over(self) -> bool:
@@ -171,8 +200,10 @@ class Keyboard:
         state = PROMISES[int(issued["nPromise"])]
         if issued["nErrorId"]:
             state = f"error {issued['nErrorId']:.0f}"
-        said = f"{issued['fPosition']:.3f} m, {issued['fVelocity']:+.3f} m/s, {state}; {self._keys.shown}"
+        places = in_units((issued[a.of("fPosition")] for a in self._axes), self._axes, "{:.3f}")
+        speeds = in_units((issued[a.of("fVelocity")] for a in self._axes), self._axes, "{:+.3f}", "/s")
+        said = f"{places}, {speeds}, {state}; {self._keys.shown}"
         if self._keys.typed:
-            said += f"; to {self._keys.typed}_ m"
+            said += f"; to {self._keys.typed}_ {self._axes[-1].unit}"
         before, self._told = self._told, said
         return "" if said == before else said

@@ -30,11 +30,10 @@ class Source:
         names = [axis.name for axis in self.plan.target.axes]
         return tuple(axis for axis in self.spec.machine().actuated if axis.name in names)
 
-    def si(self, counts: ArrayLike) -> list[float]:
-        """Turn one position per axis from counts into m (or rad)."""
+    def si(self, counts: ArrayLike) -> Array:
+        """Turn positions of all axes, in the last dimension, from counts into m (or rad)."""
         scale = np.array([axis.counts_per_si for axis in self.plan.target.axes])
-        found: list[float] = (np.asarray(counts) / scale).tolist()
-        return found
+        return np.asarray(np.asarray(counts) / scale)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -64,12 +63,12 @@ class StreamOutcome:
     @property
     def planned(self) -> Array:
         """Position that each axis is led to by the instant of each SYNC, in m, shape (cycles, axes)."""
-        return self._si(self.source.plan.at_sync)
+        return self.source.si(self.source.plan.at_sync)
 
     @property
     def actual(self) -> Array:
         """Position that each drive told at each SYNC, in m; not a number where none was told."""
-        return np.where(self._told[:, None], self._si(self._actual), np.nan)
+        return np.where(self._told[:, None], self.source.si(self._actual), np.nan)
 
     @property
     def standstills(self) -> tuple[Standstill, ...]:
@@ -82,8 +81,9 @@ class StreamOutcome:
         told, goal = self._told, self.source.plan.goal
         apart = np.abs(self.actual - self.planned)[told]
         final = np.array(self.record.final)
+        missed = final - (final if goal is None else goal)
         drive = {
-            "position_error_m": float(np.abs(self._si(final - (final if goal is None else goal))).max()),
+            "position_error_m": float(np.abs(self.source.si(missed)).max()),
             "following_error_max_m": float(apart.max()) if told.any() else None,
             "sway_residual_peak_m": self.sway,
             "cycles_unanswered": self.record.sent - int(told.sum()),
@@ -143,7 +143,3 @@ class StreamOutcome:
     @property
     def _actual(self) -> Integers:
         return self.record.actual[: len(self.source.plan.at_sync)]
-
-    def _si(self, counts: Any) -> Array:
-        scale = np.array([axis.counts_per_si for axis in self.source.plan.target.axes])
-        return np.asarray(counts / scale)

@@ -11,11 +11,15 @@ import numpy as np
 
 from gen_profile.errors import GenProfileError, SpecError, StreamAborted
 from gen_profile.motion.profile import SampledProfile
-from gen_profile.planner.commands import STILL, Command, inputs_of, live_inputs
+from gen_profile.planner.commands import STILL, Command, inputs_of
 from gen_profile.planner.design import quick_limits
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.interface import ISSUED, live_inputs
+from gen_profile.planner.machine import planned_axes
+from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import Spec
 from gen_profile.suggestion import suggestion
+from gen_profile.units import AxisScale
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.scaling import (
@@ -43,19 +47,15 @@ class Operator(Protocol):
     @property
     def over(self) -> bool:
         """Whether no further command will come."""
-        ...
 
     def operated(self) -> AbstractContextManager[object]:
         """Hold what commands are taken from."""
-        ...
 
     def due(self, cycle: int) -> Iterable[Command]:
         """Give the commands that begin in a cycle of the block, or began since the one before."""
-        ...
 
     def words(self, cycle: int, issued: Mapping[str, float]) -> str:
         """Say how it is, where there is anything new to say; given the block's cycle and outputs."""
-        ...
 
 
 class CommandList:
@@ -92,7 +92,7 @@ class CommandList:
 
 
 class PlannedMotion:
-    """A planner block that drives its axis: a `gen_profile_exporters.can.streaming.plan.SetpointSource`.
+    """A planner block that drives its axes: a `gen_profile_exporters.can.streaming.plan.SetpointSource`.
 
     Parameters
     ----------
@@ -116,21 +116,25 @@ class PlannedMotion:
     def __init__(
         self, spec: Spec, block: BlockInstance, operator: Operator, live: Mapping[str, float]
     ) -> None:
-        everything = target_of(spec)
-        self.target = attrs.evolve(everything, axes=everything.axes[:1], start=everything.start[:1])
+        everything, numbers = target_of(spec), planned_axes(spec)
+        self.target = attrs.evolve(
+            everything,
+            axes=tuple(everything.axes[number] for number in numbers),
+            start=tuple(everything.start[number] for number in numbers),
+        )
         frames.period_digits(spec.can)
         frames.require_load(self.target)
-        self.demand = _demand(spec, self.target)
+        self.demand = _demand(spec, self.target, tuple(numbers))
         self.planned: int | None = None
         self.most = LONGEST + MARGIN
-        self._block, self._operator = block, operator
+        self._block, self._axes, self._operator = block, block.axes, operator
         self._values = block.inputs | {"bEnable": 1.0} | _live_values(block, live)
         self._calls = _calls(spec, self._values["fCycleTime"])
         self._still_enough = round(STILL / spec.can.sync_period)
         self._frames = frames.setpoint_frames(self.target)
         self._outputs = {name: place for place, name in enumerate(block.outputs)}
         self._rows: list[Any] = []  # outputs at the start, one cycle ago, and now
-        self._log = np.zeros((self.most, 3), dtype=np.int64)  # where the axis is led to, promise, error
+        self._log = np.zeros((self.most, len(numbers) + 2), dtype=np.int64)  # setpoints, promise, error
         self._lost: set[int] = set()
         self._called = self._cycle = -1  # latest cycle of the block, and of the bus
         self._still = 0
@@ -139,18 +143,18 @@ class PlannedMotion:
 
     @property
     def at_sync(self) -> Integers:
-        """Where the axis was led to by each SYNC so far, in counts."""
-        return self._log[: self._cycle + 1, :1]
+        """Where the axes were led to by each SYNC so far, in counts."""
+        return self._log[: self._cycle + 1, :-2]
 
     @property
     def goal(self) -> Integers | None:
-        """Where the latest setpoint leads it."""
+        """Where the latest setpoint leads them."""
         return None if self._step is None else self._step.position
 
     @property
     def columns(self) -> Mapping[str, Integers]:
         """Promise and error of every cycle so far."""
-        _, promise, error = self._log[: self._cycle + 1].T
+        *_, promise, error = self._log[: self._cycle + 1].T
         return {"promise": promise, "error_id": error}
 
     @property
@@ -168,8 +172,9 @@ class PlannedMotion:
         return self._operator.operated()
 
     def begin(self, standing: Sequence[int]) -> Step:
-        """Enable the block where the axis stands, in counts."""
-        self._values["fActPosition"] = standing[0] / self.target.axes[0].counts_per_si
+        """Enable the block where the axes stand, in counts."""
+        for axis, scale, counts in zip(self._axes, self.target.axes, standing, strict=True):
+            self._values[axis.of("fActPosition")] = counts / scale.counts_per_si
         first = self.step(0)
         assert first is not None  # an axis stands for a while before a motion is over
         return first
@@ -193,7 +198,7 @@ class PlannedMotion:
 
     def end(self) -> bool:
         """Stop without sway, whatever the operator wants."""
-        self._values |= inputs_of(Command(time=0.0, command="stop"))
+        self._values |= inputs_of(Command(time=0.0, command="stop"), self._axes)
         self._ends = self._ends or ""
         return True
 
@@ -218,7 +223,7 @@ class PlannedMotion:
         self._called += 1
         self._values["bExecute"] = 0.0
         for command in () if self._ends is not None else self._operator.due(self._called):
-            self._values |= inputs_of(command)
+            self._values |= inputs_of(command, self._axes)
             self._still = 0
         return list(self._values.values())
 
@@ -228,8 +233,8 @@ class PlannedMotion:
     def _scale(self) -> None:
         """Scale what was issued, and count for how long the axis stands."""
         columns = [
-            np.array([[row[self._outputs[name]]] for row in self._rows])
-            for name in ("fPosition", "fVelocity", "fAcceleration")
+            np.array([[row[self._outputs[axis.of(name)]] for axis in self._axes] for row in self._rows])
+            for name in ISSUED
         ]
         period, csv = self.target.can.sync_period, self.target.can.mode == "csv"
         sampled = SampledProfile(
@@ -239,9 +244,9 @@ class PlannedMotion:
         row = 1 if csv else 2  # a velocity leads from one position to the next
         at_sync = scaled.position[1]
         over = self._ends is not None or self._operator.over
-        moves = self._of("bBusy") > 0.0 or self._of("fVelocity") != 0.0
+        moves = self._of("bBusy") > 0.0 or bool(columns[1][-1].any())
         self._still = self._still + 1 if over and not moves else 0
-        self._log[self._cycle] = at_sync[0], self._of("bPromise"), self._of("nErrorId")
+        self._log[self._cycle] = *at_sync, self._of("bPromise"), self._of("nErrorId")
         outputs = dict(zip(self._outputs, self._rows[-1], strict=True))
         self._step = Step(
             messages=cycle_of(self._frames, scaled.sent[row].tolist()),
@@ -251,27 +256,44 @@ class PlannedMotion:
         )
 
 
-def _demand(spec: Spec, target: Target) -> Demand:
-    """Find what the planner may ask of its axis."""
-    limits, axis, can = spec.limits.of(0), target.axes[0], target.can
-    assert limits.travel and limits.velocity and limits.acceleration  # or there would be no block
-    ends = exact_counts(np.array(limits.travel), exact(axis.counts_per_si))
+def _demand(spec: Spec, target: Target, numbers: Sequence[int]) -> Demand:
+    """Find what the planner may ask of its axes."""
+    limits, can = [spec.limits.of(number) for number in numbers], target.can
+    return Demand(
+        start=None,
+        ends=tuple(
+            _ends(own.travel or (0.0, 0.0), axis, can) for own, axis in zip(limits, target.axes, strict=True)
+        ),
+        velocity=_counted([own.velocity for own in limits], target),
+        acceleration=_counted([own.acceleration for own in limits], target),
+        quick_stop=tuple(
+            quick_stop_deceleration(magnitude_counts(quick_limits(spec, number)[0], axis), can, axis)
+            for number, axis in zip(numbers, target.axes, strict=True)
+        ),
+    )
+
+
+def _counted(limits: Sequence[float | None], target: Target) -> tuple[float, ...]:
+    """Scale limits, which are all stated, or there would be no block."""
+    return tuple(
+        float(magnitude_counts(limit, axis))
+        for limit, axis in zip(limits, target.axes, strict=True)
+        if limit is not None
+    )
+
+
+def _ends(travel: tuple[float, float], axis: AxisScale, can: CanSpec) -> tuple[int, int]:
+    """Scale an axis's travel, which its drive's must hold."""
+    ends = exact_counts(np.array(travel), exact(axis.counts_per_si))
     require_within(INT32, ends, f"axis {axis.name}", TOO_FAR, can.sync_period)
     least, greatest = int(ends.min()), int(ends.max())
     drive = travel_counts(axis, can)
     if drive is not None and not (drive[0] <= least and greatest <= drive[1]):
         raise SpecError(
-            f"can.travel.{axis.name}: it must hold the planner's travel of {limits.travel[0]:g} to "
-            f"{limits.travel[1]:g}; narrow limits.travel, and write the block again."
+            f"can.travel.{axis.name}: it must hold the planner's travel of {travel[0]:g} to "
+            f"{travel[1]:g}; narrow limits.travel, and write the block again."
         )
-    braking = magnitude_counts(quick_limits(spec)[0], axis)
-    return Demand(
-        start=None,
-        ends=((least, greatest),),
-        velocity=(float(magnitude_counts(limits.velocity, axis)),),
-        acceleration=(float(magnitude_counts(limits.acceleration, axis)),),
-        quick_stop=(quick_stop_deceleration(braking, can, axis),),
-    )
+    return least, greatest
 
 
 def _calls(spec: Spec, cycle: float) -> int:
@@ -287,7 +309,7 @@ def _calls(spec: Spec, cycle: float) -> int:
 
 
 def _live_values(block: BlockInstance, live: Mapping[str, float]) -> dict[str, float]:
-    known = live_inputs(block.inputs)
+    known = live_inputs(block.inputs, block.axes)
     for name in live:
         if name not in known:
             raise SpecError(f"planner.live: the block has no parameter {name!r}{suggestion(name, known)}")

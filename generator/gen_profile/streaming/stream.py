@@ -173,8 +173,8 @@ def summary(source: Source) -> dict[str, Any]:
     """List what a stream will do, without doing it."""
     plan, target, period = source.plan, source.plan.target, source.spec.can.sync_period
     none = [None] * len(target.axes)
-    starts = none if plan.demand.start is None else source.si(plan.demand.start)
-    goals = none if plan.goal is None else source.si(plan.goal)
+    starts = none if plan.demand.start is None else source.si(plan.demand.start).tolist()
+    goals = none if plan.goal is None else source.si(plan.goal).tolist()
     return {
         "state": "planned",
         "cycles_sent": 0,

@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 from typing import Any, cast
 
 import attrs
-from threadpoolctl import threadpool_limits
 
-from gen_profile.designs.design import Design, design, versions
+from gen_profile.cluster import require_versions
+from gen_profile.designs.design import Design, design
 from gen_profile.errors import (
     CosimulationError,
     ExportError,
@@ -26,6 +26,7 @@ from gen_profile.errors import (
     SolverDiverged,
     SpecError,
 )
+from gen_profile.one_thread import one_thread
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import parse_spec
 from gen_profile.sweep.grid import overrides
@@ -120,16 +121,12 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any]) -> CaseOutcom
     OutputError
         This computer has no room for the files.
     """
-    if versions() != recipe.versions:
-        raise SpecError(
-            f"scheduler: a worker has {_listed(versions())}, and this sweep needs "
-            f"{_listed(recipe.versions)}; install the same there."
-        )
+    require_versions(recipe.versions, "this sweep")
     try:
         with (
             _ALONE,
             TemporaryDirectory(prefix="gen-profile-") as folder,
-            threadpool_limits(1),
+            one_thread(),
             on_processors(1),
         ):
             by_fmpy = case % EVERY == 0
@@ -178,7 +175,3 @@ def _record(case: int, values: Mapping[str, Any], outcome: Design) -> dict[str, 
         },
         "artefacts": [attrs.asdict(artefact) for artefact in outcome.artefacts],
     }
-
-
-def _listed(installed: tuple[tuple[str, str], ...]) -> str:
-    return ", ".join(f"{library} {number}" for library, number in installed)

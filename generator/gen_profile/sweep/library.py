@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,8 @@ from gen_profile.evaluation.phrases import named
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.sweep.case import PASSED
-from gen_profile.sweep.store import grid_of, read_swept
-from gen_profile.sweep.table import Table, read_table
+from gen_profile.sweep.reading import case_files, case_folder, swept_table
+from gen_profile.sweep.store import grid_of
 from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.exporter import Target, target_of
 from gen_profile_exporters.playback.library import LibraryEntry, library_source, read_library
@@ -70,7 +71,7 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = unt
     Parameters
     ----------
     folder : Path or str
-        Of a finished sweep that exported a format with the playback block.
+        Or file, of a finished sweep that exported a format with the playback block.
     path : Path or str
         File to write, such as ``crane.st``; the function block is named after it, and its suffix tells the
         format, which need not be the sweep's.
@@ -89,33 +90,7 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = unt
     folder, path = Path(folder), Path(path)
     format_ = container_of(path)
     container, stem = find_container(format_), path.name[: -len(formats()[format_].suffix)]
-    grid = grid_of(folder)
-    keys = [axis.key for axis in grid.axes]
-    profiles: list[dict[str, Any]] = []
-    entries, target = [], None
-    passed = _passed(read_table(folder, grid))
-    for done, row in enumerate(passed):
-        progress("reading profiles", done, len(passed))
-        artefact = _block_of(row)
-        content = read_swept(folder / row["folder"] / artefact["path"], artefact["sha256"])
-        target = target or _target(folder / row["folder"], stem.removeprefix("FB_"))
-        values = {key: row[key] for key in keys}
-        source = find_container(artefact["format"]).unwrap(content, target)
-        entries.append(LibraryEntry(source=source, label="  ".join(named(values))))
-        profiles.append(
-            {
-                "number": len(profiles),
-                "case": row["case"],
-                "values": values,
-                "payload_sha256": artefact["payload_sha256"],
-                "duration_s": row["duration_s"],
-                "sway_residual_worst_m": row["check_worst_sway_m"],
-            }
-        )
-    if target is None:
-        raise SpecError(
-            f"No case of the sweep in {folder} passed, so there is nothing to put into a library."
-        )
+    profiles, entries, target = _gathered(folder, stem.removeprefix("FB_"), progress)
     progress("writing the library and reading it back")
     library = library_source(entries, target)
     first, *others = container.wrap(library, target)
@@ -138,14 +113,43 @@ def write_library(folder: Path | str, path: Path | str, progress: Progress = unt
     )
 
 
-def _passed(table: Table) -> list[dict[str, Any]]:
-    return [row for row in table.to_pylist() if row["status"] == PASSED]
+def _gathered(
+    folder: Path, name: str, progress: Progress
+) -> tuple[list[dict[str, Any]], list[LibraryEntry], Target]:
+    """Read the blocks of all cases that passed; also tell what each is, and give the library's target."""
+    grid = grid_of(folder)
+    passed = [row for row in swept_table(folder, grid).to_pylist() if row["status"] == PASSED]
+    if not passed:
+        raise SpecError(
+            f"No case of the sweep in {folder} passed, so there is nothing to put into a library."
+        )
+    target = _target(folder, passed[0], name)
+    profiles, entries = [], []
+    for number, row in enumerate(passed):
+        progress("reading profiles", number, len(passed))
+        artefact = _block_of(row)
+        content = case_files(folder, row)[artefact["path"]]
+        values = {axis.key: row[axis.key] for axis in grid.axes}
+        source = find_container(artefact["format"]).unwrap(content, target)
+        entries.append(LibraryEntry(source=source, label="  ".join(named(values))))
+        profiles.append(
+            {
+                "number": number,
+                "case": row["case"],
+                "values": values,
+                "payload_sha256": artefact["payload_sha256"],
+                "duration_s": row["duration_s"],
+                "sway_residual_worst_m": row["check_worst_sway_m"],
+            }
+        )
+    return profiles, entries, target
 
 
-def _target(case: Path, name: str) -> Target:
+def _target(folder: Path, row: Mapping[str, Any], name: str) -> Target:
     """Give what the profiles were made for, and the library's own name."""
-    path = case / FILENAME
-    spec = spec_from_dict(parse_manifest(read_swept(path), str(path)).spec, case)
+    with case_folder(folder, row) as case:
+        manifest = parse_manifest((case / FILENAME).read_bytes(), str(folder / row["folder"] / FILENAME))
+        spec = spec_from_dict(manifest.spec, case)
     return attrs.evolve(target_of(spec), name=name)
 
 

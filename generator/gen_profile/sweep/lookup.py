@@ -19,8 +19,10 @@ from gen_profile.spec.reading import overridden, spec_from_dict
 from gen_profile.suggestion import number_meant, suggestion
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.grid import Grid, GridAxis, overrides
-from gen_profile.sweep.store import grid_of, read_swept
-from gen_profile.sweep.table import Table, cell, read_table
+from gen_profile.sweep.reading import case_folder, swept_table, take_out
+from gen_profile.sweep.rows import cell
+from gen_profile.sweep.store import grid_of
+from gen_profile.sweep.table import Table
 from gen_profile.verification.check import Judgement, check_artefact
 
 TRIES = 64
@@ -94,7 +96,11 @@ class LookupResult:
 
 
 def lookup(
-    folder: Path | str, asked: Mapping[str, Any], progress: Callable[[str], None] = lambda _: None
+    folder: Path | str,
+    asked: Mapping[str, Any],
+    progress: Callable[[str], None] = lambda _: None,
+    *,
+    out: Path | None = None,
 ) -> LookupResult:
     """Find the nearest profile that keeps the limits on the machine asked for, by co-simulation of the file.
 
@@ -105,11 +111,13 @@ def lookup(
     Parameters
     ----------
     folder : Path or str
-        Of a finished sweep.
+        Or file, of a finished sweep.
     asked : mapping
         A value, or a text of one, for every varied key.
     progress : callable, optional
         Told every step.
+    out : Path, optional
+        Folder to which the profile is written, with its manifest.
 
     Raises
     ------
@@ -123,10 +131,13 @@ def lookup(
     folder = Path(folder)
     grid = grid_of(folder)
     wanted = _wanted(grid, {key: str(value) for key, value in asked.items()})
-    rows, nearest = _near(grid, read_table(folder, grid), wanted)
+    near, first = _near(grid, swept_table(folder, grid, ["case", "status", *wanted]), wanted)
+    rows = swept_table(folder, grid, cases=near).to_pylist()
+    nearest = next(iter(swept_table(folder, grid, cases=first).to_pylist()), None)
     if nearest is None:
         raise CheckFailed(f"The sweep in {folder} has no profile that passed and could be used.")
-    _spec_there(folder / nearest["folder"], wanted)  # may refuse what was asked for
+    with case_folder(folder, nearest) as case:
+        _spec_there(folder, nearest, case, wanted)  # may refuse what was asked for
     _require_within(grid, wanted, nearest)
     if not rows:
         raise CheckFailed(
@@ -137,6 +148,9 @@ def lookup(
     for row in rows:
         judgement = _judge(folder, row, wanted, lambda: progress("compiling the plant's FMU, once"))
         if judgement.check.passed:
+            if out is not None:
+                take_out(folder, row, out)
+                judgement = attrs.evolve(judgement, path=out / judgement.path.name)
             used = {key: row[key] for key in wanted}
             return LookupResult(
                 asked=wanted, used=used, row=row, judgement=judgement, passed_over=passed_over
@@ -188,10 +202,8 @@ def _range(axis: GridAxis) -> str:
     return ", ".join(str(cell(axis, value)) for value in axis.values)
 
 
-def _near(
-    grid: Grid, table: Table, wanted: Mapping[str, Any]
-) -> tuple[list[dict[str, Any]], dict[str, Any] | None]:
-    """Give usable rows within a step of the grid, the nearest first, and the nearest of all.
+def _near(grid: Grid, table: Table, wanted: Mapping[str, Any]) -> tuple[list[int], ...]:
+    """List usable cases within a step of the grid, the nearest first, and the nearest of all if there is one.
 
     Of equally near ones, the earlier case comes first.
     """
@@ -207,7 +219,7 @@ def _near(
     cases = np.flatnonzero(usable.to_numpy())
     order = cases[np.argsort(squares[cases], kind="stable")]
     near = order[farthest[order] <= 1.0 + ROUNDING][:TRIES]
-    return table.take(near).to_pylist(), next(iter(table.take(order[:1]).to_pylist()), None)
+    return tuple(table["case"].take(some).to_pylist() for some in (near, order[:1]))
 
 
 def _require_within(grid: Grid, wanted: Mapping[str, Any], nearest: Mapping[str, Any]) -> None:
@@ -229,15 +241,15 @@ def _named(row: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
 def _judge(
     folder: Path, row: Mapping[str, Any], wanted: Mapping[str, Any], on_build: Callable[[], None]
 ) -> Judgement:
-    artefact = row["artefacts"][0]
-    path = folder / row["folder"] / artefact["path"]
-    read_swept(path, artefact["sha256"])
-    return check_artefact(path, _spec_there(path.parent, wanted), on_build)
+    name = row["artefacts"][0]["path"]
+    with case_folder(folder, row) as case:
+        judgement = check_artefact(case / name, _spec_there(folder, row, case, wanted), on_build)
+    return attrs.evolve(judgement, path=folder / row["folder"] / name)
 
 
-def _spec_there(case: Path, wanted: Mapping[str, Any]) -> Spec:
-    """Put the machine asked for into a case's spec."""
-    path = case / FILENAME
-    document = parse_manifest(read_swept(path), str(path)).spec
+def _spec_there(folder: Path, row: Mapping[str, Any], case: Path, wanted: Mapping[str, Any]) -> Spec:
+    """Put the machine asked for into the spec of a case, whose files lie in a folder."""
+    manifest = (case / FILENAME).read_bytes()
+    document = parse_manifest(manifest, str(folder / row["folder"] / FILENAME)).spec
     machine = {key: value for key, value in wanted.items() if key.startswith(MACHINE)}
     return spec_from_dict(overridden(dict(document), overrides(machine)), case)

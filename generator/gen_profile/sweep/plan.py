@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from gen_profile.designs.design import versions
+from gen_profile.artefacts.manifest import versions
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.sweep.case import Recipe
 from gen_profile.sweep.grid import Grid

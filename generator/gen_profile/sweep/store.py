@@ -1,4 +1,4 @@
-"""The folder of a sweep: what was asked for, what is finished, and the artefacts.
+"""What is swept, and where what comes of it is kept: in one file (`gen_profile.sweep.archive`), or a folder.
 
 ::
 
@@ -16,19 +16,21 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import attrs
 from filelock import FileLock, Timeout
 
-from gen_profile.artefacts.manifest import sha256
 from gen_profile.artefacts.writing import deliver, staged
 from gen_profile.errors import OutputError
+from gen_profile.sweep.archive import Archive, is_archive, read_archive, written_archive
 from gen_profile.sweep.case import CaseOutcome, Recipe
 from gen_profile.sweep.grid import Grid, GridAxis
+from gen_profile.sweep.rows import case_path
+from gen_profile.sweep.table import write_table
 
 FORMAT, FORMAT_VERSION = "gen-profile sweep", 1
-DESCRIPTION, RECORD, TABLE, CASES = "sweep.json", "case.json", "sweep.parquet", "cases"
+DESCRIPTION, RECORD = "sweep.json", "case.json"
 RECORD_TYPES = {
     "status": str,
     "reason": str,
@@ -38,16 +40,16 @@ RECORD_TYPES = {
     "solver": dict,
 }
 LOCK = ".lock"
-PER_FOLDER = 1000
 
 
 @attrs.frozen(kw_only=True)
 class Store:
-    """A sweep's folder, and what is swept in it.
+    """What is swept, and its folder; as what is finished there, see `Keeper`.
 
     Attributes
     ----------
     folder : Path
+        Or file.
     name : str
         Of the spec.
     grid : Grid
@@ -97,6 +99,16 @@ class Store:
                 raise OutputError(f"{self.case_folder(case) / RECORD}: missing or damaged; sweep again.")
             yield record
 
+    def gather(self) -> Path:
+        """Write the table of all cases.
+
+        Raises
+        ------
+        OutputError
+            One is not finished, or the table cannot be written.
+        """
+        return write_table(self.folder, self.grid, self.records())
+
     def _record(self, case: int) -> dict[str, Any] | None:
         """Read a case's record, if it is there and one of this case."""
         try:
@@ -127,31 +139,67 @@ class Store:
         }
 
 
-def case_path(case: int) -> Path:
-    """Place a case's folder within that of its sweep."""
-    return Path(CASES) / f"{case // PER_FOLDER:04d}" / f"{case % PER_FOLDER:03d}"
+class Keeper(Protocol):
+    """Where finished cases are kept."""
+
+    def is_finished(self, case: int) -> bool:
+        """Whether a case is there, whole."""
+
+    def keep(self, case: int, outcome: CaseOutcome) -> None:
+        """Write a finished case."""
+
+    def gather(self) -> Path:
+        """Make the table of all cases, which must be finished; its file."""
+
+
+class _ArchiveKeeper:
+    """Finished cases in one file."""
+
+    def __init__(self, store: Store, archive: Archive) -> None:
+        self._store, self._archive = store, archive
+        self._finished = archive.finished()
+
+    def is_finished(self, case: int) -> bool:
+        return case in self._finished
+
+    def keep(self, case: int, outcome: CaseOutcome) -> None:
+        self._archive.keep(self._store.grid, outcome)
+        self._finished.add(case)
+
+    def gather(self) -> Path:
+        return self._store.folder
 
 
 @contextmanager
-def opened(store: Store) -> Iterator[None]:
-    """Begin a sweep, or go on with it; nobody else may work in its folder meanwhile.
+def opened(store: Store) -> Iterator[Keeper]:
+    """Begin a sweep, or go on with it; nobody else may work in its folder or file meanwhile.
 
     Raises
     ------
     OutputError
-        The folder holds another sweep, or is in use, or cannot be written.
+        It holds another sweep, or is in use, or cannot be written.
     """
+    asked = store.describe()
+    if is_archive(store.folder):
+        with written_archive(store.folder) as archive:
+            if archive.description() is None:
+                archive.describe(_json(asked).decode("utf-8"))
+            _require_same(store.folder, asked, archive.description() or "")
+            yield _ArchiveKeeper(store, archive)
+        return
     with _locked(store.folder):
-        asked = store.describe()
         if not (store.folder / DESCRIPTION).exists():
             deliver(store.folder / DESCRIPTION, _json(asked))
-        found = _description(store.folder)
-        if found != asked:
-            other = ", ".join(key for key in asked if found.get(key) != asked[key])
-            raise OutputError(
-                f"{store.folder} holds another sweep (its {other} differ); choose another folder."
-            )
-        yield
+        _require_same(store.folder, asked, (store.folder / DESCRIPTION).read_bytes())
+        yield store
+
+
+def _require_same(path: Path, asked: dict[str, Any], description: bytes | str) -> None:
+    found = _parsed(path, description)
+    if found != asked:
+        other = " and ".join(key for key in asked if found.get(key) != asked[key])
+        what = "file" if is_archive(path) else "folder"
+        raise OutputError(f"{path} holds a sweep with another {other}; choose another {what}.")
 
 
 @contextmanager
@@ -174,49 +222,40 @@ def _locked(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def grid_of(folder: Path) -> Grid:
-    """Read what a folder's sweep varies.
+def grid_of(path: Path) -> Grid:
+    """Read what the sweep in a folder or file varies.
 
     Raises
     ------
     OutputError
         There is no sweep in it.
     """
-    vary = _description(folder)["vary"]
+    if is_archive(path):
+        with read_archive(path) as archive:
+            description: bytes | str = archive.description() or ""
+    else:
+        try:
+            description = (path / DESCRIPTION).read_bytes()
+        except OSError as error:
+            raise OutputError(
+                f"There is no sweep in {path}: cannot read {path / DESCRIPTION} ({error.strerror})."
+            ) from error
+    vary = _parsed(path, description)["vary"]
     return Grid(axes=tuple(GridAxis(key=key, values=tuple(values)) for key, values in vary.items()))
 
 
-def read_swept(path: Path, digest: str | None = None) -> bytes:
-    """Read a case's file, which must have the SHA-256 that the table has of it, if that is given.
-
-    Raises
-    ------
-    OutputError
-        It is gone or was altered.
-    """
+def _parsed(path: Path, description: bytes | str) -> dict[str, Any]:
+    place = path if is_archive(path) else path / DESCRIPTION
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise OutputError(f"Cannot read {path}: {error.strerror or error}; sweep again.") from error
-    if digest is not None and sha256(content) != digest:
-        raise OutputError(f"{path} is not the file that the sweep wrote: it was altered; sweep again.")
-    return content
-
-
-def _description(folder: Path) -> dict[str, Any]:
-    path = folder / DESCRIPTION
-    try:
-        document = json.loads(path.read_bytes())
+        document = json.loads(description)
         if (document["format"], document["format_version"]) != (FORMAT, FORMAT_VERSION):
             raise ValueError("another format")
-    except OSError as error:
-        raise OutputError(f"There is no sweep in {folder}: cannot read {path} ({error.strerror}).") from error
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise OutputError(f"{path}: not a sweep of this version of gen-profile.") from error
+        raise OutputError(f"{place}: not a sweep of this version of gen-profile.") from error
     vary = document.get("vary")
     values = vary.values() if isinstance(vary, dict) else ()
     if not values or not all(isinstance(listed, list) and listed for listed in values):
-        raise OutputError(f"{path}: damaged; sweep again.")
+        raise OutputError(f"{place}: damaged; sweep again.")
     return dict(document)
 
 

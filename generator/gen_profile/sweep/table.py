@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
@@ -12,9 +11,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from gen_profile.errors import OutputError
-from gen_profile.sweep.grid import Grid, GridAxis
-from gen_profile.sweep.store import TABLE, case_path
+from gen_profile.sweep.grid import Grid
+from gen_profile.sweep.rows import row_of
 
+TABLE = "sweep.parquet"
 Table = Any  # pyarrow.Table, which has no types
 BATCH = 10_000  # rows that are Python objects at a time
 ARTEFACTS = pa.list_(
@@ -61,7 +61,7 @@ def write_table(folder: Path, grid: Grid, records: Iterable[Mapping[str, Any]]) 
 def _gathered(grid: Grid, records: Iterator[Mapping[str, Any]]) -> Table:
     parts = []
     while batch := list(islice(records, BATCH)):
-        parts.append(_columns([_row(grid, record) for record in batch]))
+        parts.append(columns_of([row_of(grid, record) for record in batch]))
     table = pa.concat_tables(parts, promote_options="permissive")
     for index, field in enumerate(table.schema):
         if pa.types.is_null(field.type):  # no case has it
@@ -93,33 +93,9 @@ def read_table(folder: Path, grid: Grid) -> Table:
     return table
 
 
-def cell(axis: GridAxis, value: Any) -> float | str:
-    """Write a value as its column holds it: a number, or a text."""
-    if axis.numeric:
-        return float(value)
-    return value if isinstance(value, str) else json.dumps(value)
-
-
-def _row(grid: Grid, record: Mapping[str, Any]) -> dict[str, Any]:
-    """Lay a record out flat."""
-    return {
-        "case": record["case"],
-        **{axis.key: cell(axis, record["values"][axis.key]) for axis in grid.axes},
-        "status": record["status"],
-        "reason": record["reason"],
-        "folder": case_path(record["case"]).as_posix(),
-        "artefacts": record.get("artefacts", []),
-        "spec_sha256": record.get("spec_sha256"),
-        "profile_sha256": record.get("profile_sha256"),
-        **record.get("figures", {}),
-        **{f"check_{key}": value for key, value in record.get("check", {}).items()},
-        **{f"solver_{key}": value for key, value in record.get("solver", {}).items()},
-    }
-
-
-def _columns(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Turn rows, of which some lack cells, into columns; their order is that of their first appearance."""
-    names = list(dict.fromkeys(name for row in rows for name in row))
+def columns_of(rows: Sequence[Mapping[str, Any]], names: Sequence[str] = ()) -> Table:
+    """Turn rows, of which some lack cells, into columns: those named, or all as they first appear."""
+    names = list(names or dict.fromkeys(name for row in rows for name in row))
     types = {"artefacts": ARTEFACTS, "spec_sha256": pa.string(), "profile_sha256": pa.string()}
     arrays = [pa.array([row.get(name) for row in rows], type=types.get(name)) for name in names]
     return pa.table(arrays, names=names)

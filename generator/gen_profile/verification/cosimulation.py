@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
 
+import attrs
 import numpy as np
 
 from gen_profile.errors import CosimulationError
@@ -27,6 +28,7 @@ from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 LONGEST_STEP = 1e-3  # s, of the FMU's integrator
 STEP_PHASE = 0.05  # rad of the fastest mode that one step may cover
+ROUNDING = 1e-12  # of times, relative
 ERROR_FLOOR = 1e-8  # m; covers what both integrations leave
 
 
@@ -109,7 +111,7 @@ def judge(
     """
     standing = arrival(spec, followed or setpoints)
     after = [_from(response, standing) for response in found]
-    since = standing if spec.limits.sway is None else 0.0
+    since = judged_from(spec, followed or setpoints)
     error = max(_distance(one, _from(other, since)) for one, other in zip(found, expected, strict=True))
     between = max(above_samples(response.sway) for response in after)
     if spec.limits.sway is not None:  # until the last setpoint samples are farther apart
@@ -144,6 +146,11 @@ def beyond_equations(spec: Spec, machines: Sequence[Scenario], found: Sequence[R
             f"({machines[worst].name}), and the linear equations of a {plant.type} hold up to "
             f"{1e3 * small[worst]:.4g} mm: what is told of more is rough; allow more time (move.duration)."
         )
+
+
+def judged_from(spec: Spec, setpoints: SampledProfile) -> float:
+    """Time in s from which sway counts."""
+    return (1.0 - ROUNDING) * arrival(spec, setpoints) if spec.limits.sway is None else 0.0
 
 
 def _distance(found: Response, expected: Response) -> float:
@@ -181,16 +188,9 @@ def longest_step(spec: Spec, machine: Scenario) -> float:
 
 def _from(response: Response, since: float) -> Response:
     """Cut what comes before."""
-    kept = response.times >= since * (1.0 - 1e-12)
-    return Response(
-        times=response.times[kept],
-        position=response.position[kept],
-        velocity=response.velocity[kept],
-        q_u=response.q_u[kept],
-        dq_u=response.dq_u[kept],
-        sway=response.sway[kept],
-        angle=response.angle[kept],
-    )
+    kept = slice(int(np.searchsorted(response.times, since * (1.0 - ROUNDING))), None)
+    columns = attrs.asdict(response, recurse=False)
+    return Response(**{name: values[kept] for name, values in columns.items()})
 
 
 def _finding(spec: Spec, machine: Scenario, response: Response, arrival: float) -> Finding:

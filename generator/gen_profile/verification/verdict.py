@@ -38,8 +38,34 @@ class Finding:
     on_the_way: float | None = None
 
 
+class Examination:
+    """What was examined passes where there is no reason against it."""
+
+    __slots__ = ()
+
+    def reasons(self) -> tuple[str, ...]:
+        """Say why it failed, a sentence each."""
+        raise NotImplementedError
+
+    @property
+    def passed(self) -> bool:
+        """Whether every limit is kept, the error bound included."""
+        return not self.reasons()
+
+    def raise_for_failure(self) -> None:
+        """Do nothing where it passed.
+
+        Raises
+        ------
+        CheckFailed
+            With the reasons.
+        """
+        if not self.passed:
+            raise CheckFailed("\n".join(self.reasons()))
+
+
 @attrs.frozen(kw_only=True)
-class Check:
+class Check(Examination):
     """Verdict on one artefact.
 
     Attributes
@@ -89,22 +115,6 @@ class Check:
         """Findings that the verdict rests on."""
         counted = tuple(found for found in self.findings if self.strict or found.scenario.group != TIMING)
         return counted or self.findings
-
-    @property
-    def passed(self) -> bool:
-        """Whether every load keeps its limit in every scenario, the error bound included."""
-        return not self.reasons()
-
-    def raise_for_failure(self) -> None:
-        """Do nothing where the check passed.
-
-        Raises
-        ------
-        CheckFailed
-            With the reasons.
-        """
-        if not self.passed:
-            raise CheckFailed("\n".join(self.reasons()))
 
     def keeps_limit(self, finding: Finding) -> bool:
         """Whether every load keeps its limits in one scenario, the error bound included."""

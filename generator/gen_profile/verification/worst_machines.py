@@ -13,7 +13,7 @@ import numpy as np
 
 from gen_profile.evaluation.scenarios import LAG, SEARCH, Scenario, named
 from gen_profile.motion.profile import Array, SampledProfile
-from gen_profile.problem.linearization import eigenvalues
+from gen_profile.problem.linearization import eigenvalues_at
 from gen_profile.problem.parameter_box import Box, start, worst_places
 from gen_profile.spec.model import Spec
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
@@ -164,7 +164,7 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
 def _fastest(box: Box, places: Array) -> float:
     """Greatest rate in 1/s at which any of some machines changes."""
     machines = box.machines(places)
-    return max(float(np.abs(eigenvalues(box.plant, machines, q_a)).max()) for q_a in box.ends)
+    return max(float(np.abs(rates).max()) for rates in eigenvalues_at(box.plant, machines, box.ends))
 
 
 def _coarse(way: _Way, setpoints: SampledProfile, step: float) -> Feed:

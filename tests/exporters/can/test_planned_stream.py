@@ -16,6 +16,7 @@ from fmu.kinds import PLANNED, planner_text
 from gen_profile.errors import SpecError
 from gen_profile.planner.commands import play, read_commands
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.can import CanSpec
 from gen_profile.streaming.keyboard import Keyboard, Keys
 from gen_profile.streaming.planned_motion import CommandList, PlannedMotion
@@ -24,6 +25,7 @@ from gen_profile_exporters.can.streaming.record import Phase
 COUNTS = 1_000_000
 CYCLE = PLANNED.export.cycle_time
 COMMANDS = "time_s,command,value,L1\n0.1,position,0.2,0.48\n0.7,velocity,-0.3,\n1.2,stop,,\n"
+AXES = (BlockAxis(name=""),)
 LONG = "time_s,command,value\n0.1,velocity,0.4\n"
 
 
@@ -34,7 +36,7 @@ def spec_of(**can):
 def source_of(spec, commands=COMMANDS, **live):
     operator = commands
     if isinstance(commands, str):
-        operator = CommandList(read_commands(commands, ("L1",)), CYCLE)
+        operator = CommandList(read_commands(commands, AXES, ("L1",)), CYCLE)
     return PlannedMotion(spec, BlockInstance(planner_text()), operator, live)
 
 
@@ -162,13 +164,21 @@ def test_a_block_that_does_not_fit_the_bus_is_refused():
 
 
 def test_keys_are_a_stick_and_buttons():
-    keys = Keys(2.0)
+    keys = Keys(AXES, [2.0])
     sent = (b"\x1b[C\x1b", b"[C", b"\x1bOD", b" 1.5", b"\x7f25\r", b"\x1b[D", b"q", b"..\r", b"x")
-    told = [(one.command, round(one.value, 9)) for some in sent for one in keys.take(some)]
+    taken = [one for some in sent for one in keys.take(some)]
+    told = [(one.command, *(round(value, 9) for value in one.values)) for one in taken]
     stick = [("velocity", 0.2), ("velocity", 0.4), ("velocity", 0.2)]
-    then = [("stop", 0.0), ("position", 1.25), ("velocity", -0.2), ("quick-stop", 0.0), ("stop", 0.0)]
+    then = [("stop",), ("position", 1.25), ("velocity", -0.2), ("quick-stop",), ("stop",)]
     assert told == [*stick, *then]
     assert keys.over
+
+
+def test_of_two_axes_each_has_arrows_and_places():
+    keys = Keys((BlockAxis(name="x"), BlockAxis(name="y")), [2.0, 1.0])
+    told = [(one.command, one.values) for one in keys.take(b"\x1b[C\x1b[B3,1.5\r7\r")]
+    assert told == [("velocity", (0.2, 0.0)), ("velocity", (0.2, -0.1)), ("position", (3.0, 1.5))]
+    assert keys.shown == "7: a position for each of 2 axes, please"
 
 
 @pytest.fixture
@@ -184,7 +194,7 @@ def terminal(monkeypatch):
 def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
     ours, theirs = terminal
     before = termios.tcgetattr(theirs)
-    keyboard = Keyboard(theirs, 0.5, CYCLE)
+    keyboard = Keyboard(theirs, AXES, [0.5], CYCLE)
     source = source_of(spec_of(), keyboard)
     with keyboard.operated(), bench_of(source) as bench:
         os.write(ours, b"\x1b[D")  # before the motion begins
@@ -202,7 +212,7 @@ def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
 
 def test_a_terminal_that_is_gone_stops_the_axis(terminal):
     ours, theirs = terminal
-    keyboard = Keyboard(theirs, 0.5, CYCLE)
+    keyboard = Keyboard(theirs, AXES, [0.5], CYCLE)
     source = source_of(spec_of(), keyboard)
     with keyboard.operated(), bench_of(source) as bench:
         bench.at_cycle(10, lambda: os.write(ours, b"\x1b[C"))
@@ -216,6 +226,6 @@ def test_a_terminal_that_is_gone_stops_the_axis(terminal):
 def test_what_is_no_terminal_is_refused():
     reading, writing = os.pipe()
     with pytest.raises(SpecError, match="standard input is no terminal"):
-        Keyboard(reading, 0.5, 0.004)
+        Keyboard(reading, AXES, [0.5], 0.004)
     os.close(reading)
     os.close(writing)

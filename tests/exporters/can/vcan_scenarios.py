@@ -11,6 +11,7 @@ import gc
 import json
 import multiprocessing
 import os
+import re
 import shutil
 import signal
 import socket
@@ -43,6 +44,7 @@ PATIENCE = 60.0  # s, for what takes a second or two; a machine may be busy
 SIOCSIFFLAGS = 0x8914  # linux/sockios.h
 ATTEMPTS = 8  # for a fair trial
 UNDER_WAY = 0.6  # s after the beginning of the stream
+FROZEN = 0.5  # s
 
 
 def run(place, log, queue, disturb):
@@ -65,7 +67,10 @@ def run(place, log, queue, disturb):
             _wait_for("stream …", place / "stream.err", streamer)
             time.sleep(UNDER_WAY)
             running = "aborted" not in (place / "stream.err").read_text()
-            disturb(streamer, drive)
+            try:
+                disturb(streamer, drive)
+            except ProcessLookupError:  # it has ended by itself
+                running = False
         codes = {"stream": _ended(streamer), "drive": _ended(drive, patience=10.0)}
         time.sleep(0.1)
         witness.terminate()
@@ -78,8 +83,9 @@ def run(place, log, queue, disturb):
     told = (place / "stream.json").read_text()
     if disturb is None:
         running = '"state": "done"' in told and '"cycles_unanswered": 0' in told
-    stalls = ("no heartbeat",) if disturb is _freeze else ("no heartbeat", "late at cycle")
-    return running and not any(words in told for words in stalls)
+    late = [float(ms) / 1e3 for ms in re.findall(r"([\d.]+) ms late at cycle", told)]
+    stalled = any(seconds < FROZEN - 0.1 for seconds in late) if disturb is _freeze else bool(late)
+    return running and not stalled and "no heartbeat" not in told
 
 
 def _begun(arguments, out, err):
@@ -137,7 +143,7 @@ def _signal_streamer(number):
 
 def _freeze(streamer, _):
     os.kill(streamer.pid, signal.SIGSTOP)
-    time.sleep(0.5)
+    time.sleep(FROZEN)
     os.kill(streamer.pid, signal.SIGCONT)
 
 

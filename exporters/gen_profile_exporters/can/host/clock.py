@@ -16,11 +16,9 @@ class Clock(Protocol):
 
     def now(self) -> int:
         """Time in ns since any fixed instant."""
-        ...
 
     def sleep_until(self, instant: int) -> None:
         """Return at that instant, or at once when it has passed."""
-        ...
 
 
 @attrs.frozen

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, Protocol
 
 import attrs
 import can
@@ -15,12 +15,31 @@ from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import MOVING
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
-from gen_profile_exporters.can.simulation.load import Load
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
 from gen_profile_exporters.can.streaming.link import FRAMES_AT_ONCE
 
 FAREWELL = NANOSECONDS // 2  # without SYNC, after which a stream is over
 WAIT = 0.001  # s, for a frame, before the drives look at their clocks
+
+
+class Load(Protocol):
+    """A machine whose axes follow positions."""
+
+    def advance(self, position: Sequence[float], duration: float) -> Sequence[float]:
+        """Lead every axis evenly to a position.
+
+        Parameters
+        ----------
+        position : sequence of float
+            Commanded at the end, per axis, in m (or rad).
+        duration : float
+            s.
+
+        Returns
+        -------
+        sequence of float
+            Where the axes then are.
+        """
 
 
 class DriveBank:

@@ -98,7 +98,7 @@ def configure(
             _reset_fault(link, node)
         _require_rest(link, node)
         found.remember_watch(node.number, _upload(link, node, *HEARTBEAT_WATCHED, optional=True))
-        _disarm(link, node)
+        _download(link, node, *HEARTBEAT_WATCHED, bytes(4))  # as a stream that was killed has set it
     link.meanwhile = meanwhile
     for node in nodes:
         _set(link, node, lists[node.number], found)
@@ -135,7 +135,7 @@ def start(link: Link, target: Target) -> None:
 def release(link: Link, target: Target, found: Restoration) -> tuple[str, ...]:
     """Let the drives be alone again: no PDOs taken, no heartbeat of ours watched, set as they were found.
 
-    One that does not listen reports a lost heartbeat; the others are none the worse for it.
+    One that does not listen reports a lost heartbeat; that does no harm to the others.
 
     Returns
     -------
@@ -211,16 +211,6 @@ def _reset_fault(link: Link, node: Node) -> None:
         link.wait_until(link.clock.now() + RESET_PATIENCE // 10)
 
 
-def _disarm(link: Link, node: Node) -> None:
-    """Have the drive not watch our heartbeat, as a stream that was killed has left it."""
-    try:
-        link.sdo(node.number).download(*HEARTBEAT_WATCHED, bytes(4))
-    except SdoAbortedError:  # it watches always, or never: what it then holds is read back
-        return
-    except (SdoError, struct.error) as error:
-        raise _silent(node, error) from error
-
-
 def _require_rest(link: Link, node: Node) -> None:
     state = state_of(_read(link, node, 0x6041))
     if state in FAULTS:
@@ -248,14 +238,8 @@ def _set(link: Link, node: Node, entries: Sequence[Entry], found: Restoration) -
 
     found.remember(node.number, settings_of(held, changed, read))
     for entry in entries:
-        if entry.fixed:
-            continue
-        try:
-            link.sdo(node.number).download(entry.index, entry.sub, entry.data)
-        except SdoAbortedError:  # fixed in this drive: what counts is what is read back
-            continue
-        except (SdoError, struct.error) as error:
-            raise _silent(node, error) from error
+        if not entry.fixed:
+            _download(link, node, entry.index, entry.sub, entry.data)
     if differing := _differing(_held(link, node, final), final):
         entry, kept = differing[0]
         holds = "nothing" if kept is None else f"{int.from_bytes(kept, 'little'):X}h"
@@ -371,7 +355,7 @@ def _read(link: Link, node: Node, index: int, sub: int = 0, bits: int = 32) -> i
 def _upload(
     link: Link, node: Node, index: int, sub: int, bits: int = 32, *, optional: bool = False
 ) -> bytes | None:
-    """Read an object of so many bits, whose answer may have room for more; None where the drive has none."""
+    """Read an object of some bits, whose answer may have room for more; None where the drive has none."""
     try:
         data: bytes = link.sdo(node.number).upload(index, sub)
     except SdoAbortedError as error:
@@ -383,6 +367,16 @@ def _upload(
     except (SdoError, struct.error) as error:
         raise _silent(node, error) from error
     return data[: bits // 8]
+
+
+def _download(link: Link, node: Node, index: int, sub: int, data: bytes) -> None:
+    """Write an object; a drive may refuse it, for what counts is what is read back."""
+    try:
+        link.sdo(node.number).download(index, sub, data)
+    except SdoAbortedError:
+        return
+    except (SdoError, struct.error) as error:
+        raise _silent(node, error) from error
 
 
 def _silent(node: Node, error: Exception) -> StreamAborted:

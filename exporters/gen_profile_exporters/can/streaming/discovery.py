@@ -70,15 +70,20 @@ def discover(link: Link) -> tuple[IdentifiedNode, ...]:
         The bus is in use by a controller, with which questions would interfere; disturbed, so that questions
         would be lost; or it fails.
     """
-    heard, answered = listen(link), _Answers()
-    link.subscribe(answered.take)
+    heard, answered = listen(link), set[int]()
+
+    def take(message: can.Message) -> None:  # a refusal is an answer, too
+        if not message.is_extended_id:
+            answered.add(message.arbitration_id - frames.SDO_ANSWER)
+
+    link.subscribe(take)
     for number in NODES:
         link.send(frames.message(frames.SDO_REQUEST + number, READ_DEVICE_TYPE))
         _wait(link, APART)
         heard.require_undisturbed()
     _wait(link, PATIENCE)
     heard.require_undisturbed()
-    return tuple(_identified(link, number) for number in sorted(answered.nodes))
+    return tuple(_identified(link, number) for number in sorted(answered.intersection(NODES)))
 
 
 def listen(link: Link) -> _BusMonitor:
@@ -106,8 +111,10 @@ class _BusMonitor:
     def take(self, message: can.Message) -> None:
         if message.is_error_frame:
             self._disturbed = True
-        elif not message.is_extended_id and self._commands(message.arbitration_id):
-            self._controller = message.arbitration_id
+        elif not message.is_extended_id:
+            cob_id = message.arbitration_id
+            if cob_id in CONTROLLERS or cob_id - frames.SDO_REQUEST in NODES:
+                self._controller = cob_id
 
     def require_quiet(self) -> None:
         self.require_undisturbed()
@@ -122,22 +129,6 @@ class _BusMonitor:
             raise StreamAborted(
                 "The bus is disturbed (error frames): check the bit rate, cable and termination."
             )
-
-    @staticmethod
-    def _commands(cob_id: int) -> bool:
-        return cob_id in CONTROLLERS or cob_id - frames.SDO_REQUEST in NODES
-
-
-class _Answers:
-    """Takes down who answers, be it with a refusal."""
-
-    def __init__(self) -> None:
-        self.nodes: set[int] = set()
-
-    def take(self, message: can.Message) -> None:
-        number = message.arbitration_id - frames.SDO_ANSWER
-        if not message.is_extended_id and number in NODES:
-            self.nodes.add(number)
 
 
 def _identified(link: Link, number: int) -> IdentifiedNode:

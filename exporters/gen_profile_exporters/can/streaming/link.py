@@ -28,11 +28,9 @@ class Launching(Protocol):
 
     def keeps_instants(self) -> bool:
         """Try whether it does; sends a frame that no CANopen device takes."""
-        ...
 
     def send_at(self, message: can.Message, instant: int) -> None:
         """Have a frame sent at an instant of the clock, in ns."""
-        ...
 
 
 class Link:

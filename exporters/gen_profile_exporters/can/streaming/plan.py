@@ -48,58 +48,46 @@ class SetpointSource(Protocol):
     @property
     def target(self) -> Target:
         """The drives."""
-        ...
 
     @property
     def demand(self) -> Demand:
         """What is asked of them."""
-        ...
 
     @property
     def planned(self) -> int | None:
         """How many cycles there will be, where that is known beforehand."""
-        ...
 
     @property
     def most(self) -> int:
         """How many cycles there can be."""
-        ...
 
     @property
     def at_sync(self) -> Integers:
         """Where the axes are led to by each SYNC, as far as known, in counts, shape (cycles, axes)."""
-        ...
 
     @property
     def goal(self) -> Integers | None:
         """Where they are led to at last, as far as known, in counts, shape (axes,)."""
-        ...
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What there is to say afterwards, a sentence each."""
-        ...
 
     @property
     def columns(self) -> Mapping[str, Integers]:
         """What else is known of every cycle, by name."""
-        ...
 
     def operated(self) -> AbstractContextManager[object]:
         """Hold what commands are taken from, as long as axes may move."""
-        ...
 
     def begin(self, standing: Sequence[int]) -> Step:
         """Begin where the axes stand, in counts; return the first cycle's setpoints."""
-        ...
 
     def step(self, cycle: int) -> Step | None:
         """Give the setpoints of a cycle, or None where the motion is over; the numbers never fall."""
-        ...
 
     def end(self) -> bool:
         """End the motion early without sway, if that is possible."""
-        ...
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -1,8 +1,9 @@
 // Plays the machines' moves: every machine in a picture of its own, all at the same time of the move.
+// A page that has its animations as data gets them played; others call playAnimation(host, animation, words).
 "use strict";
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
-  const animations = JSON.parse(document.getElementById("data").textContent).animations;
+  const WORDS = { play: "Play", pause: "Pause", of: "of", arrived: "arrived" };
   const LOOKS = {
     rail: { stroke: "#8a949d", "stroke-width": 2 },
     plumb: { stroke: "#9aa4ad", "stroke-width": 1, "stroke-dasharray": "4 3" },
@@ -47,12 +48,12 @@
       return { ...shape, line, node: element(svg, line ? "polyline" : round ? "ellipse" : "rect", look) };
     });
 
-    return function show(frame, factor) {
-      const before = Math.min(Math.floor(frame), moving.rest.length - 2);
+    return function show(frame, factor, { rest, swing: away } = moving) {
+      const before = Math.min(Math.floor(frame), rest.length - 2);
       const share = frame - before;
       const mix = (rows, at) => rows[before][at] * (1 - share) + rows[before + 1][at] * share;
       const point = (index, swung) =>
-        [0, 1].map((c) => mix(moving.rest, 2 * index + c) * place + swung * mix(moving.swing, 2 * index + c) * swing);
+        [0, 1].map((c) => mix(rest, 2 * index + c) * place + swung * mix(away, 2 * index + c) * swing);
       for (const { kind, line, node, points, size } of shapes) {
         let found = points.map((index) => toScreen(point(index, kind === "plumb" ? 0 : factor)));
         if (line) {
@@ -98,7 +99,7 @@
       const host = stage.appendChild(document.createElement("div"));
       host.className = "actor";
       host.style.borderTopColor = actor.colour;
-      const title = host.appendChild(document.createElement("h4"));
+      const title = host.appendChild(document.createElement("h3"));
       title.append(actor.name);
       const value = title.appendChild(document.createElement("span"));
       const pictures = animation.views.map((view, index) => {
@@ -106,31 +107,42 @@
         if (animation.views.length > 1) host.appendChild(document.createElement("small")).append(view.title);
         return show;
       });
-      return (frame, factor) => {
-        const sway = actor.sway_mm[Math.round(frame)];
+      return (frame, factor, moving = actor) => {
+        const sway = moving.sway_mm[Math.round(frame)];
         value.textContent = `${animation.load} ${sway < 0 ? "−" : "+"}${Math.abs(sway).toFixed(2)} mm`;
-        for (const show of pictures) show(frame, factor);
+        pictures.forEach((show, index) => show(frame, factor, moving.views[index]));
       };
     });
   }
 
-  function stage(host, animation) {
-    const duration = animation.step * (animation.frames - 1);
+  /** Play an animation, and give the means to put another one in its place, and to set the time in s. */
+  function stage(host, animation, words = WORDS) {
     const find = (name) => host.querySelector(`.${name}`);
     const [slider, play, clock, speed, scale] = ["time", "play", "clock", "speed", "scale"].map(find);
-    const actors = cast(find("stage"), animation);
-    const moveCursor = strip(find("strip"), animation);
+    let actors, moveCursor, duration;
     let time = 0;
     let request = null; // of the next frame; null while nothing plays
     let last = null; // when the latest frame was shown; null before the first one
 
+    function take(next) {
+      animation = next;
+      duration = animation.step * (animation.frames - 1);
+      find("stage").replaceChildren();
+      find("strip").replaceChildren();
+      actors = cast(find("stage"), animation);
+      moveCursor = strip(find("strip"), animation);
+      slider.max = duration;
+      time = Math.min(time, duration);
+      show();
+    }
     function show() {
       const frame = Math.min(time / animation.step, animation.frames - 1);
       for (const actor of actors) actor(frame, Number(scale.value));
       moveCursor(time);
       slider.value = time;
-      clock.textContent = `${time.toFixed(2)} s of ${duration.toFixed(1)} s${time >= animation.arrival ? ", arrived" : ""}`;
-      play.textContent = request === null ? "Play" : "Pause";
+      const arrived = time >= animation.arrival ? `, ${words.arrived}` : "";
+      clock.textContent = `${time.toFixed(2)} s ${words.of} ${duration.toFixed(1)} s${arrived}`;
+      play.textContent = request === null ? words.play : words.pause;
     }
     function tick(now) {
       time = Math.min(time + (Number(speed.value) * (now - (last ?? now))) / 1000, duration);
@@ -152,7 +164,6 @@
       }
       show();
     });
-    slider.max = duration;
     slider.addEventListener("input", () => {
       pause();
       time = Number(slider.value);
@@ -160,13 +171,30 @@
     });
     scale.addEventListener("change", show);
     // paper shows one moment: that of the greatest sway of the first machine
-    const sways = animation.actors[0].sway_mm.map(Math.abs);
-    const telling = animation.step * sways.indexOf(Math.max(...sways));
     let before = 0;
-    addEventListener("beforeprint", () => { pause(); before = time; time = telling; show(); });
+    addEventListener("beforeprint", () => {
+      pause();
+      const sways = animation.actors[0].sway_mm.map(Math.abs);
+      before = time;
+      time = animation.step * sways.indexOf(Math.max(...sways));
+      show();
+    });
     addEventListener("afterprint", () => { time = before; show(); });
-    show();
+    take(animation);
+    return {
+      take,
+      /** Show a time, unless it plays. */
+      seek(at) {
+        if (request !== null) return;
+        time = Math.min(Math.max(at, 0), duration);
+        show();
+      },
+    };
   }
 
-  document.querySelectorAll(".animation").forEach((host, index) => stage(host, animations[index]));
+  window.playAnimation = stage;
+  window.castAnimation = cast; // for what moves as it is told: (frame, factor, the actor's new places) of every machine
+  const data = document.getElementById("data");
+  const animations = data ? JSON.parse(data.textContent).animations : [];
+  document.querySelectorAll(".animation").forEach((host, index) => animations[index] && stage(host, animations[index]));
 })();

@@ -6,13 +6,16 @@ at every instant, not only at samples. (Farin, Curves and Surfaces for CAGD, cha
 
 from __future__ import annotations
 
+import math
+
 import attrs
 import numpy as np
-from scipy.special import comb
 
 from gen_profile.motion.profile import Array
 
 CONTROL_DEGREE = 3
+
+comb = np.vectorize(math.comb, otypes=[np.float64])  # SciPy's takes 0.1 s to load
 
 
 def bernstein(degree: int, times: Array) -> Array:

@@ -22,6 +22,7 @@ from gen_profile.solvers.direct.transcription import Iterate, Transcription
 WITHIN = 1.0 - 1e-6  # share of a limit that a program may use: its own tolerance must not break the limit
 
 STEEPER = 2.0  # by which the exponent of the sway's cost may grow from one expansion to the next
+HELD = 3e-7  # cost of changing the highest derivative by as much as it is usually
 USUAL_ACCELERATION, USUAL_JERK = 25.0, 1e3  # halves of squares, dimensionless; a quintic's are 9 and 360
 DERIVATIVES = {1: "velocity", 2: "acceleration", 3: "jerk", 0: "travel"}  # of the position, that have limits
 
@@ -87,6 +88,23 @@ def cost(
         quadratic = quadratic + matrix.T @ hessian @ matrix
         linear = matrix.T @ (slope.ravel() + hessian @ (offset - sway.ravel()))
     return quadratic, linear
+
+
+def held(
+    quadratic: Matrix, linear: Array, transcription: Transcription, iterate: Iterate
+) -> tuple[Matrix, Array]:
+    """Let it cost a little to leave the last motion's highest derivative.
+
+    An effort that sees lower derivatives only leaves programs nearly singular. With this proximal term they
+    are not, and end at the same motion (R. T. Rockafellar, Monotone operators and the proximal point
+    algorithm, 1976).
+    """
+    piece, columns = transcription.piece, transcription.intervals * transcription.breadth
+    sizes = transcription.units[:columns].reshape(-1, piece.size)
+    weights = np.where(np.arange(piece.size) < piece.order, 0.0, HELD / sizes**2).ravel()
+    padding = (0, len(linear) - columns)
+    whole = sparse.diags(np.pad(weights, padding), format="csc")
+    return quadratic + whole, linear - np.pad(weights * iterate.local.ravel(), padding)
 
 
 def approach(transcription: Transcription, sway_cost: SwayCost, before: Iterate, after: Iterate) -> Iterate:

@@ -8,7 +8,7 @@ falls smoothly with the duration: where it is 1, the limits can just be kept.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 
 import attrs
@@ -27,20 +27,24 @@ from gen_profile.solvers.direct.solver import (
     STEP_TOLERANCE,
     CostProgram,
     ProgramSequence,
+    conclude,
     sequence,
 )
 from gen_profile.solvers.direct.transcription import Iterate
+from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import LimitsSpec
 
 PRICES = (1e-5, 1e-3, 1e-1)  # of the effort without limits: ever less sway would take ever more of it
 CHANGE = 1e-4  # of the share, relative, that is worth another program
 ENOUGH = 5e-3  # by which the share's logarithm may exceed 0
 CLOSE = 0.05  # by which it may fall short of 0: the duration found is then tried
-DURATION_PRECISION = 2e-2  # relative
 POWER = 1.8  # with which shares fall over the duration, more or less
+POWERS = (1.0, 4.0)  # between which what two durations tell of it is believed
 STEPS = (math.log(1.1), math.log(2.0))  # of the duration's logarithm
+KNOWN_STEPS = (1e-3, math.log(30.0))  # likewise where two durations tell the power
 LITTLE = 0.01  # by which the share's logarithm must fall within the longer of them
 ROUNDS = 12
+CLOSER = 3  # rounds at most, once a duration is long enough
 UNSETTLED = math.log(1e6)  # in place of the logarithm of a share that was not found
 TINY = 1e-6  # share below which how small it is does not matter
 
@@ -101,12 +105,22 @@ class Relaxed:
     ----------
     share : float
         How many times as wide they must be.
-    iterate : Iterate
-        The motion.
+    found : ProgramSequence
+        By which the motion was found.
     """
 
     share: float
-    iterate: Iterate
+    found: ProgramSequence
+
+    @property
+    def iterate(self) -> Iterate:
+        """The motion, on its mesh."""
+        return self.found.iterate
+
+    @property
+    def solution(self) -> Solution:
+        """The motion as a solution, unless it swings too far."""
+        return conclude(self.found, SwayCost(beta=0.0, gamma=1.0), self.found.iterations)
 
 
 class Relaxation:
@@ -159,7 +173,7 @@ class Relaxation:
             goal = LeastShare(setup=setup, loosened=loosened, price=price / effort)
             found = sequence(unlimited.iterate, goal)
             if found.verdict is ConicStatus.SOLVED:
-                return Relaxed(share=float(found.solutions[-1].x[-1]), iterate=found.iterate)
+                return Relaxed(share=float(found.solutions[-1].x[-1]), found=found)
             if found.verdict is ConicStatus.INFEASIBLE or found.iterations == MAX_ITERATIONS:
                 break
         return None
@@ -171,8 +185,8 @@ def least_duration(relaxation: Relaxation) -> float | None:
     Returns
     -------
     float or None
-        None where the limits cannot be kept however long the move is. The problem's own where the programs do
-        not settle, so that nothing is known.
+        None where the limits cannot be kept however long the move is. The problem's own where no programs
+        settle, so that nothing is known.
     """
     problem = relaxation.problem
     places, asked = tuple(problem.limits.stated()), math.log(problem.duration)
@@ -186,18 +200,32 @@ def least_duration(relaxation: Relaxation) -> float | None:
     short = asked
     if not places or excess(short) <= 0.0:
         return problem.duration
-    lowest = short
+    lowest, power, steps = short, POWER, STEPS
     for _ in range(ROUNDS):
-        enough = short + float(np.clip(excess(short) / POWER, *STEPS))
+        enough = short + float(np.clip((excess(short) + CLOSE / 2.0) / power, *steps))
         if -CLOSE < excess(enough) <= 0.0:
             return math.exp(enough)
         if excess(enough) <= 0.0:
-            from scipy.optimize import brentq  # noqa: PLC0415  (a tenth of what the main job takes to start)
-
-            return math.exp(brentq(excess, short, enough, xtol=DURATION_PRECISION))
+            return math.exp(_close_to_zero(excess, short, enough))
+        if excess(enough) >= UNSETTLED > excess(lowest):
+            return math.exp(enough)  # by all that is known
         if excess(enough) < excess(lowest) - LITTLE:
             lowest = enough
         elif excess(enough) < UNSETTLED and enough - lowest > STEPS[1]:
             return None
+        known = (excess(short) - excess(enough)) / (enough - short)
+        settled = excess(short) < UNSETTLED and POWERS[0] < known < POWERS[1]
+        power, steps = (known, KNOWN_STEPS) if settled else (POWER, STEPS)
         short = enough
     return problem.duration
+
+
+def _close_to_zero(excess: Callable[[float], float], short: float, enough: float) -> float:
+    """Interpolate between two values, until the excess of the greater one falls little short of 0."""
+    for _ in range(CLOSER):
+        if excess(enough) > -CLOSE or excess(short) >= UNSETTLED:
+            break
+        slope = (excess(enough) - excess(short)) / (enough - short)
+        middle = enough - (excess(enough) + CLOSE / 2.0) / slope
+        short, enough = (short, middle) if excess(middle) <= 0.0 else (middle, enough)
+    return enough

@@ -63,6 +63,11 @@ class Setup:
         """Number of variables that bounding the worst machine takes."""
         return goals.worst_case_variables(self.tried) if self.tried else 0
 
+    @property
+    def sees_all(self) -> bool:
+        """Whether the effort depends on the highest derivative of the motion's polynomials."""
+        return self.problem.effort != "reference" or self.transcription.piece.order == 3
+
     def effort(self, local: Array) -> float:
         """Evaluate the effort of a motion, in units of `cost_scale`."""
         axes = local.reshape(self.transcription.intervals, len(self.forms), -1).swapaxes(0, 1)

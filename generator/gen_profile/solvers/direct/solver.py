@@ -32,16 +32,19 @@ from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
 from gen_profile.solvers.solution import Optimum, Solution, Status
 from gen_profile.spec.model import LimitsSpec
+from gen_profile.work import OutOfWork, budget, left, spend
 
 METHOD = "direct"
 STEP_TOLERANCE = 1e-8  # of the motion, relative
+COARSE = 1e-2  # step after which a motion on even intervals will do to be measured
 ROUGH = 0.5  # step after which a mesh is refined: what programs on coarse ones end at need not be exact
-STALLED = (
-    2e-4  # step that is taken for the programs' own tolerance when it ceases to shrink; costs its square
-)
+# steps taken for the programs' own tolerance when they cease to shrink, usually and of programs that are not
+# solved exactly; they cost their square
+STALLED, STALLED_INEXACT = 2e-4, 1e-2
 SLOW = 0.3  # share of the step before from which on steps are combined
 MAX_ITERATIONS = 50
 MAX_BISECTIONS = 6
+BISECTING = 0.7  # share of the work that is left, after which a motion on the first mesh will do
 WORTH_BISECTING = 1e-4  # relative change of the cost from one mesh to the next; what is left is less
 WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
 LEAST_SHARE = 0.01  # of a load's limit, of which a change is still measured
@@ -70,29 +73,24 @@ class Goal(Protocol):
     @property
     def setup(self) -> Setup:
         """The problem, transcribed."""
-        ...
 
     @property
     def extra(self) -> int:
         """Number of variables of its own, the program's last."""
-        ...
 
     def pose(
         self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
     ) -> tuple[Matrix, Array]:
         """Add limits and constraints of its own to a program, and give its cost: P and q."""
-        ...
 
     def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
         """Measure by how much what counts changed from one program to the next."""
-        ...
 
     def approach(self, before: Iterate, after: Iterate) -> Iterate:
         """Go from one iterate towards the next, as far as what was expanded holds."""
-        ...
 
 
-def solve(problem: Problem, near: Iterate | None = None) -> Solution:
+def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False) -> Solution:
     """Find the motion that minimises eq. (26) within the limits and leaves neither sway nor sensitivity.
 
     Parameters
@@ -100,6 +98,8 @@ def solve(problem: Problem, near: Iterate | None = None) -> Solution:
     problem : Problem
     near : Iterate, optional
         A motion to begin at, in place of standing still.
+    coarse : bool
+        On even intervals only, which tell as well whether there is a motion.
 
     Returns
     -------
@@ -109,14 +109,18 @@ def solve(problem: Problem, near: Iterate | None = None) -> Solution:
     setup, redundant = set_up(problem)
     if redundant:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
-        solution = solve(attrs.evolve(problem, desensitized=kept), near)
+        solution = solve(attrs.evolve(problem, desensitized=kept), near, coarse=coarse)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     sway_cost, iterations = resolve_sway_cost(problem)
     start = near or setup.transcription.rest()
 
     def attempt(sway_limit: float | None) -> Solution:
         nonlocal setup, iterations, start
-        found = refined(start, CostProgram(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit))
+        goal = CostProgram(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
+        if problem.limits.stated() and not coarse:
+            found = refined(start, goal)
+        else:
+            found = sequence(start, goal, COARSE if coarse else STEP_TOLERANCE)
         setup, start, iterations = found.setup, found.iterate, iterations + found.iterations
         return conclude(found, sway_cost, iterations)
 
@@ -132,7 +136,7 @@ def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
     if solution.optimum is None:
         return SwayCost(beta=0.0, gamma=1.0), solution.iterations
     effort, sway = solution.optimum.cost / problem.duration, sway_on_the_way(solution)
-    if sway == 0.0:  # a hoist alone swings nothing
+    if not 0.0 < sway < np.inf:  # a hoist alone swings nothing
         return SwayCost(beta=0.0, gamma=1.0), solution.iterations
     return SwayCost(
         beta=problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2, gamma=AUTO_SWAY / sway
@@ -140,11 +144,21 @@ def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
 
 
 def refined(start: Iterate, goal: CostProgram) -> ProgramSequence:
-    """Solve programs on a mesh that is bisected where limits begin or cease to bind, as long as that pays."""
-    if not goal.setup.problem.limits.stated():
-        return sequence(start, goal)
-    solutions: tuple[ConicSolution, ...] = ()
+    """Solve programs on a mesh that is bisected as long as that pays and the work reaches."""
     begun: list[tuple[Iterate, CostProgram]] = []
+    try:
+        with budget(BISECTING * left()):
+            return _refined(start, goal, begun)
+    except OutOfWork:
+        spend(0.0)
+        if not begun:
+            raise
+        return sequence(*begun[0])
+
+
+def _refined(start: Iterate, goal: CostProgram, begun: list[tuple[Iterate, CostProgram]]) -> ProgramSequence:
+    """Bisect a mesh where limits begin or cease to bind, and list what was begun on which mesh."""
+    solutions: tuple[ConicSolution, ...] = ()
     cost = float("inf")
     for _ in range(MAX_BISECTIONS):
         found = sequence(start, goal, ROUGH)
@@ -178,7 +192,10 @@ def sequence(start: Iterate, goal: Goal, enough: float = STEP_TOLERANCE) -> Prog
     while verdict is ConicStatus.FAILED and len(solutions) < MAX_ITERATIONS:
         maps = transcription.maps(iterate)
         program = transcription.program(maps, goal.extra)
-        solutions.append(program.solve(*goal.pose(program, iterate, maps)))
+        cost = goal.pose(program, iterate, maps)
+        if not goal.setup.sees_all:
+            cost = goals.held(*cost, transcription, iterate)
+        solutions.append(program.solve(*cost))
         if solutions[-1].verdict is not ConicStatus.SOLVED:
             verdict = solutions[-1].verdict
             break
@@ -186,8 +203,7 @@ def sequence(start: Iterate, goal: Goal, enough: float = STEP_TOLERANCE) -> Prog
         points.append(iterate.flat())
         iterate = transcription.iterate(solutions[-1].x, maps)
         images.append(iterate.flat())
-        stalled = step < STALLED and (step > 0.5 * before or not solutions[-1].exact)
-        if step < enough or stalled:
+        if step < enough or _stalled(step, before, exact=solutions[-1].exact):
             verdict = ConicStatus.SOLVED
         else:
             if step > SLOW * before:
@@ -196,6 +212,11 @@ def sequence(start: Iterate, goal: Goal, enough: float = STEP_TOLERANCE) -> Prog
     return ProgramSequence(
         setup=goal.setup, verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step
     )
+
+
+def _stalled(step: float, before: float, *, exact: bool) -> bool:
+    shrinks = step < 0.5 * before
+    return (step < STALLED and not (shrinks and exact)) or (step < STALLED_INEXACT and not (shrinks or exact))
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+
+import attrs
 
 from gen_profile.evaluation.simulation import greatest_sway
 from gen_profile.solvers.direct.goals import WITHIN
 from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Solution
+from gen_profile.solvers.solution import Solution, Status
 
 SWAY_ROUNDS = 4  # to account for what the sway does between collocation points
 
@@ -35,6 +38,8 @@ def within_sway(limit: float | None, attempt: Callable[[float | None], Solution]
         if limit is None or asked is None or solution.optimum is None:
             break
         sway = sway_on_the_way(solution)
+        if sway == math.inf:  # it could not be followed
+            return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
         if sway <= limit:
             break
         asked *= WITHIN * limit / sway

@@ -25,6 +25,7 @@ from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.conic import ConicStatus
 from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.solver import (
+    COARSE,
     ROUGH,
     CostProgram,
     LeastWorst,
@@ -38,6 +39,7 @@ from gen_profile.solvers.direct.transient_sway import within_sway
 from gen_profile.solvers.minimum_time import least
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
+from gen_profile.spec.model import AxisLimitsSpec
 from gen_profile.work import OutOfWork, budget, left, spend
 
 TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case
@@ -48,6 +50,7 @@ HOPELESS = 1e3  # times a load's limit, above which the least worst case is not 
 MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
 SLACK = 1.003  # what the least cost may give away of the least worst case
 GOOD_ENOUGH = 0.01  # share of a load's limit below which nobody need seek less
+HELD_BACK = 1.5  # times the exact motion's acceleration: the cost of most motions over a range needs no more
 ROUNDS = 8
 EXCHANGING = 0.8  # share of the work that is left, after which the last motion is taken
 CORNERS = 6  # parameters up to which all corners are tried
@@ -80,22 +83,19 @@ def solve(problem: Problem) -> Solution:
 
 
 def _bounded(problem: Problem) -> Solution:
-    """Solve a problem, with a limit of the effort where it needs one."""
-    bounded = _limits_effort(problem)
-    solution = _solve(problem, TRACES if bounded else TRACES[:1])
-    if solution.optimum is not None or bounded:
-        return solution
-    return _solve(_held_back(problem) or problem, TRACES)
+    """Solve a problem, with limits of the effort for the axes that have none."""
+    free = [axis for axis in range(len(problem.target)) if not _limits_effort(problem.limits.of(axis))]
+    bounded = _held_back(problem, free) if free else problem
+    return _solve(bounded or problem, TRACES)
 
 
-def _limits_effort(problem: Problem) -> bool:
-    """Whether limits bound how much effort less sway may take: on every axis its acceleration or jerk."""
-    limits = [problem.limits.of(axis) for axis in range(len(problem.target))]
-    return all(own.acceleration is not None or own.jerk is not None for own in limits)
+def _limits_effort(own: AxisLimitsSpec) -> bool:
+    """Whether an axis' limits bound how much effort less sway may take."""
+    return own.acceleration is not None or own.jerk is not None
 
 
-def _held_back(problem: Problem) -> Problem | None:
-    """Allow no more acceleration than the motion takes that is exact and insensitive.
+def _held_back(problem: Problem, free: Sequence[int]) -> Problem | None:
+    """Allow some axes little more acceleration than they take in the motion that is exact and insensitive.
 
     Without such a limit, ever less sway would ask for ever more acceleration.
     """
@@ -103,9 +103,15 @@ def _held_back(problem: Problem) -> Problem | None:
     exact = direct.solve(attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0))
     if exact.optimum is None:
         return None
-    motion = optimal_profile(exact)
-    acceleration = max(greatest(motion, 2, axis) for axis in range(motion.axes))
-    return attrs.evolve(problem, limits=attrs.evolve(problem.limits, acceleration=acceleration))
+    motion, limits = optimal_profile(exact), problem.limits
+    taken = {axis: HELD_BACK * greatest(motion, 2, axis) for axis in free}
+    own = {
+        f"axis{axis}": attrs.evolve(
+            limits.of(axis), acceleration=taken.get(axis) or limits.of(axis).acceleration
+        )
+        for axis in range(len(problem.target))
+    }
+    return attrs.evolve(problem, limits=attrs.evolve(limits, axis=own))
 
 
 def solve_within_limits(problem: Problem) -> Solution:
@@ -124,7 +130,7 @@ def solve_within_limits(problem: Problem) -> Solution:
         goal = CostProgram(
             setup=setup, sway_cost=sway_cost, sway_limit=problem.nominal_sway, worst=1.0 - MARGIN
         )
-        found = sequence(setup.transcription.rest(), goal)
+        found = sequence(setup.transcription.rest(), goal, COARSE)
         iterations += found.iterations
         solution = conclude(found, sway_cost, iterations)
         if solution.optimum is None:
@@ -137,7 +143,7 @@ def solve_within_limits(problem: Problem) -> Solution:
 
 
 def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
-    """Go from round to round as long as there is work left; the last motion is the best."""
+    """Go from round to round as long as work and programs allow; the last motion is the best."""
     solutions: list[Solution] = []
     try:
         with budget(EXCHANGING * left()):
@@ -146,7 +152,8 @@ def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
         spend(0.0)
         if not solutions:
             raise
-    return solutions[-1]
+    motions = [solution for solution in solutions if solution.optimum is not None]
+    return (motions or solutions)[-1]
 
 
 def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:

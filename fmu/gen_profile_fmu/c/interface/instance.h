@@ -41,14 +41,6 @@ typedef struct {
     int is_integrated;       /* an integrator has set states or completed a step */
 } State;
 
-typedef struct {
-    State state;
-    Host host;
-    char *name;
-    int for_model_exchange;
-    int logged_categories;
-} Instance;
-
 /* What is handed out as a saved state. */
 typedef struct {
     void *nothing;           /* null: what importers free that hand over a state where its address belongs */
@@ -61,6 +53,15 @@ typedef struct {
     State state;
     unsigned long long checksum;
 } Record;
+
+typedef struct {
+    State state;
+    Host host;
+    char *name;
+    int for_model_exchange;
+    int logged_categories;
+    Record scratch;          /* of bytes on their way, or of the model before a step: too large for a stack */
+} Instance;
 
 typedef struct {
     int states_jumped;

@@ -43,7 +43,7 @@ typedef struct {
     Extremes *axes;                      /* n_axes */
     double *on_the_way, *residual;       /* n_loads: greatest sway at any time, and of what remains */
     double *trace;                       /* cycles x (n_outputs + n_loads), or null */
-    long stands, cycles, unpromised;     /* stands: the cycle from which the axes do, or -1 */
+    long stands, cycles;                 /* stands: the cycle from which the axes do, or -1 */
     int status, fault, error;
     bool promise;                        /* at the end */
 } Found;
@@ -84,7 +84,6 @@ static bool standing(const Block *block, const double *outputs) {
 static void take_states(const Block *block, const double *outputs, Found *found) {
     if (outputs[block->error] != 0.0) found->error = (int)outputs[block->error];
     found->promise = outputs[block->promise] != 0.0;
-    if (!found->promise && outputs[block->busy] != 0.0) found->unpromised++;
 }
 
 static void take_loads(const History *history, const double *sway, bool counts, Found *found) {

@@ -14,14 +14,14 @@ static const double EARLY = 1e-6;  /* of a cycle: masters add up their steps, an
 
 static void model_start(Model *model) {
     plant_start(model, model->values + START);
-    model->values[COMMAND] = model->values[START];
+    for (int i = 0; i < N_LED; i++) model->values[COMMAND + i] = model->values[START + LED[i]];
     block_begin(&model->block, model->values);
     model->samples = 0;
     model->next_event = model->start_time;
 }
 
-/* Where an axis is asked to be: the first by the block, others by inputs. */
-static double asked(const Model *model, int i) { return model->values[i == 0 ? COMMAND : OTHERS + i - 1]; }
+/* Where an axis is asked to be: by the block or, if that does not plan it, by an input. */
+static double asked(const Model *model, int i) { return model->values[ASKED[i]]; }
 
 static void call(Model *model) {
     block_call(&model->block, model->values);
@@ -71,7 +71,7 @@ static void model_tangent(const Model *model, double tangent[N_VALUES]) {
 
 static void model_start_tangent(double tangent[N_VALUES]) {
     memcpy(tangent + Q_A, tangent + START, N_A * sizeof *tangent);
-    tangent[COMMAND] = tangent[START];
+    for (int i = 0; i < N_LED; i++) tangent[COMMAND + i] = tangent[START + LED[i]];
     block_begin_tangent(tangent);
 }
 

@@ -407,7 +407,8 @@ static int advance_with_updates(Instance *instance, double step) {
 static Status do_step(Instance *instance, double time, double step) {
     State *state = &instance->state;
     if (require_step(instance, time, step) != OK) return FAILED;
-    const Model before = state->model;
+    Model *before = &instance->scratch.state.model;
+    *before = state->model;
     state->model.time = time;
     if (!UPDATES_ON_THE_WAY || !host_takes_updates(&instance->host)) model_advance(&state->model, step);
     else if (!advance_with_updates(instance, step)) return FAILED;
@@ -415,7 +416,7 @@ static Status do_step(Instance *instance, double time, double step) {
     for (int i = STATES; i < STATES + N_STATES; i++) {
         if (isfinite(state->model.values[i])) continue;
         fail(instance, "The state is no longer finite after %g s.", time);
-        state->model = before;
+        state->model = *before;
         state->mode = STEP_FAILED;
         return DISCARD;
     }
@@ -476,23 +477,23 @@ static int is_sound(const State *state) {
 
 static Status write_bytes(Instance *instance, const void *handle, void *bytes, size_t size) {
     if (size < sizeof(Record)) return fail(instance, "The buffer is too small for the FMU state.");
-    Record record;
-    memset(&record, 0, sizeof record);
-    memcpy(record.identity, MODEL_IDENTITY, sizeof record.identity);
-    memcpy(&record.state, &((const Snapshot *)handle)->state, sizeof record.state);
-    record.checksum = checksum_of(&record);
-    memcpy(bytes, &record, sizeof record);
+    Record *record = &instance->scratch;
+    memset(record, 0, sizeof *record);
+    memcpy(record->identity, MODEL_IDENTITY, sizeof record->identity);
+    memcpy(&record->state, &((const Snapshot *)handle)->state, sizeof record->state);
+    record->checksum = checksum_of(record);
+    memcpy(bytes, record, sizeof *record);
     return OK;
 }
 
 static Status read_bytes(Instance *instance, const void *bytes, size_t size, void **handle) {
-    Record record;
-    if (size != sizeof record || memcmp(bytes, MODEL_IDENTITY, sizeof MODEL_IDENTITY) != 0) {
+    Record *record = &instance->scratch;
+    if (size != sizeof *record || memcmp(bytes, MODEL_IDENTITY, sizeof MODEL_IDENTITY) != 0) {
         return fail(instance, "The bytes are not a state of this FMU.");
     }
-    memcpy(&record, bytes, sizeof record);
-    if (record.checksum != checksum_of(&record) || !is_sound(&record.state)) {
+    memcpy(record, bytes, sizeof *record);
+    if (record->checksum != checksum_of(record) || !is_sound(&record->state)) {
         return fail(instance, "The bytes of the FMU state are damaged.");
     }
-    return keep(instance, &record.state, handle);
+    return keep(instance, &record->state, handle);
 }

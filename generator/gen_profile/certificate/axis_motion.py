@@ -1,0 +1,281 @@
+"""A smooth motion of the axes beside the setpoints, and how far the two are apart.
+
+Pieces are quintic polynomials through position, velocity and acceleration at both ends, in whole numbers of
+cycles. The motion and its velocity are continuous by construction, whatever rounding made of these values.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from itertools import pairwise
+
+import attrs
+import numpy as np
+
+from gen_profile.certificate.balls import UNIT, Array, Ball, ball, stack
+from gen_profile.errors import CertificateError
+from gen_profile.motion.profile import Profile, SampledProfile
+
+DEGREE = 5
+FINER = 4  # points per setpoint at which differences are looked at
+FEWEST = 5  # setpoints in a piece
+ROUNDS = 12  # of halving pieces
+SAGITTA = 0.25  # share of what straight lines between setpoints leave out, to which a motion is fitted
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class AxisMotion:
+    """Quintic pieces.
+
+    Attributes
+    ----------
+    knots : (pieces + 1,) array
+        s, rising.
+    position, velocity : (pieces + 1, m) arrays
+        m and m/s (or rad …).
+    acceleration : (pieces, 2, m) array
+        At the beginning and the end of every piece.
+    """
+
+    knots: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    @property
+    def halves(self) -> Ball:
+        """Half of every piece's length in s, shape (pieces,)."""
+        return 0.5 * (ball(self.knots[1:]) - self.knots[:-1])
+
+    def coefficients(self) -> Ball:
+        """Position as powers of x, which goes from −1 to 1 over a piece, shape (6, pieces, m)."""
+        half = self.halves[:, None]
+        first, last = ball(self.position[:-1]), ball(self.position[1:])
+        speeds = half * self.velocity[:-1], half * self.velocity[1:]
+        bends = half * half * self.acceleration[:, 0], half * half * self.acceleration[:, 1]
+        mean, turn, bend = 0.5 * (first + last), 0.5 * (speeds[1] - speeds[0]), 0.5 * (bends[0] + bends[1])
+        fourth = 0.125 * (bend - turn)
+        second = 0.25 * (3.0 * turn - bend)
+        way, lead, twist = 0.5 * (last - first), 0.5 * (speeds[0] + speeds[1]), 0.5 * (bends[1] - bends[0])
+        fifth = 0.125 * (twist - 3.0 * (lead - way))
+        third = 0.5 * (lead - way) - 2.0 * fifth
+        return stack([mean - second - fourth, way - third - fifth, second, third, fourth, fifth])
+
+    def profile(self) -> Profile:
+        """Take the motion as one that machines can follow, rounded."""
+        c, half = self.coefficients().mid, np.asarray(self.halves.mid)
+        shifted = np.zeros((len(half), DEGREE + 1, c.shape[2]))
+        for power in range(DEGREE + 1):  # x = s / half − 1
+            binomial = np.poly1d([1.0, -1.0]) ** power
+            for rank, factor in enumerate(binomial.coeffs[::-1]):
+                shifted[:, rank] += factor * c[power] / half[:, None] ** rank
+        return Profile(
+            knots=self.knots,
+            coefficients=shifted,
+            target=self.position[-1],
+            final_velocity=self.velocity[-1],
+            method="smoothed",
+        )
+
+
+def powers(coefficients: Ball, x: Ball, order: int) -> Ball:
+    """Evaluate a derivative by x at nodes, shape (pieces, nodes, m)."""
+    for _ in range(order):
+        factors = np.arange(1.0, len(coefficients.mid))[:, None, None]
+        coefficients = coefficients[1:] * factors
+    result = ball(0.0)
+    for power in range(len(coefficients.mid) - 1, -1, -1):
+        result = result * x[None, :, None] + coefficients[power][:, None, :]
+    return result
+
+
+def widened(coefficients: Ball, reach: float, order: int) -> Ball:
+    """Enclose a derivative by x for all |x| ≤ reach, complex ones, too, shape (pieces, m)."""
+    for _ in range(order):
+        coefficients = coefficients[1:] * np.arange(1.0, len(coefficients.mid))[:, None, None]
+    rest = sum((coefficients[k].most * reach**k for k in range(1, len(coefficients.mid))), start=0.0)
+    return Ball(coefficients[0].mid, (coefficients[0].rad + rest) * (1.0 + 1e-12))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Track:
+    """Where the axes are asked to be: straight lines between points.
+
+    Attributes
+    ----------
+    times : (points,) array
+        s.
+    position : (points, m) array
+    velocity : (m,) array
+        After the last point.
+    """
+
+    times: Array
+    position: Array
+    velocity: Array
+
+
+def track_of(setpoints: SampledProfile, velocity: Array) -> Track:
+    """Take the setpoints as drives interpolate them."""
+    return Track(times=setpoints.times, position=setpoints.position, velocity=velocity)
+
+
+def fitted(track: Track, resolution: float, longest: float, watch: float) -> AxisMotion:
+    """Fit a motion to setpoints: splines with as many knots as it takes.
+
+    Parameters
+    ----------
+    track : Track
+    resolution : float
+        Spacing of the setpoints' values.
+    longest : float
+        Of a piece in s.
+    watch : float
+        How long to go on after the last point, in s.
+
+    Raises
+    ------
+    CertificateError
+        There are too few setpoints.
+    """
+    from scipy.interpolate import make_lsq_spline  # noqa: PLC0415  (loads slowly)
+
+    times, position = track.times, track.position
+    bent = position.copy()  # by the mean of what straight lines leave out
+    bent[1:-1] += np.diff(position, 2, axis=0) / 12.0
+    last = len(times) - 1
+    if last < 2 * FEWEST:
+        raise CertificateError(
+            f"The file has {last + 1} setpoints; a certificate needs at least {2 * FEWEST + 1} of them: "
+            "choose a shorter cycle (export.cycle_time)."
+        )
+    count = max(2, int(np.ceil((times[-1] - times[0]) / longest)))
+    knots = np.unique(np.linspace(0, last, min(count, last // FEWEST) + 1).round().astype(int))
+    allowed = np.maximum(SAGITTA * np.abs(np.diff(position, 2, axis=0)).max() / 8.0, 0.6 * resolution)
+    for _ in range(ROUNDS):
+        inner = times[knots[1:-1]]
+        ends = [times[:1].repeat(DEGREE + 1), inner, times[-1:].repeat(DEGREE + 1)]
+        spline = make_lsq_spline(times, bent, np.concatenate(ends), DEGREE)
+        off = np.abs(spline(times) - bent).max(axis=1)
+        halved = [
+            (first + end) // 2
+            for first, end in pairwise(knots.tolist())
+            if end - first >= 2 * FEWEST and off[first : end + 1].max() > allowed
+        ]
+        if not halved:
+            break
+        knots = np.unique([*knots, *halved])
+    return _with_rest(
+        track, times[knots], [spline(times[knots], nu=order) for order in range(3)], longest, watch
+    )
+
+
+def _with_rest(track: Track, knots: Array, values: list[Array], longest: float, watch: float) -> AxisMotion:
+    """Begin at rest at the first setpoint, and go on after the last one."""
+    position, velocity, acceleration = values
+    position[0], velocity[0] = track.position[0], 0.0
+    position[-1], velocity[-1] = track.position[-1], track.velocity
+    after = knots[-1] + np.linspace(0.0, watch, 1 + int(np.ceil(watch / longest)))[1:]
+    onward = track.position[-1] + (after - knots[-1])[:, None] * track.velocity
+    bends = np.stack([acceleration[:-1], acceleration[1:]], axis=1)
+    return AxisMotion(
+        knots=np.concatenate([knots, after]),
+        position=np.concatenate([position, onward]),
+        velocity=np.concatenate([velocity, np.tile(track.velocity, (len(after), 1))]),
+        acceleration=np.concatenate([bends, np.zeros((len(after), 2, position.shape[1]))]),
+    )
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Gap:
+    """How far the axes are from a smooth motion of theirs at most: bounds over every piece, (pieces, m).
+
+    The difference ε of positions has the form ε̄ + ψ' on every piece, where ψ vanishes at both ends: setpoints
+    lie on both sides of a motion that is fitted to them, so ψ is smaller than ε by far.
+
+    Attributes
+    ----------
+    position, velocity : (pieces, m) arrays
+        Of ε and its rate η.
+    mean : (pieces, m) array
+        Of ε̄.
+    integral : (pieces, m) array
+        Of ψ, in m s (or rad s).
+    """
+
+    position: Array
+    velocity: Array
+    mean: Array
+    integral: Array
+
+
+def gap_between(motion: AxisMotion, track: Track) -> Gap:
+    """Bound how far straight lines between points are from a motion.
+
+    Between two points the axes move at a constant velocity, so all differences are bounded by their values at
+    the points and in between, and by the motion's greatest acceleration a: |a| h²/8 and |a| h/2.
+    """
+    c, half = motion.coefficients(), motion.halves
+    bend = (widened(c, 1.0, 2) / (half * half)[:, None]).most
+    ends = np.minimum(np.searchsorted(track.times, motion.knots), len(track.times) - 1)
+    rows = []
+    for piece, (first, last) in enumerate(pairwise(ends.tolist())):
+        inside = last > first
+        times = track.times[first : last + 1] if inside else motion.knots[piece : piece + 2]
+        at = _points(track, times, slice(first, last + 1) if inside else None)
+        rows.append(_piece_gap(c[:, piece : piece + 1], half[piece], bend[piece], ball(times) + 0.0, at))
+    position, velocity, mean, integral = np.moveaxis(np.array(rows), 1, 0) * (1.0 + 1e-12)
+    return Gap(position=position, velocity=velocity, mean=mean, integral=integral)
+
+
+def _piece_gap(c: Ball, half: Ball, bend: Array, times: Ball, at: Ball) -> list[Array]:
+    """Bound ε, η, ε̄ and ψ over one piece, which straight lines between points span, each (m,)."""
+    begin, end = times[:1], times[-1:]
+    x_of = partial(_place, 0.5 * (begin + end), half)
+    step = times[1:] - times[:-1]
+    middle = 0.5 * (times[1:] + times[:-1])
+    faster = ((at[1:] - at[:-1]) / step[:, None] - powers(c, x_of(middle), 1)[0] / half).most.max(axis=0)
+    faster = faster + bend * step.most.max() / 2.0
+    times, at = _between(times), _between(at)
+    step = times[1:] - times[:-1]
+    apart = (at - powers(c, x_of(times), 0)[0]).most.max(axis=0) + bend * step.most.max() ** 2 / 8.0
+    primitives = stack([0.0 * c[0], *(c[k] / (k + 1.0) for k in range(DEGREE + 1))])
+    primitive = powers(primitives, x_of(times), 0)[0]
+    gone = _running_sum(0.5 * step[:, None] * (at[1:] + at[:-1])) - half * (primitive - primitive[:1])
+    mean = gone[-1:] / (end - begin)
+    swung = (gone - mean * (times - begin)[:, None]).most.max(axis=0) + faster * step.most.max() ** 2 / 8.0
+    return [apart, faster, mean.most[0], swung]
+
+
+def _place(middle: Ball, half: Ball, times: Ball) -> Ball:
+    return (times - middle) / half
+
+
+def _between(values: Ball) -> Ball:
+    """Add points between others, on straight lines, each way `FINER` as many."""
+    shares = np.arange(FINER) / FINER
+    steps = (values[1:] - values[:-1])[:, None]
+    finer = values[:-1][:, None] + steps * shares.reshape(1, FINER, *[1] * (len(values.shape) - 1))
+    shape = (-1, *values.shape[1:])
+    mid = np.concatenate([finer.mid.reshape(shape), values.mid[-1:]])
+    return Ball(mid, np.concatenate([finer.rad.reshape(shape), values[-1:].rad]))
+
+
+def _running_sum(values: Ball) -> Ball:
+    """Add rows up, from nothing."""
+    terms = len(values.mid) + 1
+
+    def summed(array: Array) -> Array:
+        return np.concatenate([np.zeros((1, array.shape[1])), np.cumsum(array, axis=0)])
+
+    rad = summed(values.rad) + terms * UNIT * summed(np.abs(values.mid))
+    return Ball(summed(values.mid), rad * (1.0 + 2 * terms * UNIT))
+
+
+def _points(track: Track, times: Array, known: slice | None) -> Ball:
+    """Positions of the axes at times, shape (times, m)."""
+    if known is not None:
+        return ball(track.position[known]) + np.zeros((len(times), 1))
+    beyond = ball(times) - track.times[-1]
+    onward: Ball = beyond[:, None] * track.velocity + track.position[-1]
+    return onward

@@ -1,0 +1,75 @@
+"""Boxes of parameters: the whole of some ranges, halved as often as it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import prod
+
+import attrs
+import numpy as np
+
+from gen_profile.certificate.balls import Array, Ball, ball
+
+DyadicBox = tuple[
+    tuple[int, int], ...
+]  # of every range how often it was halved, and which of the parts it is
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Ranges:
+    """Parameters that vary.
+
+    Attributes
+    ----------
+    names : tuple of str
+    lower, upper : (ranges,) array
+    """
+
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+
+    def values(self, box: DyadicBox, places: Array) -> Array:
+        """Values at places on [−1, 1] of a box, rounded, shape (places, ranges)."""
+        low, high = (np.array(ends).reshape(-1) for ends in shares(box))
+        share = 0.5 * (low + high) + 0.5 * (high - low) * places
+        return np.asarray(self.lower + share * (self.upper - self.lower))
+
+    def enclosed(self, boxes: Sequence[DyadicBox]) -> tuple[Ball, Ball]:
+        """Enclose the ends of boxes, each of shape (boxes, ranges)."""
+        low, high = (np.array(ends).reshape(len(boxes), -1) for ends in zip(*map(shares, boxes), strict=True))
+        width = ball(self.upper) - self.lower
+        return width * low + self.lower, width * high + self.lower
+
+
+def shares(box: DyadicBox) -> tuple[list[float], list[float]]:
+    """Where a box begins and ends in every range, in shares of it, exactly."""
+    return [index / 2**level for level, index in box], [(index + 1) / 2**level for level, index in box]
+
+
+def whole(levels: Sequence[int]) -> list[DyadicBox]:
+    """Cut all ranges, each so often."""
+    grids = np.meshgrid(*[np.arange(2**level) for level in levels], indexing="ij")
+    indices = np.stack([grid.ravel() for grid in grids], axis=1) if levels else np.zeros((1, 0), dtype=int)
+    return [tuple(zip(levels, row, strict=True)) for row in indices.tolist()]
+
+
+def halves(box: DyadicBox, range_: int) -> tuple[DyadicBox, DyadicBox]:
+    """Cut a box in two."""
+    level, index = box[range_]
+    first, second = ((*box[:range_], (level + 1, 2 * index + part), *box[range_ + 1 :]) for part in (0, 1))
+    return first, second
+
+
+def covers(boxes: Sequence[DyadicBox]) -> bool:
+    """Tell whether boxes are all there is: disjoint, and together of the whole's volume."""
+    volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in boxes), Fraction(0))
+    inside = all(0 <= index < 2**level for box in boxes for level, index in box)
+    if not inside or volume != 1:
+        return False
+    low, high = (np.array(ends).reshape(len(boxes), -1) for ends in zip(*map(shares, boxes), strict=True))
+    return not any(
+        bool(((low[number] < high[number + 1 :]) & (low[number + 1 :] < high[number])).all(axis=1).any())
+        for number in range(len(boxes) - 1)
+    )

@@ -1,0 +1,162 @@
+"""Proving a bound of every machine's sway: boxes are halved until it is close, or there are too many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from math import prod
+
+import attrs
+import numpy as np
+
+from gen_profile.certificate import approximation
+from gen_profile.certificate.axis_motion import fitted, track_of
+from gen_profile.certificate.balls import Array
+from gen_profile.certificate.boxes import DyadicBox, halves, whole
+from gen_profile.certificate.theorem import Theorem, ranges_of
+from gen_profile.errors import CertificateError
+from gen_profile.evaluation.residual_sway import observation_time
+from gen_profile.motion.profile import SampledProfile
+from gen_profile.problem.parameter_box import Box
+from gen_profile.spec.model import Spec
+
+PHASE = 1.0  # rad of the fastest mode that a piece of time covers at most
+TURN = 0.8  # rad by which a mode's phase at the end varies over a box at first
+PLACES = 33  # along a range, at which phases are looked at
+CLOSE = 1.03  # of the greatest sway seen: how tight a bound is wanted
+SLACK = 1e-3  # relative, by which a bound is stated higher than it was found, lest other rounding break it
+CLOSE_TO_LIMIT = 5e-3  # of the limit, likewise
+MOST_NODES = 10**8  # at which equations are evaluated in all: some twenty minutes
+FRUITLESS = 2  # rounds in a row without a bound, after which no more are tried
+DEEPEST = 6  # halvings beyond the first boxes, of all ranges in sum
+
+Progress = Callable[[int, int], None]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Attempt:
+    """What came of a try to prove a bound.
+
+    Attributes
+    ----------
+    theorem : Theorem
+    boxes : tuple of DyadicBox
+        Of which a bound is proved.
+    coefficients, scales : array
+        Of `Approximation`, for these boxes.
+    bounds : (boxes, loads) array
+        m.
+    seen : (loads,) array
+        Greatest sway that was met, in m.
+    share : float
+        Of the whole box, of which a bound is proved.
+    """
+
+    theorem: Theorem
+    boxes: tuple[DyadicBox, ...]
+    coefficients: Array
+    scales: Array
+    bounds: Array
+    seen: Array
+    share: float
+
+
+def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _, __: None) -> Attempt:
+    """Prove bounds for boxes of machines, the worst of them as tightly as is wanted.
+
+    Parameters
+    ----------
+    spec : Spec
+    setpoints : SampledProfile
+        Replayed from an artefact.
+    progress : callable
+        Told how many boxes are done, and of how many so far.
+
+    Raises
+    ------
+    CertificateError
+        No proof is written for what the spec asks.
+    CosimulationError
+        Machines cannot be integrated.
+    """
+    theorem, spans = _prepared(spec, setpoints)
+    levels = [max(0, int(np.ceil(np.log2(max(span / TURN, 1e-9))))) for span in spans]
+    most = MOST_NODES // theorem.nodes  # boxes
+    if prod(2**level for level in levels) > most:
+        raise CertificateError(
+            f"The ranges of {', '.join(theorem.ranges.names)} are too wide for a certificate: it takes "
+            f"more than {most} boxes; narrow them, or let fewer parameters vary (check.uncertain)."
+        )
+    limits = np.array(list(spec.check.residual_sway.values()))
+    waiting, done, tried = whole(levels), {}, 0
+    seen, fruitless = np.zeros(len(limits)), 0
+    while waiting:
+        for batch in theorem.batches(waiting):
+            coefficients = approximation.approximate(theorem, batch)
+            scales = approximation.scales(theorem, batch)
+            found = theorem.enclosure(batch, coefficients, scales).bounds()
+            seen = np.fmax(seen, np.nanmax(found.seen, axis=0, initial=0.0))
+            for number, box in enumerate(batch):
+                done[box] = (coefficients[number], scales[number], found.sway[number])
+            tried += len(batch)
+            progress(tried, tried + len(waiting))
+        wanted = np.maximum(CLOSE * seen, seen + CLOSE_TO_LIMIT * limits)
+        wanted = np.where(seen < limits, np.minimum(wanted, limits / (1.0 + SLACK)), wanted)
+        coarse = [box for box, (_, _, bound) in done.items() if not (bound <= wanted).all()]
+        deepest = sum(levels) + DEEPEST
+        coarse = [box for box in coarse if box and sum(level for level, _ in box) < deepest]
+        fruitless = 0 if any(np.isfinite(done[box][2]).all() for box in waiting) else fruitless + 1
+        if tried + 2 * len(coarse) > most or fruitless == FRUITLESS:
+            break
+        waiting = [part for box in coarse for part in halves(box, _widest(box, spans))]
+        for box in coarse:
+            del done[box]
+    return _attempt(theorem, done, seen)
+
+
+def _attempt(theorem: Theorem, done: dict[DyadicBox, tuple[Array, Array, Array]], seen: Array) -> Attempt:
+    """Keep the boxes with a bound."""
+    proved = {box: found for box, found in done.items() if np.isfinite(found[2]).all()}
+    volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in proved), Fraction(0))
+    rows = list(proved.values())
+    coefficients, scales, bounds = (np.array([row[column] for row in rows]) for column in range(3))
+    return Attempt(
+        theorem=theorem,
+        boxes=tuple(proved),
+        coefficients=coefficients,
+        scales=scales,
+        bounds=bounds.reshape(-1, len(seen)),
+        seen=seen,
+        share=float(volume),
+    )
+
+
+def _widest(box: DyadicBox, spans: Sequence[float]) -> int:
+    """Choose the range to halve: over which phases vary most."""
+    return int(np.argmax([span / 2**level for span, (level, _) in zip(spans, box, strict=True)]))
+
+
+def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[float]]:
+    """State the theorem, and tell how much the modes' phases vary over each range, in rad."""
+    plant, ranges, watch = spec.machine(), ranges_of(spec), observation_time(spec)
+    box = Box(
+        plant=plant,
+        nominal=spec.plant.parameters,
+        ranges=dict(
+            zip(ranges.names, zip(ranges.lower.tolist(), ranges.upper.tolist(), strict=True), strict=True)
+        ),
+        ends=(spec.move.start, spec.move.target),
+        duration=float(setpoints.times[-1]) + watch,
+    )
+    middle = np.full((PLACES, len(ranges.names)), 0.5)
+    spans, fastest = [], float(box.phases(middle[:1]).max())
+    for column in range(len(ranges.names)):
+        line = middle.copy()
+        line[:, column] = np.linspace(0.0, 1.0, PLACES)
+        phases = box.phases(line)
+        spans.append(float(np.abs(np.diff(phases, axis=0)).sum(axis=0).max()))
+        fastest = max(fastest, float(phases.max()))
+    track = track_of(setpoints, np.array(spec.move.final_velocity))
+    longest = PHASE * box.duration / fastest
+    axes = fitted(track, float(setpoints.resolution.max()), longest, watch)
+    return Theorem(spec=spec, axes=axes, ranges=ranges, setpoints=setpoints), spans

@@ -1,0 +1,219 @@
+"""A machine's equations without accelerations, and their derivatives, evaluated on balls.
+
+Setpoints that are interpolated linearly have accelerations that are impulses. With D = −M_uu⁻¹ M_auᵀ, which
+depends on coordinates only, and v = q̇_a, the variable w = q̇_u − D v does not jump when v does:
+
+    q̇_u = w + D v
+    ẇ    = free(q_u, q̇_u, q_a, v) − (∂D/∂q_u q̇_u + ∂D/∂q_a v) v
+
+which is ẋ = f(x, q_a, v, p) for x = (q_u, w): the same motion as eq. (3)'s, and the FMU's, whose rates jump
+by D Δv at a setpoint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+
+import attrs
+import numpy as np
+
+from gen_profile.certificate import balls
+from gen_profile.certificate.balls import Ball, Operand, ball
+from gen_profile.errors import CertificateError
+from gen_profile.plants.plant import Plant
+from gen_profile.problem import symbolic as sym
+from gen_profile.problem.dynamics import dynamics
+from gen_profile.problem.symbolic import Function, Instruction
+
+
+def _power(x: Ball, exponent: Ball) -> Ball:
+    constant = np.ndim(exponent.mid) == 0 and np.ndim(exponent.rad) == 0 and float(exponent.rad) == 0.0
+    return balls.power(x, float(exponent.mid)) if constant else balls.exp(exponent * balls.log(x))
+
+
+OPERATIONS: Mapping[str, Callable[..., Ball]] = {
+    "ASSIGN": lambda x: x,
+    "ADD": lambda x, y: x + y,
+    "SUB": lambda x, y: x - y,
+    "MUL": lambda x, y: x * y,
+    "DIV": lambda x, y: x / y,
+    "NEG": lambda x: -x,
+    "SQ": lambda x: x * x,
+    "TWICE": lambda x: 2.0 * x,
+    "INV": lambda x: 1.0 / x,
+    "SIN": balls.sin,
+    "COS": balls.cos,
+    "TAN": balls.tan,
+    "SINH": balls.sinh,
+    "COSH": balls.cosh,
+    "TANH": balls.tanh,
+    "EXP": balls.exp,
+    "LOG": balls.log,
+    "SQRT": balls.sqrt,
+    "FABS": balls.absolute,
+    "SIGN": balls.sign,
+    "POW": _power,
+    "CONSTPOW": _power,
+}
+
+
+class Enclosed:
+    """An expression that is evaluated on balls.
+
+    Parameters
+    ----------
+    function : Function
+    what : str
+        For errors.
+
+    Raises
+    ------
+    CertificateError
+        It has operations that are not analytic, or not known here.
+    """
+
+    def __init__(self, function: Function, what: str) -> None:
+        self._instructions: tuple[Instruction, ...] = function.instructions()
+        known = {*OPERATIONS, "INPUT", "OUTPUT", "CONST"}
+        unknown = sorted(
+            {step.operation.lower() for step in self._instructions if step.operation not in known}
+        )
+        if unknown:
+            raise CertificateError(
+                f"The equations of {what} use {', '.join(unknown)}, for which no proof is written; "
+                "a certificate needs equations of smooth functions (sin, cos, exp, sqrt, tanh and alike)."
+            )
+        self._rows, self._columns = function.shape
+
+    def __call__(self, *inputs: Sequence[Operand]) -> list[list[Ball]]:
+        """Evaluate on columns of balls; the result is nested rows."""
+        memory: dict[int, Ball] = {}
+        results: dict[int, Ball] = {}
+        for step in self._instructions:
+            if step.operation == "INPUT":
+                column, row = step.arguments
+                memory[step.results[0]] = ball(inputs[column][row])
+            elif step.operation == "CONST":
+                memory[step.results[0]] = ball(step.constant)
+            elif step.operation == "OUTPUT":
+                results[step.results[1]] = memory[step.arguments[0]]
+            else:
+                arguments = (memory[place] for place in step.arguments)
+                memory[step.results[0]] = OPERATIONS[step.operation](*arguments)
+        return [
+            [results[row + column * self._rows] for column in range(self._columns)]
+            for row in range(self._rows)
+        ]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class EnclosedEquations:
+    """f and what bounds need of it, of columns (x, q_a, v, p) unless told otherwise.
+
+    Attributes
+    ----------
+    rate : 2 n_u × 1
+        f.
+    jacobian : 2 n_u × 2 n_u
+        J = ∂f/∂x.
+    jacobian_change : 2 n_u × 2 n_u
+        Change of J, of (x, q_a, v, p) and of the changes of these.
+    lift : 2 n_u × m
+        G = ∂f/∂v.
+    lift_change : 2 n_u × m
+        Change of G, of (x, q_a, v, p) and a change of x.
+    by_position : 2 n_u × m
+        ∂f/∂q_a.
+    curvature : 2 n_u × (2 m)²
+        Second derivatives of f by (q_a, v).
+    pull : 2 n_u × m
+        P = J G + ∂f/∂q_a − dG/dt along the smooth motion, of (x, q_a, v, p, q̈_a).
+    pull_change : 2 n_u × m
+        dP/dt, of (x, q_a, v, p, q̈_a), ẋ and the jerk of the axes.
+    sway : loads × 1
+        Of (q_u, q_a, p).
+    sway_slopes : loads × n_u
+        ∂sway/∂q_u.
+    sway_by_position : loads × m
+        ∂sway/∂q_a.
+    jump : n_u × m
+        D, of (q_u, q_a, p).
+    """
+
+    rate: Enclosed
+    jacobian: Enclosed
+    jacobian_change: Enclosed
+    lift: Enclosed
+    lift_change: Enclosed
+    by_position: Enclosed
+    curvature: Enclosed
+    pull: Enclosed
+    pull_change: Enclosed
+    sway: Enclosed
+    sway_slopes: Enclosed
+    sway_by_position: Enclosed
+    jump: Function
+
+
+@cache
+def enclosed_equations(plant: Plant) -> EnclosedEquations:
+    """Derive a machine's equations for balls.
+
+    Raises
+    ------
+    CertificateError
+        They cannot be enclosed.
+    """
+    d = dynamics(plant)
+    if sym.depends(d.driven, sym.column([d.dq_u, d.dq_a])):
+        raise CertificateError(
+            f"The inertia of {plant.type} depends on velocities, for which no proof is written."
+        )
+    n_u, m = len(plant.unactuated), len(plant.actuated)
+    q_a, v, ddq_a, jerk = d.q_a, d.dq_a, d.ddq_a, sym.symbols("jerk", m)
+    x = sym.column([d.q_u, sym.symbols("w", n_u)])
+    rates = x[n_u:] + d.driven @ v
+    along = sym.directional(d.driven @ v, sym.column([d.q_u, q_a]), sym.column([d.dq_u, v]))
+    f = sym.column([rates, sym.substitute(d.free - along, d.dq_u, rates)])
+    slopes, lift, by_position = sym.jacobian(f, x), sym.jacobian(f, v), sym.jacobian(f, q_a)
+    state = {"x": x, "q_a": q_a, "v": v, "p": d.p}
+    smooth = {**state, "ddq_a": ddq_a}
+    seen = {"q_u": d.q_u, "q_a": q_a, "p": d.p}
+    changes = {f"d_{name}": sym.symbols(f"d_{name}", symbol.shape[0]) for name, symbol in state.items()}
+    motion = sym.column([x, q_a, v, ddq_a])
+
+    def change(expression: sym.Symbol, variables: sym.Symbol, by: sym.Symbol) -> sym.Symbol:
+        columns = [sym.directional(expression[:, k], variables, by) for k in range(expression.shape[1])]
+        return sym.matrix([columns])
+
+    def enclosed(name: str, expression: sym.Symbol, inputs: Mapping[str, sym.Symbol] = state) -> Enclosed:
+        return Enclosed(Function(name, inputs, expression), plant.type)
+
+    axes, whole = sym.column([q_a, v]), sym.column(list(state.values()))
+    by_axes = sym.jacobian(f, axes)
+    pull = slopes @ lift + by_position - change(lift, motion[: 2 * n_u + 2 * m], sym.column([f, v, ddq_a]))
+    d_x = changes["d_x"]
+    return EnclosedEquations(
+        rate=enclosed("rate", f),
+        jacobian=enclosed("jacobian", slopes),
+        jacobian_change=enclosed(
+            "jacobian_change", change(slopes, whole, sym.column(list(changes.values()))), {**state, **changes}
+        ),
+        lift=enclosed("lift", lift),
+        lift_change=enclosed("lift_change", change(lift, x, d_x), {**state, "d_x": d_x}),
+        by_position=enclosed("by_position", by_position),
+        curvature=enclosed(
+            "curvature", sym.matrix([[sym.jacobian(by_axes[:, k], axes) for k in range(2 * m)]])
+        ),
+        pull=enclosed("pull", pull, smooth),
+        pull_change=enclosed(
+            "pull_change",
+            change(pull, motion, sym.column([d_x, v, ddq_a, jerk])),
+            {**smooth, "d_x": d_x, "jerk": jerk},
+        ),
+        sway=enclosed("sway", d.sway, seen),
+        sway_slopes=enclosed("sway_slopes", sym.jacobian(d.sway, d.q_u), seen),
+        sway_by_position=enclosed("sway_by_position", sym.jacobian(d.sway, q_a), seen),
+        jump=Function("jump", seen, d.driven),
+    )

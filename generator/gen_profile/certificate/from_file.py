@@ -1,0 +1,187 @@
+"""Certificates of artefacts that lie on disk: made, and checked again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from gen_profile.artefacts.manifest import FILENAME, sha256
+from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.artefacts.writing import deliver
+from gen_profile.certificate.boxes import covers
+from gen_profile.certificate.certify import SLACK, Attempt, Progress, attempt
+from gen_profile.certificate.document import Certificate, certificate_path, encode, parse
+from gen_profile.certificate.theorem import Theorem, ranges_of
+from gen_profile.errors import CertificateError, OutputError
+from gen_profile.motion.profile import SampledProfile
+from gen_profile.spec.model import Spec
+from gen_profile.verification.check import spec_of
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.registry import find_exporter, format_of
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Artefact:
+    """What a certificate is about."""
+
+    path: Path
+    sha256: str
+    spec: Spec
+    setpoints: SampledProfile
+
+
+def certify_artefact(
+    path: Path | str,
+    spec: Spec | None = None,
+    *,
+    write: bool = True,
+    progress: Progress = lambda _, __: None,
+) -> Certificate:
+    """Prove that no machine of a spec's ranges sways more than a bound after a file's motion.
+
+    docs/certificate.md states what is proved. A certificate is written beside the file where every limit is
+    proved to be kept: its name with ``.certificate.json``.
+
+    Parameters
+    ----------
+    path : Path or str
+        Any artefact of a motion.
+    spec : Spec, optional
+        Taken from ``manifest.json`` beside the file when not given.
+    write : bool
+        Whether to write it.
+    progress : callable
+        Told how many boxes of machines are done, and of how many so far.
+
+    Returns
+    -------
+    Certificate
+        Of what could be proved; `Certificate.proved` tells whether that is all.
+
+    Raises
+    ------
+    CertificateError
+        No proof is written for this machine, or what the spec asks.
+    OutputError, ExportError, SpecError, CosimulationError
+        As of `gen_profile.check_artefact`.
+    """
+    artefact = _read(Path(path), spec)
+    certificate = _certificate(artefact, attempt(artefact.spec, artefact.setpoints, progress))
+    if write and certificate.proved:
+        deliver(certificate_path(artefact.path), encode(certificate))
+    return certificate
+
+
+def check_certificate(
+    path: Path | str,
+    certificate: Path | str,
+    spec: Spec | None = None,
+    *,
+    progress: Progress = lambda _, __: None,
+) -> Certificate:
+    """Prove again what a certificate says of a file, with nothing solved and nothing believed of it.
+
+    Parameters
+    ----------
+    path : Path or str
+        The artefact.
+    certificate : Path or str
+    spec : Spec, optional
+        Taken from ``manifest.json`` beside the file when not given.
+    progress : callable
+        Told how many boxes of machines are done, and of how many.
+
+    Raises
+    ------
+    CertificateError
+        It is damaged, is about something else, or proves less than it says.
+    OutputError, ExportError, SpecError
+        As of `gen_profile.check_artefact`.
+    """
+    artefact = _read(Path(path), spec)
+    try:
+        found = parse(Path(certificate).read_bytes())
+    except OSError as error:
+        raise OutputError(f"Cannot read {certificate}: {error.strerror}.") from error
+    theorem = _require_about(found, artefact)
+    bounds = np.zeros(len(found.bounds))
+    done = 0
+    for batch in theorem.batches(found.boxes):
+        rows = slice(done, done + len(batch))
+        again = theorem.enclosure(batch, found.coefficients[rows], found.scales[rows]).bounds()
+        bounds = np.maximum(bounds, again.sway.max(axis=0))  # which keeps nan
+        done += len(batch)
+        progress(done, len(found.boxes))
+    for (load, stated), bound in zip(found.bounds.items(), bounds.tolist(), strict=True):
+        if not bound <= stated:
+            raise CertificateError(
+                f"The certificate does not prove what it says: the {load} is bounded by "
+                f"{1e3 * bound:.4g} mm, and it states {1e3 * stated:.4g} mm."
+            )
+    return found
+
+
+def _read(path: Path, spec: Spec | None) -> _Artefact:
+    content = read_artefact(path)
+    manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
+    spec = spec or spec_of(manifest, path)
+    setpoints = find_exporter(format_of(path)).replay(content, target_of(spec))
+    return _Artefact(path=path, sha256=sha256(content), spec=spec, setpoints=setpoints)
+
+
+def _certificate(artefact: _Artefact, found: Attempt) -> Certificate:
+    """State what came out."""
+    loads, theorem = list(artefact.spec.check.residual_sway), found.theorem
+    bounds = found.bounds.max(axis=0).tolist() if found.boxes else []
+    return Certificate(
+        spec_sha256=artefact.spec.sha256(),
+        artefact_sha256=artefact.sha256,
+        ranges=_named(theorem),
+        arrival=theorem.arrival,
+        until=theorem.until,
+        limits=dict(artefact.spec.check.residual_sway),
+        bounds={load: bound * (1.0 + SLACK) for load, bound in zip(loads, bounds, strict=False)},
+        seen=dict(zip(loads, found.seen.tolist(), strict=True)),
+        share=found.share,
+        axes=theorem.axes,
+        boxes=found.boxes,
+        coefficients=found.coefficients,
+        scales=found.scales,
+    )
+
+
+def _named(theorem: Theorem) -> dict[str, tuple[float, float]]:
+    ranges = theorem.ranges
+    ends = zip(ranges.lower.tolist(), ranges.upper.tolist(), strict=True)
+    return dict(zip(ranges.names, ends, strict=True))
+
+
+def _require_about(found: Certificate, artefact: _Artefact) -> Theorem:
+    """Refuse a certificate of anything else, or of a part of it.
+
+    Raises
+    ------
+    CertificateError
+    """
+    if found.artefact_sha256 != artefact.sha256:
+        raise CertificateError(
+            f"The certificate is about another file than {artefact.path}, or that was altered."
+        )
+    if found.spec_sha256 != artefact.spec.sha256():
+        raise CertificateError("The certificate is about another spec: other machines or limits.")
+    theorem = Theorem(
+        spec=artefact.spec, setpoints=artefact.setpoints, ranges=ranges_of(artefact.spec), axes=found.axes
+    )
+    theorem.require_shapes(found.boxes, found.coefficients, found.scales)
+    whole = found.share == 1.0 and dict(found.ranges) == _named(theorem) and covers(found.boxes)
+    if not whole or dict(found.limits) != dict(artefact.spec.check.residual_sway) or not found.proved:
+        raise CertificateError("The certificate does not cover all machines of the spec.")
+    if (
+        list(found.bounds) != list(found.limits)
+        or found.until > theorem.until
+        or found.arrival != theorem.arrival
+    ):
+        raise CertificateError("The certificate is about other loads or another time.")
+    return theorem

@@ -1,0 +1,169 @@
+"""What a certificate proves, and of what: machines, setpoints, and the time in which the sway counts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+import attrs
+import numpy as np
+
+from gen_profile.certificate.axis_motion import AxisMotion, Gap, gap_between, track_of
+from gen_profile.certificate.balls import Array
+from gen_profile.certificate.boxes import DyadicBox, Ranges
+from gen_profile.certificate.enclosure import TIME_NODES, Approximation, Enclosure
+from gen_profile.certificate.equations import EnclosedEquations, enclosed_equations
+from gen_profile.errors import CertificateError
+from gen_profile.evaluation.residual_sway import observation_time
+from gen_profile.motion.profile import SampledProfile
+from gen_profile.problem.initial_state import initial_state
+from gen_profile.spec.model import Spec
+
+PARAMETER_TERMS = (1, 8, 6, 5)  # in each of so many parameters
+FEWEST_TERMS = 4  # of more
+BATCH = 400_000  # numbers in an array over all nodes of a batch, which a processor's cache holds
+
+
+@attrs.frozen(kw_only=True)
+class Theorem:
+    """No machine of some ranges sways by more than a bound, from the arrival on, under a file's setpoints.
+
+    Attributes
+    ----------
+    spec : Spec
+    setpoints : SampledProfile
+        Replayed from an artefact.
+    ranges : Ranges
+    axes : AxisMotion
+        Beside the setpoints; any will do.
+
+    Raises
+    ------
+    CertificateError
+        No proof is written for what the spec asks.
+    """
+
+    spec: Spec
+    setpoints: SampledProfile
+    ranges: Ranges
+    axes: AxisMotion
+
+    def __attrs_post_init__(self) -> None:
+        if self.spec.actuator.tau:
+            raise CertificateError(
+                "actuator.tau: a certificate is for drives that follow their setpoints; drives that lag are "
+                "checked by co-simulation only."
+            )
+        if self.spec.check.foreign is not None:
+            raise CertificateError(
+                "check.fmu: a certificate is of this project's own equations of the machine; "
+                "a foreign FMU can be co-simulated only."
+            )
+        if not self._axes_fit():
+            raise CertificateError(
+                "The certificate's motion of the axes does not belong to the file's setpoints."
+            )
+
+    def _axes_fit(self) -> bool:
+        """Whether pieces end at setpoints, the last one, too, and go on for as long as the sway counts."""
+        axes, times, m = self.axes, self.setpoints.times, self.setpoints.position.shape[1]
+        knots, pieces = axes.knots, len(axes.knots) - 1
+        shapes = (axes.position.shape, axes.velocity.shape, axes.acceleration.shape)
+        if knots.ndim != 1 or shapes != ((pieces + 1, m), (pieces + 1, m), (pieces, 2, m)):
+            return False
+        moving = knots[knots <= times[-1]]
+        return bool(
+            all(np.isfinite(part).all() for part in (knots, axes.position, axes.velocity, axes.acceleration))
+            and (np.diff(knots) > 0.0).all()
+            and np.isin(moving, times).all()
+            and np.isin(times[[0, -1]], moving).all()
+            and knots[0] == times[0]
+            and knots[-1] >= self.until
+            and np.array_equal(axes.position[0], self.setpoints.position[0])
+        )
+
+    def require_shapes(self, boxes: Sequence[DyadicBox], coefficients: Array, scales: Array) -> None:
+        """Refuse arrays that do not fit together.
+
+        Raises
+        ------
+        CertificateError
+        """
+        d, size = len(self.ranges.names), 2 * len(self.spec.machine().unactuated)
+        pieces, count = len(self.axes.knots) - 1, len(boxes)
+        fits = (
+            coefficients.ndim == 5
+            and coefficients.shape[:3] == (count, pieces, size)
+            and 1 <= coefficients.shape[3] <= TIME_NODES
+            and coefficients.shape[4] == self.terms**d
+            and scales.shape in ((count, 1, size, size), (count, pieces, size, size))
+            and all(len(box) == d for box in boxes)
+        )
+        if not fits or not (np.isfinite(coefficients).all() and np.isfinite(scales).all()):
+            raise CertificateError("The certificate is damaged: its arrays do not fit together.")
+
+    @property
+    def arrival(self) -> float:
+        """When the sway begins to count, in s."""
+        return float(self.setpoints.times[-1])
+
+    @property
+    def until(self) -> float:
+        """How long it counts at least, in s."""
+        return self.arrival + observation_time(self.spec)
+
+    @property
+    def terms(self) -> int:
+        """Terms of a series in each parameter."""
+        ranges = len(self.ranges.names)
+        return PARAMETER_TERMS[ranges] if ranges < len(PARAMETER_TERMS) else FEWEST_TERMS
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of one box, over all pieces."""
+        return (len(self.axes.knots) - 1) * TIME_NODES * int((self.terms + 3) ** len(self.ranges.names))
+
+    @cached_property
+    def equations(self) -> EnclosedEquations:
+        """Of the machine."""
+        return enclosed_equations(self.spec.machine())
+
+    @cached_property
+    def gap(self) -> Gap:
+        """How far the setpoints are from the smooth motion."""
+        return gap_between(self.axes, track_of(self.setpoints, np.array(self.spec.move.final_velocity)))
+
+    def enclosure(self, boxes: Sequence[DyadicBox], coefficients: Array, scales: Array) -> Enclosure:
+        """Enclose the machines of some boxes by an approximation of their motions, see `Approximation`."""
+        nominal = self.spec.plant.parameters
+        lower, upper = self.ranges.enclosed(boxes)
+        scales = np.broadcast_to(scales, (len(boxes), len(self.axes.knots) - 1, *scales.shape[2:]))
+        return Enclosure(
+            equations=self.equations,
+            axes=self.axes,
+            gap=self.gap,
+            watched=int(np.searchsorted(self.axes.knots, self.arrival, side="right")) - 1,
+            approximation=Approximation(
+                lower=lower,
+                upper=upper,
+                varied=tuple(list(nominal).index(name) for name in self.ranges.names),
+                nominal=np.array(list(nominal.values())),
+                terms=self.terms,
+                coefficients=coefficients,
+                scales=scales,
+                start=initial_state(self.spec.machine(), self.spec.move.initial),
+            ),
+        )
+
+    def batches(self, boxes: Sequence[DyadicBox]) -> Iterator[Sequence[DyadicBox]]:
+        """Split boxes into batches of a size to be worked on at once."""
+        size = max(1, BATCH // self.nodes)
+        for first in range(0, len(boxes), size):
+            yield boxes[first : first + size]
+
+
+def ranges_of(spec: Spec) -> Ranges:
+    """List the parameters that the check changes."""
+    wide = {name: ends for name, ends in spec.checked_ranges().items() if ends[1] > ends[0]}
+    lower, upper = (np.array([ends[side] for ends in wide.values()]) for side in (0, 1))
+    return Ranges(names=tuple(wide), lower=lower, upper=upper)

@@ -1,0 +1,223 @@
+"""The commands that put a motion on a CAN bus, and a drive that follows it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gen_profile.cli.commands import cli
+from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec_options
+from gen_profile.cli.outcome import print_outcome
+from gen_profile.cli.planner import planner_options
+from gen_profile.cli.progress import progress
+from gen_profile.cli.streaming.words import at_start, outcome_words, plan_words, units
+from gen_profile.errors import OutputError, StreamAborted
+
+if TYPE_CHECKING:
+    from gen_profile.streaming.outcome import StreamOutcome
+
+_MISSES = ("extrapolate", "hold", "stop")
+
+
+def _bus_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    for decorate in (
+        click.option("--channel", metavar="NAME", help="Channel of that interface, such as can0."),
+        click.option(
+            "--interface",
+            metavar="NAME",
+            help="Interface as python-can names it: socketcan, pcan, slcan …",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+@cli.command(epilog="Example: gen-profile stream deploy/paper.log --interface socketcan --channel can0")
+@spec_options
+@_bus_options
+@planner_options
+@click.option("--mode", type=click.Choice(["csp", "ip", "csv"]), help="Mode of the drives, for a spec.")
+@click.option("--node", metavar="N", type=int, help="CANopen node of the first axis, for a spec.")
+@click.option("--simulate-drive", is_flag=True, help="Let simulated drives move the machine's FMU.")
+@click.option("--to-start", is_flag=True, help="Move slowly to the motion's start from anywhere, and end.")
+@click.option(
+    "--jog",
+    metavar="AXIS=DISTANCE",
+    multiple=True,
+    help="Move slowly by a distance in m (or rad) from anywhere, and end. Repeatable.",
+)
+@click.option("--reset-fault", is_flag=True, help="Reset drives in fault first; know why they were.")
+@click.option(
+    "--self-test",
+    is_flag=True,
+    help="First measure, for as long as the motion lasts, whether this machine can hold the cycle.",
+)
+@click.option(
+    "--live",
+    type=click.Choice(["terminal", "browser"]),
+    help="Draw the motion while it runs: here, or on a page of this machine.",
+)
+@click.option("--dry-run", is_flag=True, help="Print the plan, and touch no bus.")
+@click.option("--accept-unverified", is_flag=True, help="Stream what was exported without its check.")
+@click.option(
+    "--log",
+    "table",
+    metavar="CSV",
+    type=OutputFile(),
+    help="Write planned and actual positions side by side.",
+)
+@output_options
+def stream(table: Path | None, as_json: bool, **options: Any) -> None:
+    """Stream setpoints to CiA 402 drives, and stop them safely.
+
+    Takes the log that --export can wrote, with its manifest beside it, a spec, which is designed and checked
+    first, or a planner block, which plans under commands. No safety function: emergency stop and STO stay in
+    hardware.
+    """
+    from gen_profile.cli.streaming.request import StreamRequest
+    from gen_profile.streaming import stream as run
+
+    run.require_extra()
+    request = StreamRequest(**options)
+    request.require_sense()
+    with progress() as tell:
+        source = request.source(tell)
+        if request.moves_slowly:
+            slow = request.slow_motion(source, tell)
+            if slow is None:
+                print_outcome(*at_start(source), as_json)
+                return
+            source = slow
+        if request.dry_run:
+            plan = run.summary(source)
+            print_outcome(plan, plan_words(plan, units(source)), as_json)
+            return
+        port = request.port(source.spec.can)
+        notes = request.measured(source, tell)
+    with request.shown(source) as (tell_phase, book):
+        outcome = run.stream(
+            source,
+            port,
+            simulate_drive=request.simulate_drive,
+            reset_fault=request.reset_fault,
+            notes=notes,
+            tell=tell_phase,
+            book=book,
+        )
+    _conclude(outcome, table, as_json)
+
+
+@cli.command(
+    "drive-sim", epilog="Example: gen-profile drive-sim --preset paper --interface socketcan --channel vcan0"
+)
+@spec_options
+@_bus_options
+@click.option(
+    "--miss", type=click.Choice(_MISSES), default="extrapolate", help="What it does without a setpoint."
+)
+@click.option("--own-mapping", is_flag=True, help="Start with another PDO mapping than CiA 402 proposes.")
+@click.option("--eds", type=OutputFile(), help="Write its EDS, and end.")
+@output_options
+def drive_sim(
+    chosen: SpecChoice,
+    interface: str | None,
+    channel: str | None,
+    miss: str,
+    own_mapping: bool,
+    eds: Path | None,
+    as_json: bool,
+) -> None:
+    """Simulate CiA 402 drives that move the machine's FMU.
+
+    Ends after one stream, when all drives have been switched off again, and tells how far the load sways.
+    """
+    from gen_profile.streaming import stream as run
+
+    run.require_extra()
+    from gen_profile.artefacts.writing import deliver
+    from gen_profile.cli.streaming.request import chosen_port
+    from gen_profile.evaluation.phrases import mm, number
+    from gen_profile.streaming.load import CraneLoad
+    from gen_profile_exporters.can.simulation import drive_dictionary
+    from gen_profile_exporters.can.streaming import joint_bus
+    from gen_profile_exporters.exporter import target_of
+
+    spec = chosen.spec()
+    make = drive_dictionary.DriveVariant(miss=miss, own_mapping=own_mapping)
+    if eds is not None:
+        deliver(eds, drive_dictionary.eds(spec.can.node, make, eds.name).encode("utf-8"))
+        return
+    port = chosen_port(interface, channel, spec.can, simulated=False)
+    with (
+        progress() as tell,
+        CraneLoad(spec, lambda: tell("compiling the plant's FMU, once")) as load,
+        joint_bus.opened(port, target_of(spec)) as bus,
+    ):
+        bank = run.drive_bank(spec, bus, load, make)
+        tell("waiting for a stream, or serving it")
+        run.serve(bank, lambda: bank.finished)
+        sway = load.residual_sway()
+    scales = [axis.counts_per_si for axis in spec.axis_scales()]
+    places = [drive.actual / scale for drive, scale in zip(bank.drives, scales, strict=True)]
+    document = {
+        "position_m": places,
+        "states": [drive.state.words for drive in bank.drives],
+        "sway_residual_peak_m": sway,
+    }
+    axes = spec.machine().actuated
+    at = [f"{axis.name} at {number(place)} {axis.unit}" for axis, place in zip(axes, places, strict=True)]
+    print_outcome(document, f"{', '.join(at)}, residual sway {mm(sway)}", as_json)
+
+
+for parameter in stream.params:
+    if parameter.name == "spec_path":
+        parameter.metavar = "[ARTEFACT|SPEC.toml]"
+
+
+def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None:
+    """Report what became of a stream, by every way that still takes it, and end in the exit code of that."""
+    import attrs
+
+    from gen_profile.artefacts.writing import deliver
+
+    code, complaints = (0, []) if outcome.done else (StreamAborted.exit_code, [_aborted(outcome)])
+    if table is not None:
+        try:
+            deliver(table, outcome.table())
+        except OutputError as error:
+            outcome = attrs.evolve(outcome, notes=(*outcome.notes, str(error)))
+            code, complaints = code or OutputError.exit_code, [*complaints, f"Error: {error}"]
+    said = [_refusal(print_outcome, outcome.to_dict(), outcome_words(outcome), as_json)]
+    said += [_refusal(click.echo, complaint, err=True) for complaint in complaints]
+    refusals = [refusal for refusal in said if refusal is not None]
+    if refusals and not code:
+        raise refusals[0]
+    if refusals:
+        _lead_nowhere()
+    if code:
+        sys.exit(code)
+
+
+def _aborted(outcome: StreamOutcome) -> str:
+    return f"Stream aborted: {outcome.record.reason}"
+
+
+def _refusal(say: Callable[..., None], *arguments: Any, **options: Any) -> Exception | None:
+    """Say something, and return why it was not taken, if it was not."""
+    try:
+        say(*arguments, **options)
+    except (OSError, OutputError) as error:
+        return error
+    return None
+
+
+def _lead_nowhere() -> None:
+    """Give up streams that took nothing: Python would try again at its end, and end in a code of its own."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for number in (1, 2):
+        os.dup2(nowhere, number)

@@ -1,0 +1,117 @@
+"""Dask workers: processes of this computer, or those of a scheduler that runs elsewhere."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+from distributed import Client, LocalCluster
+
+from gen_profile.artefacts.manifest import versions
+from gen_profile.errors import SpecError
+
+ANSWER_TIME = "30s"  # that a scheduler and its first worker have to answer
+
+
+@contextmanager
+def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
+    """Reach the workers: those of a scheduler, or so many processes of this computer.
+
+    Raises SpecError where no worker answers. Processes of this computer speak TLS with a key of their own, as
+    whoever reaches a scheduler can run what he likes.
+    """
+    stack = ExitStack()
+    try:
+        cluster: LocalCluster | str
+        if scheduler is None:
+            with _undisturbed():
+                cluster = stack.enter_context(_local_cluster(workers))
+        else:
+            cluster = scheduler
+        try:
+            client = stack.enter_context(Client(cluster, timeout=ANSWER_TIME, set_as_default=False))
+            client.wait_for_workers(1, timeout=ANSWER_TIME)
+        except (OSError, ValueError) as error:
+            raise SpecError(f"scheduler {scheduler}: no worker answers ({error}).") from error
+        if scheduler is None:
+            client.run(_ignore_interrupts)  # a terminal sends Ctrl-C to them, too; this process ends them
+        yield client
+    finally:
+        with _undisturbed():
+            stack.close()
+
+
+def _local_cluster(workers: int) -> LocalCluster:
+    """Start processes of this computer, which never hear Ctrl-C where that can be had from the start."""
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # which tells of processes that are stopped
+    with ExitStack() as stack:
+        if sys.platform != "win32":
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            stack.callback(signal.pthread_sigmask, signal.SIG_SETMASK, before)
+        return LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            security=True,
+            dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # of its health page, which stays
+            silence_logs=logging.CRITICAL,
+        )
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Put interruptions off until the block is done: Dask cannot end processes that are about to start."""
+    came: list[int] = []
+    before: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if callable(signal.getsignal(number)):
+                before[number] = signal.signal(number, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        for stopping, handler in before.items():
+            signal.signal(stopping, handler)
+        for first in came[:1]:
+            signal.raise_signal(first)
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def processes(client: Client) -> int:
+    """Count how many can work at once."""
+    return sum(client.nthreads().values())
+
+
+def unable(error: Exception) -> SpecError:
+    """Say that workers fail at what this program can do."""
+    return SpecError(
+        f"scheduler: the workers cannot go on ({type(error).__name__}: {error}); they must have the "
+        "same gen-profile."
+    )
+
+
+def require_versions(needed: Sequence[tuple[str, str]], work: str) -> None:
+    """Find out, on a worker, whether it has the libraries that some work was planned with.
+
+    Raises
+    ------
+    SpecError
+        With what it has, and what it needs.
+    """
+    if versions() != tuple(needed):
+        raise SpecError(
+            f"scheduler: a worker has {_listed(versions())}, and {work} needs {_listed(needed)}; "
+            "install the same there."
+        )
+
+
+def _listed(installed: Sequence[tuple[str, str]]) -> str:
+    return ", ".join(f"{library} {number}" for library, number in installed)

@@ -1,0 +1,80 @@
+"""The inputs and outputs of a planner block: which are an axis's, which are live parameters."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+import attrs
+
+from gen_profile.errors import ExportError, SpecError
+
+COMMON = ("bEnable", "bExecute", "bVelocity", "bStop", "bQuickStop", "rOverride", "fCycleTime")
+OWN = ("fTarget", "fVelocityCommand", "fVelocityLimit", "fActPosition")  # of each axis
+ISSUED = ("fPosition", "fVelocity", "fAcceleration")  # likewise
+STATES = ("bBusy", "bPromise", "nErrorId")
+UNITS = ("m", "rad")
+
+_TARGET = re.compile(r"^\s*fTarget(\w*)\s*:\s*LREAL\s*;(?:\s*\(\*\s*(\w+))?", re.MULTILINE)
+
+
+@attrs.frozen(kw_only=True)
+class BlockAxis:
+    """An axis that a block plans.
+
+    Attributes
+    ----------
+    name : str
+        Empty where it is the only one.
+    unit : str
+        One of `UNITS`.
+    """
+
+    name: str
+    unit: str = "m"
+
+    @property
+    def suffix(self) -> str:
+        """End the names of the block's inputs and outputs that are this axis's."""
+        return f"_{self.name}" if self.name else ""
+
+    @property
+    def prefix(self) -> str:
+        """Begin the names of columns that are this axis's, as in every exported table."""
+        return f"{self.name}_" if self.name else ""
+
+    def of(self, name: str) -> str:
+        """Name the input or output of the block that is this axis's."""
+        return name + self.suffix
+
+
+def block_axes(text: str) -> tuple[BlockAxis, ...]:
+    """Find the axes that a block plans in its declarations.
+
+    Raises
+    ------
+    ExportError
+        It is no planner block's text.
+    """
+    found = tuple(
+        BlockAxis(name=suffix.removeprefix("_"), unit=unit if unit in UNITS else "m")
+        for suffix, unit in _TARGET.findall(text)
+    )
+    if not found:
+        raise ExportError("The function block has no input fTarget, so it is no planner block.")
+    return found
+
+
+def live_inputs(inputs: Iterable[str], axes: Iterable[BlockAxis]) -> dict[str, str]:
+    """Tell which inputs of a planner block are live parameters, by the parameters' names.
+
+    Raises
+    ------
+    SpecError
+        It is no planner block.
+    """
+    standard = [*COMMON, *(axis.of(name) for axis in axes for name in OWN)]
+    known = list(inputs)
+    if missing := [name for name in standard if name not in known]:
+        raise SpecError(f"The function block has no input {missing[0]}, so it is no planner block.")
+    return {name[1:]: name for name in known if name not in standard}

@@ -1,0 +1,130 @@
+"""Judging histories on the workers of a Dask scheduler."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from math import ceil
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import attrs
+import numpy as np
+
+from gen_profile.artefacts.manifest import versions
+from gen_profile.cluster import client_of, processes, require_versions, unable
+from gen_profile.errors import GenProfileError
+from gen_profile.progress import Progress
+from gen_profile.proof.closed_loop import ClosedLoop
+from gen_profile.proof.histories import Histories
+from gen_profile.proof.judging import Judge, judge_run
+from gen_profile.proof.numbering import Numbering
+from gen_profile.proof.verdict import JudgedHistory
+from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import spec_from_dict
+
+MOST_AT_ONCE = 25  # histories that a worker is handed
+
+
+@attrs.frozen(kw_only=True)
+class ProofRecipe:
+    """What a worker needs to know of a proof; nothing is shared with it but the program.
+
+    Attributes
+    ----------
+    spec : str
+        In JSON.
+    files : tuple of (str, bytes)
+        That the spec names, by their names.
+    text : str
+        The block.
+    slowed : bool
+        As of `Histories`.
+    versions : tuple of (str, str)
+        Of the libraries that shape the numbers.
+    """
+
+    spec: str = attrs.field(repr=False)
+    files: tuple[tuple[str, bytes], ...] = attrs.field(repr=False)
+    text: str = attrs.field(repr=False)
+    slowed: bool
+    versions: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def of(cls, spec: Spec, text: str, histories: Histories) -> ProofRecipe:
+        """Pack a proof's block and machine."""
+        return cls(
+            spec=json.dumps(spec.to_dict()),
+            files=tuple(spec.files().items()),
+            text=text,
+            slowed=histories.slowed,
+            versions=versions(),
+        )
+
+    def read_spec(self) -> Spec:
+        """Read the spec."""
+        with TemporaryDirectory(prefix="gen-profile-") as folder:
+            for name, content in self.files:
+                (Path(folder) / name).write_bytes(content)
+            return spec_from_dict(json.loads(self.spec), Path(folder))
+
+
+@contextmanager
+def judged_on_cluster(
+    spec: Spec, text: str, histories: Histories, scheduler: str, progress: Progress
+) -> Iterator[Judge]:
+    """Let the workers of a Dask scheduler judge.
+
+    Raises
+    ------
+    SpecError
+        No worker answers, or they cannot do it.
+    """
+    with client_of(scheduler, 0) as client:
+        recipe = client.scatter(ProofRecipe.of(spec, text, histories), broadcast=True)
+
+        def judge(numbering: Numbering, numbers: Sequence[int]) -> list[JudgedHistory]:
+            rows = [
+                (number, numbering.group(number), numbering.choices(number).tolist()) for number in numbers
+            ]
+            each = min(MOST_AT_ONCE, ceil(len(rows) / processes(client)) or 1)
+            parts = [rows[begin : begin + each] for begin in range(0, len(rows), each)]
+            judged = list[JudgedHistory]()
+            try:
+                for done in client.map(judge_part, [recipe] * len(parts), parts, pure=False):
+                    judged += done.result()
+                    progress("proving", judged[-1].number, numbering.count)
+            except GenProfileError:
+                raise
+            except Exception as error:
+                raise unable(error) from error
+            return judged
+
+        yield judge
+
+
+def judge_part(recipe: ProofRecipe, rows: Sequence[tuple[int, str, list[float]]]) -> list[JudgedHistory]:
+    """Judge some histories, on a worker.
+
+    Parameters
+    ----------
+    recipe : ProofRecipe
+    rows : sequence of (number, group, choices)
+
+    Raises
+    ------
+    SpecError
+        This computer has other versions than the recipe asks for.
+    CosimulationError
+        Something cannot be compiled or loaded here.
+    """
+    require_versions(recipe.versions, "this proof")
+    spec = recipe.read_spec()
+    histories = Histories.of(spec, slowed=recipe.slowed)
+    with ClosedLoop(spec, recipe.text, histories) as loop:
+        made = [(number, group, histories.history(np.array(choices))) for number, group, choices in rows]
+        return [
+            judge_run(spec, loop.run(history), history, cycle=loop.cycle, number=number, group=group)
+            for number, group, history in made
+        ]

@@ -1,0 +1,175 @@
+// A planner block driven by hand: a stick and a target for every axis, and the machines that follow, moment by moment.
+"use strict";
+const driving = (() => {
+  const { element } = knobs;
+  const ENDS = 2; // frames before those to be shown, at the ends of the travel
+  const $ = (id) => document.getElementById(id);
+  let page = null; // what the page lends: words, its state, its socket
+  let drive = 0, number = 0;
+  let running = false, order = null, live = {};
+  let helm = null; // the controls, once it is known what there is to control
+  let actors = null, playing = null, next = null, told = null;
+
+  function begin() {
+    park();
+    drive += 1;
+    running = true;
+    order = { command: "", values: [] };
+    live = {};
+    $("undriven").textContent = page.phrase("drive.preparing");
+    $("undriven").className = "";
+    ask();
+  }
+
+  function park() {
+    if (!running) return;
+    running = false;
+    cancelAnimationFrame(playing);
+    playing = next = actors = helm = told = null;
+    $("undriven").textContent = "";
+    for (const name of ["helm", "driven"]) $(name).replaceChildren();
+    document.querySelector("#drive .stage").replaceChildren();
+    page.say({ say: "park" });
+    buttons();
+  }
+
+  function ask() {
+    page.say({ say: "drive", number: ++number, state: page.state(), drive, ...order, live });
+  }
+
+  function command(name, values = []) {
+    order = { command: name, values };
+  }
+
+  // what comes ----------------------------------------------------------------------------------------------
+
+  const parts = {
+    driven(part) {
+      if (!actors) build(part);
+      if (playing) next = part;
+      else play(part);
+    },
+    undriven({ sentences }) {
+      park();
+      $("undriven").textContent = sentences.join(" ");
+      $("undriven").className = "bad";
+    },
+  };
+  parts.failure = parts.undriven;
+
+  function show(part) {
+    if (running && part.serial === number) parts[part.part]?.(part);
+  }
+
+  /** Show a moment while the next one is asked for. */
+  function play(part) {
+    const began = performance.now(), last = part.animation.frames - 1;
+    ask();
+    tell(part);
+    const tick = (now) => {
+      const share = Math.min(Math.max((now - began) / (1000 * part.seconds), 0), 1);
+      actors.forEach((actor, index) => actor(ENDS + share * (last - ENDS), 1, part.animation.actors[index]));
+      if (share < 1) playing = requestAnimationFrame(tick);
+      else if (next) {
+        const coming = next;
+        next = null;
+        play(coming);
+      } else playing = null;
+    };
+    playing = requestAnimationFrame(tick);
+  }
+
+  /** Write a place in the unit of the controller, to the millimetre or so. */
+  const place = (axis, value) => `${(axis.factor * value).toFixed(Math.max(0, 3 - Math.round(Math.log10(axis.factor))))} ${axis.unit}`;
+
+  function tell(part) {
+    told = part;
+    const lines = part.axes.flatMap((axis) => {
+      const name = part.axes.length > 1 ? `${page.phrase(axis.name)}: ` : "";
+      return [
+        [`${name}${page.phrase("position")}`, place(axis, axis.position)],
+        [`${name}${page.phrase("velocity")}`, `${axis.velocity.toFixed(3)} ${axis.si}/s`],
+        [`${name}${page.phrase("drive.stops")}`, place(axis, axis.stop_distance)],
+      ];
+    });
+    $("driven").replaceChildren(...lines.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, value))));
+    const kept = part.promise ? "promise" : "open";
+    if ($("promise").dataset.kept !== kept) { // a screen reader is told of changes only
+      $("promise").dataset.kept = kept;
+      $("promise").className = `pill ${part.promise ? "passed" : "open"}`;
+      $("promise").textContent = page.phrase(`drive.${kept}`);
+    }
+    $("undriven").textContent = part.error ? page.filled("drive.error", { error: part.error }) : "";
+    for (const slider of helm.live) slider.disabled = part.busy;
+    buttons();
+  }
+
+  function buttons() {
+    $("begin").textContent = page.phrase(running ? "drive.anew" : "drive.begin");
+    for (const name of ["halt", "brake", "leave", "promise"]) $(name).hidden = !told;
+  }
+
+  // controls ------------------------------------------------------------------------------------------------
+
+  /** A slider with its name and, beside, the value that it stands for. */
+  function slider(name, { least, most, value }, write, act) {
+    const range = element("input", { type: "range", min: String(least), max: String(most), step: String((most - least) / 200), "aria-label": name });
+    range.value = String(value);
+    const output = element("span", { class: "unit" });
+    const put = () => {
+      output.textContent = write(Number(range.value));
+      range.setAttribute("aria-valuetext", output.textContent);
+    };
+    range.addEventListener("input", () => { put(); act(); });
+    put();
+    return { range, put, host: element("label", { class: "lever" }, element("span", { class: "name" }, name), output, range) };
+  }
+
+  function build(part) {
+    actors = castAnimation(document.querySelector("#drive .stage"), { ...part.animation, load: page.phrase(part.animation.load), actors: part.animation.actors.map((actor) => ({ ...actor, name: page.phrase(actor.name) })), views: part.animation.views.map((view) => ({ ...view, title: page.phrase(view.title) })) });
+    const named = (key, axis) => [page.phrase(key), part.axes.length > 1 ? page.phrase(axis.name) : ""].filter(Boolean).join(", ");
+    const sticks = part.axes.map((axis) => slider(named("drive.stick", axis), { least: -axis.fastest, most: axis.fastest, value: 0 }, (value) => `${value.toFixed(2)} ${axis.si}/s`, steer));
+    const targets = part.axes.map((axis) => slider(named("move.target", axis), { least: axis.travel[0], most: axis.travel[1], value: axis.position }, (value) => place(axis, value), aim));
+    function steer() { command("velocity", sticks.map(({ range }) => Number(range.value))); }
+    function aim() { command("target", targets.map(({ range }) => Number(range.value))); }
+    for (const stick of sticks) {
+      stick.range.addEventListener("pointerup", () => { // a stick that is let go springs back
+        stick.range.value = "0";
+        stick.put();
+        steer();
+      });
+    }
+    const ropes = part.live.map(({ name, value, least, most, unit }) => slider(name, { least, most, value }, (now) => `${now.toFixed(2)} ${unit}`, () => {
+      live = Object.fromEntries(ropes.map(({ range }, index) => [part.live[index].name, Number(range.value)]));
+    }));
+    helm = { sticks, live: ropes.map(({ range }) => range) };
+    $("helm").replaceChildren(...[...sticks, ...targets, ...ropes].map(({ host }) => host));
+  }
+
+  function stop(name) {
+    for (const { range, put } of helm.sticks) {
+      range.value = "0";
+      put();
+    }
+    command(name);
+  }
+
+  /** Show the same in another language. */
+  function speak() {
+    delete $("promise").dataset.kept;
+    document.querySelector("#drive .stage").replaceChildren();
+    if (told) build(told);
+    buttons();
+  }
+
+  function lend(given) {
+    page = given;
+    $("begin").addEventListener("click", begin);
+    $("halt").addEventListener("click", () => stop("stop"));
+    $("brake").addEventListener("click", () => stop("quick_stop"));
+    $("leave").addEventListener("click", park);
+    buttons();
+  }
+
+  return { lend, show, speak };
+})();

@@ -1,0 +1,206 @@
+// The knobs: native controls for every value of the spec, built from what the spec itself says of them.
+"use strict";
+const knobs = (() => {
+  const STEPS = 1000;
+  const SVG = "http://www.w3.org/2000/svg";
+  const OPEN = new Set(["move", "plant", "robustness"]);
+  const panel = document.getElementById("knobs");
+  let rows = [];
+  let shape = "";
+
+  const digits = (value) => Number(Number(value).toPrecision(5));
+  const element = (name, attributes = {}, ...children) => {
+    const made = document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) {
+      if (key in made && typeof value !== "string") made[key] = value;
+      else made.setAttribute(key, value);
+    }
+    made.append(...children);
+    return made;
+  };
+
+  /** Append an element of SVG. */
+  const draw = (parent, name, attributes, text = "") => {
+    const made = parent.appendChild(document.createElementNS(SVG, name));
+    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    made.append(text);
+    return made;
+  };
+
+  /** Positions of a slider, and the values that they stand for. */
+  function scale({ span: [low, high], logarithmic, whole }) {
+    const log = logarithmic && low > 0;
+    const round = whole ? Math.round : digits;
+    return {
+      value: (at) => round(log ? low * (high / low) ** (at / STEPS) : low + ((high - low) * at) / STEPS),
+      place: (value) => Math.round(STEPS * (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low || 1))),
+    };
+  }
+
+  /** A number's field and its slider, which tell a value in SI units. */
+  function number(knob, label, tell) {
+    const field = element("input", { type: "number", step: "any", inputmode: "decimal", "aria-label": label });
+    const slider = element("input", { type: "range", min: "0", max: String(STEPS), step: "1", "aria-label": label });
+    const factor = knob.factor ?? 1;
+    field.addEventListener("change", () => field.value !== "" && tell(Number(field.value) / factor, true));
+    const slid = (done) => tell(scale(row.knob).value(Number(slider.value)), done);
+    slider.addEventListener("input", () => slid(false));
+    slider.addEventListener("change", () => slid(true));
+    const row = {
+      knob, field, slider,
+      show(next, value) {
+        row.knob = next;
+        const known = typeof value === "number";
+        if (document.activeElement !== field) field.value = known ? digits(value * factor) : "";
+        slider.hidden = !next.span || !known;
+        if (slider.hidden) return;
+        if (document.activeElement !== slider || !slider.matches(":active")) slider.value = scale(next).place(value);
+        slider.setAttribute("aria-valuetext", `${digits(value * factor)} ${next.unit ?? ""}`);
+      },
+    };
+    return row;
+  }
+
+  const kinds = {
+    number(knob, label, turn) {
+      const one = number(knob, label, (value, done) => turn(value, done));
+      const unit = element("span", { class: "unit" }, knob.unit ?? "");
+      const parts = [element("div", { class: "value" }, one.field, unit), one.slider];
+      const words = (knob.choices ?? []).map((choice) => {
+        const box = element("input", { type: "checkbox" });
+        box.addEventListener("change", () => turn(box.checked ? choice : one.last ?? knob.span?.[0], true));
+        parts.push(element("label", { class: "word" }, box, knob.phrase(`${knob.words}.${choice}`)));
+        return [choice, box];
+      });
+      return {
+        parts,
+        show(next) {
+          if (typeof next.value === "number") one.last = next.value;
+          for (const [choice, box] of words) box.checked = next.value === choice;
+          one.field.disabled = words.some(([, box]) => box.checked);
+          one.show(next, next.value);
+        },
+      };
+    },
+    interval(knob, label, turn) {
+      const ends = ["from", "to"].map((end, which) => number(knob, `${label}, ${knob.phrase(end)}`, (value, done) => {
+        const range = [...held.value];
+        range[which] = value;
+        turn(range.sort((a, b) => a - b), done);
+      }));
+      const share = element("span", { class: "unit" });
+      const held = { value: null };
+      const fields = element("div", { class: "value" }, ends[0].field, "–", ends[1].field, element("span", { class: "unit" }, knob.unit));
+      const sliders = element("div", { class: "two" }, ...ends.map((end) => end.slider));
+      return {
+        parts: [fields, sliders, share],
+        show(next) {
+          held.value = next.value;
+          for (const part of [fields, sliders, share]) part.hidden = !next.value;
+          ends.forEach((end, which) => end.show(next, next.value?.[which]));
+          if (!next.value) return;
+          const [low, high] = next.value;
+          share.textContent = `± ${digits((100 * (high - low)) / (high + low)).toPrecision(3)} %`;
+        },
+      };
+    },
+    pair(knob, label, turn) {
+      const fields = ["from", "to"].map((end) => element("input", { type: "number", step: "any", "aria-label": `${label}, ${knob.phrase(end)}` }));
+      for (const field of fields) field.addEventListener("change", () => turn(fields.map((one) => Number(one.value)), true));
+      const value = element("div", { class: "value" }, fields[0], "–", fields[1], element("span", { class: "unit" }, knob.unit));
+      return {
+        parts: [value],
+        show(next) {
+          value.hidden = !next.value;
+          fields.forEach((field, which) => {
+            if (document.activeElement !== field && next.value) field.value = digits(next.value[which]);
+          });
+        },
+      };
+    },
+    choice(knob, label, turn) {
+      const select = element("select", { "aria-label": label }, ...knob.choices.map((choice) =>
+        element("option", { value: String(choice) }, knob.phrase(`${knob.words}.${choice}`, String(choice)))));
+      select.addEventListener("change", () => turn(knob.choices[select.selectedIndex], true));
+      return { parts: [select], show: (next) => { select.value = String(next.value); } };
+    },
+    switch(knob, label, turn) {
+      const box = element("input", { type: "checkbox", "aria-label": label });
+      box.addEventListener("change", () => turn(box.checked, true));
+      return { parts: [element("div", { class: "value" }, box)], show: (next) => { box.checked = next.value; } };
+    },
+    text(knob, label, turn) {
+      const field = element("input", { type: "text", maxlength: "64", "aria-label": label });
+      field.addEventListener("change", () => turn(field.value, true));
+      return { parts: [field], show: (next) => { if (document.activeElement !== field) field.value = next.value; } };
+    },
+  };
+
+  /** One knob with its name, and a box that states it or leaves it out. */
+  function row(knob, options) {
+    const about = knob.about ? options.phrase(knob.about) : "";
+    const prefix = ["plant", "robustness.uncertain"].includes(knob.words) ? "" : `${options.phrase(knob.words)} `;
+    const label = about ? `${prefix}${knob.name}: ${about}` : [options.phrase(knob.words), options.phrase(knob.name ?? "")].filter(Boolean).join(", ");
+    const host = element("div", { class: `knob ${knob.kind}` });
+    const made = kinds[knob.kind]({ ...knob, phrase: options.phrase }, label, (value, done) => options.turn(one.knob, value, done));
+    const name = element(knob.optional ? "label" : "span", { class: "name" });
+    let box = null;
+    if (knob.optional) {
+      box = element("input", { type: "checkbox" });
+      box.addEventListener("change", () => options.turn(one.knob, box.checked ? options.begin(one.knob) : null, true));
+      name.append(box);
+    }
+    if (about) name.append(prefix, element("b", {}, knob.name), ` ${about}`);
+    else name.append(label);
+    const fault = element("p", { class: "fault", hidden: true });
+    host.append(name, ...made.parts, fault);
+    const one = {
+      knob, host, fault,
+      show(next) {
+        one.knob = next;
+        if (box) box.checked = next.value !== null;
+        host.classList.toggle("off", next.optional === true && next.value === null);
+        made.show(next);
+      },
+    };
+    return one;
+  }
+
+  function build(list, options) {
+    const open = new Set([...panel.querySelectorAll("details[open]")].map((part) => part.dataset.group));
+    const first = panel.childElementCount === 0;
+    panel.replaceChildren();
+    rows = list.map((knob) => row(knob, options));
+    for (const group of new Set(list.map((knob) => knob.group))) {
+      const part = element("details", { "data-group": group, open: first ? OPEN.has(group) : open.has(group) });
+      part.append(element("summary", {}, options.phrase(`group.${group}`)));
+      part.append(...rows.filter((one) => one.knob.group === group).map((one) => one.host));
+      panel.append(part);
+    }
+  }
+
+  /** Show knobs, and keep the controls while they are the same ones: a hand may be on one of them. */
+  function show(list, options) {
+    const next = JSON.stringify([options.language, list.map(({ path, index, kind, choices }) => [path, index, kind, choices])]);
+    if (next !== shape) build(list, options);
+    shape = next;
+    list.forEach((knob, place) => rows[place].show(knob));
+  }
+
+  /** Say at a knob what is wrong with it, and give those that no knob shows. */
+  function blame(faults) {
+    const left = [...faults];
+    for (const one of rows) {
+      const found = left.findIndex(({ place }) => place && (place === one.knob.path || one.knob.path.startsWith(`${place}.`) || place.startsWith(`${one.knob.path}.`)));
+      one.fault.hidden = found < 0;
+      one.host.classList.toggle("wrong", found >= 0);
+      if (found < 0) continue;
+      one.fault.textContent = left[found].sentence;
+      one.host.closest("details").open = true;
+      left.splice(found, 1);
+    }
+    return left;
+  }
+
+  return { show, blame, element, draw, digits };
+})();

@@ -1,0 +1,447 @@
+// The page: holds the state (a start and edits), asks the server for its picture, and shows every part that comes.
+"use strict";
+(async () => {
+  const $ = (id) => document.getElementById(id);
+  const { element } = knobs;
+  const WORDS = await (await fetch("words.json")).json();
+  const LANGUAGES = ["en", "de"];
+  let language = localStorage.getItem("language") ?? (navigator.language.startsWith("de") ? "de" : "en");
+  let state = { preset: "", edits: {} };
+  let kept = JSON.stringify(state); // the state that undo leads back from
+  const undone = [], done = [];
+  const latest = {}; // the newest part of every kind
+  const pins = [];
+  const turned = new Map(); // serial → when the hand turned the knob that it answers
+  let serial = 0, pictured = 0, handles = [], asked = null, wanted = 0, player = null, waiting = null, painting = false;
+  const inbox = []; // what came while the browser was to draw
+
+  // words ---------------------------------------------------------------------------------------------------
+
+  /** A text by its key, or a text that was written in English, in the reader's language. */
+  function phrase(key, otherwise = key) {
+    const column = LANGUAGES.indexOf(language);
+    if (WORDS.texts[key]) return WORDS.texts[key][column];
+    if (column === 0) return otherwise;
+    for (const [pattern, translated] of WORDS.patterns) {
+      const found = key.match(new RegExp(`^${pattern}$`));
+      if (found) return translated.replace(/\$(\d)/g, (_, group) => phrase(found[group]));
+    }
+    return otherwise;
+  }
+  const filled = (key, values) => phrase(key).replace(/\{(\w+)\}/g, (_, name) => values[name]);
+  const mm = (metres) => `${knobs.digits((1e3 * metres).toPrecision(4))} mm`;
+
+  function speak() {
+    document.documentElement.lang = language;
+    for (const part of document.querySelectorAll("[data-text]")) part.textContent = phrase(part.dataset.text);
+    for (const part of document.querySelectorAll("[data-words]")) {
+      part.setAttribute("aria-label", phrase(part.dataset.words));
+      if (part.matches("button")) part.title = phrase(part.dataset.words);
+    }
+    $("language").textContent = LANGUAGES.find((one) => one !== language).toUpperCase();
+    player = null;
+    logs.speak();
+    driving.speak();
+    for (const part of Object.values(latest)) take(part);
+  }
+
+  // state ---------------------------------------------------------------------------------------------------
+
+  const setting = () => ({ phrase, turn, begin, language });
+
+  /** Take a knob's new value into the state; the end of a gesture is what undo steps over. */
+  function turn(knob, value, end) {
+    edit(edits(knob, value), end);
+  }
+
+  /** What a knob's new value changes in the spec: some values go together. */
+  function edits(knob, value) {
+    const every = latest.setting.knobs;
+    const known = (path) => every.find((one) => one.path === path)?.value;
+    if (knob.kind === "interval") {
+      const name = knob.path.split(".").at(-1);
+      const others = every.some((one) => one.kind === "interval" && one.path !== knob.path && one.value);
+      if (!value) return { [knob.path]: null, ...(others ? {} : { "robustness.method": "none" }) };
+      const [low, high] = value;
+      return {
+        [`plant.${name}`]: knobs.digits((low + high) / 2),
+        [knob.path]: Math.min(knobs.digits((high - low) / (high + low)), 0.9),
+        ...(known("robustness.method") === "none" ? { "robustness.method": "sensitivity" } : {}),
+      };
+    }
+    if (knob.path === "actuator.type") return { [knob.path]: value, "actuator.tau": value === "ideal" ? null : known("actuator.tau") ?? 0.1 };
+    if (knob.index === undefined) return { [knob.path]: value };
+    const array = every.filter((one) => one.path === knob.path).map((one) => state.edits[knob.path]?.[one.index] ?? one.value);
+    array[knob.index] = value;
+    return { [knob.path]: array };
+  }
+
+  /** What a value begins with that the spec has left out: what the motion takes now, or a usual one. */
+  function begin(knob) {
+    const taken = latest.curves?.margins.find((one) => one.place === knob.path || (knob.path === `limits.${one.quantity}` && !one.axis));
+    if (knob.kind === "interval") {
+      const nominal = latest.setting.knobs.find((one) => one.path === knob.path.replace("robustness.uncertain", "plant")).value;
+      return [0.9 * nominal, 1.1 * nominal];
+    }
+    if (knob.kind === "pair" && knob.about) {
+      const nominal = latest.setting.knobs.find((one) => one.path === `plant.${knob.name}`).value;
+      return nominal ? [knobs.digits(0.9 * nominal), knobs.digits(1.1 * nominal)] : [0, 0.1];
+    }
+    if (knob.kind === "pair") {
+      const [low, high] = [0, ...latest.setting.knobs.filter((one) => /^move\.(distance|target|start)$/.test(one.path) && (one.name ?? "") === (knob.name ?? "")).map((one) => one.value)].reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [0, 0]);
+      return [low, high];
+    }
+    if (taken) return knobs.digits((1.05 * taken.takes).toPrecision(3));
+    if (knob.path === "limits.sway") return knobs.digits((1.05 * (latest.verdict?.sway_worst ?? 0.1)).toPrecision(3));
+    return knob.usual ?? knob.span?.[0] ?? 1;
+  }
+
+  function edit(changes, end = true) {
+    state = { ...state, edits: { ...state.edits, ...changes } };
+    wanted = window.event?.timeStamp ?? performance.now();
+    if (end) keep();
+    ask();
+  }
+
+  function keep() {
+    const now = JSON.stringify(state);
+    if (now === kept) return;
+    done.push(kept);
+    undone.length = 0;
+    kept = now;
+    arrows();
+    tellAddress();
+  }
+
+  /** Put the state into the address at the end of a gesture: browsers refuse one that changes all the time. */
+  function tellAddress() {
+    const { address, serial: of } = latest.setting ?? {};
+    if (of === serial && kept === JSON.stringify(state)) history.replaceState(null, "", address ? `#${address}` : location.pathname);
+  }
+
+  function arrows() {
+    $("undo").disabled = !done.length;
+    $("redo").disabled = !undone.length;
+  }
+
+  function step(from, to) {
+    if (!from.length) return;
+    to.push(kept);
+    kept = from.pop();
+    go(JSON.parse(kept));
+    arrows();
+  }
+
+  function go(next) {
+    state = next;
+    wanted = performance.now();
+    $("preset").value = state.preset;
+    ask();
+  }
+
+  function ask() {
+    const now = JSON.stringify(state);
+    if (now === asked || socket.readyState !== WebSocket.OPEN) return;
+    asked = now;
+    turned.set(++serial, wanted);
+    expect();
+    say({ say: "show", serial, state });
+  }
+
+  /** Say so when the answer takes its time, lest an older one be taken for it. */
+  function expect() {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => {
+      document.body.classList.add("busy");
+      document.body.classList.toggle("stale", pictured !== serial);
+      judge("open", phrase("overdue"), [], []);
+    }, 250);
+  }
+
+  // parts ---------------------------------------------------------------------------------------------------
+
+  const drawing = (more = {}) => ({ phrase, language, drag: (path, value) => edit({ [path]: value }, false), dropped: keep, ...more });
+
+  /** Give the limits' places to the panels that show them, so that they can be dragged. */
+  function withLimits(panels, margins) {
+    return panels.map((panel) => {
+      const margin = margins.find((one) => panel.title.toLowerCase().startsWith(one.quantity) && (!one.axis || panel.title.endsWith(` ${one.axis}`)));
+      return { ...panel, limit: margin && margin.allowed !== null ? { path: margin.place, factor: 1 } : null };
+    });
+  }
+
+  /** Tell which knobs are the end of the move and the limit in the curves of the loads; null where there is none. */
+  function draggable() {
+    const every = latest.setting?.knobs ?? [];
+    const duration = every.find((knob) => knob.path === "move.duration");
+    return [typeof duration?.value === "number" ? duration.path : null, every.find((knob) => knob.words === "check.residual_sway")?.path ?? null];
+  }
+
+  const ghosts = (panel) => pins.flatMap((pin) => {
+    const same = pin.panels.find((one) => one.title === panel.title);
+    if (!same) return [];
+    const [{ y }] = same.curves;
+    const at = (time) => {
+      const place = same.x.findIndex((x) => x >= time);
+      return place < 0 ? null : y[place];
+    };
+    return [{ name: pin.name, colour: "ghost", dash: "dash", width: 1.3, y: panel.x.map(at) }];
+  });
+
+  const parts = {
+    hello({ presets, opened, start, formats }) {
+      $("preset").replaceChildren(element("option", { value: "" }, start.replace("--preset ", "")), ...Object.entries(presets).filter(([name]) => start !== `--preset ${name}`).map(([name]) => element("option", { value: name }, name)));
+      opened.forEach(offer);
+      const boxes = Object.entries(formats).map(([name, about]) => element("label", { title: about }, element("input", { type: "checkbox", value: name, checked: name === "csv" }), name));
+      $("formats").append(...boxes);
+    },
+    state({ preset, edits: taken }) {
+      state = { preset, edits: taken };
+      kept = asked = JSON.stringify(state);
+      $("preset").value = preset;
+    },
+    notice: ({ sentence }) => notice(sentence),
+    opened({ preset }) {
+      offer(preset);
+      restart(preset);
+    },
+    curves(part) {
+      const { motion, sway, margins, duration } = part;
+      handles = draggable();
+      const [path, limit] = handles;
+      const loads = sway.map((panel) => ({ ...panel, end: { at: duration, path }, limit: limit && { path: limit, factor: 1e3 } }));
+      const options = drawing({ ghosts, seek: (time) => player?.seek(time) });
+      const answered = performance.now();
+      curves.draw($("sway"), loads, options);
+      curves.draw($("motion"), withLimits(motion, margins), options);
+      shares(margins);
+      pictured = part.serial;
+      if (pictured === serial) document.body.classList.remove("stale");
+      paint(part.serial, answered);
+    },
+    animation({ animation }) {
+      const host = document.querySelector(".animation");
+      host.hidden = false;
+      const views = animation.views.map((view) => ({ ...view, title: phrase(view.title) }));
+      const actors = animation.actors.map((actor) => ({ ...actor, name: phrase(actor.name) }));
+      const shown = { ...animation, views, actors, load: phrase(animation.load) };
+      if (player) player.take(shown);
+      else player = playAnimation(host, shown, { play: phrase("play"), pause: phrase("pause"), of: phrase("of"), arrived: phrase("arrived") });
+    },
+    setting(part) {
+      $("name").textContent = part.name;
+      $("summary").textContent = phrase(part.summary);
+      document.title = `${part.name} · gen-profile studio`;
+      knobs.show(part.knobs, setting());
+      knobs.blame([]);
+      $("command").textContent = part.command;
+      const doubt = part.doubts.map((one) => one.sentence ?? one);
+      notice(doubt.length ? `${phrase("beware")}: ${doubt.join(" ")}` : "");
+      if (latest.curves && String(handles) !== String(draggable())) take(latest.curves); // they came before their knobs
+      tellAddress();
+    },
+    verdict(part) {
+      const word = part.passed ? "passed" : "failed";
+      if (part.serial === serial) settled(false);
+      else expect();
+      logs.planned();
+      judge(word, filled(word, { load: phrase(part.load), residual: mm(part.residual), allowed: mm(part.allowed), machine: phrase(part.machine) }), [], []);
+      const facts = [
+        ["over.duration", `${knobs.digits(part.duration)} s`],
+        ["over.acceleration", `${curves.short(part.point.acceleration)} ${latest.curves.margins[0].unit.replace("/s", "/s²")}`],
+        ["sway", mm(part.sway)],
+        ["sway.worst", mm(part.sway_worst)],
+        ["residual", mm(part.residual)],
+        ["margin", mm(part.allowed - part.residual)],
+      ];
+      $("facts").replaceChildren(...facts.map(([key, value]) => element("div", {}, element("dt", {}, phrase(key)), element("dd", {}, value))));
+      listDesigns();
+    },
+    faults({ faults }) {
+      const others = knobs.blame(faults);
+      judge("failed", phrase("faulty"), (others.length ? others : faults).map(({ place, sentence }) => (place ? `${place}: ${sentence}` : sentence)), []);
+      settled(true);
+    },
+    failure({ sentences, cures }) {
+      judge("failed", phrase("none"), sentences.map((one) => phrase(one)), cures);
+      settled(true);
+    },
+    spectrum: ({ panels }) => curves.draw($("spectrum"), panels, drawing()),
+    robustness: ({ panels }) => curves.draw($("robustness"), panels, drawing()),
+    maps: (part) => maps.show($("maps"), part.maps, drawing()),
+    comparison: () => listDesigns(),
+    consent({ files }) {
+      $("programs").replaceChildren(...files.map(({ path, sha256 }) => element("li", {}, path, element("br"), element("code", {}, sha256))));
+      $("consent").showModal();
+    },
+    progress({ stage, done: so, total, remark }) {
+      $("stop").hidden = false;
+      const share = total ? ` ${so} / ${total}` : "";
+      $("outcome").replaceChildren(element("progress", total ? { max: String(total), value: String(so), "aria-label": phrase("progress") } : { "aria-label": phrase("progress") }), ` ${phrase(stage)}${share} ${remark}`);
+    },
+    made({ passed, sentences, scenarios, file }) {
+      $("stop").hidden = true;
+      const link = file ? [element("a", { href: file.link, download: file.name, class: "main" }, `${file.name} (${Math.ceil(file.bytes / 1024)} kB)`)] : [];
+      const verdict = element("p", { class: passed ? "good" : "bad" }, passed ? filled("checked", { scenarios }) : phrase("unchecked"));
+      $("outcome").replaceChildren(verdict, ...sentences.map((one) => element("p", {}, one)), ...link);
+    },
+  };
+
+  function take(part) {
+    parts[part.part]?.(part);
+  }
+
+  /** Offer a spec that was opened as a start. */
+  function offer(name) {
+    if (![...$("preset").options].some((one) => one.value === name)) $("preset").append(element("option", { value: name }, name));
+  }
+
+  function restart(preset) {
+    state = { preset, edits: {} };
+    wanted = performance.now();
+    $("preset").value = preset;
+    keep();
+    ask();
+  }
+
+  function judge(kind, answer, reasons, cures) {
+    $("verdict").className = `card verdict ${kind}`;
+    $("pill").className = `pill ${kind}`;
+    $("pill").textContent = phrase(`pill.${kind}`);
+    $("answer").textContent = answer;
+    $("reasons").replaceChildren(...reasons.map((one) => element("li", {}, one)));
+    $("cures").replaceChildren(...cures.map((changes) => {
+      const words = Object.entries(changes).map(([path, value]) => `${path} = ${Array.isArray(value) ? `[${value}]` : value}`).join(", ");
+      const button = element("button", { type: "button", class: "main" }, words);
+      button.addEventListener("click", () => edit(changes));
+      return button;
+    }));
+  }
+
+  /** Show whether what is seen belongs to the knobs, now that there is an answer: stale pictures fade. */
+  function settled(stale) {
+    clearTimeout(waiting);
+    document.body.classList.remove("busy");
+    document.body.classList.toggle("stale", stale);
+  }
+
+  /** Let the browser draw the curves before anything else is done, and note how long it took from the hand to them. */
+  function paint(of, answered) {
+    const began = turned.get(of);
+    for (const old of turned.keys()) if (old <= of) turned.delete(old);
+    painting = !document.hidden;
+    requestAnimationFrame(() => setTimeout(() => {
+      painting = false;
+      if (began === undefined) document.documentElement.dataset.drawn = "true";
+      else performance.measure("picture", { start: began, end: performance.now(), detail: { answered: answered - began } });
+      receive();
+    }));
+  }
+
+  function shares(margins) {
+    const rows = margins.map(({ quantity, axis, unit, takes, allowed }) => {
+      const share = allowed === null ? null : takes / allowed;
+      const name = [phrase(`limits.${quantity}`), phrase(axis)].filter(Boolean).join(", ");
+      const bar = element("meter", { min: "0", max: "1", value: String(Math.min(share ?? 0, 1)), "aria-label": name });
+      return element("div", { class: share !== null && share > 1 ? "share bad" : "share" }, element("span", {}, name), element("span", { class: "amount" }, `${curves.short(takes)} ${unit}`), share === null ? element("span", { class: "hint" }, phrase("unlimited")) : bar, element("span", { class: "amount" }, share === null ? "" : `${(100 * share).toFixed(0)} %`));
+    });
+    $("margins").replaceChildren(...rows);
+  }
+
+  function listDesigns() {
+    designs.show(latest.comparison, latest.verdict?.point && { ...latest.verdict.point, method: "now" }, pins, {
+      phrase, limit: latest.verdict?.allowed,
+      take: (row) => (row.pin ? (keep(), done.push(kept), kept = JSON.stringify(row.pin.state), go(row.pin.state), arrows()) : edit(row.edits)),
+      unpin: (row) => { pins.splice(pins.indexOf(row.pin), 1); listDesigns(); take(latest.curves); },
+    });
+  }
+
+  function notice(sentence) {
+    $("notice").textContent = sentence;
+    $("notice").hidden = !sentence;
+  }
+
+  // wiring --------------------------------------------------------------------------------------------------
+
+  const socket = new WebSocket(`ws://${location.host}${location.pathname}live`);
+  const say = (message) => socket.send(JSON.stringify(message));
+  socket.addEventListener("open", () => say({ say: "open", address: location.hash.slice(1) }));
+  socket.addEventListener("close", () => notice(phrase("closed")));
+  socket.addEventListener("message", ({ data }) => {
+    inbox.push(data);
+    receive();
+  });
+
+  /** Take what has come, unless the browser is to draw first. */
+  function receive() {
+    while (inbox.length && !painting) hear(JSON.parse(inbox.shift()));
+  }
+
+  function hear(part) {
+    const elsewhere = { log: logs, drive: driving }[part.of];
+    if (elsewhere) {
+      elsewhere.show(part);
+      return;
+    }
+    // while a hand is on a knob, curves of a moment ago are welcome, but nothing that would take the knob back
+    if (part.serial < serial && !["hello", "progress", "made", "curves", "animation"].includes(part.part)) return;
+    latest[part.part] = part;
+    if (part.part === "verdict") for (const old of ["failure", "faults"]) delete latest[old];
+    if (["failure", "faults"].includes(part.part)) delete latest.verdict;
+    take(part);
+  }
+
+  $("undo").addEventListener("click", () => step(done, undone));
+  $("redo").addEventListener("click", () => step(undone, done));
+  addEventListener("keydown", (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.target.matches("input[type=text], input[type=number]")) return;
+    if (event.key === "z" && !event.shiftKey) step(done, undone);
+    else if (event.key === "y" || (event.key === "Z" && event.shiftKey)) step(undone, done);
+    else return;
+    event.preventDefault();
+  });
+  $("preset").addEventListener("change", () => restart($("preset").value));
+  $("pin").addEventListener("click", () => {
+    if (!latest.verdict) return;
+    const name = `${phrase("pinned")} ${1 + Math.max(0, ...pins.map((pin) => pin.number))}`;
+    pins.push({ name, number: pins.length + 1, state, point: latest.verdict.point, panels: [...latest.curves.sway, ...latest.curves.motion] });
+    listDesigns();
+    take(latest.curves);
+  });
+  $("theme").addEventListener("click", () => {
+    const dark = getComputedStyle(document.documentElement).getPropertyValue("--dark").trim() === "1";
+    document.documentElement.dataset.theme = dark ? "light" : "dark";
+    localStorage.setItem("theme", document.documentElement.dataset.theme);
+    curves.redraw();
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", curves.redraw);
+  $("language").addEventListener("click", () => {
+    language = LANGUAGES.find((one) => one !== language);
+    localStorage.setItem("language", language);
+    speak();
+  });
+  const order = (report) => say({ say: "make", state, report, formats: [...$("formats").querySelectorAll("input:checked")].map((box) => box.value) });
+  $("make").addEventListener("click", () => order(false));
+  $("report").addEventListener("click", () => order(true));
+  $("stop").addEventListener("click", () => { say({ say: "stop" }); $("stop").hidden = true; $("outcome").replaceChildren(); });
+  $("spec").addEventListener("click", () => {
+    const link = element("a", { href: URL.createObjectURL(new Blob([latest.setting.text], { type: "application/toml" })), download: `${latest.setting.name}.toml` });
+    link.click();
+    URL.revokeObjectURL(link.href);
+  });
+  $("copy").addEventListener("click", async () => {
+    await navigator.clipboard.writeText($("command").textContent);
+    $("copy").textContent = phrase("copied");
+    setTimeout(() => { $("copy").textContent = phrase("copy"); }, 1500);
+  });
+  $("agree").addEventListener("click", () => { $("consent").close(); say({ say: "agree" }); });
+  $("refuse").addEventListener("click", () => { $("consent").close(); notice(phrase("refused")); });
+  driving.lend({ phrase, filled, say, state: () => state });
+  logs.begin({
+    phrase, filled, notice, edit, drawing, say, send: (blob) => socket.send(blob), state: () => state,
+    mostUpload: () => latest.hello.most_upload,
+  });
+  const theme = localStorage.getItem("theme");
+  if (theme) document.documentElement.dataset.theme = theme;
+  speak();
+})();

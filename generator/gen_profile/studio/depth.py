@@ -1,0 +1,118 @@
+"""What a page shows once the hand rests: the spectrum, other methods, sway over parameters' errors."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from gen_profile.charts.curves import spectrum_figure
+from gen_profile.charts.figure import Map
+from gen_profile.charts.method_styles import method_styles
+from gen_profile.charts.plotly_json import rounded
+from gen_profile.charts.robustness import curves_figure, maps_figure
+from gen_profile.comparison.candidates import own_method
+from gen_profile.comparison.compare import ComparedMethod, Comparison, compare
+from gen_profile.comparison.robustness import error_grid, robustness_of
+from gen_profile.designs.plan import plan
+from gen_profile.errors import GenProfileError
+from gen_profile.motion.profile import Profile
+from gen_profile.spec.model import Spec
+from gen_profile.studio.curves_json import curves_json
+from gen_profile.studio.orders import Question
+from gen_profile.studio.views import Part, point
+
+CURVES = 3  # parameters that have a robustness curve
+MAP_POINTS = 15  # of each parameter's error
+RIVALS = 3  # methods beside the design's own in it
+
+
+def depth(question: Question) -> Iterator[Part]:
+    """Show what takes longer: the spectrum, other methods, and residual sway over the parameters' errors."""
+    try:
+        found = plan(question.spec())
+        spec, evaluation = found.spec, found.evaluation
+        yield {"part": "spectrum", "panels": curves_json(spectrum_figure(spec, evaluation))}
+        own = own_method(spec)
+        yield _robustness(spec, own, {own: evaluation.motion})
+        yield _maps(spec, {own: evaluation.motion})
+        comparison = compare(spec)
+        yield _comparison(comparison, own)
+        rivals = {row.method: row.evaluation.motion for row in _rivals(comparison, own)}
+        yield _robustness(spec, own, {own: evaluation.motion, **rivals})
+    except GenProfileError:  # the picture says why
+        return
+
+
+def _comparison(found: Comparison, own: str) -> Part:
+    spec = found.spec
+    return {
+        "part": "comparison",
+        "own": own,
+        "limit": min(spec.check.residual_sway.values()),
+        "unit": spec.machine().actuated[0].unit,
+        "rows": [
+            {
+                **point(row.method, row.figures),
+                "safe": row.safe,
+                "pareto": row.method in found.efficient,
+                "edits": _taking(spec, row.method, own),
+            }
+            for row in found.rows
+        ],
+        "left_out": found.left_out,
+        "recommended": {kind: advice.method for kind, advice in found.recommended.items()},
+    }
+
+
+def _taking(spec: Spec, method: str, own: str) -> dict[str, Any]:
+    """Say what to change in order to design by a method of the comparison."""
+    optimal = {} if spec.solver.shaper is None else {"solver.method": "auto"}
+    if method == own:
+        return {}
+    if not method.startswith("optimal"):
+        return {"solver.method": method}
+    if weight := re.fullmatch(r"optimal-beta([0-9.]+)", method):
+        return {**optimal, "cost.sway_weight": float(weight[1])}
+    kinds: dict[str, dict[str, Any]] = {
+        "optimal-order1": {"robustness.method": "sensitivity", "robustness.order": 1},
+        "optimal-order2": {"robustness.method": "sensitivity", "robustness.order": 2},
+        "optimal-range": {"robustness.method": "range"},
+    }
+    return {**optimal, **kinds.get(method, {})}
+
+
+def _rivals(found: Comparison, own: str) -> Sequence[ComparedMethod]:
+    """Choose the methods that leave the least sway, the best shaper among them."""
+    others = [row for row in found.rows if row.method != own]
+    others.sort(key=lambda row: row.figures["sway_residual_worst_m"])
+    shapers = [row for row in others if not row.method.startswith("optimal")]
+    return list({row.method: row for row in [*shapers[:1], *others]}.values())[:RIVALS]
+
+
+def _maps(spec: Spec, motions: Mapping[str, Profile]) -> Part:
+    """Show what is left where two parameters are off at once; no map where fewer are uncertain."""
+    names = list(spec.robustness.uncertain)[:2]
+    if len(names) < 2:
+        return {"part": "maps", "maps": []}
+    figure = maps_figure(robustness_of(spec, motions, error_grid(spec, names, MAP_POINTS)))
+    return {"part": "maps", "maps": [_map(panel) for panel in figure.panels if isinstance(panel, Map)]}
+
+
+def _map(panel: Map) -> dict[str, Any]:
+    return {
+        "title": panel.title,
+        "x_label": panel.x_label,
+        "y_label": panel.y_label,
+        "x": rounded(panel.x),
+        "y": rounded(panel.y),
+        "values": [rounded(row) for row in panel.values],
+        "frame": panel.frame,
+    }
+
+
+def _robustness(spec: Spec, own: str, motions: Mapping[str, Profile]) -> Part:
+    names = list(spec.robustness.uncertain)[:CURVES]
+    found = {name: robustness_of(spec, motions, error_grid(spec, (name,))) for name in names}
+    styles = method_styles(motions, [own])
+    return {"part": "robustness", "panels": curves_json(curves_figure(found, styles)) if found else []}

@@ -1,0 +1,167 @@
+"""What one page asks, and who answers: the newest question only, however fast a hand is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import attrs
+
+from gen_profile.studio.workers import BEGUN, ENDED, LOST, Job, Message, Worker, Workers
+
+PATIENCE = 0.6  # s that a question may wait for the first part of an older one's answer
+CALM = 0.3  # s without a new question, after which what takes longer is asked for
+NOBODY = -2  # whose question no page asks
+TRIES = 2  # of a new worker in the place of one that died before it began anything
+GONE = "The process that solved this has ended, and another one takes its place. Undo the last change."
+
+Tell = Callable[[Message], None]
+
+
+class Loop(Protocol):
+    """The part of an event loop that is needed."""
+
+    def call_later(self, delay: float, callback: Callable[..., None], *args: Any) -> Any:
+        """Call something later."""
+
+    def call_soon_threadsafe(self, callback: Callable[..., None], *args: Any) -> Any:
+        """Call something in the loop's thread."""
+
+
+class QuestionLine:
+    """Questions of one kind, numbered upwards; what is overtaken is left unfinished."""
+
+    def __init__(self, kind: str, workers: Workers, loop: Loop, tell: Tell) -> None:
+        self._workers, self._loop, self._tell = workers, loop, tell
+        self._worker: Worker | None = None
+        self._job = Job(number=-1, kind=kind, question=None)
+        self._begun = self._ended = -1
+        self._deaths = 0  # of workers, in a row, that had begun nothing
+        self._answers = (
+            False  # whether the worker has begun anything: one that starts is at no older question
+        )
+
+    def ask(self, number: int, question: Any) -> None:
+        """Ask."""
+        waits = self._ended < self._job.number
+        self._job = attrs.evolve(self._job, number=number, question=question)
+        if self._worker is None:
+            self._take_worker()
+        else:
+            self._worker.ask(self._job)
+        if waits:
+            self._loop.call_later(PATIENCE, self._overtake, number)
+
+    def stop(self) -> None:
+        """Let go of the worker, whatever it does."""
+        if self._worker is not None:
+            self._workers.give_back(self._worker)
+        self._worker, self._ended = None, self._job.number
+
+    def _overtake(self, number: int) -> None:
+        """Ask somebody else where the worker is still at an older question."""
+        if self._worker is None or self._begun >= number:
+            return
+        if self._answers:
+            self._workers.give_back(self._worker)
+            self._take_worker()
+        elif number == self._job.number:  # one that starts may yet begin with an older question
+            self._loop.call_later(PATIENCE, self._overtake, number)
+
+    def _take_worker(self) -> None:
+        self._worker, self._answers = self._workers.take(self._heard_elsewhere), False
+        self._worker.ask(self._job)
+
+    def _heard_elsewhere(self, worker: Worker, message: Message) -> None:
+        self._loop.call_soon_threadsafe(self._heard, worker, message)
+
+    def _heard(self, worker: Worker, message: Message) -> None:
+        if worker is not self._worker:
+            return
+        if message.name == LOST and not self._answers and self._deaths < TRIES:
+            self._deaths += 1
+            self._take_worker()  # it died while it waited: the question is not to blame
+            return
+        if message.name == LOST:
+            self.stop()
+            told: dict[str, Any] = {"part": "failure", "sentences": [GONE], "cures": []}
+            told |= {"of": self._job.kind, "serial": self._job.number}
+            message = Message(
+                number=self._job.number, kind=self._job.kind, name="failure", text=json.dumps(told)
+            )
+        elif message.name == BEGUN:
+            self._begun, self._answers, self._deaths = message.number, True, 0
+        elif message.name == ENDED:
+            self._ended = message.number
+        self._tell(message)
+
+
+class Desk:
+    """The lines of one page: the picture, then what takes longer; files and logs when they are asked for."""
+
+    def __init__(self, workers: Workers, loop: Loop) -> None:
+        self._loop, self._heard = loop, list[Message]()
+        self._tell: Tell = self._heard.append
+        self._picture = QuestionLine("picture", workers, loop, self._take)
+        self._depth = QuestionLine("depth", workers, loop, self._take)
+        self._files = QuestionLine("files", workers, loop, self._take)
+        self._log = QuestionLine("log", workers, loop, self._take)
+        self._drive = QuestionLine("drive", workers, loop, self._take)
+        self._question: Any = None
+        self._newest, self._solved, self._orders = -1, -1, 0
+
+    def attach(self, tell: Tell) -> None:
+        """Tell somebody what was found so far, and from now on."""
+        self._tell = tell
+        for message in self._heard:
+            tell(message)
+
+    def show(self, number: int, question: Any) -> None:
+        """Ask for the picture of a state."""
+        if question != self._question:
+            self._newest, self._question = number, question
+            self._picture.ask(number, question)
+
+    def make(self, order: Any) -> None:
+        """Ask for files."""
+        self._orders += 1
+        self._files.ask(self._orders, order)
+
+    def leave_off(self) -> None:
+        """Make no files."""
+        self._files.stop()
+
+    def read(self, number: int, question: Any) -> None:
+        """Ask what a log tells."""
+        self._log.ask(number, question)
+
+    def drive(self, number: int, question: Any) -> None:
+        """Ask for what a planner block does next."""
+        self._drive.ask(number, question)
+
+    def leave_drive(self) -> None:
+        """Drive no more."""
+        self._drive.stop()
+
+    def leave_log(self) -> None:
+        """Read no log."""
+        self._log.stop()
+
+    def close(self) -> None:
+        """Let go of all workers, and take none any more for what was due later."""
+        self._newest = NOBODY
+        for line in (self._picture, self._depth, self._files, self._log, self._drive):
+            line.stop()
+
+    def _take(self, message: Message) -> None:
+        if message.name not in (BEGUN, ENDED):
+            self._tell(message)
+        if message.name == "verdict":
+            self._solved = message.number
+        elif message.name == ENDED and message.kind == "picture" and self._solved == message.number:
+            self._loop.call_later(CALM, self._look_deeper, message.number)
+
+    def _look_deeper(self, number: int) -> None:
+        if number == self._newest:
+            self._depth.ask(number, self._question)

@@ -1,0 +1,260 @@
+"""A planner block that is driven by hand on a page, and the machines that follow it: a moment per question.
+
+The page is the clock. It asks for the next moment while it shows the last one, so a slow computer makes time
+pass slowly, and nothing is left to run when a page is gone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.charts.figure import PALETTE
+from gen_profile.errors import GenProfileError, SpecError
+from gen_profile.evaluation.phrases import machine, place_unit
+from gen_profile.evaluation.simulation import equations_of
+from gen_profile.motion.profile import Array
+from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.planner import Planner, SetpointHistory
+from gen_profile.problem.dynamics import parameter_column
+from gen_profile.report.animation import Actor, Animation
+from gen_profile.report.machines import body_size, drawings, pose_of
+from gen_profile.spec.model import Spec
+from gen_profile.studio.orders import DriveQuestion
+
+MOMENT = 0.1  # s
+FRAMES = 4  # of a moment
+COLOURS = PALETTE[:3]
+SWAYS = 0.35  # rad, of the ropes, that a picture has room for
+COMMANDS = ("velocity", "target", "stop", "quick_stop")
+
+Part = dict[str, Any]
+
+
+def drive(asked: DriveQuestion) -> Iterator[Part]:
+    """Go on with a drive, or begin one."""
+    try:
+        yield _going(asked).moment(asked)
+    except GenProfileError as error:
+        yield {"part": "undriven", "sentences": str(error).splitlines()}
+
+
+_drives: dict[int, Drive] = {}  # the one that this process is at, by its number
+
+
+def _going(asked: DriveQuestion) -> Drive:
+    if asked.drive not in _drives:
+        _drives.clear()
+        _drives[asked.drive] = Drive(asked.question.spec())
+    return _drives[asked.drive]
+
+
+@attrs.frozen(kw_only=True)
+class Follower:
+    """A machine that follows the block: its name, and by how much its parameters are off."""
+
+    name: str
+    off: Mapping[str, float]
+
+
+class Drive:
+    """A planner block and the machines that follow it, from rest.
+
+    Parameters
+    ----------
+    spec : Spec
+
+    Raises
+    ------
+    SpecError
+        A limit is not stated, or no block takes this machine.
+    CosimulationError
+        There is no C compiler.
+    """
+
+    def __init__(self, spec: Spec) -> None:
+        self._spec, self._plant = spec, spec.machine()
+        self._columns = list(planned_axes(spec))
+        self._followers = _followers(spec)
+        self._places = np.array(spec.move.start, dtype=np.float64)
+        start = self._places[self._columns]
+        self._planner = Planner(spec, start if len(start) > 1 else float(start[0]))
+        self._live = self._planner.live
+        n_u = len(self._plant.unactuated)
+        self._state = np.zeros((2, len(self._followers), n_u))  # coordinates and rates of every machine
+        self._axes = self._at(np.array([start]), np.zeros((2, 1, len(start))))[0]
+        self._bounds = self._room()
+
+    def moment(self, asked: DriveQuestion) -> Part:
+        """Follow a hand for a moment, and tell what is then to be seen."""
+        issued = self._planner.hold(MOMENT, **self._orders(asked))
+        self._tell_live(asked.live)
+        position, velocity, acceleration = (
+            np.reshape(values, (-1, len(self._columns)))
+            for values in (issued.position, issued.velocity, issued.acceleration)
+        )
+        axes = self._at(position, np.stack([velocity, acceleration]))
+        states = self._swing(axes)
+        shown = np.linspace(0, len(axes), FRAMES + 1).round().astype(int)
+        frames = self._animation(np.stack([self._axes, *axes])[shown, 0], states[shown])
+        self._axes, self._state = axes[-1], states[-1]
+        return {
+            "part": "driven",
+            "animation": frames.to_json(self._bounds),
+            "seconds": MOMENT,
+            "axes": self._told(issued, position[-1], velocity[-1]),
+            "live": [self._ranges(name, value) for name, value in self._live.items()],
+            "busy": bool(issued.busy[-1]),
+            "promise": bool(issued.promise[-1]),
+            "error": int(issued.error_id[-1]),
+        }
+
+    def _orders(self, asked: DriveQuestion) -> dict[str, Any]:
+        """Write a command as the planner takes it."""
+        if asked.command not in ("", *COMMANDS) or not np.isfinite(asked.values).all():
+            raise SpecError(f"There is no command {asked.command[:20]!r} with such values.")
+        orders: dict[str, Any] = {"live": asked.live}
+        if asked.command in ("stop", "quick_stop"):
+            return {**orders, asked.command: True}
+        if asked.command:
+            if len(asked.values) != len(self._columns):
+                raise SpecError(f"The planner takes {len(self._columns)} values, one for each axis.")
+            orders[asked.command] = asked.values if len(asked.values) > 1 else asked.values[0]
+        return orders
+
+    def _tell_live(self, live: Mapping[str, float]) -> None:
+        """Give the machines the ropes that the planner was told of."""
+        self._live = {**self._live, **live}
+        for column, axis in enumerate(self._plant.actuated):
+            self._places[column] = self._live.get(axis.name, self._places[column])
+
+    def _parameters(self) -> list[dict[str, float]]:
+        nominal = dict(self._spec.plant.parameters)
+        nominal |= {name: value for name, value in self._live.items() if name in nominal}
+        return [
+            {name: value * one.off.get(name, 1.0) for name, value in nominal.items()}
+            for one in self._followers
+        ]
+
+    def _at(self, position: Array, rates: Array) -> Array:
+        """Put the planned axes' motion beside those that stand still: shape (cycles, 3, axes)."""
+        axes = np.zeros((len(position), 3, len(self._places)))
+        axes[:, 0] = self._places
+        for order, values in enumerate((position, *rates)):
+            axes[:, order, self._columns] = values
+        return axes
+
+    def _swing(self, axes: Array) -> Array:
+        """Integrate all machines from cycle to cycle by the classical method of Runge and Kutta.
+
+        Returns
+        -------
+        (cycles + 1, 2, machines, n_u) array
+        """
+        accelerations, step = equations_of(self._plant)[0], self._planner.cycle_time
+        p = np.concatenate([parameter_column(self._plant, values) for values in self._parameters()])
+        states, before = [self._state], self._axes
+
+        def rates(state: Array, motion: Array) -> Array:
+            rows = np.tile(motion.ravel(), (len(p), 1))
+            return np.stack([state[1], accelerations(state[0], state[1], rows, p)[:, :, 0]])
+
+        for after in axes:
+            state, middle = states[-1], 0.5 * (before + after)
+            k1 = rates(state, before)
+            k2 = rates(state + 0.5 * step * k1, middle)
+            k3 = rates(state + 0.5 * step * k2, middle)
+            k4 = rates(state + step * k3, after)
+            states.append(state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+            before = after
+        return np.array(states)
+
+    def _animation(self, places: Array, states: Array) -> Animation:
+        """Draw the machines; two frames at the ends of the travel come first: rails go as far."""
+        ends = self._ends()
+        q_a = np.concatenate([ends, places])
+        still = np.zeros((len(ends), len(self._plant.unactuated)))
+        outputs, actors = equations_of(self._plant)[1], []
+        for index, (one, parameters) in enumerate(zip(self._followers, self._parameters(), strict=True)):
+            q_u = np.concatenate([still, states[:, 0, index]])
+            size = body_size(self._plant, parameters, q_a)
+            pose = pose_of(self._plant, parameters, q_a, q_u, size)
+            row = parameter_column(self._plant, parameters)
+            sway = outputs(q_u, q_a, row)[:, : len(self._plant.loads), 0][:, self._plant.end_load]
+            drawn = drawings(self._plant, pose)
+            sign = sway[:, -1] if sway.shape[1] == 1 else np.linalg.norm(sway, axis=1)
+            actors.append(Actor(name=one.name, colour=COLOURS[index], sway=sign, drawings=drawn))
+        return Animation(
+            times=np.linspace(0.0, MOMENT, len(q_a)),
+            arrival=0.0,
+            limit=min(self._spec.check.residual_sway.values()),
+            load=self._plant.end_load_name,
+            actors=actors,
+        )
+
+    def _ends(self) -> Array:
+        """Give the places of all axes at both ends of the travel, shape (2, axes)."""
+        ends = np.tile(self._places, (2, 1))
+        for column in self._columns:
+            ends[:, column] = self._spec.limits.of(column).travel or self._places[column]
+        return ends
+
+    def _room(self) -> list[list[float]]:
+        """Choose what a picture shows: the whole travel, and loads that swing."""
+        swung = np.full((2, len(self._followers), len(self._plant.unactuated)), 0.0)
+        angles = [one.unit == "rad" for one in self._plant.unactuated]
+        swung[0] = np.where(angles, SWAYS, 0.0)
+        states = np.stack([-swung, swung])
+        views: list[list[float]] = [
+            view["bounds"] for view in self._animation(self._ends(), states).to_json()["views"]
+        ]
+        return views
+
+    def _told(self, issued: SetpointHistory, position: Array, velocity: Array) -> list[Part]:
+        """Tell of every planned axis where it is, in its controller's unit, and what it may do."""
+        stops = np.reshape(issued.stop_distance, (-1, len(self._columns)))[-1]
+        told = []
+        for index, column in enumerate(self._columns):
+            axis, limits = self._plant.actuated[column], self._spec.limits.of(column)
+            unit, factor = place_unit(self._spec, column)
+            told.append(
+                {
+                    "name": axis.name,
+                    "unit": unit,
+                    "factor": factor,
+                    "si": axis.unit,
+                    "position": float(position[index]),
+                    "velocity": float(velocity[index]),
+                    "stop_distance": float(stops[index]),
+                    "fastest": limits.velocity,
+                    "travel": limits.travel,
+                }
+            )
+        return told
+
+    def _ranges(self, name: str, value: float) -> Part:
+        low, high = self._spec.planner.live[name]
+        units = {one.name: one.unit for one in self._plant.parameters}
+        units |= {axis.name: axis.unit for axis in self._plant.actuated}
+        return {"name": name, "value": value, "least": low, "most": high, "unit": units[name]}
+
+
+def _followers(spec: Spec) -> Sequence[Follower]:
+    """Choose the machines: nominal, and both ends of every range beside."""
+    ranges, nominal = spec.checked_ranges(), spec.plant.parameters
+    ends = {
+        name: (low / nominal[name], high / nominal[name])
+        for name, (low, high) in ranges.items()
+        if nominal[name] != 0.0 and name not in spec.check.spans
+    }
+    if not ends:
+        return [Follower(name="nominal", off={})]
+    found = [Follower(name="nominal", off={})]
+    for side in (0, 1):
+        off = {name: both[side] for name, both in ends.items()}
+        words = ", ".join(f"{name} {100.0 * (share - 1.0):+.3g} %" for name, share in off.items())
+        found.append(Follower(name=machine(words), off=off))
+    return found

@@ -1,0 +1,410 @@
+"""The knobs of a spec: what may be changed, between which bounds, as the spec's own annotations say.
+
+A knob's words are looked up by its key in ``assets/words.json``; only a machine's parameters bring their own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import attrs
+
+from gen_profile.evaluation.phrases import place_unit
+from gen_profile.plants.plant import Parameter
+from gen_profile.spec.model import MoveSpec, Spec
+from gen_profile.spec.structure import kinds_of
+from gen_profile.spec.values import Bounds
+
+REACH = 4.0  # times the value to begin with, up to which a slider goes, and down to which share of it
+RATES = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³"}
+UNITS = {
+    "move.duration": "s",
+    "actuator.tau": "s",
+    "cost.sway_scale": "1/m",
+    "limits.sway": "m",
+    "check.residual_sway": "m",
+    "check.path.latency": "s",
+    "check.path.jitter": "s",
+    "check.path.quantum": "m",
+    "export.cycle_time": "s",
+    "planner.quick_stop": "m/s²",
+    "planner.quick_stop_jerk": "m/s³",
+    "can.bitrate": "bit/s",
+    "can.sync_period": "s",
+    "can.torque_per_acceleration": "‰ s²/m",
+    "can.timeout": "s",
+    "can.start_tolerance": "m",
+    "can.following_error": "m",
+    "can.quick_stop": "m/s²",
+}
+USUAL = {"cost.sway_weight": 50.0, "actuator.tau": 0.1, "cost.sway_scale": 50.0, "check.samples": 100.0}
+USUAL |= {"planner.quick_stop": 1.0, "planner.quick_stop_jerk": 10.0, "can.torque_per_acceleration": 1.0}
+USUAL |= {"can.timeout": 0.02, "can.following_error": 0.01, "can.quick_stop": 1.0}
+LEFT_OUT = {
+    "can.vendor",  # numbers of one drive, which nobody turns
+    "can.product",
+    "check.foreign",
+    "check.default",
+    "check.uncertain",
+    "move.shortest",
+}
+LEFT_OUT |= {"check.path.lag", "export.csv_columns", "plant"}
+ORDER = (
+    *("move", "plant", "robustness", "cost", "solver", "limits", "actuator"),
+    *("check", "planner", "axis", "export", "can"),
+)
+
+
+@attrs.frozen(kw_only=True)
+class Knob:
+    """One value of a spec, as a page shows it.
+
+    Attributes
+    ----------
+    path : str
+        Its key.
+    index : int or None
+        Its place where the key holds an array.
+    group : str
+        Table of the spec.
+    kind : str
+        ``"number"``, ``"interval"`` (a parameter's range, stated as a share of it), ``"pair"``, ``"choice"``,
+        ``"switch"`` or ``"text"``.
+    words : str
+        Key of its name in the table of words.
+    name : str
+        What it belongs to, such as an axis, a load or a parameter.
+    about : str
+        What a machine says of its parameter.
+    value
+        In SI units; None where the spec states none.
+    unit : str
+    factor : float
+        How many of the unit make one SI unit.
+    least, most : float or None
+        Bounds.
+    span : (float, float) or None
+        Ends of a slider.
+    logarithmic : bool
+        Whether the slider is.
+    whole : bool
+        Whether it takes whole numbers only.
+    optional : bool
+        Whether the spec may leave it out.
+    usual : float or None
+        What to begin with where it is left out.
+    choices : tuple
+    """
+
+    path: str
+    index: int | None = None
+    group: str
+    kind: str
+    words: str
+    name: str = ""
+    about: str = ""
+    value: Any
+    unit: str = ""
+    factor: float = 1.0
+    least: float | None = None
+    most: float | None = None
+    span: tuple[float, float] | None = None
+    logarithmic: bool = False
+    whole: bool = False
+    optional: bool = False
+    usual: float | None = None
+    choices: tuple[Any, ...] = ()
+
+
+def knobs(spec: Spec, document: Mapping[str, Any], start: Spec) -> list[Knob]:
+    """List the knobs of a spec.
+
+    Parameters
+    ----------
+    spec : Spec
+    document : mapping
+        As it is written: a move is changed in the way that it is stated.
+    start : Spec
+        Around whose values sliders go.
+    """
+    found = [*_listed(spec, document)]
+    before = {(knob.path, knob.index): knob.value for knob in _listed(start, document)}
+    return [_with_slider(knob, before.get((knob.path, knob.index))) for knob in found]
+
+
+def _listed(spec: Spec, document: Mapping[str, Any]) -> Iterator[Knob]:
+    for table in ORDER:
+        match table:
+            case "move":
+                yield from _move(spec, document.get("move", {}))
+            case "plant":
+                yield from _parameters(spec)
+            case "robustness":
+                yield from _fields(spec.robustness, table, table)
+                yield from _intervals(spec)
+            case "limits":
+                yield from _limits(spec)
+            case "check":
+                yield from _residual_sway(spec, document.get("check", {}))
+                yield from _fields(spec.check, table, table)
+                yield from _fields(spec.check.path, "check.path", table)
+                for one in spec.machine().parameters:
+                    yield _range(one, "check.spans", table, spec.check.spans.get(one.name))
+            case "planner":
+                yield from _planner(spec)
+            case "can":
+                yield from _of_axes(spec, _fields(spec.can, table, table))
+            case "axis":
+                yield from _axes(spec, document.get("axis", {}))
+            case _:
+                yield from _fields(getattr(spec, table), table, table)
+    yield Knob(path="name", group="export", kind="text", words="name", value=spec.name)
+
+
+def _fields(table: Any, place: str, group: str, *, words: str = "", name: str = "") -> Iterator[Knob]:
+    """List the plain fields of a table: numbers, choices and switches."""
+    kinds: Any = type(table)
+    for key, kind in kinds_of(kinds).items():
+        knob = _field(kind)
+        if knob is None or f"{place}.{key}" in LEFT_OUT:
+            continue
+        label = f"{words or place}.{key}"
+        usual = {"unit": UNITS.get(label, ""), "usual": USUAL.get(label)}
+        yield Knob(
+            path=f"{place}.{key}",
+            group=group,
+            words=label,
+            name=name,
+            value=getattr(table, key),
+            **{**usual, **knob},
+        )
+
+
+def _field(kind: Any) -> dict[str, Any] | None:
+    """Say what a field's annotation makes of its knob; None for what is no plain value."""
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):
+        found = _field(inner[0])
+        return found and {**found, "optional": True}
+    if origin is Literal:
+        return {"kind": "choice", "choices": inner}
+    if origin is Annotated:
+        found = _field(inner[0])
+        bounds = next((one for one in inner[1:] if isinstance(one, Bounds)), Bounds())
+        return found and {**found, **_bounds(bounds)}
+    if kind is bool:
+        return {"kind": "switch"}
+    if kind is int:
+        return {"kind": "number", "whole": True}
+    return {"kind": "number"} if kind is float else None
+
+
+def _bounds(bounds: Bounds) -> dict[str, Any]:
+    least = max(bounds.above, bounds.least)
+    return {
+        "least": least if math.isfinite(least) else None,
+        "most": bounds.most if math.isfinite(bounds.most) else None,
+        "logarithmic": bounds.above == 0.0 or bounds.least > 0.0,
+    }
+
+
+def _move(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
+    """Tell ways in the unit of each axis, and the duration."""
+    by_distance = "target" not in stated
+    ways = (
+        {"distance": spec.move.distance}
+        if by_distance
+        else {"start": spec.move.start, "target": spec.move.target}
+    )
+    ways["final_velocity"] = spec.move.final_velocity
+    several = len(spec.axis) > 1
+    for key, values in ways.items():
+        for column, axis in enumerate(spec.machine().actuated):
+            unit, factor = place_unit(spec, column)
+            speed = key == "final_velocity"
+            yield Knob(
+                path=f"move.{key}",
+                index=column,
+                group="move",
+                kind="number",
+                words=f"move.{key}",
+                name=axis.name if several else "",
+                value=values[column],
+                unit=f"{axis.unit}/s" if speed else unit,
+                factor=1.0 if speed else factor,
+                least=None if speed or not math.isfinite(axis.lower) else axis.lower,
+                most=None if speed or not math.isfinite(axis.upper) else axis.upper,
+            )
+        if key == ("distance" if by_distance else "target"):
+            duration = _field(kinds_of(MoveSpec)["duration"])
+            yield Knob(
+                path="move.duration",
+                group="move",
+                words="move.duration",
+                value="minimum" if spec.move.shortest else spec.move.duration,
+                unit=UNITS["move.duration"],
+                choices=("minimum",),
+                **(duration or {}),
+            )
+
+
+def _parameters(spec: Spec) -> Iterator[Knob]:
+    for one in spec.machine().parameters:
+        yield _of_parameter(one, "plant", "number", spec.plant.parameters[one.name])
+
+
+def _of_parameter(one: Parameter, group: str, kind: str, value: Any) -> Knob:
+    place = "plant" if kind == "number" else "robustness.uncertain"
+    return Knob(
+        path=f"{place}.{one.name}",
+        group=group,
+        kind=kind,
+        words=place,
+        name=one.name,
+        about=one.description,
+        value=value,
+        unit=one.unit.replace("^2", "²").replace("^3", "³"),
+        least=one.lower,
+        most=one.upper,
+        logarithmic=one.lower > 0.0,
+        optional=kind != "number",
+    )
+
+
+def _intervals(spec: Spec) -> Iterator[Knob]:
+    """Tell the range of every parameter in its own unit: metres of rope, not a share of them."""
+    for one in spec.machine().parameters:
+        nominal, share = spec.plant.parameters[one.name], spec.robustness.uncertain.get(one.name)
+        if nominal > 0.0:
+            ends = None if share is None else [nominal * (1.0 - share), nominal * (1.0 + share)]
+            yield _of_parameter(one, "robustness", "interval", ends)
+
+
+def _range(one: Parameter, place: str, group: str, value: Any) -> Knob:
+    """Tell a parameter's least and greatest value, for something else than the design."""
+    knob = _of_parameter(one, group, "pair", value)
+    return attrs.evolve(knob, path=f"{place}.{one.name}", words=place)
+
+
+def _planner(spec: Spec) -> Iterator[Knob]:
+    """Tell what the planner block is told at run time, and how fast that may change."""
+    live, rates = spec.planner.live, spec.planner.live_rate
+    for one in spec.machine().parameters:
+        yield _range(one, "planner.live", "planner", live.get(one.name))
+        if one.name in live:
+            rate = _of_parameter(one, "planner", "number", rates.get(one.name))
+            yield attrs.evolve(
+                rate,
+                path=f"planner.live_rate.{one.name}",
+                words="planner.live_rate",
+                unit=f"{rate.unit}/s",
+                least=0.0,
+                most=None,
+                optional=True,
+                usual=0.1 * (live[one.name][1] - live[one.name][0]),
+            )
+    for axis in spec.machine().actuated:
+        if axis.name in live:  # a hoist
+            yield Knob(
+                path=f"planner.live.{axis.name}",
+                group="planner",
+                kind="pair",
+                words="planner.live",
+                name=axis.name,
+                value=live[axis.name],
+                unit=axis.unit,
+                optional=True,
+            )
+    yield from _of_axes(spec, _fields(spec.planner, "planner", "planner"))
+
+
+def _of_axes(spec: Spec, listed: Iterator[Knob]) -> Iterator[Knob]:
+    """Write units of axes that turn, where all do."""
+    turning = all(axis.unit == "rad" for axis in spec.machine().actuated)
+    for knob in listed:
+        turned = turning and knob.unit.startswith("m")
+        yield attrs.evolve(knob, unit=f"rad{knob.unit[1:]}") if turned else knob
+
+
+def _limits(spec: Spec) -> Iterator[Knob]:
+    """List the limits of all axes, and of every axis where there are several."""
+    axes = spec.machine().actuated
+    units = {axis.unit for axis in axes}
+    tables: dict[str, Any] = {"limits": spec.limits}
+    if len(axes) > 1:
+        for column, axis in enumerate(axes):
+            tables[f"limits.axis.{axis.name}"] = spec.limits.own(column)[1]
+    for place, table in tables.items():
+        name = place.rpartition(".")[2] if place != "limits" else ""
+        unit = next((axis.unit for axis in axes if axis.name == name), "m" if "m" in units else "rad")
+        if not name and len(units) > 1:  # no limit means the same of axes of different units
+            yield from (knob for knob in _fields(table, place, "limits") if knob.words == "limits.sway")
+            continue
+        for knob in _fields(table, place, "limits", words="limits", name=name):
+            rate = RATES.get(knob.words.rpartition(".")[2])
+            yield attrs.evolve(knob, unit=f"{unit}{rate}") if rate else knob
+        yield Knob(
+            path=f"{place}.travel",
+            group="limits",
+            kind="pair",
+            words="limits.travel",
+            name=name,
+            value=table.travel,
+            unit=unit,
+            optional=True,
+        )
+
+
+def _residual_sway(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
+    """List what may remain of the sway: of all loads, or of each where that is stated."""
+    of_each = isinstance(stated.get("residual_sway"), Mapping)
+    for load, limit in spec.check.residual_sway.items():
+        path = f"check.residual_sway.{load}" if of_each else "check.residual_sway"
+        yield Knob(
+            path=path,
+            group="check",
+            kind="number",
+            words="check.residual_sway",
+            name=load if of_each else "",
+            value=limit,
+            unit="mm",
+            factor=1e3,
+            least=0.0,
+            logarithmic=True,
+        )
+        if not of_each:
+            return
+
+
+def _axes(spec: Spec, stated: Mapping[str, Any]) -> Iterator[Knob]:
+    bare = len(spec.axis) == 1 and not any(isinstance(stated.get(name), Mapping) for name in spec.axis)
+    for name, axis in spec.axis.items():
+        place = "axis" if bare else f"axis.{name}"
+        yield from _fields(axis, place, "axis", words="axis", name="" if len(spec.axis) == 1 else name)
+
+
+def _with_slider(knob: Knob, before: Any) -> Knob:
+    """Choose the ends of a knob's slider: around the value to begin with, so that they stand still."""
+    if knob.kind == "interval":
+        ends = [end for value in (before, knob.value) if value for end in value]
+        return attrs.evolve(knob, span=_around(knob, min(ends), max(ends)) if ends else None)
+    if knob.kind != "number" or isinstance(knob.value, bool):
+        return knob
+    known = [value for value in (before, knob.value, knob.usual) if isinstance(value, int | float)]
+    if not known:
+        return knob
+    return attrs.evolve(knob, span=_around(knob, min(known), max(known)))
+
+
+def _around(knob: Knob, low: float, high: float) -> tuple[float, float]:
+    least = -math.inf if knob.least is None else knob.least
+    most = math.inf if knob.most is None else knob.most
+    if least >= 0.0 and most <= 1.0 and not knob.logarithmic:
+        return (least, most)
+    if knob.logarithmic:
+        return (max(low / REACH, least), min(high * REACH, most))
+    greatest = max(abs(low), abs(high)) or 1.0
+    return (max(0.0 if low >= 0.0 else -REACH / 2.0 * greatest, least), min(REACH / 2.0 * greatest, most))

@@ -1,0 +1,428 @@
+"""The studio's page and what it says: on this machine only, for who knows the address.
+
+Three things keep others out: the server listens on the loopback interface, its address holds a token that
+nobody can guess, and requests that name another host or come from another page are refused (a page elsewhere
+could have its own name resolve to this machine: CWE-350).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+import math
+import secrets
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import attrs
+import tornado.httpserver
+import tornado.netutil
+import tornado.web
+import tornado.websocket
+
+from gen_profile.errors import GenProfileError, OutputError, SpecError
+from gen_profile.spec.reading import presets
+from gen_profile.studio.desk import Desk
+from gen_profile.studio.orders import DriveQuestion, LogQuestion, Order, Question
+from gen_profile.studio.state import StudioState, WrittenSpec, opened_start, preset_start
+from gen_profile.studio.workers import Message, Part, Workers
+from gen_profile_exporters.registry import find_exporter, formats
+
+LOOPBACK = "127.0.0.1"
+MOST_MESSAGE = 65_536  # bytes of what a page may say at once
+MOST_UPLOAD = 16_777_216  # bytes of a file that is dropped on a page, its name included
+MOST_FILES = 4  # of a page, that can be downloaded
+MOST_NAME = 100  # characters of such a file's name
+MOST_OPENED = 32  # specs that were dropped
+KINDS = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+}
+ASSETS = {
+    "": ("gen_profile.studio", "studio.html"),
+    **{
+        name: ("gen_profile.studio", name)
+        for name in (
+            "studio.css",
+            "studio.js",
+            "knobs.js",
+            "curves.js",
+            "designs.js",
+            "logs.js",
+            "maps.js",
+            "drive.js",
+            "words.json",
+        )
+    },
+    "uPlot.js": ("gen_profile.studio", "uPlot/uPlot.iife.min.js"),
+    "uPlot.css": ("gen_profile.studio", "uPlot/uPlot.min.css"),
+    "animation.js": ("gen_profile.report", "animation.js"),
+}
+
+
+@attrs.define
+class Studio:
+    """What all pages share.
+
+    Attributes
+    ----------
+    start : WrittenSpec
+        What the command named.
+    workers : Workers
+    agreed : dict of Path to str
+        Programs that the user lets run, with their SHA-256.
+    opened : dict of str to WrittenSpec
+        Specs that were dropped on a page, by the name that its state holds.
+    first : Desk or None
+        Where the first page's question is answered before that page is there.
+    """
+
+    start: WrittenSpec
+    workers: Workers
+    agreed: dict[Path, str] = attrs.field(factory=dict)
+    opened: dict[str, WrittenSpec] = attrs.field(factory=dict)
+    first: Desk | None = None
+
+    def question(self, state: StudioState) -> Question:
+        """Say what a page asks for.
+
+        Raises
+        ------
+        SpecError
+            There is no such preset, and no spec of that name was opened.
+        """
+        known = self.opened.get(state.preset, self.start if not state.preset else None)
+        return Question(start=known or preset_start(state.preset), state=state)
+
+    def open(self, name: str, content: bytes) -> str:
+        """Take a spec that was dropped on a page, and say how a page's state calls it.
+
+        Raises
+        ------
+        SpecError
+            It is no spec that can be read.
+        """
+        opened = opened_start(name, content, self.start.folder)
+        key = f"{name} ({hashlib.sha256(content).hexdigest()[:6]})"
+        self.opened[key] = opened
+        while len(self.opened) > MOST_OPENED:
+            del self.opened[next(iter(self.opened))]
+        return key
+
+    def unknown_programs(self, start: WrittenSpec) -> dict[Path, str]:
+        """List programs of a spec that the user has not agreed to, as they are now.
+
+        Raises
+        ------
+        OutputError
+            One cannot be read.
+        """
+        strange = [path for path in start.programs if path.exists() and not path.is_file()]
+        if strange:
+            raise OutputError(f"Cannot read {strange[0]}: it is no file.")
+        try:
+            found = {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in start.programs}
+        except OSError as error:
+            raise OutputError(f"Cannot read {error.filename}: {error.strerror}.") from error
+        return {path: digest for path, digest in found.items() if self.agreed.get(path) != digest}
+
+
+class Guarded(tornado.web.RequestHandler):
+    """Answers only who knows the address, and calls this machine by its number."""
+
+    @property
+    def host(self) -> str:
+        """Under which this server is known."""
+        return str(self.settings["host"])
+
+    def prepare(self) -> None:
+        """Refuse strangers."""
+        token = self.path_kwargs.get("token", "")
+        known = secrets.compare_digest(token, self.settings["token"])
+        here = self.request.headers.get("Origin", f"http://{self.host}") == f"http://{self.host}"
+        elsewhere = self.request.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin")
+        if not known or self.request.host != self.host or not here or elsewhere:
+            raise tornado.web.HTTPError(404)
+
+    def set_default_headers(self) -> None:
+        """Let nothing but the page's own scripts run, and nothing be kept, framed or told to others."""
+        host = self.settings["host"]
+        self.set_header(
+            "Content-Security-Policy",
+            f"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+            f"connect-src 'self' ws://{host}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+        )
+        self.set_header("Cache-Control", "no-store")
+        self.set_header("X-Content-Type-Options", "nosniff")
+        self.set_header("Referrer-Policy", "no-referrer")
+        self.set_header("Cross-Origin-Resource-Policy", "same-origin")
+        self.clear_header("Server")
+
+    def write_error(self, status_code: int, **_: Any) -> None:
+        """Say nothing to strangers."""
+        self.finish(f"{status_code}")
+
+
+class Asset(Guarded):
+    """A file of the page."""
+
+    def get(self, token: str, name: str) -> None:
+        """Send it."""
+        if name not in ASSETS:
+            raise tornado.web.HTTPError(404)
+        package, file = ASSETS[name]
+        self.set_header("Content-Type", KINDS[Path(file).suffix])
+        self.finish((resources.files(package) / "assets" / file).read_bytes())
+
+
+class Download(Guarded):
+    """A file that a page had made."""
+
+    def get(self, token: str, name: str) -> None:
+        """Send it under its name."""
+        made = self.settings["made"]
+        if name not in made:
+            raise tornado.web.HTTPError(404)
+        filename, content = made[name]
+        self.set_header("Content-Type", "application/octet-stream")
+        self.set_header("Content-Disposition", f'attachment; filename="{filename}"')
+        self.finish(content)
+
+
+class Conversation(Guarded, tornado.websocket.WebSocketHandler):
+    """What one page asks and is told; every page has its own, so they do not disturb each other."""
+
+    def check_origin(self, origin: str) -> bool:
+        """Let only the page itself talk."""
+        return origin == f"http://{self.host}"
+
+    def open(self, *_: str, **__: str) -> None:
+        """Greet a page."""
+        self.set_nodelay(True)
+        self._studio: Studio = self.settings["studio"]
+        self._serial, self._made = 0, list[str]()
+        self._pending: tuple[StudioState, dict[Path, str]] | None = None
+        self._dropped: tuple[str, bytes] | None = None
+        desk, self._studio.first = self._studio.first, None
+        self._desk = desk or Desk(self._studio.workers, asyncio.get_running_loop())
+        self._tell(
+            {
+                "part": "hello",
+                "presets": presets(),
+                "opened": list(self._studio.opened),
+                "most_upload": MOST_UPLOAD - MOST_MESSAGE,
+                "start": " ".join(self._studio.start.words),
+                "formats": {name: form.summary for name, form in formats().items()},
+            }
+        )
+        self._desk.attach(self._pass_on)
+
+    def on_message(self, message: str | bytes) -> None:
+        """Take what the page asks for; whatever it says wrong is answered in a sentence."""
+        head, _, content = message.partition(b"\n") if isinstance(message, bytes) else (message, b"", b"")
+        if len(head) > MOST_MESSAGE:
+            self.close(code=1009)
+            return
+        try:
+            said = json.loads(head)
+            act: dict[str, Callable[[dict[str, Any]], None]] = {
+                "open": self._begin,
+                "show": self._show,
+                "agree": self._agree,
+                "make": self._make,
+                "stop": lambda _: self._desk.leave_off(),
+                "drop": lambda said: self._drop(said, content),
+                "read": self._read,
+                "forget": lambda _: self._forget(),
+                "drive": self._drive,
+                "park": lambda _: self._desk.leave_drive(),
+            }
+            act[said["say"]](said)
+        except GenProfileError as error:
+            self._tell({"part": "failure", "sentences": str(error).splitlines(), "cures": []})
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            self._tell({"part": "failure", "sentences": ["The page said something unheard of."], "cures": []})
+
+    def on_close(self) -> None:
+        """Let go of the page's workers and files."""
+        self._desk.close()
+        for name in self._made:
+            self.settings["made"].pop(name, None)
+
+    def _begin(self, said: dict[str, Any]) -> None:
+        """Show the state that an address holds."""
+        try:
+            state = StudioState.from_address(said["address"]) if said["address"] else StudioState()
+            self._studio.question(state)
+        except SpecError as error:
+            state = StudioState()
+            self._tell({"part": "notice", "sentence": str(error)})
+        self._tell({"part": "state", "preset": state.preset, "edits": dict(state.edits)})
+        self._ask(state)
+
+    def _show(self, said: dict[str, Any]) -> None:
+        self._serial = int(said["serial"])
+        self._ask(StudioState.from_json(said["state"]))
+
+    def _ask(self, state: StudioState) -> None:
+        """Ask for a picture, once the user lets run what the spec wants to run."""
+        question = self._studio.question(state)
+        unknown = self._studio.unknown_programs(question.start)
+        if unknown:
+            self._pending = (state, unknown)
+            files = [{"path": str(path), "sha256": digest} for path, digest in unknown.items()]
+            self._tell({"part": "consent", "files": files})
+        else:
+            self._desk.show(self._serial, question)
+
+    def _agree(self, _: dict[str, Any]) -> None:
+        if self._pending is not None:
+            state, unknown = self._pending
+            self._studio.agreed |= unknown
+            self._pending = None
+            self._ask(state)
+
+    def _make(self, said: dict[str, Any]) -> None:
+        question = self._studio.question(StudioState.from_json(said["state"]))
+        names = tuple(str(name) for name in said["formats"][: len(formats())])
+        for name in names:
+            find_exporter(name)
+        if self._studio.unknown_programs(question.start):
+            return
+        self._desk.make(Order(question=question, formats=names or ("csv",), report=bool(said["report"])))
+
+    def _drop(self, said: dict[str, Any], content: bytes) -> None:
+        """Take a file that was dropped on the page: a spec to start with, or a log."""
+        name = str(said["name"])[:MOST_NAME]
+        if not name.isprintable():
+            raise ValueError(name)
+        if not name.lower().endswith(".toml"):
+            self._dropped = (name, content)
+            return
+        try:
+            self._tell({"part": "opened", "preset": self._studio.open(name, content)})
+        except SpecError as error:
+            self._tell({"part": "notice", "sentence": str(error)})
+
+    def _read(self, said: dict[str, Any]) -> None:
+        """Ask what the log tells, once its spec may run what it wants to run."""
+        question = self._studio.question(StudioState.from_json(said["state"]))
+        if self._dropped is None or self._studio.unknown_programs(question.start):
+            return
+        name, content = self._dropped
+        columns, after, at = said["columns"], float(said["after"]), tuple(map(float, said["at"]))
+        if not all(map(math.isfinite, (after, *at))):
+            raise ValueError(after, at)
+        asked = LogQuestion(
+            question=question,
+            name=name,
+            content=content,
+            use=str(said["use"]),
+            columns=None if columns is None else str(columns),
+            after=after,
+            at=at,
+            free=tuple(map(str, said["free"])),
+        )
+        self._desk.read(int(said["number"]), asked)
+
+    def _drive(self, said: dict[str, Any]) -> None:
+        """Let a planner block go on for a moment, once its spec may run what it wants to run."""
+        question = self._studio.question(StudioState.from_json(said["state"]))
+        if self._studio.unknown_programs(question.start):
+            return
+        asked = DriveQuestion(
+            question=question,
+            drive=int(said["drive"]),
+            command=str(said["command"]),
+            values=tuple(map(float, said["values"])),
+            live={str(name): float(value) for name, value in said["live"].items()},
+        )
+        self._desk.drive(int(said["number"]), asked)
+
+    def _forget(self) -> None:
+        """Read no log any more."""
+        self._dropped = None
+        self._desk.leave_log()
+
+    def _tell(self, part: Part) -> None:
+        self._write(json.dumps({**part, "serial": self._serial}))
+
+    def _pass_on(self, message: Message) -> None:
+        """Hand on what a worker tells; a file stays here until it is fetched."""
+        if message.file is None:
+            self._write(message.text)
+        else:
+            self._tell({**json.loads(message.text), "file": self._keep(*message.file)})
+
+    def _write(self, text: str) -> None:
+        if self.ws_connection is not None:
+            self.write_message(text)
+
+    def _keep(self, name: str, content: bytes) -> Part:
+        key, made = secrets.token_urlsafe(8), self.settings["made"]
+        made[key] = (name, content)
+        self._made.append(key)
+        for old in self._made[:-MOST_FILES]:
+            made.pop(old, None)
+        return {"name": name, "bytes": len(content), "link": f"made/{key}"}
+
+
+def serve(start: WrittenSpec, port: int, ready: Callable[[str], None]) -> None:
+    """Serve pages until interrupted.
+
+    Parameters
+    ----------
+    start : WrittenSpec
+    port : int
+        0 for any that is free.
+    ready : str → None
+        Is told the address.
+
+    Raises
+    ------
+    OutputError
+        The port is taken.
+    """
+    asyncio.run(_serve(start, port, ready))
+
+
+async def _serve(start: WrittenSpec, port: int, ready: Callable[[str], None]) -> None:
+    workers = Workers()
+    studio = Studio(start=start, workers=workers)
+    if not start.programs:  # the first picture is on its way before the browser is
+        studio.first = Desk(workers, asyncio.get_running_loop())
+        studio.first.show(0, studio.question(StudioState()))
+    try:
+        sockets = tornado.netutil.bind_sockets(port, LOOPBACK)
+    except OSError as error:
+        workers.close()
+        raise OutputError(f"port {port}: {error.strerror}; leave it out to take one that is free.") from error
+    host, token = f"{LOOPBACK}:{sockets[0].getsockname()[1]}", secrets.token_urlsafe(16)
+    application = tornado.web.Application(
+        [
+            (r"/(?P<token>[\w-]+)/(?P<name>live)", Conversation),
+            (r"/(?P<token>[\w-]+)/made/(?P<name>[\w-]+)", Download),
+            (r"/(?P<token>[\w-]+)/(?P<name>[\w.-]*)", Asset),
+            (r"/.*", Guarded),
+        ],
+        websocket_max_message_size=MOST_UPLOAD,
+        log_function=lambda _: None,
+        studio=studio,
+        host=host,
+        token=token,
+        made={},
+    )
+    server = tornado.httpserver.HTTPServer(
+        application, max_body_size=MOST_MESSAGE, max_header_size=MOST_MESSAGE
+    )
+    server.add_sockets(sockets)
+    ready(f"http://{host}/{token}/")
+    try:
+        await asyncio.Event().wait()
+    finally:
+        workers.close()

@@ -1,0 +1,200 @@
+"""From a changed spec to what a page shows of it, part by part: what is found soonest comes first.
+
+Every part is a mapping of plain values with its name under ``"part"``. What takes longer is in
+`gen_profile.studio.depth`.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from gen_profile.charts.curves import motion_figure, select_machines, sway_figure
+from gen_profile.comparison.candidates import own_method
+from gen_profile.designs.plan import Plan, draft, judged
+from gen_profile.errors import GenProfileError, SpecError
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
+from gen_profile.evaluation.phrases import machine, move, place_unit
+from gen_profile.motion.metrics import extremes, greatest, peak
+from gen_profile.report.actors import animation
+from gen_profile.solvers.method_selection import ANSWER, OTHERWISE
+from gen_profile.solvers.solution import Status
+from gen_profile.spec.model import Spec
+from gen_profile.spec.plausibility import doubts
+from gen_profile.spec.reading import spec_from_dict
+from gen_profile.studio.curves_json import curves_json
+from gen_profile.studio.knobs import knobs
+from gen_profile.studio.orders import Question
+from gen_profile.studio.state import command_of, text_of
+from gen_profile.work import OutOfWork, budget
+
+SAMPLES = 300  # of a curve: as many as a panel has pixels
+RANKED = 401  # instants after the move by which machines are ranked for the picture
+SHOWN = 2  # machines beside the nominal one
+FIGURES = {
+    "duration": "duration_s",
+    "acceleration": "acceleration_max_m_per_s2",
+    "sway": "sway_transient_peak_m",
+    "residual": "sway_residual_worst_m",
+}
+SEARCHING = "Looking for what would help …"
+CURE = re.compile(r"(\w+(?:\.\w+)+) = (\[[^]]*\]|\"[^\"]*\"|[-+0-9.e]*[0-9])")
+SENTENCES = re.compile(r"\n|(?<=\.) (?=[A-Z])")
+LONGER = re.compile(r"(?:at least|about) ([0-9.e+]+) s \((move\.duration)\)")
+
+Part = dict[str, Any]
+
+
+def picture(question: Question) -> Iterator[Part]:
+    """Solve a spec and show it: curves and the machine first, then knobs and the verdict."""
+    try:
+        spec = question.spec()
+        with budget(*ANSWER):
+            found = draft(spec)
+            if found.motion is None:
+                yield {"part": "failure", "sentences": [SEARCHING], "cures": []}
+            else:
+                yield from _seen(found.spec, sketch(found.spec, found.motion))
+            yield _setting(question, spec)
+            yield _verdict(judged(found))
+    except (GenProfileError, OutOfWork) as error:
+        yield from _failure(question, error)
+
+
+def _seen(spec: Spec, evaluation: MotionEvaluation) -> Iterator[Part]:
+    """Draw the motion, and the machines under it."""
+    arrival = evaluation.motion.duration
+    shown = [one for one in select_machines(evaluation, RANKED) if one.rank <= SHOWN]
+    yield {
+        "part": "curves",
+        "duration": arrival,
+        "motion": curves_json(motion_figure(spec, evaluation, SAMPLES)),
+        "sway": curves_json(sway_figure(spec, evaluation, shown, arrival, SAMPLES)),
+        "margins": [*_margins(spec, evaluation)],
+    }
+    yield {"part": "animation", "animation": animation(spec, evaluation, shown, arrival).to_json()}
+
+
+def _setting(question: Question, spec: Spec) -> Part:
+    """Tell the knobs, and how else the same is stated."""
+    start, state = question.start, question.state
+    beginning = spec_from_dict(start.document, start.folder)
+    return {
+        "part": "setting",
+        "name": spec.name,
+        "summary": spec.machine().summary,
+        "machine": spec.plant.type,
+        "knobs": [_json(knob) for knob in knobs(spec, question.document(), beginning)],
+        "command": command_of(start, state.edits),
+        "text": text_of(start, state.edits),
+        "address": state.address,
+        "doubts": list(doubts(spec)),
+    }
+
+
+def _json(knob: Any) -> dict[str, Any]:
+    """Leave out what is as by default; the page knows."""
+    fields = attrs.fields(type(knob))
+    values = {field.name: getattr(knob, field.name) for field in fields}
+    told = (
+        name for name, value in values.items() if value != getattr(fields, name).default or name == "value"
+    )
+    return {name: values[name] for name in told}
+
+
+def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any]]:
+    """Hold what the drives are asked for against the limits."""
+    for column, axis in enumerate(spec.machine().actuated):
+        limits = spec.limits.of(column)
+        for order, (quantity, per) in enumerate(
+            zip(("velocity", "acceleration", "jerk"), ("", "²", "³"), strict=True), start=1
+        ):
+            yield {
+                "place": spec.limits.place(column, quantity),
+                "quantity": quantity,
+                "axis": axis.name if len(spec.axis) > 1 else "",
+                "unit": f"{axis.unit}/s{per}",
+                "takes": greatest(evaluation.command, order, column),
+                "allowed": getattr(limits, quantity),
+            }
+        if limits.travel is not None:
+            least, most = extremes(evaluation.command, 0, column)
+            low, high = limits.travel
+            unit, factor = place_unit(spec, column)
+            yield {
+                "place": spec.limits.place(column, "travel"),
+                "quantity": "travel",
+                "axis": axis.name if len(spec.axis) > 1 else "",
+                "unit": unit,
+                "takes": factor * max(most - (high + low) / 2.0, (high + low) / 2.0 - least),
+                "allowed": factor * (high - low) / 2.0,
+            }
+
+
+def _verdict(found: Plan) -> Part:
+    """Judge the motion on all machines of the ranges; a file that is written is judged by the check alone."""
+    spec, evaluation = found.spec, found.evaluation
+    begin, limits = evaluation.motion.duration, np.array(list(spec.check.residual_sway.values()))
+    times = np.linspace(begin, begin + evaluation.watch, RANKED)
+    peaks = np.array([peak(one.sway) for one in evaluation.swing.at(times)])
+    worst, load = np.unravel_index((peaks / limits).argmax(), peaks.shape)
+    figures = found.figures
+    inside = load in range(*spec.machine().end_load.indices(len(limits)))
+    return {
+        "part": "verdict",
+        "passed": keeps_residual_sway(spec, evaluation),
+        "load": list(spec.check.residual_sway)[load],
+        "machine": machine(evaluation.machines[worst].name),
+        "move": move(spec),
+        "duration": begin,
+        "residual": max(float(peaks[worst, load]), figures["sway_residual_worst_m"] if inside else 0.0),
+        "allowed": float(limits[load]),
+        "sway": figures["sway_transient_peak_m"],
+        "sway_worst": figures["sway_transient_worst_m"],
+        "sway_allowed": spec.limits.sway,
+        "point": point(own_method(spec), figures),
+        "solver_time": found.solver_time,
+        "iterations": None if found.solution is None else found.solution.iterations,
+    }
+
+
+def _failure(question: Question, error: Exception) -> Iterator[Part]:
+    """Say why there is no motion, what would help, and keep the knobs usable."""
+    if isinstance(error, SpecError):
+        sentences = str(error).splitlines()
+        yield {"part": "faults", "faults": [_fault(sentence) for sentence in sentences]}
+        if question.state.edits:
+            return
+    else:
+        sentences = SENTENCES.split(str(error) or Status.GIVEN_UP.value)
+    yield {"part": "failure", "sentences": sentences, "cures": cures(" ".join(sentences))}
+
+
+def _fault(sentence: str) -> dict[str, str]:
+    place, colon, problem = sentence.partition(": ")
+    return {"place": place, "sentence": problem} if colon else {"place": "", "sentence": sentence}
+
+
+def cures(text: str) -> list[dict[str, Any]]:
+    """Find what sentences of `gen_profile.solvers.method_selection` offer, as edits of the spec."""
+    found: list[dict[str, Any]] = []
+    if longer := LONGER.search(text):
+        found.append({longer[2]: float(longer[1])})
+    _, _, instead = text.partition("it would do with ")
+    for offer in re.split(r", or with ", instead):
+        edits = {place: tomllib.loads(f"v = {value}")["v"] for place, value in CURE.findall(offer)}
+        if edits:
+            found.append(edits)
+    if OTHERWISE in text:
+        return [{"solver.method": "auto", **edits} for edits in found or [{}]]
+    return found
+
+
+def point(method: str, figures: Mapping[str, float]) -> dict[str, Any]:
+    """Tell a design by the figures that designs are compared by."""
+    return {"method": method, **{name: figures[key] for name, key in FIGURES.items()}}

@@ -1,0 +1,206 @@
+"""Processes that answer questions, one each; one that is overtaken can be ended, for another is ready."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from importlib import import_module
+from multiprocessing.connection import Connection
+from threading import Lock, Thread, Timer
+from typing import Any
+
+import attrs
+
+from gen_profile.one_thread import one_thread
+
+# what can be asked, and what answers it, which only a worker loads
+ANSWERS = {
+    "picture": "gen_profile.studio.views:picture",
+    "depth": "gen_profile.studio.depth:depth",
+    "files": "gen_profile.studio.files:files",
+    "drive": "gen_profile.studio.driving:drive",
+    "log": "gen_profile.studio.logs:log",
+}
+POLITE = {"depth", "files", "log"}  # give way to what a hand waits for
+NICENESS = 10
+PAUSE = 1.0  # s after a worker was taken, in which it has the processor for itself
+BEGUN, ENDED, LOST = "begun", "ended", "lost"
+
+Part = dict[str, Any]
+
+
+@attrs.frozen(kw_only=True)
+class Message:
+    """A part of an answer, as it goes to a page.
+
+    Attributes
+    ----------
+    number : int
+        Of the question.
+    kind : str
+        Of the question.
+    name : str
+        Of the part; or that a question is taken up (`BEGUN`) or done with (`ENDED`), or the process `LOST`.
+    text : str
+        The part in JSON.
+    file : (str, bytes) or None
+        Name and content of a file that was made.
+    """
+
+    number: int
+    kind: str = ""
+    name: str
+    text: str = "{}"
+    file: tuple[str, bytes] | None = None
+
+
+Hear = Callable[["Worker", Message], None]
+
+
+@attrs.frozen(kw_only=True)
+class Job:
+    """A question, and who is to answer it.
+
+    Attributes
+    ----------
+    number : int
+        By which its answer is known.
+    kind : str
+        One of `ANSWERS`.
+    question
+        What they take.
+    """
+
+    number: int
+    kind: str
+    question: Any
+
+
+class Worker:
+    """One process, and a thread that hears it.
+
+    Parameters
+    ----------
+    hear : callable
+        Is told every part of an answer, in that thread.
+    """
+
+    def __init__(self, hear: Hear | None = None) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_work, args=(theirs,), daemon=True)
+        self._process.start()
+        theirs.close()
+        self._lock, self._lost, self._hear = Lock(), False, hear
+        Thread(target=self._listen, daemon=True).start()
+
+    def heard_by(self, hear: Hear) -> bool:
+        """Let somebody else hear it from now on; False where it is lost already."""
+        with self._lock:  # else it could be lost in between, and nobody would be told
+            if not self._lost:
+                self._hear = hear
+            return not self._lost
+
+    def ask(self, job: Job) -> None:
+        """Hand over a question; what is being answered is left unfinished at the next part."""
+        with suppress(OSError):  # a process that has ended is heard of
+            self._connection.send(job)
+
+    def end(self) -> None:
+        """End the process at once, and hear no more of it."""
+        self._hear = None
+        self._process.kill()
+
+    def _listen(self) -> None:
+        with suppress(EOFError, OSError):
+            while True:
+                self._tell(self._connection.recv())
+        with self._lock:
+            self._lost = True
+        self._process.join()
+        self._tell(Message(number=-1, name=LOST))
+
+    def _tell(self, message: Message) -> None:
+        hear = self._hear
+        if hear is not None:
+            hear(self, message)
+
+
+class Workers:
+    """Workers that wait until they are needed: one is ready soon after another was taken."""
+
+    def __init__(self) -> None:
+        self._lock, self._closed = Lock(), False
+        self._taken: list[Worker] = []
+        self._ready: Worker | None = Worker()
+
+    def take(self, hear: Hear) -> Worker:
+        """Take the worker that is ready, or a new one."""
+        with self._lock:
+            ready, self._ready = self._ready, None
+            worker = ready if ready is not None and ready.heard_by(hear) else Worker(hear)
+            self._taken.append(worker)
+        later = Timer(PAUSE, self._prepare)
+        later.daemon = True
+        later.start()
+        return worker
+
+    def _prepare(self) -> None:
+        with self._lock:
+            if self._ready is None and not self._closed:
+                self._ready = Worker()
+
+    def give_back(self, worker: Worker) -> None:
+        """End a worker."""
+        worker.end()
+        with self._lock, suppress(ValueError):
+            self._taken.remove(worker)
+
+    def close(self) -> None:
+        """End all."""
+        with self._lock:
+            self._closed = True
+            for worker in filter(None, (*self._taken, self._ready)):
+                worker.end()
+
+
+def _work(connection: Connection) -> None:
+    """Answer questions until nobody asks any more; in a process of its own."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # which is for the server
+    if sys.platform != "win32":
+        os.setpgrp()
+    import_module("gen_profile.studio.views")  # before the first question comes
+    with one_thread(), suppress(EOFError, OSError):
+        while True:
+            job = connection.recv()
+            while connection.poll():
+                job = connection.recv()
+            _answer(connection, job)
+
+
+def _answer(connection: Connection, job: Job) -> None:
+    if job.kind in POLITE and sys.platform != "win32" and os.nice(0) < NICENESS:
+        os.nice(NICENESS)
+    connection.send(Message(number=job.number, kind=job.kind, name=BEGUN))
+    for part in _parts(job):
+        file, told = part.get("file"), {**part, "of": job.kind, "serial": job.number}
+        text = json.dumps(told if file is None else {**told, "file": None}, separators=(",", ":"))
+        connection.send(Message(number=job.number, kind=job.kind, name=part["part"], text=text, file=file))
+        if connection.poll():
+            return
+    connection.send(Message(number=job.number, kind=job.kind, name=ENDED))
+
+
+def _parts(job: Job) -> Iterator[Mapping[str, Any]]:
+    """Answer a question; what should not happen is a sentence, too."""
+    module, _, name = ANSWERS[job.kind].partition(":")
+    try:
+        yield from getattr(import_module(module), name)(job.question)
+    except Exception as error:
+        sentence = f"Internal error ({type(error).__name__}: {error}); undo the last change."
+        yield {"part": "failure", "sentences": [sentence], "cures": []}

@@ -1,0 +1,179 @@
+"""Certificates as files: made beside the artefact, checked again, and refused when anything is altered."""
+
+import base64
+import json
+import shutil
+import zlib
+
+import numpy as np
+import pytest
+from command_line import run_here
+
+import gen_profile as gp
+from gen_profile.errors import CertificateError, OutputError, SpecError
+
+SPEC = ("--preset", "single-pendulum-crane", "--set", "export.cycle_time=0.01")
+
+
+@pytest.fixture(scope="module")
+def certified(tmp_path_factory):
+    """A file with its manifest and certificate, made on the command line, and what was printed."""
+    folder = tmp_path_factory.mktemp("certified")
+    assert run_here(*SPEC, "--out", folder, "--json").code == 0
+    artefact = folder / "single-pendulum-crane.csv"
+    return artefact, run_here("check", artefact, "--certify", "--json")
+
+
+@pytest.fixture
+def copied(certified, tmp_path):
+    shutil.copytree(certified[0].parent, tmp_path, dirs_exist_ok=True)
+    artefact = tmp_path / certified[0].name
+    return artefact, artefact.with_name(f"{artefact.name}.certificate.json")
+
+
+def test_a_certificate_is_made_beside_the_file_and_holds_when_checked_again(certified):
+    artefact, made = certified
+    beside = artefact.with_name(f"{artefact.name}.certificate.json")
+    assert made.code == 0 and beside.is_file()
+    said, check = made.document["certificate"], made.document["check"]
+    worst = max(row["residual_peaks_m"]["payload"] for row in check["scenarios"])
+    assert said["proved"] and said["share_proved"] == 1.0 and said["reasons"] == []
+    assert worst <= said["bounds_m"]["payload"] <= 1.05 * worst < said["limits_m"]["payload"]
+    assert said["ranges"] == {"L0": pytest.approx([2.7, 3.3])}
+    again = run_here("check", artefact, "--certificate", beside, "--json")
+    assert again.code == 0 and again.document["certificate"] == said
+    text = run_here("check", artefact, "--certificate", beside).out
+    assert "all with L0 from 2.7 to 3.3" in text and f"{1e3 * said['bounds_m']['payload']:.4g} mm" in text
+
+
+def test_a_limit_below_the_bound_is_not_proved_though_the_check_passes(copied):
+    artefact, beside = copied
+    beside.unlink()
+    worst = run_here("check", artefact, "--json").document["check"]["scenarios"]
+    limit = max(row["residual_peaks_m"]["payload"] for row in worst) * 1.0005
+    refused = run_here(
+        "check", artefact, *SPEC, "--set", f"check.residual_sway={limit}", "--certify", "--json"
+    )
+    assert refused.code == 4 and not beside.exists()
+    assert refused.document["check"]["passed"] and not refused.document["certificate"]["proved"]
+    assert refused.errors[0].startswith("Not proved: The payload is proved to sway by at most")
+    failed = run_here("check", artefact, *SPEC, "--set", "check.residual_sway=0.003", "--certify", "--json")
+    assert failed.code == 4 and failed.document["certificate"] is None
+
+
+def stated_lower(document):
+    document["bounds_m"]["payload"] *= 0.99
+
+
+def stated_share(document):
+    document["share_proved"] = 0.5
+
+
+def a_box_less(document):
+    document["parts"][0] = document["parts"][1]
+
+
+def limits_raised(document):
+    document["limits_m"]["payload"] *= 2.0
+
+
+def narrower(document):
+    document["ranges"]["L0"][1] *= 0.99
+
+
+def knots_moved(document):
+    document["axes"]["knots"][3] += 1e-4
+
+
+def later(document):
+    document["from_s"] += 0.5
+
+
+def scales_singular(document):
+    document["scales"] = changed(document["scales"], "<f8", lambda scales: 0.0 * scales)
+
+
+def motion_altered(document):
+    document["coefficients"] = changed(document["coefficients"], "<i4", lambda c: c + c // 100)
+
+
+def motion_cut(document):
+    document["coefficients"]["shape"][0] += 1
+
+
+def quanta_odd(document):
+    document["quanta"][0] *= 3.0
+
+
+def another_file(document):
+    document["artefact_sha256"] = "0" * 64
+
+
+def changed(packed, kind, change):
+    values = np.frombuffer(zlib.decompress(base64.b64decode(packed["zlib"])), kind)
+    content = base64.b64encode(zlib.compress(change(values).astype(kind).tobytes())).decode()
+    return {**packed, "zlib": content}
+
+
+TAMPERED = {
+    stated_lower: "does not prove what it says",
+    stated_share: "does not cover all machines",
+    a_box_less: "does not cover all machines",
+    limits_raised: "does not cover all machines",
+    narrower: "does not cover all machines",
+    knots_moved: "does not belong to the file's setpoints",
+    later: "other loads or another time",
+    scales_singular: "does not prove what it says",
+    motion_altered: "does not prove what it says",
+    motion_cut: "is damaged",
+    quanta_odd: "is damaged",
+    another_file: "about another file",
+}
+
+
+@pytest.mark.parametrize(("tamper", "said"), TAMPERED.items(), ids=[one.__name__ for one in TAMPERED])
+def test_a_tampered_certificate_is_refused(copied, tamper, said):
+    artefact, beside = copied
+    document = json.loads(beside.read_text())
+    tamper(document)
+    beside.write_text(json.dumps(document))
+    with pytest.raises(CertificateError, match=said):
+        gp.check_certificate(artefact, beside)
+
+
+def test_what_is_no_certificate_or_of_something_else_is_refused(copied):
+    artefact, beside = copied
+    with pytest.raises(CertificateError, match="is no certificate"):
+        gp.check_certificate(artefact, artefact.with_name("manifest.json"))
+    with pytest.raises(OutputError, match="Cannot read"):
+        gp.check_certificate(artefact, artefact.with_name("none.json"))
+    wider = gp.preset_spec(
+        "single-pendulum-crane", ["export.cycle_time=0.01", "robustness.uncertain={L0=0.11}"]
+    )
+    with pytest.raises(CertificateError, match="about another spec"):
+        gp.check_certificate(artefact, beside, wider)
+    artefact.write_text(artefact.read_text().replace("1.0", "1.1", 1))
+    with pytest.raises((CertificateError, gp.ExportError)):
+        gp.check_certificate(artefact, beside)
+
+
+@pytest.mark.parametrize(
+    ("override", "error", "said"),
+    [
+        ("actuator={type='first-order', tau=0.05}", CertificateError, "drives that lag"),
+        ("check.uncertain={L0=0.9, m=0.9, g=0.9, c=0.9}", CertificateError, "too wide"),
+    ],
+)
+def test_what_no_proof_is_written_for_is_refused(copied, override, error, said):
+    spec = gp.preset_spec("single-pendulum-crane", ["export.cycle_time=0.01", override])
+    with pytest.raises(error, match=said):
+        gp.certify_artefact(copied[0], spec)
+
+
+def test_options_that_do_not_go_together_are_refused(copied):
+    artefact, beside = copied
+    both = run_here("check", artefact, "--certificate", beside, "--strict")
+    assert both.code == 2 and "--strict" in both.errors[0]
+    scaled = run_here("check", artefact, "--certify", "--scale", "cart=0.5")
+    assert scaled.code == 2 and "--certify" in scaled.errors[0]
+    assert issubclass(SpecError, gp.GenProfileError)

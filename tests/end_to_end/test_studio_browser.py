@@ -1,0 +1,233 @@
+"""The studio in a headless Chromium: knobs turned by keys and mouse, and what is then to be seen."""
+
+import json
+import os
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from end_to_end.studios import studio
+from headless import browser as start
+from selenium.webdriver.common.keys import Keys
+from system_parts import missing
+
+from gen_profile.evaluation.simulation import free_swing
+from gen_profile.problem.dynamics import parameter_column
+from gen_profile.spec.reading import preset_spec, preset_text
+
+pytestmark = pytest.mark.slow
+
+SETTLED = "return document.querySelector('#pill').classList.contains('{}')"
+DURATION = 'input[type=range][aria-label="Duration"]'
+DROP = """
+    const files = new DataTransfer();
+    files.items.add(new File([arguments[0]], 'bay.toml'));
+    window.dispatchEvent(new DragEvent('drop', {dataTransfer: files, bubbles: true}))"""
+SHOWN = "return document.querySelector('#facts dd').textContent"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with start() as window:
+        yield window
+
+
+@pytest.fixture(scope="module")
+def page(browser):
+    with studio("--preset", "paper") as (address, _):
+        browser.size(1400, 900)
+        browser.visit(address)
+        browser.wait(SETTLED.format("passed"))
+        yield browser
+        assert browser.complaints() == []
+
+
+@pytest.fixture(autouse=True)
+def _at_a_desk(page):
+    page.size(1400, 900)
+
+
+def state(page):
+    return page.run("return [document.querySelector('#command').textContent, location.hash]")
+
+
+def test_a_knob_turned_by_a_key_is_solved_and_drawn(page):
+    before = page.run(
+        "return [...document.querySelectorAll('.strip polyline')].map((line) => line.outerHTML)"
+    )
+    assert len(before) == 3
+    page.find(DURATION).send_keys(Keys.ARROW_RIGHT * 5)
+    page.wait("return performance.getEntriesByName('picture').length > 0")
+    page.wait("return document.querySelector('#command').textContent.includes('move.duration=3.0')")
+    after = page.run("return [...document.querySelectorAll('.strip polyline')].map((line) => line.outerHTML)")
+    assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+def test_undo_redo_and_the_address_bring_a_state_back(page):
+    page.find('input[type=number][aria-label="Duration"]').send_keys(Keys.CONTROL, "a", Keys.NULL, "2.9\n")
+    page.wait("return document.querySelector('#command').textContent.endsWith('move.duration=2.9')")
+    changed = state(page)
+    page.find("#undo").click()
+    page.wait("return !document.querySelector('#command').textContent.endsWith('move.duration=2.9')")
+    page.find("#redo").click()
+    page.wait("return document.querySelector('#command').textContent.endsWith('move.duration=2.9')")
+    assert state(page) == changed
+    page.run("location.reload()")
+    page.wait("return document.querySelector('#command')?.textContent.endsWith('move.duration=2.9')")
+    page.wait(SETTLED.format("passed"))
+    assert state(page) == changed
+
+
+def test_the_end_of_the_move_is_dragged_and_undone_in_one_step(page):
+    page.run("document.querySelector('#sway').scrollIntoView({block: 'center'})")
+    x, y, second = page.run("""
+        const over = document.querySelector('#sway .u-over'), box = over.getBoundingClientRect();
+        const y = box.top + box.height / 2;
+        for (let x = box.right - 1; x > box.left; x--) {
+            over.dispatchEvent(new PointerEvent('pointermove', {clientX: x, clientY: y}));
+            if (over.style.cursor === 'ew-resize') return [x, y, (x - box.left) / 2.9];
+        }""")
+    before = state(page)
+    page.drag((x, y), (x - 0.5 * second, y))
+    page.wait("return /move.duration=2.[3-6]/.test(document.querySelector('#command').textContent)")
+    page.wait("return document.querySelector('#pill').matches('.passed, .failed')")
+    page.find("#undo").click()
+    page.wait(f"return document.querySelector('#command').textContent === {json.dumps(before[0])}")
+    page.wait(SETTLED.format("passed"))
+    assert state(page) == before
+
+
+def test_a_limit_beyond_all_designs_is_not_drawn_at_the_edge(page):
+    page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
+    found = page.run("""
+        return [0.001, 0.004].map((residual) => {
+            const own = {method: 'own', duration: 3.0, acceleration: 0.3, sway: 0.02, residual};
+            designs.show(null, own, [], {limit: 0.003, phrase: (word) => word});
+            return document.querySelectorAll('#pareto .limit').length;
+        })""")
+    assert found == [0, 1]
+    page.run("location.reload()")
+
+
+def test_designs_are_pinned_and_taken(page):
+    page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
+    page.find("#pin").click()
+    page.wait("return document.querySelector('.point.pinned') !== null")
+    page.run("""
+        const rows = [...document.querySelectorAll('#designs tr')];
+        rows.find((row) => row.textContent.startsWith('zvd')).querySelector('button').click()""")
+    page.wait("return document.querySelector('#command').textContent.includes('solver.method=zvd')")
+    page.find("#undo").click()
+    page.wait("return !document.querySelector('#command').textContent.includes('zvd')")
+
+
+@pytest.mark.parametrize("width", [1400, 820, 390])
+def test_nothing_is_wider_than_the_screen(page, width):
+    page.size(width, 844, mobile=width < 500)
+    page.wait(f"return document.documentElement.scrollWidth <= {width}")
+
+
+def violations(page):
+    path = os.environ.get("AXE_CORE") or missing("AXE_CORE, the path of axe-core's axe.min.js")
+    page.run(Path(path).read_text("utf-8"))
+    page.run("for (const part of document.querySelectorAll('details')) part.open = true")
+    found = page.run_async("axe.run().then((found) => arguments[0](found.violations))")
+    return [(one["id"], [node["html"][:200] for node in one["nodes"]][:3]) for one in found]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_is_accessible(page, scheme):
+    """By the rules of axe-core, which look at names, roles, contrast and order."""
+    page.size(1400, 900)
+    with page.emulated(scheme):
+        assert violations(page) == []
+
+
+def test_a_log_that_is_chosen_tells_parameters_that_are_taken(page, tmp_path):
+    times = np.arange(0.0, 6.0, 0.03)
+    spec = preset_spec("paper")
+    longer = parameter_column(spec.machine(), {**spec.plant.parameters, "L1": 0.52})
+    start = np.array([[0.1, 0.1, 0.0, 0.0]])
+    swung = free_swing(spec.machine(), longer, q_a=[0.3], starts=start, times=times)[1][0, :, 0]
+    table = np.stack(
+        [times, np.degrees(swung) + np.random.default_rng(0).normal(0.0, 0.05, len(times))], axis=1
+    )
+    np.savetxt(tmp_path / "stop.csv", table, delimiter=",", header="time_s,hook_angle_deg", comments="")
+    page.find("#file").send_keys(str(tmp_path / "stop.csv"))
+    page.wait("return document.querySelector('#tells button, #tells .bad') !== null")
+    assert violations(page) == []
+    page.run("document.querySelector('#field').scrollIntoView({block: 'start'})")
+    assert page.run("""
+        const field = document.querySelector('#field');
+        const at = field.querySelector('h2').getBoundingClientRect();
+        return field.contains(document.elementFromPoint(at.left + 4, at.top + 4))""")  # nothing lies above it
+    page.find("#tells button").click()
+    page.wait("return /plant.L1=0.5[12]/.test(document.querySelector('#command').textContent)")
+    assert page.run("return document.querySelectorAll('#logged canvas').length") == 3
+    (tmp_path / "bay.toml").write_text(preset_text("paper").replace('"paper"', '"bay 9"', 1), "utf-8")
+    page.find("#undo").click()
+    page.find("#file").send_keys(str(tmp_path / "bay.toml"))
+    page.wait("return document.querySelector('#name').textContent === 'bay 9'")
+    page.find("#undo").click()
+    page.wait("return document.querySelector('#name').textContent === 'paper'")
+    page.find("#forget").click()
+
+
+def test_a_planner_block_is_driven_by_hand(page):
+    page.find("#begin").click()
+    page.wait("return document.querySelector('#undriven.bad') !== null")
+    assert "limits.velocity" in page.find("#undriven").text
+    limits = "velocity = 0.5\nacceleration = 1.0\njerk = 20.0\ntravel = [-1.0, 1.0]\n"
+    text = preset_text("paper").replace("cycle_time = 0.001", "cycle_time = 0.01")
+    page.run(DROP, f"{text}\n[limits]\n{limits}")
+    page.wait("return document.querySelector('#command').textContent.includes('bay.toml')")
+    page.find("#begin").click()
+    page.wait("return document.querySelector('#promise.passed') !== null")
+    page.run("""
+        const [, target] = document.querySelectorAll('#helm input');
+        target.value = '0.5';
+        target.dispatchEvent(new Event('input'))""")
+    page.wait("return parseFloat(document.querySelector('#driven dd').textContent) > 0.1")
+    assert violations(page) == []
+    page.find("#halt").click()
+    page.wait("return document.querySelectorAll('#driven dd')[1].textContent.startsWith('0.000')")
+    page.find("#leave").click()
+    page.find("#undo").click()
+    page.wait("return !document.querySelector('#command').textContent.includes('bay.toml')")
+
+
+def test_it_speaks_german(page):
+    page.find("#language").click()
+    page.wait("return document.documentElement.lang === 'de'")
+    words = page.find("#panel").text
+    assert "Dauer" in words and "Duration" not in words
+    page.find("#language").click()
+
+
+def test_the_full_check_gives_files(page):
+    page.run("document.querySelector('#formats').scrollIntoView()")
+    page.find("#make").click()
+    page.wait("return document.querySelector('#outcome a, #outcome .bad') !== null")
+    link = page.find("#outcome a").get_attribute("href")
+    content = page.run_async(
+        """
+        const [link, done] = arguments;
+        fetch(link).then((answer) => answer.bytes()).then((bytes) => done([...bytes].slice(0, 2)))""",
+        link,
+    )
+    assert bytes(content) == b"PK" and urlsplit(link).hostname == "127.0.0.1"
+
+
+def test_what_cannot_be_offers_its_cure_as_a_button(page):
+    page.run("document.querySelector('[data-group=limits]').open = true")
+    box = page.find('[data-group=limits] .knob input[type="checkbox"]')
+    box.click()  # takes what the motion needs now, and a little more
+    field = page.find('[data-group=limits] input[type=number][aria-label="Velocity"]')
+    page.wait("return Number(document.querySelector('[data-group=limits] input[type=number]').value) > 0.1")
+    field.send_keys(Keys.CONTROL, "a", Keys.NULL, "0.05\n")
+    page.wait(SETTLED.format("failed"))
+    page.wait("return document.querySelector('#cures button') !== null")
+    page.find("#cures button").click()
+    page.wait(SETTLED.format("passed"))
+    assert page.run("return document.querySelectorAll('#reasons li').length") == 0

@@ -1,0 +1,226 @@
+"""The planner block of machines with several axes, and of axes that turn."""
+
+import csv
+
+import numpy as np
+import pytest
+from counted_block import CountedBlock, compile_counting, require_interpreted
+from farthest_motion import farthest
+from generator.planned_machines import GANTRY
+from scipy.integrate import solve_ivp
+
+import gen_profile as gp
+from gen_profile.errors import SpecError
+from gen_profile.planner.commands import play
+from gen_profile.planner.design import planner_block
+from gen_profile.planner.interface import BlockAxis, block_axes
+from gen_profile.spec.reading import parse_spec, preset_spec
+
+pytestmark = pytest.mark.slow
+
+CYCLE, ROPE, G = 0.001, 5.0, 9.81
+LIMITS = {"x": (1.0, 0.3, 1.0, 0.0, 40.0), "y": (0.5, 0.4, 1.0, 0.0, 12.0)}
+
+
+@pytest.fixture(scope="module")
+def text():
+    return planner_block(parse_spec(GANTRY)).text
+
+
+@pytest.fixture(scope="module")
+def counted(text):
+    return compile_counting(text)
+
+
+@pytest.fixture
+def block(counted):
+    block = CountedBlock(counted, fL=ROPE)
+    block.hold(3000)
+    return block
+
+
+def joined(parts):
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def require_limits(out):
+    for axis, (velocity, acceleration, jerk, low, high) in LIMITS.items():
+        v, a, x = (out[f"{name}_{axis}"] for name in ("fVelocity", "fAcceleration", "fPosition"))
+        assert np.abs(v).max() <= velocity + 1e-9
+        assert np.abs(a).max() <= acceleration + 1e-9
+        assert np.abs(np.diff(a)).max() <= (jerk + 1e-9) * CYCLE
+        assert low - 1e-9 <= x.min() <= x.max() <= high + 1e-9
+        advance = CYCLE * (v[1:] + v[:-1]) / 2 - CYCLE**2 * np.diff(a) / 12
+        assert np.abs(np.diff(x) - advance).max() < 1e-9
+
+
+def residual(out, rope=ROPE):
+    """Amplitude in m/s that the load is left with, in either direction."""
+    turned = np.exp(1j * np.sqrt(G / rope) * CYCLE * np.arange(len(out["bBusy"])))
+    return max(np.abs(np.trapezoid(out[f"fAcceleration_{axis}"] * turned, dx=CYCLE)) for axis in LIMITS)
+
+
+def random_command(random):
+    targets = {f"fTarget_{axis}": random.uniform(low, high) for axis, (*_, low, high) in LIMITS.items()}
+    stick = {f"fVelocityCommand_{axis}": random.choice([0.0, random.uniform(-v, v)])
+             for axis, (v, *_) in LIMITS.items()}  # fmt: skip
+    return [
+        {"bVelocity": 0.0, "bStop": 0.0, "bExecute": 1.0, **targets},
+        {"bVelocity": 1.0, "bStop": 0.0, **stick},
+        {"bVelocity": 0.0, "bStop": 1.0},
+    ][random.choice(3, p=[0.4, 0.4, 0.2])]
+
+
+def test_any_commands_keep_every_limit_and_leave_no_sway(block):
+    random = np.random.default_rng(5)
+    parts = [block.hold(int(random.integers(40, 5000)), **random_command(random)) for _ in range(120)]
+    parts.append(block.hold(40_000, bVelocity=0.0, bStop=1.0))
+    out = joined(parts)
+    require_limits(out)
+    assert out["operations"].max() <= 3000
+    assert not out["bBusy"][-1]
+    assert out["bPromise"].all()
+    assert residual(out) < 1e-8
+
+
+@pytest.mark.parametrize("target", [(8.0, 3.0), (1.0, 9.0), (30.0, 0.02)])
+def test_all_axes_arrive_together_as_soon_as_the_slowest_can(block, target):
+    out = block.hold(60_000, bExecute=1.0, fTarget_x=target[0], fTarget_y=target[1])
+    require_limits(out)
+    ends = [np.flatnonzero(out[f"fVelocity_{axis}"])[-1] for axis in LIMITS]
+    assert ends[0] == ends[1] == np.argmax(out["bDone"]) - 1
+    assert (out["fPosition_x"][-1], out["fPosition_y"][-1]) == target
+    shorter, rate = CYCLE * ends[0] / 1.10, np.sqrt([G / ROPE])
+    reached = [farthest(shorter, rate, limits[:3]) for limits in LIMITS.values()]
+    assert any(reach < place for reach, place in zip(reached, target, strict=True))
+    assert np.argmax(out["fVelocity_x"] != 0.0) <= 20  # though two are planned
+
+
+@pytest.mark.parametrize(("cycles", "x"), [(6000, 12.0), (8000, 4.0)])
+def test_a_new_target_on_the_way_brings_all_axes_to_rest_together(block, cycles, x):
+    parts = [block.hold(cycles, bExecute=1.0, fTarget_x=20.0, fTarget_y=2.0)]
+    parts.append(block.hold(60_000, bExecute=1.0, fTarget_x=x, fTarget_y=9.0))
+    out = joined(parts)
+    require_limits(out)
+    ends = [np.flatnonzero(out[f"fVelocity_{axis}"])[-1] for axis in LIMITS]
+    assert ends[0] == ends[1]
+    assert (out["fPosition_x"][-1], out["fPosition_y"][-1]) == (x, 9.0)
+    assert residual(out) < 1e-8
+
+
+def test_an_axis_that_is_where_it_shall_be_stays(block):
+    out = block.hold(60_000, bExecute=1.0, fTarget_x=8.0, fTarget_y=0.0)
+    assert not out["fVelocity_y"].any()
+    assert out["bDone"][-1]
+
+
+def test_a_quick_stop_brakes_every_axis(block):
+    block.hold(5000, bExecute=1.0, fTarget_x=20.0, fTarget_y=9.0)
+    out = block.hold(3000, bQuickStop=1.0)
+    for axis, (_, acceleration, jerk, *_) in LIMITS.items():
+        assert np.abs(out[f"fAcceleration_{axis}"]).max() <= 2 * acceleration + 1e-12
+        assert np.abs(np.diff(out[f"fAcceleration_{axis}"])).max() <= (4 * jerk + 1e-9) * CYCLE
+        assert out[f"fVelocity_{axis}"][-1] == 0.0
+    assert not out["bPromise"][-1]
+
+
+@pytest.mark.parametrize(
+    ("given", "number"),
+    [
+        ({"bExecute": 1.0, "fTarget_y": 13.0}, 3),
+        ({"bVelocity": 1.0, "fVelocityCommand_y": np.nan}, 3),
+        ({"fVelocityLimit_y": -1.0}, 5),
+    ],
+)
+def test_a_senseless_input_of_one_axis_stops_all(block, given, number):
+    parts = [block.hold(5000, bExecute=1.0, fTarget_x=20.0, fTarget_y=9.0), block.hold(20_000, **given)]
+    out = joined(parts)
+    assert out["nErrorId"][-1] == number
+    assert not out["bBusy"][-1]
+    require_limits(out)
+    assert residual(out) < 1e-8
+
+
+def test_it_computes_what_the_text_says(text, counted):
+    orders = [
+        (60, {}),
+        (60, {"bVelocity": 1.0, "fVelocityCommand_x": 0.5, "fVelocityCommand_y": -0.2}),
+        (60, {"bVelocity": 0.0, "bExecute": 1.0, "fTarget_x": 0.3, "fTarget_y": 0.1}),
+        (5, {"bQuickStop": 1.0}),
+    ]
+    last = require_interpreted(text, CountedBlock(counted, fL=ROPE), orders)
+    assert last["fVelocity_x"] != 0.0
+
+
+def test_on_the_spherical_pendulum_little_remains_of_both_directions(block):
+    """A point mass on a rope, in Cartesian coordinates: what couples the directions remains."""
+    out = block.hold(25_000, bExecute=1.0, fTarget_x=8.0, fTarget_y=3.0)
+    pushes = np.transpose([out["fAcceleration_x"], out["fAcceleration_y"]])
+    times = CYCLE * np.arange(len(pushes))
+
+    def slope(time, state):
+        place, speed = state[:3], state[3:]
+        push = np.append(pushes[min(int(time / CYCLE), len(pushes) - 1)], 0.0)
+        free = np.array([0.0, 0.0, -G]) - push
+        pull = (free @ place + speed @ speed) / (place @ place)
+        return np.concatenate([speed, free - pull * place])
+
+    begin = [0.0, 0.0, -ROPE, 0.0, 0.0, 0.0]
+    found = solve_ivp(slope, (0.0, times[-1]), begin, max_step=0.02, t_eval=times[::10], rtol=1e-7)
+    sway = np.hypot(*found.y[:2])
+    arrived = np.argmax(out["bDone"]) // 10
+    assert sway[arrived:].max() < 2e-3 * sway.max()
+
+
+COMMANDS = "time_s,command,value_x,value_y,L\n0.5,position,4.0,2.0,4.5\n20,velocity,0.0,-0.3,\n25,stop,,,\n"
+
+
+def test_play_has_columns_for_every_axis(text):
+    rows = list(csv.DictReader(play(text, COMMANDS).table.splitlines()))
+    own = [
+        f"{axis}_{name}"
+        for axis in "xy"
+        for name in ("position_m", "velocity_m_per_s", "acceleration_m_per_s2")
+    ]
+    common = ["busy", "done", "error_id", "promise", "x_stop_distance_m", "y_stop_distance_m"]
+    assert list(rows[0]) == ["time_s", *own, *common]
+    there = rows[round(20 / CYCLE) - 1]
+    assert [float(there[name]) for name in ("x_position_m", "y_position_m", "done")] == [4.0, 2.0, 1.0]
+    assert float(rows[-1]["x_position_m"]) == 4.0
+    assert float(rows[-1]["y_position_m"]) < 1.5
+    with pytest.raises(
+        SpecError, match="no column value_y; the first line must name time_s, command, value_x"
+    ):
+        play(text, "time_s,command,value_x\n0,position,1\n")
+
+
+def test_from_python_a_number_for_each_axis_takes_the_place_of_one():
+    planner = gp.Planner(parse_spec(GANTRY))
+    assert planner.axes == ("x", "y")
+    planner.hold(3.0)
+    moved = planner.hold(20.0, target=(4.0, 2.0))
+    assert moved.position.shape == (20_000, 2)
+    assert moved.position[-1].tolist() == [4.0, 2.0]
+    assert planner.step(velocity=[0.1, -0.1]).stop_distance.tolist() == [0.0, 0.0]
+    stick = np.linspace([0.0, 0.0], [0.1, -0.1], 2000)
+    assert planner.hold(2.0, velocity=stick).velocity[-1, 1] < 0.0
+    with pytest.raises(SpecError, match=r"target: must be a number for each axis \(x, y\), found 3.0"):
+        planner.step(target=3.0)
+
+
+def test_an_axis_that_turns_is_planned_in_rad():
+    limits = ["velocity=3.0", "acceleration=20.0", "jerk=800.0", "travel=[-3.0, 3.0]"]
+    text = planner_block(preset_spec("flexible-joint", [f"limits.{limit}" for limit in limits])).text
+    assert "velocity 3 rad/s, acceleration 20 rad/s2, jerk 800 rad/s3, travel -3 to 3 rad." in text
+    assert block_axes(text) == (BlockAxis(name="", unit="rad"),)
+
+
+def test_short_slots_leave_no_cycle_more_work():
+    """Slots of 43 cycles, where a new target comes on the way."""
+    text = planner_block(parse_spec(GANTRY, ["export.cycle_time=0.004"])).text
+    block = CountedBlock(compile_counting(text), fL=3.0, fActPosition_x=30.0, fActPosition_y=9.95)
+    block.hold(930)
+    ways = [(70, 40.0, 8.7), (215, 33.8, 9.7), (6000, 0.0, 0.14)]
+    parts = [block.hold(cycles, bExecute=1.0, fTarget_x=x, fTarget_y=y) for cycles, x, y in ways]
+    assert max(part["operations"].max() for part in parts) <= 3000
+    assert parts[-1]["fVelocity_x"][1600] < -0.1

@@ -1,0 +1,318 @@
+"""The studio without a browser: states and their address, knobs, and what a page is told."""
+
+import base64
+import json
+import random
+import re
+import shlex
+import zlib
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+from gen_profile.designs.plan import plan
+from gen_profile.errors import SpecError
+from gen_profile.solvers.method_selection import IN_VAIN, OTHERWISE, WIDER
+from gen_profile.solvers.solution import Status
+from gen_profile.spec.reading import parse_spec, preset_spec, preset_text, presets, spec_from_dict
+from gen_profile.studio.depth import depth
+from gen_profile.studio.knobs import knobs
+from gen_profile.studio.orders import Question
+from gen_profile.studio.state import (
+    MOST_ADDRESS,
+    MOST_STATE,
+    StudioState,
+    WrittenSpec,
+    command_of,
+    document_of,
+    preset_start,
+    text_of,
+)
+from gen_profile.studio.views import SEARCHING, SENTENCES, cures, picture
+
+PAPER = preset_start("paper")
+LIMITED = {"limits.velocity": 0.3, "limits.acceleration": 0.8, "limits.jerk": 40.0}
+EDITS = [
+    {},
+    {
+        "move.duration": 3.2,
+        "plant.L1": 0.5,
+        "solver.method": "zvd",
+        "robustness.method": "range",
+        "robustness.nominal_zero": True,
+    },
+    {"move.target": [0.4], "name": "bay 3"},
+    {
+        "robustness.uncertain": None,
+        "robustness.method": "none",
+        "check.samples": 5,
+        "cost.sway_scale": None,
+        "limits.travel": [-0.1, 0.4],
+    },
+    {**LIMITED, "move.duration": "minimum", "limits.jerk": None},
+    {
+        "planner.live.L1": [0.4, 0.5],
+        "planner.live_rate.L1": 0.01,
+        "check.spans.c1": [0.0, 0.02],
+        "can.node": 5,
+        "can.mode": "csv",
+        "can.following_error": 0.01,
+    },
+]
+WORDS = json.loads((files("gen_profile.studio") / "assets" / "words.json").read_text("utf-8"))
+
+
+def of(preset, edits):
+    return Question(start=preset_start(preset), state=StudioState(preset=preset, edits=edits))
+
+
+def parts(answer):
+    return {part["part"]: part for part in json.loads(json.dumps(list(answer), allow_nan=False))}
+
+
+@pytest.mark.parametrize("edits", EDITS)
+def test_an_address_brings_a_state_back(edits):
+    state = StudioState(preset="paper", edits=edits)
+    assert StudioState.from_address(state.address) == state
+    assert state.address.replace("-", "").replace("_", "").isalnum()
+
+
+def packed(text):
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    return base64.urlsafe_b64encode(packer.compress(text) + packer.flush()).decode()
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "x",
+        "not base64!",
+        StudioState(preset="paper", edits=EDITS[1]).address[:-9],
+        "A" * (2 * MOST_ADDRESS),
+        packed(b"[" * 100_000),
+        packed(b'{"preset": 1}'),
+        packed(b"null"),
+        packed(b'{"edits": {"move.duration": NaN}}'),
+        packed(b'{"edits": {"__class__": 1}}'),
+        packed(b'{"edits": {"plant.file": "/tmp/evil.py"}}'),
+        packed(b'{"edits": {"check.fmu": "evil.fmu"}}'),
+        packed(b'{"edits": {"move.target": [[1.0]]}}'),
+        packed(b'{"edits": {"name": "' + b"a" * (2 * MOST_STATE) + b'"}}'),
+    ],
+)
+def test_an_address_that_no_page_wrote_is_a_sentence(address):
+    with pytest.raises(SpecError):
+        StudioState.from_address(address)
+
+
+@pytest.mark.parametrize("edits", EDITS)
+def test_page_command_line_and_spec_file_state_the_same(edits):
+    spec = spec_from_dict(document_of(PAPER, edits))
+    words = shlex.split(command_of(PAPER, edits))
+    assert words[:3] == ["gen-profile", "--preset", "paper"] and set(words[3::2]) <= {"--set"}
+    assert parse_spec(preset_text("paper"), words[4::2]) == spec
+    text = text_of(PAPER, edits)
+    assert parse_spec(text) == spec
+    assert "# kg, hook mass" in text  # what its author wrote stays
+
+
+@pytest.mark.parametrize("preset", presets())
+def test_every_knob_says_what_the_spec_says(preset):
+    """Set to the value that it shows, each one by itself leaves the spec as it is."""
+    start = preset_start(preset)
+    document = document_of(start, {})
+    spec = spec_from_dict(document)
+    listed = knobs(spec, document, spec)
+    for knob in listed:
+        value = knob.value
+        if knob.kind == "interval" and value is not None:
+            value = (value[1] - value[0]) / (value[1] + value[0])
+        if knob.index is not None:
+            value = [other.value for other in listed if other.path == knob.path]
+        if value is None:
+            assert knob.optional
+            continue
+        changed = spec_from_dict(document_of(start, {knob.path: value}))
+        before, after = spec.to_dict(), changed.to_dict()
+        if knob.kind == "interval":
+            assert after["robustness"]["uncertain"] == pytest.approx(before["robustness"]["uncertain"])
+        else:
+            assert after == before, knob.path
+
+
+@pytest.mark.parametrize("preset", ["paper", "gantry-crane", "tower-crane", "slosh-tank"])
+def test_a_knob_s_bounds_are_the_spec_s(preset):
+    start = preset_start(preset)
+    document = document_of(start, {})
+    spec = spec_from_dict(document)
+    bounded = [knob for knob in knobs(spec, document, spec) if knob.kind == "number" and knob.index is None]
+    assert len(bounded) > 10
+    for knob in bounded:
+        for bound, outward in ((knob.least, -1.0), (knob.most, 1.0)):
+            if bound is not None:
+                with pytest.raises(SpecError, match=knob.path.replace("axis.", "axis.(.*[.])?")):
+                    spec_from_dict(document_of(start, {knob.path: bound + outward * (abs(bound) + 1.0)}))
+        if knob.span is not None:
+            low, high = knob.span
+            assert low < high and low <= knob.value <= high if isinstance(knob.value, float) else True
+
+
+def test_every_word_is_there_in_both_languages():
+    shown = set()
+    for preset in presets():
+        document = document_of(preset_start(preset), {})
+        spec = spec_from_dict(document)
+        for knob in knobs(spec, document, spec):
+            shown |= {knob.words, f"group.{knob.group}"} - {"plant", "robustness.uncertain"}
+    assert shown - set(WORDS["texts"]) == set()
+    assert all(len(texts) == 2 and all(texts) for texts in WORDS["texts"].values())
+    page = (files("gen_profile.studio") / "assets" / "studio.html").read_text("utf-8")
+    used = {text.split('"')[0] for key in ('data-text="', 'data-words="') for text in page.split(key)[1:]}
+    assert used - set(WORDS["texts"]) == set()
+
+
+def test_live_ranges_and_spans_have_knobs():
+    found = {knob["path"]: knob for knob in parts(picture(of("paper", EDITS[-1])))["setting"]["knobs"]}
+    assert found["planner.live.L1"]["value"] == [0.4, 0.5]
+    assert found["planner.live_rate.L1"]["value"] == 0.01 and "planner.live_rate.L2" not in found
+    assert found["check.spans.c1"]["value"] == [0.0, 0.02] and found["check.spans.c2"]["value"] is None
+    assert found["can.node"]["value"] == 5 and found["can.node"]["whole"] is True
+
+
+def test_what_is_shown_is_what_a_design_finds():
+    found = parts(picture(of("paper", {"move.duration": 3.2})))
+    assert list(found) == ["curves", "animation", "setting", "verdict"]
+    design = plan(spec_from_dict(document_of(PAPER, {"move.duration": 3.2})))
+    sway = next(panel for panel in found["curves"]["sway"] if panel["title"] == "Sway of the payload")
+    nominal = next(curve for curve in sway["curves"] if curve["name"] == "nominal")
+    peak = 1e3 * design.figures["sway_transient_peak_m"]
+    assert max(map(abs, nominal["y"])) == pytest.approx(peak, rel=2e-3)
+    takes = {row["quantity"]: row["takes"] for row in found["curves"]["margins"]}
+    assert takes["jerk"] == pytest.approx(design.figures["jerk_max_m_per_s3"])
+    assert found["verdict"]["passed"] is True
+    assert found["verdict"]["point"]["residual"] == pytest.approx(design.figures["sway_residual_worst_m"])
+    assert found["setting"]["command"] == "gen-profile --preset paper --set move.duration=3.2"
+
+
+@pytest.mark.slow
+def test_what_takes_longer_comes_afterwards_and_can_be_taken():
+    found = parts(depth(of("paper", {})))
+    assert list(found) == ["spectrum", "robustness", "maps", "comparison"] and found["maps"]["maps"] == []
+    (panel,) = found["robustness"]["panels"]
+    assert panel["curves"][0]["name"] == "optimal-beta50"
+    rows = {row["method"]: row for row in found["comparison"]["rows"]}
+    for method in ("zv", "optimal-beta20"):
+        taken = parts(picture(of("paper", rows[method]["edits"])))["verdict"]["point"]
+        figures = {name: rows[method][name] for name in ("duration", "acceleration", "sway", "residual")}
+        assert {name: taken[name] for name in figures} == pytest.approx(figures)
+
+
+def test_two_uncertain_parameters_make_a_map():
+    """Whose middle lines are the curves of either parameter alone."""
+    edits = {"robustness.uncertain.L2": 0.1, "solver.method": "zvd", "move.duration": 4.0}
+    answer = depth(of("paper", edits))
+    found = {part["part"]: part for part in (next(answer) for _ in range(3))}
+    (drawn,) = found["maps"]["maps"]
+    curve = found["robustness"]["panels"][0]
+    limit = 1e3 * preset_spec("paper").check.residual_sway["payload"]
+    assert drawn["frame"] == pytest.approx([20.0, 10.0]) and len(drawn["values"]) == len(drawn["y"])
+    middle = [value * limit / 100.0 for value in drawn["values"][len(drawn["y"]) // 2]]
+    along = np.interp(drawn["x"], curve["x"], curve["curves"][0]["y"])
+    assert np.all(np.array(middle) >= 0.9 * along) and max(middle) > 0.0
+
+
+def test_what_cannot_be_says_why_and_what_would_help():
+    edits = {"move.duration": 1.5, "limits.velocity": 0.15}
+    found = parts(picture(of("paper", edits)))
+    assert found["failure"]["sentences"] and found["failure"]["cures"]
+    (cure,) = found["failure"]["cures"]
+    healed = parts(picture(of("paper", {**edits, **cure})))
+    assert "verdict" in healed and "failure" not in healed
+
+
+def test_cures_are_read_out_of_the_sentences():
+    text = (
+        "With these limits it takes at least 3.03 s (move.duration). In 2 s it would do with "
+        "limits.axis.x.jerk = 4.5, or with limits.travel = [-0.1, 0.4] and limits.sway = 1e-02, "
+        'or with robustness.method = "none".'
+    )
+    assert cures(text) == [
+        {"move.duration": 3.03},
+        {"limits.axis.x.jerk": 4.5},
+        {"limits.travel": [-0.1, 0.4], "limits.sway": 0.01},
+        {"robustness.method": "none"},
+    ]
+    assert cures(f"{OTHERWISE}, which finds a motion.") == [{"solver.method": "auto"}]
+    assert cures(f"{OTHERWISE}. It takes at least 3 s (move.duration).") == [
+        {"solver.method": "auto", "move.duration": 3.0}
+    ]
+
+
+REFUSAL = (
+    "move.duration: no duration keeps the limits and brings the load to rest. With these limits it takes "
+    "at least 3.03 s (move.duration). In 2 s it would do with limits.axis.x.jerk = 4.5, or with "
+    f"limits.travel = [-0.1, 0.4] and limits.sway = 0.01. {WIDER} {IN_VAIN} "
+    f"{OTHERWISE}, which finds a motion."
+)
+ENDS = [end.value for end in Status if end != Status.CONVERGED]
+
+
+@pytest.mark.parametrize("sentence", [*SENTENCES.split(REFUSAL), SEARCHING, *ENDS])
+def test_why_there_is_no_motion_is_told_in_german_too(sentence):
+    assert [pattern for pattern, _ in WORDS["patterns"] if re.fullmatch(pattern, sentence)]
+
+
+@pytest.mark.parametrize("preset", presets())
+def test_a_machine_s_summary_is_german_too(preset):
+    summary = preset_spec(preset).machine().summary
+    assert [pattern for pattern, _ in WORDS["patterns"] if re.fullmatch(pattern, summary)]
+
+
+def test_a_value_that_does_not_fit_is_told_at_its_knob():
+    found = parts(picture(of("paper", {"plant.m1": -1.0, "limits.velocity": "fast"})))
+    assert {fault["place"] for fault in found["faults"]["faults"]} == {"plant.m1", "limits.velocity"}
+
+
+def test_a_start_that_is_no_spec_is_a_sentence():
+    start = WrittenSpec(words=("x.toml",), text="plant = 3 3", folder=PAPER.folder)
+    with pytest.raises(SpecError, match=r"x\.toml: not valid TOML"):
+        _ = start.document
+
+
+def random_edits(chance, listed):
+    """Turn some knobs as a hand might, within their bounds and beyond."""
+    edits = {}
+    for knob in chance.sample(listed, chance.randint(1, 4)):
+        match knob.kind:
+            case "choice":
+                edits[knob.path] = chance.choice(knob.choices)
+            case "switch":
+                edits[knob.path] = chance.random() < 0.5
+            case "number":
+                value = (knob.value or 0.1) * chance.uniform(0.8, 1.25)
+                if chance.random() < 0.05:
+                    value = chance.choice([0.0, -1.0, 1e9])
+                edits[knob.path] = value if knob.index is None else [value] * chance.randint(1, 2)
+            case "interval":
+                edits[knob.path] = chance.choice([None, 0.1])
+            case "pair":
+                edits[knob.path] = [-0.1, chance.uniform(0.0, 1.0)]
+    return edits
+
+
+def test_whatever_is_turned_is_answered_without_a_traceback():
+    chance, listed = random.Random(1), knobs(spec := spec_from_dict(PAPER.document), PAPER.document, spec)
+    # limits and ranges can make a search take seconds
+    quick = [
+        knob
+        for knob in listed
+        if knob.group != "limits" and knob.words not in ("robustness.method", "move.duration")
+    ]
+    ends = {"verdict": 0, "failure": 0, "faults": 0}
+    for _ in range(25):
+        found = parts(picture(of("paper", random_edits(chance, quick))))
+        (end,) = ends.keys() & found.keys()
+        ends[end] += 1
+        assert "Internal error" not in json.dumps(found)
+    assert min(ends["verdict"], ends["faults"]) > 1

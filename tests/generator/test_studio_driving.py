@@ -1,0 +1,89 @@
+"""A planner block driven on the studio's page: it arrives, stops, and its machines swing as they should."""
+
+import json
+
+import numpy as np
+import pytest
+from generator.free_swings import states
+
+from gen_profile.studio.driving import MOMENT, Drive, drive
+from gen_profile.studio.orders import DriveQuestion, Question
+from gen_profile.studio.state import StudioState, preset_start
+
+pytestmark = pytest.mark.slow  # blocks are compiled
+
+LIMITS = {
+    "limits.velocity": 0.5,
+    "limits.acceleration": 1.0,
+    "limits.jerk": 20.0,
+    "limits.travel": [-1.0, 1.0],
+}
+EDITS = {**LIMITS, "export.cycle_time": 0.01, "planner.live.L1": [0.4, 0.5], "check.residual_sway": 0.02}
+
+
+def asked(preset="paper", edits=EDITS, **how):
+    question = Question(start=preset_start(preset), state=StudioState(preset=preset, edits=edits))
+    return DriveQuestion(**{"question": question, "drive": 1, "command": "", "values": (), "live": {}, **how})
+
+
+def moments(count, **how):
+    found = [json.loads(json.dumps(list(drive(asked(**how))), allow_nan=False)) for _ in range(count)]
+    return [part for (part,) in found]
+
+
+def test_a_drive_arrives_without_sway_and_begins_anew():
+    """At 0.45 m of rope, which the block is told of, and for the nominal machine, which has it."""
+    moments(10, drive=1, live={"L1": 0.45})
+    away = moments(60, drive=1, command="target", values=(0.6,))
+    assert away[-1]["axes"][0]["position"] == pytest.approx(0.6) and not away[-1]["busy"]
+    sway = {actor["name"]: actor["sway_mm"] for actor in away[-1]["animation"]["actors"]}
+    assert list(sway) == ["nominal", "L1 −20\N{NO-BREAK SPACE}%", "L1 +20\N{NO-BREAK SPACE}%"]
+    assert max(map(abs, sway["nominal"])) < 0.1 < max(map(abs, sway["L1 −20\N{NO-BREAK SPACE}%"]))
+    assert away[-1]["promise"] is True and away[-1]["live"][0]["value"] == 0.45
+    (anew,) = moments(1, drive=2)
+    assert anew["axes"][0]["position"] == 0.0
+
+
+def test_a_stick_is_followed_and_a_stop_leaves_no_sway():
+    moments(10, drive=3)
+    pulled = moments(15, drive=3, command="velocity", values=(0.3,))
+    assert pulled[-1]["axes"][0]["velocity"] > 0.1
+    reached = pulled[-1]["axes"][0]["position"] + pulled[-1]["axes"][0]["stop_distance"]
+    stopped = moments(40, drive=3, command="stop")[-1]
+    assert stopped["axes"][0]["position"] <= reached + 1e-6 and not stopped["busy"]
+    assert max(map(abs, stopped["animation"]["actors"][0]["sway_mm"])) < 0.3
+
+
+def test_machines_swing_by_the_equations():
+    """After a quick stop they swing freely, as others integrate them."""
+    going = Drive(asked().question.spec())
+    for command, count in (("", 5), ("velocity", 12), ("quick_stop", 20)):
+        for _ in range(count):
+            going.moment(asked(command=command, values=(0.4,)))
+    times = np.arange(0.0, MOMENT * 5, 0.01)
+    before = going._state[:, 0].ravel()
+    for _ in range(5):
+        going.moment(asked())
+    parameters = going._parameters()[0]
+    place = tuple(going._axes[0])
+    free = states(parameters, np.append(times, MOMENT * 5), before, place, "double-pendulum-crane")
+    assert np.abs(before).max() > 0.05
+    assert going._state[:, 0].ravel() == pytest.approx(free[:, -1], abs=1e-5)
+
+
+def test_what_is_no_command_is_a_sentence():
+    for how in ({"command": "fly"}, {"command": "target", "values": (float("nan"),)}, {"command": "target"}):
+        ((part,),) = [list(drive(asked(drive=3, **how)))]
+        assert part["part"] == "undriven" and part["sentences"]
+    (part,) = drive(asked(drive=3, live={"m1": 3.0}))
+    assert "no live parameter" in part["sentences"][0]
+    (part,) = drive(asked(drive=4, edits={}))
+    assert "limits" in " ".join(part["sentences"])
+
+
+def test_several_axes_take_a_value_each():
+    edits = {**LIMITS, "limits.travel": [-1.0, 20.0], "check.residual_sway": 0.2}
+    (part,) = drive(asked("gantry-crane", edits, drive=5))
+    assert [axis["name"] for axis in part["axes"]] == ["x", "y"]
+    (part,) = drive(asked("gantry-crane", edits, drive=5, command="velocity", values=(0.1,)))
+    assert part["sentences"] == ["The planner takes 2 values, one for each axis."]
