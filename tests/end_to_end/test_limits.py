@@ -47,7 +47,7 @@ def test_an_impossible_limit_is_named_with_a_cure_that_works(tmp_path, name, lim
     assert not (tmp_path / "new").exists()
     (error,) = refused.errors
     assert f"limits.{name}" in error
-    (least,) = re.findall(r"at least ([\d.]+) s \(move\.duration\)", error)
+    (least,) = re.findall(r"duration of ([\d.]+) s will do \(move\.duration\)", error)
     (wider,) = re.findall(rf"In 3 s it would do with limits\.{name} = ([\d.]+\d)", error)
     figure = ("command_" if lag else "") + FIGURES[name]
     for cure, allowed in ((f"move.duration={least}", limit), (f"limits.{name}={wider}", float(wider))):

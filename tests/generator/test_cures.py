@@ -30,7 +30,7 @@ def refused(preset, *overrides):
     """Solve what cannot be solved; the changes that are named then, each a list of settings."""
     solution = choice.solve(problem_of(preset_spec(preset, overrides)))
     assert solution.optimum is None
-    longer = re.findall(r"at least ([\d.]+) s \(move\.duration\)", solution.cure)
+    longer = re.findall(r"duration of ([\d.]+) s will do \(move\.duration\)", solution.cure)
     changes = [[f"move.duration={duration}"] for duration in longer]
     named = re.findall(rf"with ({SETTING}(?: and {SETTING})*)", solution.cure)
     changes.extend([setting.replace(" = ", "=") for setting in together.split(" and ")] for together in named)
@@ -109,7 +109,7 @@ def test_what_was_found_before_the_work_is_used_up_is_told():
 
     trial = CandidateTest(solve=solve, keeps=choice.keeps_limits, welcome=lambda _: False)
     named = cures(problem, trial)
-    assert named == f"With these limits it takes at least {told[0].problem.duration:g} s (move.duration)."
+    assert named == f"With these limits a duration of {told[0].problem.duration:g} s will do (move.duration)."
 
 
 @pytest.mark.parametrize(("order", "less"), [(1, 'robustness.method = "none"'), (2, "robustness.order = 1")])

@@ -233,7 +233,7 @@ def test_what_cannot_be_says_why_and_what_would_help():
 
 def test_cures_are_read_out_of_the_sentences():
     text = (
-        "With these limits it takes at least 3.03 s (move.duration). In 2 s it would do with "
+        "With these limits a duration of 3.03 s will do (move.duration). In 2 s it would do with "
         "limits.axis.x.jerk = 4.5, or with limits.travel = [-0.1, 0.4] and limits.sway = 1e-02, "
         'or with robustness.method = "none".'
     )
@@ -244,14 +244,14 @@ def test_cures_are_read_out_of_the_sentences():
         {"robustness.method": "none"},
     ]
     assert cures(f"{OTHERWISE}, which finds a motion.") == [{"solver.method": "auto"}]
-    assert cures(f"{OTHERWISE}. It takes at least 3 s (move.duration).") == [
+    assert cures(f"{OTHERWISE}. A duration of 3 s will do (move.duration).") == [
         {"solver.method": "auto", "move.duration": 3.0}
     ]
 
 
 REFUSAL = (
-    "move.duration: no duration keeps the limits and brings the load to rest. With these limits it takes "
-    "at least 3.03 s (move.duration). In 2 s it would do with limits.axis.x.jerk = 4.5, or with "
+    "move.duration: no duration keeps the limits and brings the load to rest. With these limits a duration "
+    "of 3.03 s will do (move.duration). In 2 s it would do with limits.axis.x.jerk = 4.5, or with "
     f"limits.travel = [-0.1, 0.4] and limits.sway = 0.01. {WIDER} {IN_VAIN} "
     f"{OTHERWISE}, which finds a motion."
 )

@@ -133,8 +133,8 @@ def cures(problem: Problem, trial: CandidateTest, *, in_time: bool = False) -> s
     except OutOfWork:  # of the budget for the whole answer: what was found so far is told
         pass
     if duration:
-        within = "With these limits it" if stated else "It"
-        sentences.append(f"{within} takes at least {duration} s (move.duration).")
+        some = "With these limits a" if stated else "A"
+        sentences.append(f"{some} duration of {duration} s will do (move.duration).")
     if instead:
         sentences.append(f"In {problem.duration:g} s it would do with {', or with '.join(instead)}.")
     return " ".join(sentences)

@@ -45,7 +45,7 @@ FIGURES = {
 SEARCHING = "Looking for what would help …"
 CURE = re.compile(r"(\w+(?:\.\w+)+) = (\[[^]]*\]|\"[^\"]*\"|[-+0-9.e]*[0-9])")
 SENTENCES = re.compile(r"\n|(?<=\.) (?=[A-Z])")
-LONGER = re.compile(r"(?:at least|about) ([0-9.e+]+) s \((move\.duration)\)")
+LONGER = re.compile(r"(?:duration of|about) ([0-9.e+]+) s (?:will do )?\((move\.duration)\)")
 
 Part = dict[str, Any]
 
