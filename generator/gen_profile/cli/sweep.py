@@ -163,6 +163,7 @@ def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:
         asked[key] = value
     if len(folders) != 1:
         raise click.UsageError(
-            "name one folder or file that was swept to, and a value for every key varied there."
+            "name one folder or file that was swept to, and a value for every key varied there, "
+            "such as --plant.L1 5.2."
         )
     return Path(folders[0]), asked
