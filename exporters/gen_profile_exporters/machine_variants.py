@@ -172,15 +172,12 @@ def _is_linear(law: Law, states: States, axis: int) -> bool:
 
 def _coupling(law: Law, states: States) -> Array:
     """Differentiate the accelerations by q_u, then by q̇_u, one column each."""
-    columns = []
-    for which, number in product((0, 1), range(states[0].shape[1])):
-        ends = []
-        for sign in (-1.0, 1.0):
-            moved = [values.copy() for values in states]
-            moved[which][:, number] += sign * STEP
-            ends.append(law(*moved)[0])
-        columns.append((ends[1] - ends[0]) / (2.0 * STEP))
-    return np.stack(columns, axis=-1)
+    count, loads = states[0].shape
+    ends = [np.tile(values, (4 * loads, 1)) for values in states]
+    for column, (which, number, sign) in enumerate(product((0, 1), range(loads), (-1.0, 1.0))):
+        ends[which][column * count : (column + 1) * count, number] += sign * STEP
+    below, above = law(*ends)[0].reshape(2 * loads, 2, count, loads).swapaxes(0, 1)
+    return np.moveaxis((above - below) / (2.0 * STEP), 0, -1)
 
 
 def _reached(push: Array, coupling: Array) -> NDArray[np.bool_]:

@@ -62,18 +62,9 @@ def test_a_bug_stops_one_case_only(tmp_path, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("0/0")
 
-    monkeypatch.setattr(sweep_case, "design", broken)
+    monkeypatch.setattr(sweep_case, "design_in_memory", broken)
     record = run_case(prepared(tmp_path, "move.duration=3,4").recipe, 0, {}).record
     assert (record["status"], record["reason"]) == ("crashed", "Internal error (ZeroDivisionError: 0/0).")
-
-
-def test_a_full_disk_is_no_fault_of_the_case(tmp_path, monkeypatch):
-    def full(*_, **__):
-        raise OutputError("No space left.")
-
-    monkeypatch.setattr(sweep_case, "design", full)
-    with pytest.raises(OutputError, match="No space left"):
-        run_case(prepared(tmp_path, "move.duration=3,4").recipe, 0, {})
 
 
 def test_a_worker_with_other_libraries_refuses(tmp_path):

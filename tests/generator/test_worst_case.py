@@ -10,6 +10,7 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import least_worst_sway
 
 from gen_profile.motion.metrics import greatest
+from gen_profile.problem.parameter_box import Start, worst_places
 from gen_profile.problem.problem import WorstCase, problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import solver as direct
@@ -173,3 +174,16 @@ def test_where_programs_for_more_machines_fail_the_motion_for_fewer_is_taken(mon
     assert worst_case.solve(problem).optimum is motion.optimum
     monkeypatch.setattr(worst_case, "_rounds", lambda *_: iter([failed]))
     assert worst_case.solve(problem).optimum is None
+
+
+def test_a_search_for_the_worst_places_looks_at_none_twice():
+    looked_at = []
+
+    def shares(places):
+        looked_at.extend(map(tuple, places.tolist()))
+        return np.cos(3.0 * places)  # greatest at an edge, where half of what is polled lies outside
+
+    begun = Start(places=np.linspace(0.0, 1.0, 9)[:, None], steps=np.array([0.125]))
+    places, tried = worst_places(shares, begun)
+    assert places.tolist() == [[0.0]]
+    assert len(looked_at) == len(set(looked_at)) < tried

@@ -129,12 +129,17 @@ def plain(name: str) -> str:
 
 def _values(table: PlaybackTable) -> dict[str, str]:
     """Fill every hole of the program but for those of the table itself."""
-    return _constants(table) | {"checksum": str(table_checksum(table))}
+    constants = _constants(table)
+    return constants | {"checksum": str(_checksum(table, constants))}
 
 
 def table_checksum(table: PlaybackTable) -> int:
     """Checksum that a block works out: of the table, then of all other constants, axis by axis."""
-    constants = playback_block.constants(_constants(table), table.layout, len(table.axes))
+    return _checksum(table, _constants(table))
+
+
+def _checksum(table: PlaybackTable, values: Mapping[str, str]) -> int:
+    constants = playback_block.constants(values, table.layout, len(table.axes))
     numbers = np.array([_array(Token(text)) * np.ones(len(table.axes)) for text in constants])
     return checksum(np.append(table.values(), numbers.T))
 
@@ -233,7 +238,7 @@ def _table(found: Mapping[str, Token], layout: str, target: Target) -> PlaybackT
                 f"line {token.line}: {length} values in an array {found['rows'].text[:40]} for {len(axes)} "
                 "axes; values are missing or too many, export the block again."
             )
-    cycle, last = found["cycle_time"], _number(found["last"].text, found["last"].line)
+    cycle, last = found["cycle_time"], _number(found["last"].text, found["last"])
     cycles = rows // len(axes) - 1 if first is None else last
     if last != cycles or not 1 <= last <= MOST_CYCLES or (first is not None and not _rise(first, last)):
         raise ExportError(
@@ -243,19 +248,19 @@ def _table(found: Mapping[str, Token], layout: str, target: Target) -> PlaybackT
     columns_by_axis = np.array(columns).reshape(len(names), -1, len(axes))
     return PlaybackTable(
         layout=layout,
-        cycle_time=plausible_cycle_time(_number(cycle.text, cycle.line), cycle.line),
+        cycle_time=plausible_cycle_time(_number(cycle.text, cycle), cycle.line),
         axes=axes,
         first=first,
         columns=columns_by_axis,
         last=int(last),
         target=columns_by_axis[0, -1] if first is None else _end(found["target"], axes),
-        play_on=_within(found["play_on"], last),
+        stated_play_on=_within(found["play_on"], last),
         variants=_variants(found, axes),
     )
 
 
 def _within(token: Token, last: float) -> int:
-    number = _number(token.text, token.line)
+    number = _number(token.text, token)
     if not (0.0 <= number <= last and number.is_integer()):
         raise ExportError(
             f"line {token.line}: {token.text[:40]} is no cycle of the motion; export the block again."
@@ -345,9 +350,8 @@ def _array(token: Token) -> Array:
     texts = token.text.strip("[]").split(",")
     if _NUMBERS.fullmatch(token.text) and np.isfinite(numbers := np.array(list(map(float, texts)))).all():
         return numbers
-    first = token.line
-    lines = first + np.cumsum([text.rstrip().count("\n") for text in texts])
-    return np.array([_number(text, line) for text, line in zip(texts, lines.tolist(), strict=True)])
+    below = np.cumsum([text.rstrip().count("\n") for text in texts])
+    return np.array([_number(text, token, lines) for text, lines in zip(texts, below.tolist(), strict=True)])
 
 
 def _numbers(token: Token) -> list[float] | str:
@@ -357,9 +361,12 @@ def _numbers(token: Token) -> list[float] | str:
     return [float(number) for number in _array(token).tolist()]
 
 
-def _number(text: str, line: int) -> float:
+def _number(text: str, token: Token, below: int = 0) -> float:
+    """Read a number that stands in a token, so many lines below where that begins."""
     text = _SWITCH.get(text.strip().upper(), text)
     number = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(number):
-        raise ExportError(f"line {line}: {text.strip()[:40]!r} is no finite number; export the block again.")
+        raise ExportError(
+            f"line {token.line + below}: {text.strip()[:40]!r} is no finite number; export the block again."
+        )
     return number

@@ -57,10 +57,10 @@ class PlaybackTable:
         Cycle of the end.
     target : (axes,) array
         Position at the end, in axis units.
-    play_on : int
-        Cycle from which a stop by the motion's own peaks would end no sooner than the motion.
     variants : tuple of AxisVariants
         What may be changed of the motion at its start, axis by axis.
+    stated_play_on : int or None
+        What a block says of `play_on`.
     """
 
     layout: str
@@ -70,8 +70,8 @@ class PlaybackTable:
     columns: Array
     last: int
     target: Array
-    play_on: int = 0
     variants: tuple[AxisVariants, ...]
+    stated_play_on: int | None = None
 
     @property
     def start(self) -> Array:
@@ -98,10 +98,13 @@ class PlaybackTable:
         """Values that the block takes into its checksum in a cycle."""
         return max(LEAST_CHECKS, ceil(len(self.values()) * self.cycle_time / CHECKED_WITHIN))
 
-    def stoppable(self) -> PlaybackTable:
-        """Work out until when a stop by the motion's own peaks is worth it."""
+    @cached_property
+    def play_on(self) -> int:
+        """Cycle from which a stop by the motion's own peaks would end no sooner than the motion."""
+        if self.stated_play_on is not None:
+            return self.stated_play_on
         _, velocity, acceleration = _quantities(self.played())
-        return attrs.evolve(self, play_on=latest_stop(self.limits(), velocity, acceleration, self.cycle_time))
+        return latest_stop(self.limits(), velocity, acceleration, self.cycle_time)
 
     def played(self) -> AxisTable:
         """List what the block issues every cycle when nothing disturbs it, in axis units."""
@@ -176,7 +179,7 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
             last=int(segments.first[-1]),
             target=_literal(in_axis_units(segments.target, factor)),
             variants=variants,
-        ).stoppable()
+        )
     table = axis_table(motion, axes)
     columns = _quantities(table)
     if target.export.plc_layout == "counts":
@@ -191,7 +194,7 @@ def tabulate(profile: Profile, target: Target) -> PlaybackTable:
         last=len(table.position) - 1,
         target=columns[0, -1],
         variants=variants,
-    ).stoppable()
+    )
 
 
 def _quantities(table: AxisTable | SampledProfile) -> Array:

@@ -58,11 +58,13 @@ class ManyRuns:
     def __init__(self, fmu: PlantFmu, version: Version, *, workers: int = 1) -> None:
         self._references = {variable.name: i for i, variable in enumerate(fmu.variables.variables)}
         self._workers = [_Worker(fmu, version) for _ in range(workers)]
+        self._threads = ThreadPoolExecutor(workers)  # which start when they are needed
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._threads.shutdown()
         for worker in self._workers:
             worker.close()
 
@@ -126,8 +128,7 @@ class ManyRuns:
         if len(shares) == 1:
             reached = [self._workers[0].run(plan, 0, len(found), found)]
         else:
-            with ThreadPoolExecutor(len(shares)) as pool:
-                reached = list(pool.map(lambda share: share[0].run(plan, *share[1:], found), shares))
+            reached = list(self._threads.map(lambda share: share[0].run(plan, *share[1:], found), shares))
         for run, (worker, _, end) in zip(reached, shares, strict=True):
             if run < end:
                 reason = " ".join(worker.messages)

@@ -5,16 +5,51 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Protocol
 
 from gen_profile.errors import OutputError
 from gen_profile.private_folder import temporary_folder
 
 
-class Staging:
+class Staging(Protocol):
+    """Where files wait until they are judged."""
+
+    def write(self, name: str, content: bytes) -> bytes:
+        """Write a file and return what is there of it."""
+
+    def earlier(self, name: str) -> bytes | None:
+        """Read a file of this name at the destination, if there is one."""
+
+    def deliver(self) -> None:
+        """Pass all files on."""
+
+
+class Kept:
+    """A staging place in memory."""
+
+    def __init__(self) -> None:
+        self._written: dict[str, bytes] = {}
+        self.delivered: dict[str, bytes] = {}
+
+    def write(self, name: str, content: bytes) -> bytes:
+        """Keep a file."""
+        self._written[name] = content
+        return content
+
+    def earlier(self, name: str) -> bytes | None:
+        """Find nothing, as nothing was delivered before."""
+        return self.delivered.get(name)
+
+    def deliver(self) -> None:
+        """Let all files be taken."""
+        self.delivered |= self._written
+
+
+class StagingFolder:
     """A hidden folder beside the files to come; made by `staged`."""
 
     def __init__(self, folder: Path, destination: Path) -> None:
-        self._folder, self.destination = folder, destination
+        self._folder, self._destination = folder, destination
         self._names: list[str] = []
 
     def write(self, name: str, content: bytes) -> bytes:
@@ -24,14 +59,19 @@ class Staging:
         self._names.append(name)
         return path.read_bytes()
 
+    def earlier(self, name: str) -> bytes | None:
+        """Read a file of this name at the destination, if there is one."""
+        path = self._destination / name
+        return path.read_bytes() if path.is_file() else None
+
     def deliver(self) -> None:
         """Move the files to their destination, in the order in which they were written."""
         for name in self._names:
-            (self._folder / name).replace(self.destination / name)
+            (self._folder / name).replace(self._destination / name)
 
 
 @contextmanager
-def staged(destination: Path) -> Iterator[Staging]:
+def staged(destination: Path) -> Iterator[StagingFolder]:
     """Open a staging folder in an output folder; what is not delivered when it closes is gone.
 
     So is what a run that was killed left there.
@@ -48,7 +88,7 @@ def staged(destination: Path) -> Iterator[Staging]:
         try:
             destination.mkdir(parents=True, exist_ok=True)
             with temporary_folder(destination, ".gen-profile-") as folder:
-                yield Staging(folder, destination)
+                yield StagingFolder(folder, destination)
         finally:
             _remove_empty(made)
     except OSError as error:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256, versions
-from gen_profile.artefacts.writing import Staging, staged
+from gen_profile.artefacts.writing import Kept, Staging, staged
 from gen_profile.designs.plan import Plan, plan
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
@@ -148,12 +148,42 @@ def design(
     GenProfileError
         Nothing was written.
     """
-    folder, formats = Path(folder), [formats] if isinstance(formats, str) else formats
+    folder = Path(folder)
+    return _designed(
+        spec,
+        [formats] if isinstance(formats, str) else formats,
+        folder,
+        staged(folder),
+        check=check,
+        keep_failed=keep_failed,
+        by_fmpy=by_fmpy,
+        progress=progress,
+    )
+
+
+def design_in_memory(spec: Spec, formats: Sequence[str], *, by_fmpy: bool) -> tuple[Design, dict[str, bytes]]:
+    """Do what `design` does, but hand over the files that pass, by name, for others to write."""
+    kept = Kept()
+    made = _designed(spec, formats, Path(), nullcontext(kept), by_fmpy=by_fmpy)
+    return made, dict(sorted(kept.delivered.items()))
+
+
+def _designed(
+    spec: Spec,
+    formats: Sequence[str],
+    folder: Path,
+    place: AbstractContextManager[Staging],
+    *,
+    check: bool = True,
+    keep_failed: bool = False,
+    by_fmpy: bool,
+    progress: Progress = untold,
+) -> Design:
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
     require_end(exporters, stops=spec.move.stops)
     planned = plan(spec, progress)
     spec = planned.spec
-    with staged(folder) as staging:
+    with place as staging:
         progress("exporting")
         artefacts, replayed = _export(spec, planned.evaluation.command, exporters, staging)
         worst = _check(spec, planned, replayed, by_fmpy, progress) if check else None
@@ -183,7 +213,7 @@ def deliver_judged(
         artefacts=artefacts,
         check=None if judged is None else judged.to_dict(),
     )
-    staging.write(FILENAME, _after_earlier_ones(manifest, staging.destination / FILENAME).to_json())
+    staging.write(FILENAME, _after_earlier_ones(manifest, staging.earlier(FILENAME)).to_json())
     if judged is not None and not judged.passed and not keep_failed:
         return ()
     staging.deliver()
@@ -264,10 +294,10 @@ def _compiling(progress: Progress) -> Callable[[], None]:
     return lambda: progress("compiling the plant's FMU, once")
 
 
-def _after_earlier_ones(manifest: Manifest, path: Path) -> Manifest:
+def _after_earlier_ones(manifest: Manifest, earlier: bytes | None) -> Manifest:
     """Keep what the manifest in the output folder says of files that stay; replace a damaged one."""
-    if not path.is_file():
+    if earlier is None:
         return manifest
     with suppress(OutputError):
-        return manifest.after(parse_manifest(path.read_bytes(), str(path)))
+        return manifest.after(parse_manifest(earlier, FILENAME))
     return manifest

@@ -8,7 +8,7 @@ others begun anew. (E. Hairer, S. Nørsett, G. Wanner, Solving ordinary differen
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import attrs
@@ -64,15 +64,24 @@ class Trajectories:
 
     def __call__(self, times: Array) -> Array:
         """Evaluate at rising times in s, shape (2, times, coordinates): positions and velocities."""
-        found = np.empty((2, len(times), self.position.shape[-1]))
+        return self._evaluated(times, (self.position, self.velocity))
+
+    def positions(self, times: Array) -> Array:
+        """Evaluate positions at rising times in s, shape (times, coordinates)."""
+        (found,) = self._evaluated(times, (self.position,))
+        return np.asarray(found)
+
+    def _evaluated(self, times: Array, polynomials: Sequence[Array]) -> Array:
+        """Evaluate polynomials at rising times, shape (polynomials, times, coordinates)."""
+        found = np.empty((len(polynomials), len(times), self.position.shape[-1]))
         step = np.clip(np.searchsorted(self.knots, times, side="right") - 1, 0, len(self.knots) - 2)
         begin, end = self.knots[step], self.knots[step + 1]
         powers = legendre.legvander(2.0 * (times - begin) / (end - begin) - 1.0, NODES + 1)
         edges = np.searchsorted(step, np.arange(len(self.knots)))
-        for number, (first, last) in enumerate(pairwise(edges)):
-            here = slice(first, last)
-            found[0, here] = powers[here] @ self.position[number]
-            found[1, here] = powers[here, : NODES + 1] @ self.velocity[number]
+        for rows, coefficients in zip(found, polynomials, strict=True):
+            taken = powers[:, : coefficients.shape[1]]
+            for own, (first, last) in zip(coefficients, pairwise(edges.tolist()), strict=True):
+                np.matmul(taken[first:last], own, out=rows[first:last])
         return found
 
 

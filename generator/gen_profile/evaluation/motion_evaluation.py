@@ -11,7 +11,7 @@ import numpy as np
 from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import Scenario, scenarios
-from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, PlantSimulation, Response
+from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, PlantSimulation, Sway
 from gen_profile.motion.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.problem.actuator import lag_compensated
@@ -57,14 +57,14 @@ class MotionEvaluation:
         """Of the first axis and the end load: sway on the way of the nominal machine, afterwards of all."""
         return _figures(self)
 
-    def followed(self, times: Array, others: Sequence[Scenario] = ()) -> tuple[Response, ...]:
-        """Tell what the machines, and others, do at rising times in s."""
-        found = self.swing.at(times)
-        if not others:
-            return found
-        parameters, initial = [machine.parameters for machine in others], self.swing.initial
-        more = PlantSimulation(self.swing.plant, self.motion, parameters, float(times[-1]), initial)
-        return (*found, *more.at(times))
+    def followed(self, times: Array, others: Sequence[Scenario] = ()) -> tuple[Sway, ...]:
+        """Tell how the loads of the machines, and of others, sway at rising times in s."""
+        simulations = [self.swing]
+        if others:
+            parameters, initial = [machine.parameters for machine in others], self.swing.initial
+            more = PlantSimulation(self.swing.plant, self.motion, parameters, float(times[-1]), initial)
+            simulations.append(more)
+        return tuple(Sway(times=times, sway=sway) for swing in simulations for sway in swing.sway(times))
 
 
 def evaluate(spec: Spec, motion: Profile) -> MotionEvaluation:

@@ -33,27 +33,39 @@ AT_REST: Mapping[str, float] = MappingProxyType({})
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Response:
-    """What the machine does.
+class Sway:
+    """How the loads of a machine sway.
 
     Attributes
     ----------
     times : (samples,) array
         s, rising.
+    sway : (samples, loads) array
+        Of every load as `gen_profile.plants.plant.Outputs` defines it, in m.
+    """
+
+    times: Array
+    sway: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Response(Sway):
+    """What the machine does.
+
+    Attributes
+    ----------
     position, velocity : (samples, axes) arrays
         Of the driven axes, in m and m/s (or rad and rad/s).
     q_u, dq_u : (samples, n_u) arrays
         Unactuated coordinates and rates.
-    sway, angle : (samples, loads) arrays
-        Of every load as `gen_profile.plants.plant.Outputs` defines them, in m and rad.
+    angle : (samples, loads) array
+        Of every load as `gen_profile.plants.plant.Outputs` defines it, in rad.
     """
 
-    times: Array
     position: Array
     velocity: Array
     q_u: Array
     dq_u: Array
-    sway: Array
     angle: Array
 
 
@@ -92,7 +104,6 @@ class PlantSimulation:
         *,
         accuracy: float = RELATIVE_TOLERANCE,
     ) -> None:
-        self._outputs = equations_of(plant)[1]
         self.plant, self.initial, self._profile = plant, initial, profile
         self._p = p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
         start, motion = initial_state(plant, initial).reshape(2, -1), _motion(profile)
@@ -128,6 +139,7 @@ class PlantSimulation:
         """Evaluate every machine at rising times in s."""
         states, loads = self.states(times), len(self.plant.loads)
         position, velocity = (self._profile.derivative(times, order) for order in (0, 1))
+        outputs = equations_of(self.plant)[1](states[0], position, self._p[:, None])[..., 0]
         return tuple(
             Response(
                 times=times,
@@ -138,17 +150,13 @@ class PlantSimulation:
                 sway=seen[:, :loads],
                 angle=seen[:, loads:],
             )
-            for q_u, dq_u, seen in zip(*states, self._seen(states[0], position), strict=True)
+            for q_u, dq_u, seen in zip(*states, outputs, strict=True)
         )
 
     def sway(self, times: Array) -> Array:
         """Sway of every load in m at rising times in s, shape (machines, times, loads)."""
-        seen = self._seen(self.states(times)[0], self._profile.derivative(times, 0))
-        return seen[:, :, : len(self.plant.loads)]
-
-    def _seen(self, q_u: Array, position: Array) -> Array:
-        """Sway, then angle, of every load, shape (machines, times, 2 loads)."""
-        return self._outputs(q_u, position, self._p[:, None])[..., 0]
+        q_u = self._solution.positions(times).reshape(len(times), len(self._p), -1).swapaxes(0, 1)
+        return _sway(self.plant)(q_u, self._profile.derivative(times, 0), self._p[:, None])[..., 0]
 
 
 def greatest_sway(
@@ -258,6 +266,13 @@ def equations_of(plant: Plant) -> tuple[Function, Function]:
     acceleration = Function("acceleration", {"q_u": d.q_u, "dq_u": d.dq_u, "axes": axes, "p": d.p}, d.ddq_u)
     seen = sym.column([d.sway, d.angle])
     return acceleration, Function("seen", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, seen)
+
+
+@cache
+def _sway(plant: Plant) -> Function:
+    """Compile the sway of (q_u, q_a, p), where nothing else is looked at."""
+    d = dynamics(plant)
+    return Function("sway", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, d.sway)
 
 
 def _motion(profile: Profile) -> Callable[[Array], Array]:

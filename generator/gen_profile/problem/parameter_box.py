@@ -203,8 +203,9 @@ def worst_places(shares: Shares, begun: Start, keep: int = 1) -> tuple[Array, in
     places : (places, ranges) array
         Local maxima of each figure, those of the first figure first, each figure's greatest first.
     tried : int
-        Number of places looked at.
+        Number of places looked at, those that were come back to included.
     """
+    shares = _remembering(shares)
     values, ranges = shares(begun.places), begun.places.shape[1]
     rounds = ROUNDS + 2 * (ranges - 1)
     starts = min(STARTS, max(POLLS // (rounds * 2 * ranges * values.shape[1]), keep))
@@ -236,6 +237,20 @@ def worst_places(shares: Shares, begun: Start, keep: int = 1) -> tuple[Array, in
         ]
     ]
     return np.array(kept), tried
+
+
+def _remembering(shares: Shares) -> Shares:
+    """Find shares once for every place: searches at an edge, or that meet, come back to some."""
+    known: dict[bytes, Array] = {}
+
+    def found(places: Array) -> Array:
+        keys = [place.tobytes() for place in places]
+        new = {key: place for key, place in zip(keys, places, strict=True) if key not in known}
+        if new:
+            known.update(zip(new, shares(np.array(list(new.values()))), strict=True))
+        return np.array([known[key] for key in keys])
+
+    return found
 
 
 def _separate(places: Array, values: Array, steps: Array) -> NDArray[np.intp]:

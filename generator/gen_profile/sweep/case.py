@@ -9,20 +9,18 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, cast
 
 import attrs
 
 from gen_profile.cluster import require_versions
-from gen_profile.designs.design import Design, design
+from gen_profile.designs.design import Design, design_in_memory
 from gen_profile.errors import (
     CosimulationError,
     ExportError,
     GenProfileError,
     InfeasibleProblem,
     LimitViolation,
-    OutputError,
     SolverDiverged,
     SpecError,
 )
@@ -118,23 +116,12 @@ def run_case(recipe: Recipe, case: int, values: Mapping[str, Any]) -> CaseOutcom
     ------
     SpecError
         This computer has other versions than the recipe asks for.
-    OutputError
-        This computer has no room for the files.
     """
     require_versions(recipe.versions, "this sweep")
     try:
-        with (
-            _ALONE,
-            TemporaryDirectory(prefix="gen-profile-") as folder,
-            one_thread(),
-            on_processors(1),
-        ):
-            by_fmpy = case % EVERY == 0
-            outcome = design(recipe.spec(values), recipe.formats, Path(folder), by_fmpy=by_fmpy)
-            files = {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
+        with _ALONE, one_thread(), on_processors(1):
+            outcome, files = design_in_memory(recipe.spec(values), recipe.formats, by_fmpy=case % EVERY == 0)
         return CaseOutcome(record=_record(case, values, outcome), files=files)
-    except OutputError:
-        raise
     except GenProfileError as error:
         return failed(case, values, STATUSES.get(type(error), CRASHED), str(error))
     except Exception as error:

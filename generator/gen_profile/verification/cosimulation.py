@@ -16,7 +16,7 @@ from gen_profile.evaluation.residual_sway import (
     observation_time,
 )
 from gen_profile.evaluation.scenarios import Scenario
-from gen_profile.evaluation.simulation import Response
+from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.problem.linearization import linearize
@@ -93,7 +93,7 @@ def judge(
     setpoints: SampledProfile,
     machines: Sequence[Scenario],
     found: Sequence[Response],
-    expected: Sequence[Response],
+    expected: Sequence[Sway],
     *,
     followed: SampledProfile | None = None,
 ) -> Check:
@@ -103,16 +103,15 @@ def judge(
     ----------
     found : sequence of Response
         Of `cosimulate`, one per machine.
-    expected : sequence of Response
-        Of another simulation, at some of the same times, such that how far the two are apart bounds the error
-        of `found`.
+    expected : sequence of Sway
+        Of another simulation, all at some of the same times, such that how far the two are apart bounds the
+        error of `found`.
     followed : SampledProfile, optional
         What `found` followed, where it goes on for longer than the setpoints.
     """
     standing = arrival(spec, followed or setpoints)
     after = [_from(response, standing) for response in found]
-    since = judged_from(spec, followed or setpoints)
-    error = max(_distance(one, _from(other, since)) for one, other in zip(found, expected, strict=True))
+    error = _greatest_distance(found, expected, judged_from(spec, followed or setpoints))
     between = max(above_samples(response.sway) for response in after)
     if spec.limits.sway is not None:  # until the last setpoint samples are farther apart
         moving = len(setpoints.times)
@@ -153,10 +152,14 @@ def judged_from(spec: Spec, setpoints: SampledProfile) -> float:
     return (1.0 - ROUNDING) * arrival(spec, setpoints) if spec.limits.sway is None else 0.0
 
 
-def _distance(found: Response, expected: Response) -> float:
-    """Greatest difference of sways in m at the times of the second response, which the first one has, too."""
-    middles = 0.5 * (found.times[:-1] + found.times[1:])
-    return float(np.abs(found.sway[np.searchsorted(middles, expected.times)] - expected.sway).max())
+def _greatest_distance(found: Sequence[Sway], expected: Sequence[Sway], since: float) -> float:
+    """Greatest difference of sways in m from a time on, at the expected times, which the others have, too."""
+    times = expected[0].times
+    compared = times >= since * (1.0 - ROUNDING)
+    own = found[0].times
+    rows = np.searchsorted(0.5 * (own[:-1] + own[1:]), times[compared])
+    apart = (one.sway[rows] - other.sway[compared] for one, other in zip(found, expected, strict=True))
+    return max(float(np.abs(distance).max()) for distance in apart)
 
 
 def sample_spacing(spec: Spec, setpoints: SampledProfile) -> float:
