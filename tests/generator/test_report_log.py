@@ -157,7 +157,17 @@ def test_heads_in_other_languages_and_places(head, columns):
     np.testing.assert_allclose(log.sways["payload"], 1e-3 * (5.5 + np.arange(20)))
 
 
-@pytest.mark.parametrize("columns", ["Zeit", "time_s=", "time_s=1,speed=2", "time_s=1,sway=9", "sway=2"])
+def test_counts_are_as_large_as_is_said():
+    text = table(["a", "b", "c"], TIMES, [100.0] * 20, [-40.0] * 20)
+    log = parse_log(text, "log.csv", paper(), "time_s=a,hook_angle_0.09deg=b,payload_sway_.5 mm=c")
+    np.testing.assert_allclose(log.angles["hook"], np.radians(9.0))
+    np.testing.assert_allclose(log.sways["payload"], -0.02)
+
+
+@pytest.mark.parametrize(
+    "columns",
+    ["Zeit", "time_s=", "time_s=1,speed=2", "time_s=1,sway=9", "sway=2", "time_s=1,payload_sway_0mm=2"],
+)
 def test_columns_that_are_not_there(columns):
     with pytest.raises(OutputError, match=r"(MEANING=COLUMN|nothing of this machine|no column).*[.]$"):
         parse_log(table(["a", "b"], TIMES, TIMES), "log.csv", paper(), columns)

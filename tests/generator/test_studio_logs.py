@@ -42,8 +42,12 @@ def swing():
     return "".join(["Uhr;Geber 4\n", *rows]).encode()
 
 
-def test_a_swing_tells_parameters_that_can_be_taken(swing, tmp_path, monkeypatch):
-    found = told(swing, name="stop.csv", use="swing", columns="time_ms=1,hook_angle_deg=2")
+@pytest.mark.parametrize("count", [1.0, 0.09])
+def test_a_swing_tells_parameters_that_can_be_taken(swing, count, tmp_path, monkeypatch):
+    if count != 1.0:  # as an encoder tells it
+        rows = [row.replace(",", ".").split(";") for row in swing.decode().splitlines()[1:]]
+        swing = "".join(f"{time};{round(float(value) / count)}\n" for time, value in rows).encode()
+    found = told(swing, name="stop.csv", use="swing", columns=f"time_ms=1,hook_angle_{count:g}deg=2")
     (row,) = found["identified"]["parameters"]
     assert row["name"] == "L1" and abs(row["value"] - TRUE) <= row["half_range"]
     taken = spec_from_dict(document_of(PAPER.start, found["identified"]["edits"]))

@@ -117,6 +117,8 @@ def rounded(values: Array) -> list[float | None]:
     largest = float(np.nanmax(np.abs(values), initial=0.0))
     decimals = DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
     numbers: list[float] = (np.round(values, decimals) + 0.0).tolist()
+    if not np.isnan(values).any():
+        return [*numbers]
     return [None if math.isnan(number) else number for number in numbers]
 
 

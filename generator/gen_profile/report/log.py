@@ -45,6 +45,8 @@ _COLUMN = re.compile(
     r"(?:[ _]?[\[(]?(?P<unit>s|ms|m|mm|um|rad|deg|counts)[\])]?)?",
     re.IGNORECASE,
 )
+# only where a person says so: in a file's own names a number may be a sensor's
+_COUNTED = re.compile(r"(?P<meaning>.+_)(?P<step>[0-9]*\.?[0-9]+) ?(?P<unit>[a-z]+)", re.IGNORECASE)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -88,7 +90,8 @@ def read_log(path: Path, spec: Spec, columns: str | None = None) -> MeasuredLog:
     path : Path
     spec : Spec
     columns : str, optional
-        Which column holds what, as in ``time_ms=Zeit,payload_sway_mm=4``; told by their names by default.
+        Which column holds what, as in ``time_ms=Zeit,payload_sway_mm=4``; told by their names by default. A
+        number before a unit is the size of one count, ``hook_angle_0.09deg``.
 
     Raises
     ------
@@ -215,15 +218,17 @@ def _chosen(columns: str) -> dict[str, str]:
 
 
 def _required(meaning: str, spec: Spec, where: str) -> _Column:
-    found = _column(meaning, spec, where)
-    if found is None:
+    counted = _COUNTED.fullmatch(meaning)
+    plain = counted["meaning"] + counted["unit"] if counted else meaning
+    found, step = _column(plain, spec, where), float(counted["step"]) if counted else 1.0
+    if found is None or step == 0.0:
         plant = spec.machine()
         raise OutputError(
             f"columns: {meaning!r} is nothing of this machine; write time_s, "
             f"{plant.actuated[0].name}_position, "
             f"{plant.loads[-1]}_sway or {plant.loads[-1]}_angle, with a unit behind such as _mm or _deg."
         )
-    return found
+    return attrs.evolve(found, divisor=found.divisor / step)
 
 
 def _head(table: LogTable, chosen: Collection[str]) -> int:

@@ -127,7 +127,8 @@ def _identify_command(asked: LogQuestion, swing: SwingLog, places: Mapping[str, 
     """Write the command line that identifies the same."""
     time = next(meaning for meaning in places if meaning.startswith("time"))
     signal = f"{swing.load}_{swing.quantity}"
-    value = next(meaning for meaning in places if re.fullmatch(rf"{re.escape(signal)}(_[a-z]+)?", meaning))
+    told = re.compile(rf"{re.escape(signal)}(_[0-9.]*[a-z]+)?")
+    value = next(filter(told.fullmatch, places))
     words = ["--swing", asked.name, "--columns", f"{places[time]},{places[value]}"]
     words += ["--signal", f"{swing.quantity}:{swing.load}"]
     words += ["--unit", value.rpartition("_")[2]] if value != signal else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import multiprocessing
 import os
@@ -28,6 +29,7 @@ ANSWERS = {
 }
 POLITE = {"depth", "files", "log"}  # give way to what a hand waits for
 NICENESS = 10
+FRAME = 0.015  # s after the curves of a picture, in which the browser has the processor to draw them
 PAUSE = 1.0  # s after a worker was taken, in which it has the processor for itself
 BEGUN, ENDED, LOST = "begun", "ended", "lost"
 
@@ -175,6 +177,7 @@ def _work(connection: Connection) -> None:
     if sys.platform != "win32":
         os.setpgrp()
     import_module("gen_profile.studio.views")  # before the first question comes
+    gc.freeze()  # what was loaded stays: looking through it for garbage takes as long as a solve
     with one_thread(), suppress(EOFError, OSError):
         while True:
             job = connection.recv()
@@ -191,7 +194,7 @@ def _answer(connection: Connection, job: Job) -> None:
         file, told = part.get("file"), {**part, "of": job.kind, "serial": job.number}
         text = json.dumps(told if file is None else {**told, "file": None}, separators=(",", ":"))
         connection.send(Message(number=job.number, kind=job.kind, name=part["part"], text=text, file=file))
-        if connection.poll():
+        if connection.poll(FRAME if part["part"] == "curves" else 0.0):
             return
     connection.send(Message(number=job.number, kind=job.kind, name=ENDED))
 

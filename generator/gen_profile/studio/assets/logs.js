@@ -54,33 +54,36 @@ const logs = (() => {
     return owner ? `${words}, ${page.phrase(owner)}` : words;
   }
 
-  /** Split "payload_sway_mm" into what is measured and its unit. */
+  /** Split "payload_sway_0.1mm" into what is measured, the size of one count, and its unit. */
   function split(meaning) {
     const base = reading.meanings.find((one) => meaning === one || meaning.startsWith(`${one}_`)) ?? "";
-    return [base, meaning.slice(base.length + 1)];
+    const [, step, unit] = meaning.slice(base.length + 1).match(/^([\d.]*)(.*)$/);
+    return [base, step, unit];
   }
 
   /** One column of the file: its name, what it holds, and the unit. */
   function column({ name, meaning }, place, changed) {
     const label = name || `${page.phrase("field.column")} ${place + 1}`;
-    const [held, unit] = split(meaning);
+    const [held, step, unit] = split(meaning);
     const meanings = element("select", { "aria-label": label }, element("option", { value: "" }, "–"), ...reading.meanings.map((base) => element("option", { value: base }, named(base))));
     const units = element("select", { "aria-label": `${label}, ${page.phrase("axis.unit")}` });
+    const count = element("input", { type: "number", step: "any", min: "0", value: step, placeholder: "1", title: page.phrase("field.count"), "aria-label": `${label}, ${page.phrase("field.count")}` });
     const offer = (chosen) => {
       const known = UNITS[quantity(meanings.value)] ?? [];
       units.hidden = !known.length;
+      count.hidden = !["sway", "angle"].includes(quantity(meanings.value)); // an axis' counts are in the spec
       units.replaceChildren(...known.map((one) => element("option", { value: one }, one || page.phrase("field.own"))));
       units.value = known.includes(chosen) ? chosen : known[0] ?? "";
     };
     meanings.value = held;
     offer(unit);
     meanings.addEventListener("change", () => { offer(""); changed(row); });
-    units.addEventListener("change", () => changed(row));
+    for (const one of [count, units]) one.addEventListener("change", () => changed(row));
     const row = {
-      host: element("div", { class: "column" }, element("span", {}, label), meanings, units),
+      host: element("div", { class: "column" }, element("span", {}, label), meanings, element("div", { class: "value" }, count, units)),
       free: () => { meanings.value = ""; offer(""); },
       get base() { return meanings.value; },
-      get written() { return meanings.value && `${[meanings.value, units.value].filter(Boolean).join("_")}=${place + 1}`; },
+      get written() { return meanings.value && `${[meanings.value, `${count.hidden ? "" : count.value}${units.value}`].filter(Boolean).join("_")}=${place + 1}`; },
     };
     return row;
   }
