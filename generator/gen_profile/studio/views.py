@@ -93,7 +93,7 @@ def _setting(question: Question, spec: Spec) -> Part:
         "command": command_of(start, state.edits),
         "text": text_of(start, state.edits),
         "address": state.address,
-        "doubts": list(doubts(spec)),
+        "doubts": [_fault(sentence) for sentence in doubts(spec)],
     }
 
 

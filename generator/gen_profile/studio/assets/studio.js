@@ -29,6 +29,7 @@
     return otherwise;
   }
   const filled = (key, values) => phrase(key).replace(/\{(\w+)\}/g, (_, name) => values[name]);
+  const placed = ({ place, sentence }) => [place, phrase(sentence)].filter(Boolean).join(": ");
   const mm = (metres) => `${knobs.digits((1e3 * metres).toPrecision(4))} mm`;
 
   function speak() {
@@ -235,8 +236,7 @@
       knobs.show(part.knobs, setting());
       knobs.blame([]);
       $("command").textContent = part.command;
-      const doubt = part.doubts.map((one) => one.sentence ?? one);
-      notice(doubt.length ? `${phrase("beware")}: ${doubt.join(" ")}` : "");
+      notice(part.doubts.length ? `${phrase("beware")}: ${part.doubts.map(placed).join(" ")}` : "");
       if (latest.curves && String(handles) !== String(draggable())) take(latest.curves); // they came before their knobs
       tellAddress();
     },
@@ -258,8 +258,8 @@
       listDesigns();
     },
     faults({ faults }) {
-      const others = knobs.blame(faults);
-      judge("failed", phrase("faulty"), (others.length ? others : faults).map(({ place, sentence }) => (place ? `${place}: ${sentence}` : sentence)), []);
+      const others = knobs.blame(faults.map((one) => ({ ...one, sentence: phrase(one.sentence) })));
+      judge("failed", phrase("faulty"), (others.length ? others : faults).map(placed), []);
       settled(true);
     },
     failure({ sentences, cures }) {

@@ -1,0 +1,95 @@
+"""What the studio's page says in German of sentences that are written in English."""
+
+import json
+import re
+from importlib.resources import files
+
+import pytest
+
+from gen_profile.errors import SpecError
+from gen_profile.solvers.method_selection import IN_VAIN, OTHERWISE, WIDER
+from gen_profile.solvers.solution import Status
+from gen_profile.spec.plausibility import doubts
+from gen_profile.spec.reading import preset_spec, presets, spec_from_dict
+from gen_profile.studio.knobs import knobs
+from gen_profile.studio.state import document_of, preset_start
+from gen_profile.studio.views import SEARCHING, SENTENCES
+
+WORDS = json.loads((files("gen_profile.studio") / "assets" / "words.json").read_text("utf-8"))
+ENGLISH = re.compile(
+    r"\b(the|of|than|and|or|must|be|found|at|is|are|which|only|with|from|to|by|did|state|no|it|that)\b"
+)
+REFUSAL = (
+    "move.duration: no duration keeps the limits and brings the load to rest. With these limits a duration "
+    "of 3.03 s will do (move.duration). In 2 s it would do with limits.axis.x.jerk = 4.5, or with "
+    f"limits.travel = [-0.1, 0.4] and limits.sway = 0.01. {WIDER} {IN_VAIN} "
+    f"{OTHERWISE}, which finds a motion."
+)
+ENDS = [end.value for end in Status if end != Status.CONVERGED]
+UNFIT = {
+    "number": (-1.0, 0.0, 1e3, 1e5, 1e9),
+    "interval": (0.95,),
+    "pair": ([3.0, 1.0], [-1.0, 1e9]),
+    "switch": (True, False),
+    "text": ("",),
+    "choice": (),
+}
+
+
+def german(sentence):
+    """Translate as studio.js does."""
+    if sentence in WORDS["texts"]:
+        return WORDS["texts"][sentence][1]
+    for pattern, translated in WORDS["patterns"]:
+        if found := re.fullmatch(pattern, sentence):
+            return re.sub(r"\$(\d)", lambda group: german(found[int(group[1])]), translated)
+    return sentence
+
+
+def told(document):
+    """What the spec's rules say of a document, without the places."""
+    try:
+        sentences = doubts(spec_from_dict(document))
+    except SpecError as error:
+        sentences = str(error).splitlines()
+    return {sentence.partition(": ")[2] for sentence in sentences}
+
+
+@pytest.mark.parametrize("sentence", [*SENTENCES.split(REFUSAL), SEARCHING, *ENDS])
+def test_why_there_is_no_motion(sentence):
+    assert not ENGLISH.search(german(sentence))
+
+
+@pytest.mark.parametrize("preset", presets())
+def test_a_machine_s_summary(preset):
+    summary = preset_spec(preset).machine().summary
+    assert german(summary) != summary
+
+
+@pytest.mark.parametrize("preset", ["paper", "gantry-crane", "flexible-joint"])
+def test_whatever_rules_say_of_a_knob_s_value(preset):
+    start = preset_start(preset)
+    spec = spec_from_dict(start.document)
+    sentences = set()
+    for knob in knobs(spec, start.document, spec):
+        usual = (50.0 * knob.value,) if isinstance(knob.value, float) else ()
+        for value in (*UNFIT[knob.kind], *knob.choices, *usual):
+            changed = value if knob.index is None else [value] * len(spec.axis)
+            sentences |= told(document_of(start, {knob.path: changed}))
+    assert len(sentences) > 30
+    english = {sentence for sentence in sentences if ENGLISH.search(german(sentence))}
+    assert english == set()
+
+
+def test_every_word_is_there_in_both_languages():
+    shown = set()
+    for preset in presets():
+        document = document_of(preset_start(preset), {})
+        spec = spec_from_dict(document)
+        for knob in knobs(spec, document, spec):
+            shown |= {knob.words, f"group.{knob.group}"} - {"plant", "robustness.uncertain"}
+    assert shown - set(WORDS["texts"]) == set()
+    assert all(len(texts) == 2 and all(texts) for texts in WORDS["texts"].values())
+    page = (files("gen_profile.studio") / "assets" / "studio.html").read_text("utf-8")
+    used = {text.split('"')[0] for key in ('data-text="', 'data-words="') for text in page.split(key)[1:]}
+    assert used - set(WORDS["texts"]) == set()
