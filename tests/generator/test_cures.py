@@ -112,6 +112,34 @@ def test_what_was_found_before_the_work_is_used_up_is_told():
     assert named == f"With these limits a duration of {told[0].problem.duration:g} s will do (move.duration)."
 
 
+def test_where_nothing_that_was_tried_will_do_it_is_told_how_long_it_would_take():
+    problem = problem_of(preset_spec("paper", ["limits.acceleration=0.01"]))
+    trial = CandidateTest(solve=choice.given_up, keeps=choice.keeps_limits, welcome=lambda _: True)
+    (told,) = re.findall(r"With these limits it would take some ([\d.]+) s\.", cures(problem, trial))
+    assert works("paper", "limits.acceleration=0.01", f"move.duration={1.1 * float(told)}")
+    assert not works("paper", "limits.acceleration=0.01", f"move.duration={0.9 * float(told)}")
+
+
+def test_no_limits_are_named_that_no_machine_has():
+    """Without the machine's sway all limits together would do, 37 times as wide."""
+    spec = preset_spec(
+        "double-pendulum-crane", ["move.duration=5.0", "limits={velocity=1.5, acceleration=0.6}"]
+    )
+    with pytest.raises(InfeasibleProblem) as refusal:
+        plan(spec)
+    assert re.search(r"a duration of [\d.]+ s will do \(move\.duration\)\.$", str(refusal.value))
+
+
+@pytest.mark.slow
+def test_a_limit_is_kept_by_machines_whose_sway_hardly_follows_the_nominal_one_s():
+    """Supposing that the worst one's sway falls as the nominal one's does took ever less of it, in vain."""
+    ways = ["move.distance=[-2.5, 3.53]", "move.duration=7.41", 'cost={effort="snap", sway_weight=0.0}']
+    machine = ["plant.m=32.0", "plant.L=8.52", "plant.c=0.0"]
+    unsure = "robustness={method='none', uncertain={L=0.204}}"
+    spec = preset_spec("gantry-crane", [*ways, *machine, unsure, "limits={acceleration=9.46, sway=0.66}"])
+    assert plan(spec).figures["sway_transient_worst_m"] <= 1.01 * 0.66
+
+
 @pytest.mark.parametrize(("order", "less"), [(1, 'robustness.method = "none"'), (2, "robustness.order = 1")])
 def test_robustness_is_to_blame_where_nothing_else_is(order, less):
     problem = problem_of(preset_spec("paper", [f"robustness.order={order}"]))
@@ -243,7 +271,12 @@ def test_the_least_duration_is_found_in_few_steps_however_far_it_is(monkeypatch,
 
 def test_a_trial_begins_with_what_the_next_run_knows(monkeypatch):
     spec, begun = preset_spec("paper", ["limits.sway=0.02"]), []
-    monkeypatch.setattr(transient_sway, "kept_by_all", lambda _, problem, *__: begun.append(problem))
+
+    def kept_by_all(_, problem, *__):
+        begun.append(problem)
+        return choice.given_up(problem)
+
+    monkeypatch.setattr(transient_sway, "kept_by_all", kept_by_all)
     transient_sway.as_asked_next(spec, attrs.evolve(problem_of(spec), sway_spread=1.2))
     assert begun[0].sway_spread == 1.0
 

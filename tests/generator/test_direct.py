@@ -94,7 +94,7 @@ def test_auto_takes_the_indirect_method_where_no_limit_binds():
 def test_an_infeasible_problem_says_what_would_do():
     solution = choice.solve(limited(acceleration=0.2, velocity=0.2))
     assert solution.status is Status.INFEASIBLE
-    assert "at least 3.18 s" in solution.cure
+    assert "a duration of 3.18 s will do" in solution.cure
     assert "In 3 s it would do with limits.acceleration = 0.233." in solution.cure
     assert "limits.velocity" not in solution.cure
 

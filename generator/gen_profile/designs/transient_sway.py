@@ -1,7 +1,8 @@
 """The limit of sway on the way, which holds for every machine of a check's ranges.
 
 Solvers know the nominal machine, so it is allowed so much less as the worst machine sways more. How much that
-is hardly depends on the motion: it is measured on one, and tried on the next.
+is hardly depends on the motion: it is measured on one, and tried on the next; where it does depend on it, two
+motions tell by how much.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from gen_profile.errors import SpecError
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.evaluation.simulation import greatest_sway
 from gen_profile.motion.profile import Profile
+from gen_profile.problem.limits import SWAY_TOLERANCE
 from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
@@ -34,6 +36,7 @@ ROUNDS = 4  # of measuring and solving again
 ENOUGH = 1.005  # times the limit that the worst machine may sway
 NEARLY_ENOUGH = 1.008  # likewise where solving again takes long
 MARGIN = 1.002  # for what lies between the machines and the times looked at
+STEEPNESS = 0.1  # least share of its own sway, by which the worst machine's falls with the nominal one's
 AT_ONCE = 3.0  # s of work, in which a motion without limits is found, or is not worth the while
 ACCURACY = 1e-6  # of the machines' integration, relative
 SAMPLES = 1001
@@ -102,9 +105,13 @@ def as_asked_next(spec: Spec, problem: Problem) -> Solution:
     if spec.solver.solver != "direct" and problem.worst_case is None:
         with suppress(OutOfWork), budget(AT_ONCE):
             smooth = choice.attempt(problem, "indirect")
-            if choice.keeps_limits(smooth) and _spread(spec, smooth, ENOUGH) is None:
+            found = choice.keeps_limits(smooth) and _too_much(spec, smooth, ENOUGH) is None
+            if found or smooth.status is Status.INFEASIBLE:
                 return smooth
-    return _attempt(spec, problem, "direct")
+    solution = _attempt(spec, problem, "direct")
+    if solution.optimum is None or _too_much(spec, solution, SWAY_TOLERANCE) is None:
+        return solution
+    return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
 
 
 def kept_by_all(spec: Spec, problem: Problem, method: SolverName, progress: Progress = untold) -> Solution:
@@ -144,28 +151,46 @@ def _kept(
     progress: Progress = untold,
 ) -> Solution:
     """Solve a problem again until the worst machine sways no more than enough times its limit."""
-    solution = solve(problem)
+    solution, before = solve(problem), (0.0, 0.0)
     for _ in range(ROUNDS):
         if solution.optimum is None:
             break
-        spread = _spread(spec, solution, enough)
-        if spread == math.inf:
-            return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
-        if spread is None:
+        found = _too_much(spec, solution, enough)
+        if found is None:
             break
+        if found[1] == math.inf:
+            return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
+        spread = _spread(problem.limits.sway or 0.0, before, found)
         progress("solving", remark=f"for the machine that sways {spread:.3g} times as much on the way")
-        solution = solve(attrs.evolve(problem, sway_spread=spread))
+        solution, before = solve(attrs.evolve(problem, sway_spread=spread)), found
     return solution
 
 
-def _spread(spec: Spec, solution: Solution, enough: float) -> float | None:
-    """Tell how many times as much as the nominal machine the worst one sways where that is too much."""
+def _too_much(spec: Spec, solution: Solution, enough: float) -> tuple[float, float] | None:
+    """Tell how much the nominal machine and the worst one sway in m, where that is too much."""
     if not _limited(spec, solution.problem):
         return None
     nominal, worst = sways(spec, solution.problem, optimal_profile(solution))
     if worst <= max(enough * (solution.problem.limits.sway or 0.0), nominal) < math.inf:
         return None
-    return MARGIN * worst / nominal if worst < math.inf else math.inf
+    return nominal, worst
+
+
+def _spread(limit: float, before: tuple[float, float], found: tuple[float, float]) -> float:
+    """Extrapolate how many times as much as the nominal machine the worst one sways at the limit.
+
+    Parameters
+    ----------
+    limit : float
+        m, of the worst machine's sway.
+    before, found : (float, float)
+        m, of the nominal machine and the worst one; in two motions, or nothing and one.
+    """
+    nominal, worst = found
+    slope = worst / nominal
+    if nominal < before[0]:
+        slope = min(slope, max((before[1] - worst) / (before[0] - nominal), STEEPNESS * slope))
+    return MARGIN * limit / max(nominal - (worst - limit) / slope, nominal / 2.0)
 
 
 def with_usual_spread(spec: Spec, problem: Problem) -> Problem:

@@ -12,7 +12,7 @@ from gen_profile.motion.profile import Profile
 from gen_profile.spec.model import LimitsSpec
 
 SWAY_TOLERANCE = 1.01  # times limits.sway that machines off nominal may sway: searches find the worst so well
-ROUNDING = 1e-6  # share of its width by which travel may be left: a move may begin and end at its edges
+ROUNDING = 1e-6  # share of a limit, or of travel's width, that counts for nothing: programs are no more exact
 
 
 @attrs.frozen(kw_only=True)
@@ -71,7 +71,7 @@ def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Brea
         for order, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
             allowed = getattr(allowed_here, name)
             if allowed is not None:
-                found = greatest(command, order, column)
+                found = (1.0 - ROUNDING) * greatest(command, order, column)
                 yield Breach(limit=limits.place(column, name), found=found, allowed=allowed)
         if allowed_here.travel is not None:
             (low, high), travel = allowed_here.travel, limits.place(column, "travel")

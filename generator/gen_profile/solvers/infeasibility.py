@@ -23,6 +23,7 @@ NEAR = 1.05  # how many times a value that will not do the one that is named may
 WORK = 20.0  # s to look for all cures
 SHARE = 0.5  # of the work that is left, which one cure may take, and one duration tried
 MOST = 0.8  # likewise a longer move, which nearly always does
+WIDEST = 4.0  # times as wide as they are, all limits together are worth naming
 AMPLE = 1.3  # times the least value: where nearer ones take too much work, a smooth motion may do
 FARTHER = 1.7  # times the least value with a solution, up to which one that is welcome is looked for
 
@@ -118,14 +119,15 @@ def cures(problem: Problem, trial: CandidateTest, *, in_time: bool = False) -> s
     in_time : bool
         Look for what would do in the duration asked for only.
     """
-    duration, instead, sentences = None, list[str](), list[str]()
+    needed, duration, instead, sentences = None, None, list[str](), list[str]()
     stated, relaxation = problem.limits.stated(), Relaxation(problem)
     alone = (partial(_widened, relaxation, trial, {place: value}) for place, value in stated.items())
-    together = [partial(_widened, relaxation, trial, stated)] if len(stated) > 1 else []
+    together = [partial(_widened, relaxation, trial, stated, WIDEST)] if len(stated) > 1 else []
     try:
         with budget(WORK):
             if not in_time:
-                duration = longer(problem, trial, relaxation)
+                needed = _in_time(partial(least_duration, relaxation))
+                duration = needed and _in_time(partial(_longer, relaxation, trial, needed), MOST)
             instead.extend(filter(None, map(_in_time, alone)))
             for last_resort in (*together, partial(_less_robust, problem, trial)):
                 if not instead:
@@ -135,21 +137,30 @@ def cures(problem: Problem, trial: CandidateTest, *, in_time: bool = False) -> s
     if duration:
         some = "With these limits a" if stated else "A"
         sentences.append(f"{some} duration of {duration} s will do (move.duration).")
+    elif needed and needed > NEAR * problem.duration:
+        sentences.append(f"With these limits it would take some {float(f'{needed:.2g}'):g} s.")
     if instead:
         sentences.append(f"In {problem.duration:g} s it would do with {', or with '.join(instead)}.")
     return " ".join(sentences)
 
 
-def longer(problem: Problem, trial: CandidateTest, relaxation: Relaxation | None = None) -> str | None:
+def longer(problem: Problem, trial: CandidateTest) -> str | None:
     """Find the least duration in s that will do, in most of the work that is left."""
-    return _in_time(partial(_longer, relaxation or Relaxation(problem), trial), MOST)
+    relaxation = Relaxation(problem)
+    needed = _in_time(partial(least_duration, relaxation), MOST)
+    return None if needed is None else _in_time(partial(_longer, relaxation, trial, needed), MOST)
 
 
-def _longer(relaxation: Relaxation, trial: CandidateTest) -> str:
-    """Find the least duration that will do, in s, rounded up to three digits; empty where there is none."""
-    enough = least_duration(relaxation)
-    if enough is None:
-        return ""
+def _longer(relaxation: Relaxation, trial: CandidateTest, enough: float) -> str:
+    """Find the least duration that will do, in s, rounded up to three digits; empty where there is none.
+
+    Parameters
+    ----------
+    relaxation : Relaxation
+    trial : CandidateTest
+    enough : float
+        s, in which limits can just be kept by the relaxation.
+    """
 
     def lasting(factor: float) -> Problem:
         return attrs.evolve(relaxation.problem, duration=float(rounded_up(factor * enough)))
@@ -158,10 +169,12 @@ def _longer(relaxation: Relaxation, trial: CandidateTest) -> str:
     return "" if factor is None else rounded_up(factor * enough)
 
 
-def _widened(relaxation: Relaxation, trial: CandidateTest, limits: Mapping[str, Any]) -> str:
+def _widened(
+    relaxation: Relaxation, trial: CandidateTest, limits: Mapping[str, Any], most: float = math.inf
+) -> str:
     """Widen some limits as little as will do, the others as they are; nothing where nothing will."""
     problem, easiest = relaxation.problem, relaxation.least(tuple(limits))
-    if easiest is None:
+    if easiest is None or easiest.share > most:
         return ""
     enough = max(easiest.share, 1.0)
 

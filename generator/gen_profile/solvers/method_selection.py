@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from itertools import count
 
@@ -14,13 +15,13 @@ from gen_profile.problem.problem import Problem
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct import worst_case
-from gen_profile.solvers.direct.relaxation import Relaxation
+from gen_profile.solvers.direct.relaxation import Relaxation, Relaxed
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.infeasibility import CandidateTest, cures, longer
 from gen_profile.solvers.minimum_time import shortest_duration
 from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Solution, Status
+from gen_profile.solvers.solution import WIDER, Solution, Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.values import SolverName
 from gen_profile.work import OutOfWork, budget, spend
@@ -30,10 +31,10 @@ Trial = Callable[[Problem], Solution]  # of a problem by the direct method, as t
 SHORTEST = "looking for the shortest duration"
 ANSWER = 24.0, 28.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 8.0  # s of work for a method
+LOOKING = 0.5  # likewise to see whether limits can be kept at all
 DIRECTLY = 12.0  # likewise for the direct one
 NEARLY = 1.1  # times the limits that the motion most easily within them may take, for it costs a little, too
 OTHERWISE = 'Set solver.method = "auto"'
-WIDER = "Allow more time (move.duration), or wider limits."
 IN_VAIN = (
     "Longer moves, wider limits and less robustness were tried as far as the work allows, and none was found "
     "to do. Not tried: fewer limits, or fewer parameters in robustness.uncertain. See whether all numbers of "
@@ -73,8 +74,8 @@ def attempt(problem: Problem, method: SolverName = "auto", *, coarse: bool = Fal
     solve = partial(_direct, coarse=coarse)
     if method == "direct" or problem.worst_case is not None:
         return _in_time(solve, attrs.evolve(problem, worst_case=None), DIRECTLY)
-    solution = _in_time(indirect.solve, problem, SOLVING)
-    if method == "indirect" or keeps_limits(solution):
+    solution = _in_time(partial(indirect.solve, far=partial(_within_reach, problem)), problem, SOLVING)
+    if method == "indirect" or keeps_limits(solution) or solution.status is Status.INFEASIBLE:
         return solution
     other = _in_time(solve, problem, DIRECTLY)
     return solution if other.optimum is None and solution.optimum is None else other
@@ -154,16 +155,30 @@ def _direct(problem: Problem, *, coarse: bool) -> Solution:
     solution = direct.solve(problem, coarse=coarse)
     if coarse or keeps_limits(solution) or not problem.limits.stated():
         return solution
-    easiest = Relaxation(problem).least(tuple(problem.limits.stated()))
+    easiest = _easiest(problem)
     if easiest is None or easiest.share > NEARLY:
         return solution
     return direct.solve(problem, easiest.iterate)
 
 
+def _easiest(problem: Problem) -> Relaxed | None:
+    """Find the motion that is most easily within the limits; none without limits."""
+    places = tuple(problem.limits.stated())
+    return Relaxation(problem).least(places) if places else None
+
+
+def _within_reach(problem: Problem) -> bool:
+    """Whether a motion may keep the limits, for all that a few programs tell."""
+    easiest = None
+    with suppress(OutOfWork), budget(LOOKING):
+        easiest = _easiest(problem)
+    spend(0.0)
+    return easiest is None or easiest.share <= NEARLY
+
+
 def _over_a_range(problem: Problem) -> Solution:
     """Look for the least worst case only where the nominal machine's motion can keep the limits."""
-    places = tuple(problem.limits.stated())
-    easiest = Relaxation(problem).least(places) if places else None
+    easiest = _easiest(problem)
     if easiest is None or easiest.share <= NEARLY:
         return worst_case.solve(problem)
     return attrs.evolve(easiest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, cure=WIDER)

@@ -10,6 +10,8 @@ from gen_profile.errors import GenProfileError, InfeasibleProblem, SolverDiverge
 from gen_profile.motion.profile import Array
 from gen_profile.problem.problem import Problem
 
+WIDER = "Allow more time (move.duration), or wider limits."
+
 
 class Status(Enum):
     """How a solve ended, each with its sentence."""

@@ -30,7 +30,7 @@ from gen_profile.solvers.direct.refinement import bisected, switching
 from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
-from gen_profile.solvers.solution import Optimum, Solution, Status
+from gen_profile.solvers.solution import WIDER, Optimum, Solution, Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.work import OutOfWork, budget, left, spend
 
@@ -319,7 +319,7 @@ def conclude(found: ProgramSequence, sway_cost: SwayCost, iterations: int) -> So
     problem = found.setup.problem
     status, cure = Status.CONVERGED, ""
     if found.verdict is ConicStatus.INFEASIBLE:
-        status, cure = Status.INFEASIBLE, "Allow more time (move.duration), or wider limits."
+        status, cure = Status.INFEASIBLE, WIDER
     elif found.verdict is not ConicStatus.SOLVED:
         status, cure = Status.DIVERGED, "Allow more time (move.duration)."
     elif greatest_angle(found) > HORIZONTAL:

@@ -8,6 +8,7 @@ as fine as it takes (`solvers.homotopy`).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import attrs
 import numpy as np
@@ -23,12 +24,12 @@ from gen_profile.solvers.indirect.boundary_value_problem import (
     quintic,
     with_sway_cost,
 )
-from gen_profile.solvers.indirect.extremal import METHOD, judged
+from gen_profile.solvers.indirect.extremal import METHOD, failure, judged
 from gen_profile.solvers.indirect.homotopy import MODERATE_ANGLE, solve_by_homotopy
 from gen_profile.solvers.indirect.newton import NewtonOutcome
 from gen_profile.solvers.indirect.refinement import refine
 from gen_profile.solvers.indirect.simplified_newton import solve_simplified
-from gen_profile.solvers.solution import Solution
+from gen_profile.solvers.solution import WIDER, Solution, Status
 
 __all__ = ["METHOD", "solve"]
 
@@ -36,12 +37,14 @@ LONG_INTERVALS = 8  # at least
 RADIANS_PER_LONG_INTERVAL = 6.0  # of the fastest mode that matters
 
 
-def solve(problem: Problem) -> Solution:
+def solve(problem: Problem, far: Callable[[], bool] = lambda: True) -> Solution:
     """Find the motion that minimises eq. (26) and leaves neither sway nor sensitivity.
 
     Parameters
     ----------
     problem : Problem
+    far : () → bool
+        Whether one that swings far is worth looking for, which takes long; asked where there is no other.
 
     Returns
     -------
@@ -54,23 +57,25 @@ def solve(problem: Problem) -> Solution:
         The machine does not hang at rest, so that it has no natural frequencies.
     """
     with one_thread():
-        return _solve(problem)
+        return _solve(problem, far)
 
 
-def _solve(problem: Problem) -> Solution:
+def _solve(problem: Problem, far: Callable[[], bool]) -> Solution:
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     quiet = canonical_problem(problem, system)
     asked, redundant = independence(quiet)
     if redundant:
         kept = tuple(name for name in problem.desensitized if name not in redundant)
-        solution = _solve(attrs.evolve(problem, desensitized=kept))
+        solution = _solve(attrs.evolve(problem, desensitized=kept), far)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
     try:
         found = _solve_simply(problem, quiet)
     except np.linalg.LinAlgError:
         found = None
-    return found or solve_by_homotopy(problem, quiet)
+    if found is not None:
+        return found
+    return solve_by_homotopy(problem, quiet) if far() else failure(problem, Status.INFEASIBLE, 0, WIDER)
 
 
 def _solve_simply(problem: Problem, quiet: BoundaryValueProblem) -> Solution | None:
