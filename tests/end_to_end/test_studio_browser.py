@@ -184,11 +184,13 @@ def test_a_planner_block_is_driven_by_hand(page):
     page.wait("return document.querySelector('#command').textContent.includes('bay.toml')")
     page.find("#begin").click()
     page.wait("return document.querySelector('#promise.passed') !== null")
-    page.run("""
-        const [, target] = document.querySelectorAll('#helm input');
-        target.value = '0.5';
-        target.dispatchEvent(new Event('input'))""")
-    page.wait("return parseFloat(document.querySelector('#driven dd').textContent) > 0.1")
+    page.run("document.querySelector('#drive .stage').scrollIntoView({block: 'center'})")
+    x, y, width = page.run("""
+        const box = document.querySelector('#drive svg').getBoundingClientRect();
+        return [box.left + box.width / 2, box.top + box.height / 2, box.width]""")
+    page.drag((x, y), (x + 0.25 * width, y))
+    page.wait("return Number(document.querySelectorAll('#helm input')[1].value) > 0.3")
+    page.wait("return parseFloat(document.querySelector('#driven dd').textContent) > 0.3")
     assert violations(page) == []
     page.find("#halt").click()
     page.wait("return document.querySelectorAll('#driven dd')[1].textContent.startsWith('0.000')")

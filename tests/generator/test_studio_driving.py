@@ -87,3 +87,20 @@ def test_several_axes_take_a_value_each():
     assert [axis["name"] for axis in part["axes"]] == ["x", "y"]
     (part,) = drive(asked("gantry-crane", edits, drive=5, command="velocity", values=(0.1,)))
     assert part["sentences"] == ["The planner takes 2 values, one for each axis."]
+
+
+@pytest.mark.parametrize(
+    ("preset", "limits", "view"),
+    [("paper", {}, 0), ("gantry-crane", {"limits.travel": [-1.0, 20.0], "check.residual_sway": 0.2}, -1)],
+)
+def test_the_target_is_where_the_load_hangs_in_the_picture_that_is_pointed_at(preset, limits, view):
+    going = Drive(asked(preset, {**LIMITS, **limits}).question.spec())
+    view %= len(going._bounds)
+    there = np.array([0.4] if preset == "paper" else [3.0, 1.2])
+    place = going._marks(there)[view]
+    part = going.moment(asked(command="point", values=(view, *place)))
+    assert part["target"] == pytest.approx(there, abs=1e-6)
+    assert part["marks"][view] == pytest.approx(place, abs=1e-6)
+    beyond = going.moment(asked(command="point", values=(view, 1e3, 1e3)))["target"]
+    assert beyond == pytest.approx(np.full(len(there), {"paper": 1.0}.get(preset, 20.0)))
+    assert going.moment(asked(command="stop"))["target"] is None

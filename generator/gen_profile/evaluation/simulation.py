@@ -23,7 +23,7 @@ from gen_profile.work import spend
 
 RELATIVE_TOLERANCE = 1e-10
 ABSOLUTE_TOLERANCE = 1e-13
-FREE_ACCURACY = 1e-8  # of free swings, which are compared with measured ones
+FREE_ACCURACY = 1e-8  # of swings from given states, which are compared with measured ones
 TRANSIENT_SAMPLES = 4001
 SHORTEST_STRETCH = 1e-9  # of a motion's duration: closer times are one
 GROWTH = 1e-6  # of the fastest rate, beyond which a machine does not return to rest
@@ -207,21 +207,64 @@ def free_swing(
         The integration fails.
     """
     position = np.array([q_a], dtype=np.float64)
-    axes = np.concatenate([position, np.zeros((1, 2 * position.size))], axis=1)
+    still = np.concatenate([position, np.zeros((1, 2 * position.size))], axis=1)
+    followed = swing_from(
+        plant,
+        machines,
+        motion=lambda nodes: np.repeat(still, len(nodes), axis=0),
+        start=starts.reshape(len(machines), 2, -1).swapaxes(0, 1),
+        times=times,
+    )
+    q_u = np.ascontiguousarray(followed[0].swapaxes(0, 1))
+    outputs, loads = equations_of(plant)[1], len(plant.loads)
+    seen = outputs(q_u, position, machines[:, None])[..., 0]
+    return seen[:, :, :loads], seen[:, :, loads:]
+
+
+def swing_from(
+    plant: Plant,
+    machines: Array,
+    *,
+    motion: Callable[[Array], Array],
+    start: Array,
+    times: Array,
+) -> Array:
+    """Let machines swing from given states while their axes move.
+
+    Parameters
+    ----------
+    plant : Plant
+    machines : (machines, parameters) array
+        In the order of `Plant.parameters`.
+    motion : (nodes,) array → (nodes, 3 axes) array
+        Position, velocity and acceleration of all axes at times in s.
+    start : (2, machines, n_u) array
+        q_u and q̇_u at the first of the times.
+    times : (samples,) array
+        s, rising.
+
+    Returns
+    -------
+    (2, samples, machines, n_u) array
+        q_u and q̇_u.
+
+    Raises
+    ------
+    CosimulationError
+        The integration fails.
+    """
+    q_a = motion(times[:1])[0, : len(plant.actuated)].tolist()
     swing = integrate(
-        _accelerations(plant, machines, lambda nodes: np.repeat(axes, len(nodes), axis=0)),
+        _accelerations(plant, machines, motion),
         lambda _: linear_terms(plant, machines, q_a),
-        starts.reshape(len(machines), 2, -1).swapaxes(0, 1).reshape(2, -1),
+        start.reshape(2, -1),
         times[[0, -1]],
         fastest=float(np.abs(eigenvalues(plant, machines, q_a)).max()),
         accuracy=FREE_ACCURACY,
         least=ABSOLUTE_TOLERANCE / RELATIVE_TOLERANCE * FREE_ACCURACY,
         what=f"{plant.type}'s swing",
     )
-    q_u = np.ascontiguousarray(swing(times)[0].reshape(len(times), len(machines), -1).swapaxes(0, 1))
-    outputs, loads = equations_of(plant)[1], len(plant.loads)
-    seen = outputs(q_u, position, machines[:, None])[..., 0]
-    return seen[:, :, :loads], seen[:, :, loads:]
+    return swing(times).reshape(2, len(times), *start.shape[1:])
 
 
 def _stretches(profile: Profile, until: float) -> Array:

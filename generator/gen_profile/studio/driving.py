@@ -11,14 +11,16 @@ from typing import Any
 
 import attrs
 import numpy as np
+from scipy.optimize import least_squares
 
 from gen_profile.charts.figure import PALETTE
 from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.evaluation.phrases import machine, place_unit
-from gen_profile.evaluation.simulation import equations_of
+from gen_profile.evaluation.simulation import equations_of, swing_from
 from gen_profile.motion.profile import Array
 from gen_profile.planner.machine import planned_axes
 from gen_profile.planner.planner import Planner, SetpointHistory
+from gen_profile.plants.drawing import Drawing
 from gen_profile.problem.dynamics import parameter_column
 from gen_profile.report.animation import Actor, Animation
 from gen_profile.report.machines import body_size, drawings, pose_of
@@ -29,7 +31,7 @@ MOMENT = 0.1  # s
 FRAMES = 4  # of a moment
 COLOURS = PALETTE[:3]
 SWAYS = 0.35  # rad, of the ropes, that a picture has room for
-COMMANDS = ("velocity", "target", "stop", "quick_stop")
+COMMANDS = ("velocity", "target", "point", "stop", "quick_stop")
 
 Part = dict[str, Any]
 
@@ -86,6 +88,7 @@ class Drive:
         n_u = len(self._plant.unactuated)
         self._state = np.zeros((2, len(self._followers), n_u))  # coordinates and rates of every machine
         self._axes = self._at(np.array([start]), np.zeros((2, 1, len(start))))[0]
+        self._target: Array | None = None  # of the planned axes
         self._bounds = self._room()
 
     def moment(self, asked: DriveQuestion) -> Part:
@@ -99,14 +102,16 @@ class Drive:
         axes = self._at(position, np.stack([velocity, acceleration]))
         states = self._swing(axes)
         shown = np.linspace(0, len(axes), FRAMES + 1).round().astype(int)
-        frames = self._animation(np.stack([self._axes, *axes])[shown, 0], states[shown])
-        self._axes, self._state = axes[-1], states[-1]
+        frames = self._animation(np.stack([self._axes, *axes])[shown, 0], states[0, shown])
+        self._axes, self._state = axes[-1], states[:, -1]
         return {
             "part": "driven",
             "animation": frames.to_json(self._bounds),
             "seconds": MOMENT,
             "axes": self._told(issued, position[-1], velocity[-1]),
             "live": [self._ranges(name, value) for name, value in self._live.items()],
+            "target": None if self._target is None else self._target.tolist(),
+            "marks": [] if self._target is None else self._marks(self._target).tolist(),
             "busy": bool(issued.busy[-1]),
             "promise": bool(issued.promise[-1]),
             "error": int(issued.error_id[-1]),
@@ -117,13 +122,45 @@ class Drive:
         if asked.command not in ("", *COMMANDS) or not np.isfinite(asked.values).all():
             raise SpecError(f"There is no command {asked.command[:20]!r} with such values.")
         orders: dict[str, Any] = {"live": asked.live}
+        if not asked.command:
+            return orders
+        self._target = None
         if asked.command in ("stop", "quick_stop"):
             return {**orders, asked.command: True}
-        if asked.command:
-            if len(asked.values) != len(self._columns):
-                raise SpecError(f"The planner takes {len(self._columns)} values, one for each axis.")
-            orders[asked.command] = asked.values if len(asked.values) > 1 else asked.values[0]
-        return orders
+        command, values = asked.command, asked.values
+        if command == "point":
+            command, values = "target", self._pointed(values)
+        if len(values) != len(self._columns):
+            raise SpecError(f"The planner takes {len(self._columns)} values, one for each axis.")
+        if command == "target":
+            self._target = np.array(values)
+        return {**orders, command: values if len(values) > 1 else values[0]}
+
+    def _pointed(self, values: Sequence[float]) -> tuple[float, ...]:
+        """Find the target at which the load hangs where a picture is pointed at, or as near as it gets.
+
+        Parameters
+        ----------
+        values : (view, x, y)
+            The picture's number, and a place in it in m.
+        """
+        if len(values) != 3 or values[0] not in range(len(self._bounds)):
+            raise SpecError(f"There is no command 'point' with {len(values)} such values.")
+        low, high = self._ends()[:, self._columns]
+        view, *place = values
+        found = least_squares(
+            lambda target: self._marks(target)[int(view)] - place,
+            np.clip(self._axes[0, self._columns], low, high),
+            bounds=(low, high),
+        )
+        return tuple(found.x.tolist())
+
+    def _marks(self, target: Array) -> Array:
+        """Tell where in every picture the nominal machine's end load hangs at a target, shape (views, 2)."""
+        q_a = np.concatenate([self._ends(), self._places[None]])
+        q_a[-1, self._columns] = target
+        seen = self._drawn(self._parameters()[0], q_a, np.zeros((len(q_a), len(self._plant.unactuated))))
+        return np.array([drawing.rest[-1, _load(drawing)] for drawing in seen])
 
     def _tell_live(self, live: Mapping[str, float]) -> None:
         """Give the machines the ropes that the planner was told of."""
@@ -148,43 +185,28 @@ class Drive:
         return axes
 
     def _swing(self, axes: Array) -> Array:
-        """Integrate all machines from cycle to cycle by the classical method of Runge and Kutta.
+        """Let all machines follow the axes, shape (2, cycles + 1, machines, n_u)."""
+        rows = np.stack([self._axes, *axes]).reshape(len(axes) + 1, -1)
+        times = self._planner.cycle_time * np.arange(len(rows))
+        return swing_from(
+            self._plant,
+            np.concatenate([parameter_column(self._plant, values) for values in self._parameters()]),
+            motion=lambda nodes: np.stack([np.interp(nodes, times, row) for row in rows.T], axis=1),
+            start=self._state,
+            times=times,
+        )
 
-        Returns
-        -------
-        (cycles + 1, 2, machines, n_u) array
-        """
-        accelerations, step = equations_of(self._plant)[0], self._planner.cycle_time
-        p = np.concatenate([parameter_column(self._plant, values) for values in self._parameters()])
-        states, before = [self._state], self._axes
-
-        def rates(state: Array, motion: Array) -> Array:
-            rows = np.tile(motion.ravel(), (len(p), 1))
-            return np.stack([state[1], accelerations(state[0], state[1], rows, p)[:, :, 0]])
-
-        for after in axes:
-            state, middle = states[-1], 0.5 * (before + after)
-            k1 = rates(state, before)
-            k2 = rates(state + 0.5 * step * k1, middle)
-            k3 = rates(state + 0.5 * step * k2, middle)
-            k4 = rates(state + step * k3, after)
-            states.append(state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
-            before = after
-        return np.array(states)
-
-    def _animation(self, places: Array, states: Array) -> Animation:
+    def _animation(self, places: Array, swung: Array) -> Animation:
         """Draw the machines; two frames at the ends of the travel come first: rails go as far."""
         ends = self._ends()
         q_a = np.concatenate([ends, places])
         still = np.zeros((len(ends), len(self._plant.unactuated)))
         outputs, actors = equations_of(self._plant)[1], []
         for index, (one, parameters) in enumerate(zip(self._followers, self._parameters(), strict=True)):
-            q_u = np.concatenate([still, states[:, 0, index]])
-            size = body_size(self._plant, parameters, q_a)
-            pose = pose_of(self._plant, parameters, q_a, q_u, size)
+            q_u = np.concatenate([still, swung[:, index]])
             row = parameter_column(self._plant, parameters)
             sway = outputs(q_u, q_a, row)[:, : len(self._plant.loads), 0][:, self._plant.end_load]
-            drawn = drawings(self._plant, pose)
+            drawn = self._drawn(parameters, q_a, q_u)
             sign = sway[:, -1] if sway.shape[1] == 1 else np.linalg.norm(sway, axis=1)
             actors.append(Actor(name=one.name, colour=COLOURS[index], sway=sign, drawings=drawn))
         return Animation(
@@ -195,6 +217,11 @@ class Drive:
             actors=actors,
         )
 
+    def _drawn(self, parameters: Mapping[str, float], q_a: Array, q_u: Array) -> Sequence[Drawing]:
+        """Draw a machine from every side."""
+        size = body_size(self._plant, parameters, q_a)
+        return drawings(self._plant, pose_of(self._plant, parameters, q_a, q_u, size))
+
     def _ends(self) -> Array:
         """Give the places of all axes at both ends of the travel, shape (2, axes)."""
         ends = np.tile(self._places, (2, 1))
@@ -204,13 +231,10 @@ class Drive:
 
     def _room(self) -> list[list[float]]:
         """Choose what a picture shows: the whole travel, and loads that swing."""
-        swung = np.full((2, len(self._followers), len(self._plant.unactuated)), 0.0)
         angles = [one.unit == "rad" for one in self._plant.unactuated]
-        swung[0] = np.where(angles, SWAYS, 0.0)
-        states = np.stack([-swung, swung])
-        views: list[list[float]] = [
-            view["bounds"] for view in self._animation(self._ends(), states).to_json()["views"]
-        ]
+        swung = np.tile(np.where(angles, SWAYS, 0.0), (len(self._followers), 1))
+        frames = self._animation(self._ends(), np.stack([-swung, swung])).to_json()
+        views: list[list[float]] = [view["bounds"] for view in frames["views"]]
         return views
 
     def _told(self, issued: SetpointHistory, position: Array, velocity: Array) -> list[Part]:
@@ -240,6 +264,12 @@ class Drive:
         units = {one.name: one.unit for one in self._plant.parameters}
         units |= {axis.name: axis.unit for axis in self._plant.actuated}
         return {"name": name, "value": value, "least": low, "most": high, "unit": units[name]}
+
+
+def _load(drawing: Drawing) -> int:
+    """Find the point of a drawing at which its end load is."""
+    loads = [shape for shape in drawing.shapes if shape.kind == "load"]
+    return [*drawing.shapes, *loads][-1].points[0]
 
 
 def _followers(spec: Spec) -> Sequence[Follower]:

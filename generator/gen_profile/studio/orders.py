@@ -69,9 +69,10 @@ class DriveQuestion:
     drive : int
         Which drive it is: another number begins anew.
     command : str
-        ``"velocity"``, ``"target"``, ``"stop"``, ``"quick_stop"``, or empty to go on.
+        ``"velocity"``, ``"target"``, ``"point"``, ``"stop"``, ``"quick_stop"``, or empty to go on.
     values : tuple of float
-        A velocity or target for every axis that is planned, in m/s or m (or rad).
+        A velocity or target for every axis that is planned, in m/s or m (or rad); to point, the number of a
+        picture, and a place in it in m.
     live : mapping of str to float
         Live parameters, as they are now.
     """

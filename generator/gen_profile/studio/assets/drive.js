@@ -1,12 +1,12 @@
 // A planner block driven by hand: a stick and a target for every axis, and the machines that follow, moment by moment.
 "use strict";
 const driving = (() => {
-  const { element } = knobs;
+  const { draw, element } = knobs;
   const ENDS = 2; // frames before those to be shown, at the ends of the travel
   const $ = (id) => document.getElementById(id);
   let page = null; // what the page lends: words, its state, its socket
   let drive = 0, number = 0;
-  let running = false, order = null, live = {};
+  let running = false, pointing = false, order = null, live = {};
   let helm = null; // the controls, once it is known what there is to control
   let actors = null, playing = null, next = null, told = null;
 
@@ -101,6 +101,14 @@ const driving = (() => {
     }
     $("undriven").textContent = part.error ? page.filled("drive.error", { error: part.error }) : "";
     for (const slider of helm.live) slider.disabled = part.busy;
+    for (const { mark, at, view } of helm.views) {
+      const [x, y] = part.target ? at(part.marks[view]) : [-100, -100]; // out of sight
+      mark.setAttribute("transform", `translate(${x} ${y})`);
+    }
+    if (part.target && order.command === "point") {
+      helm.targets.forEach(({ range, put }, index) => { range.value = String(part.target[index]); put(); });
+      if (!pointing) command("target", part.target);
+    }
     buttons();
   }
 
@@ -142,8 +150,27 @@ const driving = (() => {
     const ropes = part.live.map(({ name, value, least, most, unit }) => slider(name, { least, most, value }, (now) => `${now.toFixed(2)} ${unit}`, () => {
       live = Object.fromEntries(ropes.map(({ range }, index) => [part.live[index].name, Number(range.value)]));
     }));
-    helm = { sticks, live: ropes.map(({ range }) => range) };
+    const views = [...document.querySelectorAll("#drive .stage svg")].map((svg, place) => pictured(svg, part.animation.views, place % part.animation.views.length));
+    helm = { sticks, targets, views, live: ropes.map(({ range }) => range) };
     $("helm").replaceChildren(...[...sticks, ...targets, ...ropes].map(({ host }) => host));
+  }
+
+  /** Let the target be dragged in a picture, and mark where the load will hang. */
+  function pictured(svg, views, view) {
+    const [left, bottom, width, height] = views[view].bounds, scale = 1000 / width;
+    const mark = draw(svg, "path", { class: "target", d: "M-16 0H16M0-16V16M-9 0a9 9 0 1 0 18 0a9 9 0 1 0-18 0", transform: "translate(-100 -100)" });
+    const point = (event) => {
+      const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+      command("point", [view, left + x / scale, bottom + height - y / scale]);
+    };
+    svg.addEventListener("pointerdown", (event) => {
+      svg.setPointerCapture(event.pointerId);
+      pointing = true;
+      point(event);
+    });
+    svg.addEventListener("pointermove", (event) => { if (pointing) point(event); });
+    for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, () => { pointing = false; });
+    return { mark, view, at: ([x, y]) => [(x - left) * scale, (bottom + height - y) * scale] };
   }
 
   function stop(name) {
