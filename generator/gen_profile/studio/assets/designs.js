@@ -34,7 +34,7 @@ const designs = (() => {
     }
     if (limit <= top) draw(svg, "path", { class: "limit", d: `M${ROOM.left} ${up(limit)}H${width - ROOM.right}` });
     draw(svg, "text", { x: width - ROOM.right, y: HEIGHT - 2, "text-anchor": "end" }, `${options.phrase(`over.${over}`)} (${over === "acceleration" ? `${unit}/s²` : over === "sway" ? "mm" : "s"})`);
-    draw(svg, "text", { x: 4, y: 10 }, `${options.phrase("residual")} (mm)`);
+    draw(svg, "text", { x: 4, y: 10 }, `${options.residual} (mm)`);
     rows.forEach((row, place) => {
       const kind = row.pinned ? "pinned" : row.own ? "own" : row.method.startsWith("optimal") ? "optimal" : "shaper";
       const mark = draw(svg, "g", { class: `point ${kind}${row.pareto || row.own || row.pinned ? "" : " beaten"}` });
@@ -48,7 +48,7 @@ const designs = (() => {
 
   function listed() {
     const { rows, limit, unit } = shown;
-    const head = ["designs.method", "over.duration", "over.acceleration", "over.sway", "residual"].map((key) => options.phrase(key));
+    const head = [...["designs.method", "over.duration", "over.acceleration", "over.sway"].map((key) => options.phrase(key)), options.residual];
     const units = ["", "s", `${unit}/s²`, "mm", "mm"];
     const body = rows.map((row) => {
       const values = [row.duration, row.acceleration, 1e3 * row.sway, 1e3 * row.residual].map(curves.short);
