@@ -29,3 +29,9 @@ def test_derivatives_are_quotients_of_differences(direction):
 
 def test_far_too_much_sway_costs_a_finite_amount():
     assert np.isfinite(COST.derivatives(np.array([[1e3, 0.0]]))[1]).all()
+
+
+def test_a_sway_beyond_all_numbers_costs_the_most_without_a_warning():
+    far = np.array([[1e200, 1e200]])
+    assert COST.values(far) == COST.values(np.array([[1e3, 0.0]]))
+    assert (COST.derivatives(far)[0] > 0.0).all()

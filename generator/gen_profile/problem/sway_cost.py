@@ -19,7 +19,8 @@ class SwayCost:
 
     def exponents(self, sway: Array) -> Array:
         """(γ d)², shape (points,)."""
-        return np.asarray(self.gamma**2 * (sway**2).sum(axis=1))
+        with np.errstate(over="ignore"):  # of an iterate that diverges
+            return np.asarray(self.gamma**2 * (sway**2).sum(axis=1))
 
     def values(self, sway: Array) -> Array:
         """Evaluate the cost, shape (points,)."""
@@ -28,5 +29,6 @@ class SwayCost:
     def derivatives(self, sway: Array) -> tuple[Array, Array]:
         """Differentiate it once and twice: (points, directions) and (points, directions, directions)."""
         steepness = 2.0 * self.gamma**2 * self.values(sway)[:, None]
-        square = np.eye(sway.shape[1]) + 2.0 * self.gamma**2 * sway[:, :, None] * sway[:, None]
-        return steepness * sway, steepness[..., None] * square
+        with np.errstate(over="ignore"):
+            square = np.eye(sway.shape[1]) + 2.0 * self.gamma**2 * sway[:, :, None] * sway[:, None]
+            return steepness * sway, steepness[..., None] * square

@@ -187,7 +187,7 @@ class Drive:
     def _swing(self, axes: Array) -> Array:
         """Let all machines follow the axes, shape (2, cycles + 1, machines, n_u)."""
         rows = np.stack([self._axes, *axes]).reshape(len(axes) + 1, -1)
-        times = self._planner.cycle_time * np.arange(len(rows))
+        times: Array = self._planner.cycle_time * np.arange(len(rows), dtype=np.float64)
         return swing_from(
             self._plant,
             np.concatenate([parameter_column(self._plant, values) for values in self._parameters()]),
