@@ -199,11 +199,20 @@ def test_a_planner_block_is_driven_by_hand(page):
     page.wait("return !document.querySelector('#command').textContent.includes('bay.toml')")
 
 
-def test_it_speaks_german(page):
+def test_it_speaks_german_of_what_is_shown(page):
+    page.find('input[type=number][aria-label="Duration"]').send_keys(Keys.CONTROL, "a", Keys.NULL, "3.1\n")
+    page.wait("return document.querySelector('#command').textContent.endsWith('move.duration=3.1')")
     page.find("#language").click()
     page.wait("return document.documentElement.lang === 'de'")
     words = page.find("#panel").text
     assert "Dauer" in words and "Duration" not in words
+    boxes = page.run("return [...document.querySelectorAll('#formats input')].map((box) => box.value)")
+    assert len(boxes) == len(set(boxes))
+    page.find('input[type=number][aria-label="Weg"]').send_keys(Keys.CONTROL, "a", Keys.NULL, "0.2\n")
+    page.wait("return document.querySelector('#command').textContent.includes('move.distance=')")
+    assert "move.duration=3.1" in state(page)[0]
+    page.find("#undo").click()
+    page.find("#undo").click()
     page.find("#language").click()
 
 

@@ -5,6 +5,7 @@
   const { element } = knobs;
   const WORDS = await (await fetch("words.json")).json();
   const LANGUAGES = ["en", "de"];
+  const ONCE = new Set(["hello", "state", "opened", "consent"]); // parts that do something: no other language shows them again
   let language = localStorage.getItem("language") ?? (navigator.language.startsWith("de") ? "de" : "en");
   let state = { preset: "", edits: {} };
   let kept = JSON.stringify(state); // the state that undo leads back from
@@ -44,7 +45,7 @@
     player = null;
     logs.speak();
     driving.speak();
-    for (const part of Object.values(latest)) take(part);
+    for (const part of Object.values(latest)) if (!ONCE.has(part.part)) take(part);
   }
 
   // state ---------------------------------------------------------------------------------------------------
