@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from contextlib import suppress
 from functools import cache, partial
@@ -12,7 +13,7 @@ import numpy as np
 from gen_profile.designs import transient_sway
 from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import InfeasibleProblem, LimitViolation, SolverDiverged
-from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, keeps_residual_sway
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, share_of_residual_sway
 from gen_profile.motion.profile import Profile, grid_length, grid_times
 from gen_profile.problem.limits import SWAY_TOLERANCE, breaches, rounded_up
 from gen_profile.problem.linearization import linearize
@@ -103,13 +104,19 @@ def timed(spec: Spec, progress: Progress = untold) -> Spec:
     SolverDiverged
         None was found in the work that a search may take.
     """
+    return _timed(spec, progress)[0]
+
+
+def _timed(spec: Spec, progress: Progress) -> tuple[Spec, Draft | None]:
+    """Find the shortest duration where a spec asks for it, and the motion, where that was looked for, too."""
     if not spec.move.shortest:
-        return spec
+        return spec, None
     if spec.solver.shaper is not None:
-        return _lasting(spec, shaped_motion(spec, spec.solver.shaper).duration)
+        return _lasting(spec, shaped_motion(spec, spec.solver.shaper).duration), None
     try:
         with budget(SEARCHING):
-            return _shortest(spec, progress)
+            found = _shortest(spec, progress)
+            return found.spec, found
     except OutOfWork as error:
         spend(0.0)
         enough = choice.sufficient_duration(_slow(spec), partial(transient_sway.as_asked_next, spec))
@@ -120,7 +127,7 @@ def timed(spec: Spec, progress: Progress = untold) -> Spec:
         ) from error
 
 
-def _shortest(spec: Spec, progress: Progress) -> Spec:
+def _shortest(spec: Spec, progress: Progress) -> Draft:
     problem = problem_of(spec)
     shortest = choice.minimum_time(problem, progress)
     with suppress(OutOfWork), budget(SPREADING * left()):
@@ -141,24 +148,26 @@ def _shortest(spec: Spec, progress: Progress) -> Spec:
         raise InfeasibleProblem(
             f"move.duration: no duration keeps the limits and brings the load to rest. {cure}"
         )
-    quickest = _lasting(spec, shortest)
-    if _calms(quickest, problem.sway_spread):
-        return quickest
 
     @cache  # for many a duration ends on the same cycle
-    def calms(duration: float) -> bool:
+    def attempted(duration: float) -> tuple[float, Draft]:
         progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
-        return _calms(_lasting(spec, duration), problem.sway_spread)
+        found = _solved(_lasting(spec, duration), spread=problem.sway_spread)
+        return _unrest(found), found
 
-    calm = least_beyond(
-        lambda duration: calms(_lasting(spec, duration).move.duration), shortest, LONGEST * shortest
-    )
+    def in_cycles(duration: float) -> tuple[float, Draft]:
+        return attempted(_lasting(spec, duration).move.duration)
+
+    unrest, quickest = in_cycles(shortest)
+    if unrest <= 0.0:
+        return quickest
+    calm = least_beyond(lambda duration: in_cycles(duration)[0], shortest, LONGEST * shortest, unrest)
     if calm is None:
         raise InfeasibleProblem(
             "check.residual_sway: no duration leaves so little sway on every machine of "
             "robustness.uncertain; allow more, or narrow the ranges."
         )
-    return _lasting(spec, calm)
+    return in_cycles(calm)[1]
 
 
 def _slow(spec: Spec) -> Problem:
@@ -176,17 +185,21 @@ def _lasting(spec: Spec, duration: float) -> Spec:
     return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=whole, shortest=False))
 
 
-def _calms(spec: Spec, spread: float) -> bool:
-    """Whether the optimal motion of a spec leaves little enough sway on every machine."""
-    solution = transient_sway.attempt(spec, spread=spread)
-    return solution.optimum is not None and _is_calm(spec, solution)
+def _unrest(found: Draft) -> float:
+    """Tell how much more sway a draft leaves than it should, as a logarithm; infinite without a motion."""
+    if found.motion is None or found.solution is None:
+        return math.inf
+    evaluation, limit = evaluate(found.spec, found.motion), found.solution.problem.limits.sway
+    if limit is not None and evaluation.figures["sway_transient_worst_m"] > SWAY_TOLERANCE * limit:
+        return math.inf
+    share = share_of_residual_sway(found.spec, evaluation)
+    return math.log(share / CALM) if share > 0.0 else -math.inf
 
 
 def _is_calm(spec: Spec, solution: Solution) -> bool:
     """Whether a solution leaves every machine of a spec little enough sway, and no more on the way."""
-    evaluation, limit = evaluate(spec, optimal_profile(solution)), solution.problem.limits.sway
-    swings = limit is not None and evaluation.figures["sway_transient_worst_m"] > SWAY_TOLERANCE * limit
-    return not swings and keeps_residual_sway(spec, evaluation, CALM)
+    motion = optimal_profile(solution)
+    return _unrest(Draft(spec=spec, solution=solution, motion=motion, solver_time=0.0)) <= 0.0
 
 
 def plan(spec: Spec, progress: Progress = untold) -> Plan:
@@ -219,15 +232,20 @@ def draft(spec: Spec, progress: Progress = untold) -> Draft:
     OutOfWork
         Nothing is left of a budget.
     """
-    spec = timed(spec, progress)
+    spec, found = _timed(spec, progress)
     progress("solving")
+    return found or _solved(spec, progress)
+
+
+def _solved(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Draft:
+    """Solve a spec with a duration, or shape a move for it."""
     began = time.perf_counter()
     solution: Solution | None = None
     motion: Profile | None = None
     if spec.solver.shaper is not None:
         motion = shaped_motion(spec, spec.solver.shaper)
     else:
-        solution = transient_sway.attempt(spec, progress)
+        solution = transient_sway.attempt(spec, progress, spread)
         if solution.optimum is not None:
             motion = optimal_profile(solution)
     return Draft(spec=spec, solution=solution, motion=motion, solver_time=time.perf_counter() - began)

@@ -156,10 +156,15 @@ def _require_room(spec: Spec, until: float) -> None:
             )
 
 
-def keeps_residual_sway(spec: Spec, evaluation: MotionEvaluation, share: float = 1.0) -> bool:
-    """Whether every load keeps a share of its limit of residual sway on all machines."""
-    limits = share * np.array(list(spec.check.residual_sway.values()))
-    return all(bool((peak(sway) <= limits).all()) for sway in _afterwards(evaluation))
+def keeps_residual_sway(spec: Spec, evaluation: MotionEvaluation) -> bool:
+    """Whether every load keeps its limit of residual sway on all machines."""
+    return share_of_residual_sway(spec, evaluation) <= 1.0
+
+
+def share_of_residual_sway(spec: Spec, evaluation: MotionEvaluation) -> float:
+    """Greatest share of its limit of residual sway that a load takes, on all machines."""
+    limits = np.array(list(spec.check.residual_sway.values()))
+    return float(max((peak(sway) / limits).max() for sway in _afterwards(evaluation)))
 
 
 def _afterwards(evaluation: MotionEvaluation) -> list[Array]:

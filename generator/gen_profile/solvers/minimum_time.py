@@ -18,6 +18,7 @@ LONGEST = 1e3  # slowest periods, after which the search gives up
 STRIDE = 1.5
 BISECTING = 0.6  # share of the work that is left
 LONGER = 8.0  # from stride to stride away from a duration that is too short
+ASIDE = 0.4  # of the precision, by which a try lies beside where a line crosses zero, for a narrow bracket
 
 
 def shortest_duration(
@@ -43,10 +44,13 @@ def shortest_duration(
     def feasible(duration: float) -> bool:
         return solve(attrs.evolve(problem, duration=duration, sway_weight=0.0)).optimum is not None
 
+    def excess(duration: float) -> float:
+        return -math.inf if feasible(duration) else math.inf
+
     slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
     period = 2.0 * math.pi / float(slowest)
     if beyond is not None:
-        return least_beyond(feasible, beyond, LONGEST * period)
+        return least_beyond(excess, beyond, LONGEST * period)
     return least(feasible, period, LONGEST * period)
 
 
@@ -84,37 +88,78 @@ def least(
             enough, short = STRIDE * enough, enough
             if enough > most:
                 return None
-    return _between(feasible, short, enough, precision)
+
+    def excess(value: float) -> float:
+        return -math.inf if feasible(value) else math.inf
+
+    return _between(excess, (short, math.inf), (enough, -math.inf), precision)
 
 
-def least_beyond(feasible: Callable[[float], bool], short: float, most: float) -> float | None:
+def least_beyond(
+    excess: Callable[[float], float], short: float, most: float, short_excess: float = math.inf
+) -> float | None:
     """Find the least duration that will do beyond one that will not, which is often next to it.
 
     Parameters
     ----------
-    feasible : float → bool
+    excess : float → float
+        Positive where a duration will not do, and continuous; infinite where that is all that is known.
     short : float
         Too short, in s.
     most : float
         Where to give up, in s.
+    short_excess : float
+        Of the one that is too short.
 
     Returns
     -------
     float or None
         s; None where none up to `most` was found to do.
     """
-    start, stride = short, PRECISION
-    while not feasible(enough := (1.0 + stride) * start):
+    start, stride, found = short, PRECISION, (short, short_excess)
+    while True:
+        enough = (1.0 + stride) * start
+        beyond = excess(enough)
+        if beyond <= 0.0:
+            return _between(excess, found, (enough, beyond), PRECISION)
         if enough > most:
             return None
-        short, stride = enough, LONGER * stride
-    return _between(feasible, short, enough, PRECISION)
+        found, stride = (enough, beyond), LONGER * stride
 
 
-def _between(feasible: Callable[[float], bool], short: float, enough: float, precision: float) -> float:
-    """Bisect as far as a share of the work that is left allows, and return the feasible end."""
+def _between(
+    excess: Callable[[float], float],
+    short: tuple[float, float],
+    enough: tuple[float, float],
+    precision: float,
+) -> float:
+    """Narrow a bracket as far as a share of the work that is left allows, and return the end that will do.
+
+    Where the excess is known at both ends, by the rule of false position, an end's excess being halved when
+    the other one was replaced twice (the Illinois method: M. Dowell, P. Jarratt, BIT 11, 1971, 168-174); by
+    bisection elsewhere.
+
+    Parameters
+    ----------
+    excess : float → float
+    short, enough : (float, float)
+        The ends of the bracket and their excess.
+    precision : float
+        Relative.
+    """
+    side = 0.0  # on which the last try was: -1 too short
     with suppress(OutOfWork), budget(BISECTING * left()):
-        while enough - short > precision * enough:
-            middle = (enough + short) / 2.0
-            enough, short = (middle, short) if feasible(middle) else (enough, middle)
-    return enough
+        while (width := enough[0] - short[0]) > precision * enough[0]:
+            middle = short[0] + width / 2.0
+            if math.isfinite(enough[1] - short[1]):
+                aside = ASIDE * precision * enough[0]
+                crossing = enough[0] - width * enough[1] / (enough[1] - short[1])
+                middle = min(max(crossing - (side or -1.0) * aside, short[0] + aside), enough[0] - aside)
+            found = middle, excess(middle)
+            if found[1] <= 0.0:
+                enough, short = found, (short[0], short[1] * (0.5 if side > 0.0 else 1.0))
+                side = 1.0
+            else:
+                short, enough = found, (enough[0], enough[1] * (0.5 if side < 0.0 else 1.0))
+                side = -1.0
+    return enough[0]
