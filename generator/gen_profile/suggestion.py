@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
 
@@ -90,7 +89,9 @@ def _misspelt(word: str, names: Iterable[str]) -> list[str]:
         own, other = word.split("-"), name.lower().split("-")
         shared = {*own} & {*other} if 2 * len({*own} & {*other}) <= len(own) else set[str]()
         rests = ["-".join(part for part in parts if part not in shared) for parts in (own, other)]
-        return difflib.SequenceMatcher(None, rests[0], rests[1]).ratio()
+        from difflib import SequenceMatcher  # noqa: PLC0415  (of which --help has no need)
+
+        return SequenceMatcher(None, rests[0], rests[1]).ratio()
 
     best = max(names, key=likeness, default="")
     return [best] if best and likeness(best) >= ALIKE else []

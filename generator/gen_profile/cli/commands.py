@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -323,6 +322,8 @@ def studio(
 
     def ready(address: str) -> None:
         if as_json:
+            import json
+
             click.echo(json.dumps({"address": address}, indent=2))
         else:
             click.echo(f"Studio at {address}\nCtrl-C ends it.", err=True)

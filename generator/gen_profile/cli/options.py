@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-import attrs
 import click
 from click.shell_completion import CompletionItem
 
@@ -83,8 +82,7 @@ class PictureFile(OutputFile):
         return path
 
 
-@attrs.frozen(kw_only=True)
-class SpecChoice:
+class SpecChoice(NamedTuple):  # attrs would take as long to load as half of click
     """The spec that a command line names, a file or a preset, and what it changes of that."""
 
     path: Path | None
@@ -99,7 +97,7 @@ class SpecChoice:
     def changed(self, values: Mapping[str, object]) -> SpecChoice:
         """Add options that stand for keys of the spec, as --set would; None is for one that was not given."""
         more = (f"{key}={value}" for key, value in values.items() if value is not None)
-        return attrs.evolve(self, overrides=(*self.overrides, *more))
+        return self._replace(overrides=(*self.overrides, *more))
 
     def spec(self) -> Spec:
         """Read it; doubt its values aloud."""

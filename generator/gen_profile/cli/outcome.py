@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import re
 import signal
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -30,7 +29,7 @@ def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
         stdout does not take it, as on a full disk.
     """
     try:
-        click.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else text)
+        click.echo(_json(document) if as_json else text)
     except BrokenPipeError:  # a reader that left early, which click knows
         raise
     except OSError as error:
@@ -82,13 +81,19 @@ def print_error(error: Exception, as_json: bool) -> int:
     if as_json:
         document = {"error": {"type": type(error).__name__, "message": message, "exit_code": code}}
         with suppress(OSError):  # the error may be that stdout takes nothing
-            click.echo(json.dumps(document, indent=2))
+            click.echo(_json(document))
     if isinstance(error, click.ClickException):
         error.show()
     else:
         for line in message.splitlines():
             click.echo(f"Error: {line}", err=True)
     return code
+
+
+def _json(document: Mapping[str, Any]) -> str:
+    import json
+
+    return json.dumps(document, indent=2, allow_nan=False)
 
 
 def _as_typed(message: str) -> str:
