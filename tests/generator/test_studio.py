@@ -231,6 +231,13 @@ def test_cures_are_read_out_of_the_sentences():
     ]
 
 
+@pytest.mark.parametrize(("travel", "share"), [([0.0, 0.6], 0.5), ([-0.3, 0.3], 0.5), ([-0.1, 0.35], 2 / 3)])
+def test_a_margin_of_travel_is_the_share_of_it_that_is_used(travel, share):
+    margins = next(picture(of("paper", {"limits.travel": travel})))["margins"]
+    (row,) = [row for row in margins if row["quantity"] == "travel"]
+    assert row["takes"] / row["allowed"] == pytest.approx(share, rel=0.01)
+
+
 def test_a_value_that_does_not_fit_is_told_at_its_knob():
     found = parts(picture(of("paper", {"plant.m1": -1.0, "limits.velocity": "fast"})))
     assert {fault["place"] for fault in found["faults"]["faults"]} == {"plant.m1", "limits.velocity"}

@@ -91,7 +91,7 @@ def test_several_axes_take_a_value_each():
 
 @pytest.mark.parametrize(
     ("preset", "limits", "view"),
-    [("paper", {}, 0), ("gantry-crane", {"limits.travel": [-1.0, 20.0], "check.residual_sway": 0.2}, -1)],
+    [("paper", {}, 0), ("gantry-crane", {"limits.travel": [0.0, 20.0], "check.residual_sway": 0.2}, -1)],
 )
 def test_the_target_is_where_the_load_hangs_in_the_picture_that_is_pointed_at(preset, limits, view):
     going = Drive(asked(preset, {**LIMITS, **limits}).question.spec())

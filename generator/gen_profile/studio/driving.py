@@ -152,6 +152,7 @@ class Drive:
             lambda target: self._marks(target)[int(view)] - place,
             np.clip(self._axes[0, self._columns], low, high),
             bounds=(low, high),
+            method="dogbox",  # the other one stays where it begins at a bound
         )
         return tuple(found.x.tolist())
 

@@ -21,6 +21,7 @@ from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
 from gen_profile.evaluation.phrases import machine, move, place_unit
 from gen_profile.motion.metrics import extremes, greatest, peak
+from gen_profile.problem.limits import ROUNDING
 from gen_profile.report.actors import animation
 from gen_profile.solvers.method_selection import ANSWER, OTHERWISE
 from gen_profile.solvers.solution import Status
@@ -125,14 +126,16 @@ def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any
         if limits.travel is not None:
             least, most = extremes(evaluation.command, 0, column)
             low, high = limits.travel
+            beyond = max(low - least, most - high)
+            way = high - low + beyond if beyond > ROUNDING * (high - low) else most - least
             unit, factor = place_unit(spec, column)
             yield {
                 "place": spec.limits.place(column, "travel"),
                 "quantity": "travel",
                 "axis": axis.name if len(spec.axis) > 1 else "",
                 "unit": unit,
-                "takes": factor * max(most - (high + low) / 2.0, (high + low) / 2.0 - least),
-                "allowed": factor * (high - low) / 2.0,
+                "takes": factor * way,
+                "allowed": factor * (high - low),
             }
 
 

@@ -102,8 +102,8 @@ const driving = (() => {
     $("undriven").textContent = part.error ? page.filled("drive.error", { error: part.error }) : "";
     for (const slider of helm.live) slider.disabled = part.busy;
     for (const { mark, at, view } of helm.views) {
-      const [x, y] = part.target ? at(part.marks[view]) : [-100, -100]; // out of sight
-      mark.setAttribute("transform", `translate(${x} ${y})`);
+      mark.toggleAttribute("hidden", !part.target);
+      if (part.target) mark.setAttribute("transform", at(part.marks[view]));
     }
     if (part.target && order.command === "point") {
       helm.targets.forEach(({ range, put }, index) => { range.value = String(part.target[index]); put(); });
@@ -158,7 +158,7 @@ const driving = (() => {
   /** Let the target be dragged in a picture, and mark where the load will hang. */
   function pictured(svg, views, view) {
     const [left, bottom, width, height] = views[view].bounds, scale = 1000 / width;
-    const mark = draw(svg, "path", { class: "target", d: "M-16 0H16M0-16V16M-9 0a9 9 0 1 0 18 0a9 9 0 1 0-18 0", transform: "translate(-100 -100)" });
+    const mark = draw(svg, "path", { class: "target", d: "M-8 0H8M0-8V8M-5 0a5 5 0 1 0 10 0a5 5 0 1 0-10 0" });
     const point = (event) => {
       const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
       command("point", [view, left + x / scale, bottom + height - y / scale]);
@@ -170,7 +170,8 @@ const driving = (() => {
     });
     svg.addEventListener("pointermove", (event) => { if (pointing) point(event); });
     for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, () => { pointing = false; });
-    return { mark, view, at: ([x, y]) => [(x - left) * scale, (bottom + height - y) * scale] };
+    const at = ([x, y]) => `translate(${(x - left) * scale} ${(bottom + height - y) * scale}) scale(${1 / svg.getScreenCTM().a})`;
+    return { mark, view, at };
   }
 
   function stop(name) {

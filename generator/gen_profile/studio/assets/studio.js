@@ -30,7 +30,6 @@
     return otherwise;
   }
   const filled = (key, values) => phrase(key).replace(/\{(\w+)\}/g, (_, name) => values[name]);
-  const of = (key, load) => [phrase(key), load && phrase(load)].filter(Boolean).join(": ");
   const placed = ({ place, sentence }) => [place, phrase(sentence)].filter(Boolean).join(": ");
   const mm = (metres) => `${knobs.digits((1e3 * metres).toPrecision(4))} mm`;
 
@@ -253,10 +252,10 @@
         ["over.acceleration", `${curves.short(part.point.acceleration)} ${latest.curves.margins[0].unit.replace("/s", "/s²")}`],
         ["sway", mm(part.sway)],
         ["sway.worst", mm(part.sway_worst)],
-        ["residual", mm(part.residual), part.load],
+        ["residual", mm(part.residual)],
         ["margin", mm(part.allowed - part.residual)],
       ];
-      $("facts").replaceChildren(...facts.map(([key, value, load]) => element("div", {}, element("dt", {}, of(key, load)), element("dd", {}, value))));
+      $("facts").replaceChildren(...facts.map(([key, value]) => element("div", {}, element("dt", {}, filled(key, { load: phrase(part.load) })), element("dd", {}, value))));
       listDesigns();
     },
     faults({ faults }) {
@@ -352,7 +351,7 @@
 
   function listDesigns() {
     designs.show(latest.comparison, latest.verdict?.point && { ...latest.verdict.point, method: "now" }, pins, {
-      phrase, limit: latest.verdict?.allowed, residual: of("residual", latest.animation?.animation.load),
+      phrase, limit: latest.verdict?.allowed, residual: filled("residual", { load: phrase(latest.animation?.animation.load ?? "load") }),
       take: (row) => (row.pin ? (keep(), done.push(kept), kept = JSON.stringify(row.pin.state), go(row.pin.state), arrows()) : edit(row.edits)),
       unpin: (row) => { pins.splice(pins.indexOf(row.pin), 1); listDesigns(); take(latest.curves); },
     });
