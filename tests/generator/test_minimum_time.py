@@ -3,6 +3,7 @@
 import math
 from types import SimpleNamespace
 
+import attrs
 import numpy as np
 import pytest
 from generator.crane_problems import CRANE, crane_problem
@@ -110,6 +111,15 @@ def test_of_other_machines(preset, method):
     uncertain = [] if method == "none" else found
     best = shortest(found, np.abs(problem.distance), duration, uncertain, **limits)
     assert 0.998 * best < duration < 1.02 * best
+
+
+@pytest.mark.slow
+def test_a_hoisting_machine_s_shortest_move_is_not_that_of_the_rope_at_the_start():
+    """Programs linearised at rest find nothing in less than 11.4 s."""
+    problem = problem_of(preset_spec("single-pendulum-crane", ["limits.acceleration=0.5"]))
+    duration = choice.minimum_time(problem)
+    assert duration < 10.5
+    assert choice.keeps_limits(choice.attempt(attrs.evolve(problem, duration=duration + 0.01)))
 
 
 @pytest.mark.parametrize(("enough", "tries"), [(10.001, 1), (10.03, 5), (10.5, 10), (13.0, 14)])

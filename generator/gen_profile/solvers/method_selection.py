@@ -19,7 +19,7 @@ from gen_profile.solvers.direct.relaxation import Relaxation, Relaxed
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.infeasibility import CandidateTest, cures, longer
-from gen_profile.solvers.minimum_time import shortest_duration
+from gen_profile.solvers.minimum_time import shorter_duration, shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import WIDER, Solution, Status
 from gen_profile.spec.model import LimitsSpec
@@ -155,10 +155,20 @@ def _direct(problem: Problem, *, coarse: bool) -> Solution:
     solution = direct.solve(problem, coarse=coarse)
     if coarse or keeps_limits(solution) or not problem.limits.stated():
         return solution
+    other = _from_the_easiest(problem)
+    return solution if other.optimum is None else other
+
+
+def _from_the_easiest(problem: Problem, *, coarse: bool = False) -> Solution:
+    """Begin at the motion that is most easily within the limits, unless that breaks them."""
     easiest = _easiest(problem)
-    if easiest is None or easiest.share > NEARLY:
-        return solution
-    return direct.solve(problem, easiest.iterate)
+    if easiest is None:
+        return given_up(problem)
+    if easiest.share > NEARLY:
+        return attrs.evolve(
+            easiest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, cure=WIDER
+        )
+    return direct.solve(problem, easiest.iterate, coarse=coarse)
 
 
 def _easiest(problem: Problem) -> Relaxed | None:
@@ -204,15 +214,18 @@ def minimum_time(problem: Problem, progress: Progress = untold, beyond: float | 
     beyond : float, optional
         A duration in s than which none is shorter.
     """
-    coarse = partial(direct.solve, coarse=True)
-    solve = coarse if problem.worst_case is None else worst_case.solve_within_limits
     tries = count(1)
 
-    def attempted(other: Problem) -> Solution:
+    def attempted(solve: Callable[[Problem], Solution], other: Problem) -> Solution:
         progress(SHORTEST, remark=f"trying {other.duration:.3g} s ({next(tries)})")
         return _in_time(solve, other, SOLVING)
 
-    return shortest_duration(problem, attempted, beyond)
+    if problem.worst_case is not None:
+        return shortest_duration(problem, partial(attempted, worst_case.solve_within_limits), beyond)
+    found = shortest_duration(problem, partial(attempted, partial(direct.solve, coarse=True)), beyond)
+    if found is None:
+        return None
+    return shorter_duration(problem, partial(attempted, partial(_from_the_easiest, coarse=True)), found)
 
 
 def keeps_limits(solution: Solution) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 
 import attrs
 
@@ -15,6 +16,7 @@ from gen_profile.work import OutOfWork, budget, left
 
 PRECISION = 1e-3  # relative, of the duration; what is returned is the feasible end
 LONGEST = 1e3  # slowest periods, after which the search gives up
+SHORTER = 5e-3  # relative, by which a duration is tried to be shorter still
 STRIDE = 1.5
 BISECTING = 0.6  # share of the work that is left
 LONGER = 8.0  # from stride to stride away from a duration that is too short
@@ -40,9 +42,7 @@ def shortest_duration(
     float or None
         s; None where no duration was found to do.
     """
-
-    def feasible(duration: float) -> bool:
-        return solve(attrs.evolve(problem, duration=duration, sway_weight=0.0)).optimum is not None
+    feasible = _feasible(problem, solve)
 
     def excess(duration: float) -> float:
         return -math.inf if feasible(duration) else math.inf
@@ -52,6 +52,39 @@ def shortest_duration(
     if beyond is not None:
         return least_beyond(excess, beyond, LONGEST * period)
     return least(feasible, period, LONGEST * period)
+
+
+def shorter_duration(problem: Problem, solve: Callable[[Problem], Solution], known: float) -> float:
+    """Look for durations shorter than one that is known to do, by a slower solver that may find more.
+
+    Parameters
+    ----------
+    problem : Problem
+        Whose duration does not matter.
+    solve : Problem → Solution
+    known : float
+        s.
+
+    Returns
+    -------
+    float
+        s.
+    """
+    feasible, less = _feasible(problem, solve), (1.0 - SHORTER) * known
+    with suppress(OutOfWork), budget(BISECTING * left()):
+        if feasible(less):
+            return least(feasible, less, known) or known
+    return known
+
+
+def _feasible(problem: Problem, solve: Callable[[Problem], Solution]) -> Callable[[float], bool]:
+    """Tell of durations whether a solver finds a motion, whatever its sway on the way."""
+
+    @cache
+    def feasible(duration: float) -> bool:
+        return solve(attrs.evolve(problem, duration=duration, sway_weight=0.0)).optimum is not None
+
+    return feasible
 
 
 def least(
