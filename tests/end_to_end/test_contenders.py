@@ -10,7 +10,7 @@ from gen_profile.comparison.candidates import candidates
 from gen_profile.comparison.compare import compare
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.evaluation.motion_evaluation import evaluate
-from gen_profile.problem.actuator import lag_compensated
+from gen_profile.motion.actuator import lag_compensated
 from gen_profile.problem.limits import SWAY_TOLERANCE, breaches
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.impulses import SHAPERS

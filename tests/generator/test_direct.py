@@ -6,8 +6,8 @@ import pytest
 from generator.crane_problems import CRANE, EFFORTS, crane_problem
 from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost
 
+from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
-from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.problem import problem_of
 from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.solvers import method_selection as choice

@@ -6,7 +6,7 @@ from generator.crane_problems import EFFORTS, crane_problem
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PPoly
 
-from gen_profile.problem.actuator import lag_compensated
+from gen_profile.motion.actuator import lag_compensated
 from gen_profile.solvers.indirect.solver import solve
 from gen_profile.solvers.motion import optimal_profile
 

@@ -12,9 +12,9 @@ from gen_profile.designs import transient_sway
 from gen_profile.designs.plan import timed
 from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import GenProfileError, InfeasibleProblem, SpecError
+from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Profile
-from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.solvers.motion import optimal_profile

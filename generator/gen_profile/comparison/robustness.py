@@ -14,8 +14,8 @@ import numpy as np
 from gen_profile.comparison.candidates import candidates
 from gen_profile.errors import GenProfileError, SpecError
 from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
+from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Array, Profile, grid_length, grid_times, read_only
-from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec

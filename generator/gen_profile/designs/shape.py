@@ -6,8 +6,8 @@ import attrs
 
 from gen_profile.designs.transient_sway import sways
 from gen_profile.errors import InfeasibleProblem
+from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Profile, grid_length, grid_times
-from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches, rounded_up
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of

@@ -12,9 +12,9 @@ from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import Scenario, scenarios
 from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, PlantSimulation, Sway
+from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
 from gen_profile.motion.profile import Array, Profile
-from gen_profile.problem.actuator import lag_compensated
 from gen_profile.problem.limits import rounded_down
 from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import problem_of

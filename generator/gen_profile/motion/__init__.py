@@ -1,1 +1,1 @@
-"""Motions of the axes, continuous and sampled, and measures of them."""
+"""Motions of the axes, continuous and sampled, what drives are asked for them, and measures of them."""

@@ -9,7 +9,7 @@ from itertools import count
 
 import attrs
 
-from gen_profile.problem.actuator import lag_compensated
+from gen_profile.motion.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.problem import Problem
 from gen_profile.progress import Progress, untold
