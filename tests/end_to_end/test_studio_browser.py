@@ -178,12 +178,17 @@ def test_a_planner_block_is_driven_by_hand(page):
     page.find("#begin").click()
     page.wait("return document.querySelector('#undriven.bad') !== null")
     assert "limits.velocity" in page.find("#undriven").text
+    page.find("#undriven button").click()  # takes limits that the motion keeps
+    page.wait("return document.querySelector('#promise.passed:not([hidden])') !== null")
+    page.wait("return document.querySelector('#command').textContent.includes('limits.travel=')")
+    page.find("#leave").click()
+    page.find("#undo").click()
     limits = "velocity = 0.5\nacceleration = 1.0\njerk = 20.0\ntravel = [-1.0, 1.0]\n"
     text = preset_text("paper").replace("cycle_time = 0.001", "cycle_time = 0.01")
     page.run(DROP, f"{text}\n[limits]\n{limits}")
     page.wait("return document.querySelector('#command').textContent.includes('bay.toml')")
     page.find("#begin").click()
-    page.wait("return document.querySelector('#promise.passed') !== null")
+    page.wait("return document.querySelector('#promise.passed:not([hidden])') !== null")
     page.run("document.querySelector('#drive .stage').scrollIntoView({block: 'center'})")
     x, y, width = page.run("""
         const box = document.querySelector('#drive svg').getBoundingClientRect();

@@ -74,11 +74,11 @@ def test_machines_swing_by_the_equations():
 def test_what_is_no_command_is_a_sentence():
     for how in ({"command": "fly"}, {"command": "target", "values": (float("nan"),)}, {"command": "target"}):
         ((part,),) = [list(drive(asked(drive=3, **how)))]
-        assert part["part"] == "undriven" and part["sentences"]
+        assert part["part"] == "undriven" and part["faults"]
     (part,) = drive(asked(drive=3, live={"m1": 3.0}))
-    assert "no live parameter" in part["sentences"][0]
+    assert "no live parameter" in part["faults"][0]["sentence"]
     (part,) = drive(asked(drive=4, edits={}))
-    assert "limits" in " ".join(part["sentences"])
+    assert {fault["place"] for fault in part["faults"]} == LIMITS.keys()
 
 
 def test_several_axes_take_a_value_each():
@@ -86,7 +86,7 @@ def test_several_axes_take_a_value_each():
     (part,) = drive(asked("gantry-crane", edits, drive=5))
     assert [axis["name"] for axis in part["axes"]] == ["x", "y"]
     (part,) = drive(asked("gantry-crane", edits, drive=5, command="velocity", values=(0.1,)))
-    assert part["sentences"] == ["The planner takes 2 values, one for each axis."]
+    assert [one["sentence"] for one in part["faults"]] == ["The planner takes 2 values, one for each axis."]
 
 
 @pytest.mark.parametrize(

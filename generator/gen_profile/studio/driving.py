@@ -26,6 +26,7 @@ from gen_profile.report.animation import Actor, Animation
 from gen_profile.report.machines import body_size, drawings, pose_of
 from gen_profile.spec.model import Spec
 from gen_profile.studio.orders import DriveQuestion
+from gen_profile.studio.views import fault
 
 MOMENT = 0.1  # s
 FRAMES = 4  # of a moment
@@ -41,7 +42,7 @@ def drive(asked: DriveQuestion) -> Iterator[Part]:
     try:
         yield _going(asked).moment(asked)
     except GenProfileError as error:
-        yield {"part": "undriven", "sentences": str(error).splitlines()}
+        yield {"part": "undriven", "faults": [fault(sentence) for sentence in str(error).splitlines()]}
 
 
 _drives: dict[int, Drive] = {}  # the one that this process is at, by its number

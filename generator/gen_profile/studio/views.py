@@ -94,7 +94,7 @@ def _setting(question: Question, spec: Spec) -> Part:
         "command": command_of(start, state.edits),
         "text": text_of(start, state.edits),
         "address": state.address,
-        "doubts": [_fault(sentence) for sentence in doubts(spec)],
+        "doubts": [fault(sentence) for sentence in doubts(spec)],
     }
 
 
@@ -170,7 +170,7 @@ def _failure(question: Question, error: Exception) -> Iterator[Part]:
     """Say why there is no motion, what would help, and keep the knobs usable."""
     if isinstance(error, SpecError):
         sentences = str(error).splitlines()
-        yield {"part": "faults", "faults": [_fault(sentence) for sentence in sentences]}
+        yield {"part": "faults", "faults": [fault(sentence) for sentence in sentences]}
         if question.state.edits:
             return
     else:
@@ -178,7 +178,8 @@ def _failure(question: Question, error: Exception) -> Iterator[Part]:
     yield {"part": "failure", "sentences": sentences, "cures": cures(" ".join(sentences))}
 
 
-def _fault(sentence: str) -> dict[str, str]:
+def fault(sentence: str) -> dict[str, str]:
+    """Tell the place in a spec from what is wrong there."""
     place, colon, problem = sentence.partition(": ")
     return {"place": place, "sentence": problem} if colon else {"place": "", "sentence": sentence}
 

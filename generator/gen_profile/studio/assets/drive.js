@@ -49,13 +49,20 @@ const driving = (() => {
       if (playing) next = part;
       else play(part);
     },
-    undriven({ sentences }) {
+    undriven({ faults }) {
       park();
-      $("undriven").textContent = sentences.join(" ");
+      const missing = faults.map(({ place }) => page.knob(place)).filter((knob) => knob?.optional && knob.value === null);
+      const told = faults.map((fault) => element("p", {}, page.placed(fault)));
+      const button = element("button", { type: "button" }, page.phrase("drive.limits"));
+      button.addEventListener("click", () => {
+        page.edit(Object.fromEntries(missing.map((knob) => [knob.path, page.begin(knob)])));
+        begin();
+      });
+      $("undriven").replaceChildren(...told, ...(missing.length ? [button] : []));
       $("undriven").className = "bad";
     },
   };
-  parts.failure = parts.undriven;
+  parts.failure = ({ sentences }) => parts.undriven({ faults: sentences.map((sentence) => ({ place: "", sentence })) });
 
   function show(part) {
     if (running && part.serial === number) parts[part.part]?.(part);

@@ -78,22 +78,20 @@
     return { [knob.path]: array };
   }
 
+  const at = (path) => latest.setting.knobs.find((knob) => knob.path === path);
+
   /** What a value begins with that the spec has left out: what the motion takes now, or a usual one. */
   function begin(knob) {
-    const taken = latest.curves?.margins.find((one) => one.place === knob.path || (knob.path === `limits.${one.quantity}` && !one.axis));
-    if (knob.kind === "interval") {
-      const nominal = latest.setting.knobs.find((one) => one.path === knob.path.replace("robustness.uncertain", "plant")).value;
-      return [0.9 * nominal, 1.1 * nominal];
-    }
-    if (knob.kind === "pair" && knob.about) {
-      const nominal = latest.setting.knobs.find((one) => one.path === `plant.${knob.name}`).value;
+    const taken = (latest.curves?.margins ?? []).filter((one) => [one.place, `limits.${one.quantity}`].includes(knob.path)).map((one) => one.takes);
+    if (knob.kind === "interval" || (knob.kind === "pair" && knob.about)) {
+      const nominal = at(`plant.${knob.name}`).value;
       return nominal ? [knobs.digits(0.9 * nominal), knobs.digits(1.1 * nominal)] : [0, 0.1];
     }
     if (knob.kind === "pair") {
-      const [low, high] = [0, ...latest.setting.knobs.filter((one) => /^move\.(distance|target|start)$/.test(one.path) && (one.name ?? "") === (knob.name ?? "")).map((one) => one.value)].reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [0, 0]);
-      return [low, high];
+      const ends = latest.setting.knobs.filter((one) => /^move\.(distance|target|start)$/.test(one.path) && (!knob.name || one.name === knob.name));
+      return [Math.min(0, ...ends.map((one) => one.value)), Math.max(0, ...ends.map((one) => one.value))];
     }
-    if (taken) return knobs.digits((1.05 * taken.takes).toPrecision(3));
+    if (taken.length) return knobs.digits((1.05 * Math.max(...taken)).toPrecision(3));
     if (knob.path === "limits.sway") return knobs.digits((1.05 * (latest.verdict?.sway_worst ?? 0.1)).toPrecision(3));
     return knob.usual ?? knob.span?.[0] ?? 1;
   }
@@ -437,7 +435,7 @@
   });
   $("agree").addEventListener("click", () => { $("consent").close(); say({ say: "agree" }); });
   $("refuse").addEventListener("click", () => { $("consent").close(); notice(phrase("refused")); });
-  driving.lend({ phrase, filled, say, state: () => state });
+  driving.lend({ phrase, filled, placed, say, edit, begin, knob: at, state: () => state });
   logs.begin({
     phrase, filled, notice, edit, drawing, say, send: (blob) => socket.send(blob), state: () => state,
     mostUpload: () => latest.hello.most_upload,
