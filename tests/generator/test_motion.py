@@ -55,7 +55,7 @@ def test_states_and_profile_are_one(solution, profile):
     for order in range(3):
         found = profile.derivative(optimum.knots[:-1], order)[:, 0]
         expected = optimum.states[:-1, 4 + order]
-        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-8 * np.abs(expected).max())
 
 
 def test_snap_begins_and_ends_without_jerk():
