@@ -396,6 +396,27 @@ def test_the_command_line_writes_and_executes_a_block(tmp_path):
     assert rows[-1]["velocity_m_per_s"] == "0.0"
 
 
+@pytest.mark.parametrize("stops", [False, True])
+def test_a_motion_far_longer_than_a_swing_is_as_insensitive_as_a_short_one(text, stops):
+    """Its frequencies differ by 2.5 %, and what sways in the beginning is not left until it brakes."""
+    driver = Driver(text, fL1=9.0, fm2=1776.0, fActPosition=1.0).hold(2.0)
+    driver.hold(40.0, bExecute=1, fTarget=39.0, fVelocityLimit=0.39)
+    begins = driver.outputs["fPosition"][-1]
+    out = driver.hold(75.0, bStop=float(stops)).outputs
+    require_limits(out)
+    assert not out["bBusy"][-1]
+    if stops:
+        assert abs(out["fPosition"][-1] - begins) < 2.0
+        assert not out["bBusy"][round(52.0 / CYCLE)]
+    else:
+        assert out["fPosition"][-1] == 39.0
+    time = CYCLE * np.arange(len(out["fAcceleration"]))
+    for error in (-0.025, 0.025):
+        rates = (1.0 + error) * frequencies(9.0, 1776.0)
+        left = np.trapezoid(out["fAcceleration"] * np.exp(1j * rates[:, None] * time), dx=CYCLE)
+        assert np.sum(np.abs(left) / rates) < 0.005
+
+
 @pytest.mark.parametrize(
     ("commands", "words"),
     [
@@ -481,9 +502,9 @@ def test_a_fault_in_the_spec_is_told_with_its_place(changes, words):
         ("mass-spring-chain", ["plant.type=mass-spring-chain-4"], "has 4 modes"),
         ("gantry-crane", ["planner.live={y=[0.0, 1.0]}"], "planner.live.y: this axis makes the load sway"),
         (
-            "gantry-crane",
-            ["planner.live={L=[3.0, 9.0]}", "planner.live_rate={L=0.1}", "plant.c=0.0"],
-            "planner.live_rate: the planner block takes parameters that change on the way for one axis only",
+            "tower-crane",
+            ["planner.live={L=[8.0, 20.0]}", "planner.live_rate={L=0.1}", "plant.c=0.0"],
+            "planner.live_rate: the loads of a tower-crane .* sway otherwise along another axis",
         ),
     ],
 )

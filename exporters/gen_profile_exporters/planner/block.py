@@ -10,7 +10,16 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile_exporters.planner.calming_text import CALMING, FOLLOWING
+from gen_profile_exporters.planner.calming_text import (
+    CALMING,
+    FOLLOW,
+    FOLLOWED,
+    FORGET,
+    LOOK,
+    MATRIX,
+    NEXT_JOB,
+    RENEW,
+)
 from gen_profile_exporters.planner.interface_text import HEADER, INTERFACE
 from gen_profile_exporters.planner.motion_text import INPUTS, OUTPUTS, SLOTS
 from gen_profile_exporters.planner.planning_text import MODEL, PLANNING
@@ -21,12 +30,13 @@ from gen_profile_exporters.playback.structured_text import block_name, initialis
 
 Array = NDArray[np.float64]
 
-FUTURE = 256  # slots of a committed future
-LONGEST = 248  # of a plan
+LONGEST_ON_WAY = 72  # where the axis moves already
+FUTURE = 140  # slots of a committed future
+LONGEST = 132  # of a plan; farther targets are approached by pulses, as a stick would
 MOST = 48  # unknowns of a plan; in a longer one the slots in the middle have the same velocity
 KERNEL_SLOTS = 56
 WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
-REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, 120, LONGEST)  # measured
+REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
 CHUNK = 45  # slots that a phase takes at once
 WORK = 2960  # floating-point operations that a cycle may spend, by a cautious count
 ITERATIONS = 6
@@ -44,6 +54,15 @@ FRESH = 8  # cycles, for which the machine that is followed counts as constant
 RESERVE = 0.1  # share of the limits that only calming takes up, where live parameters change on the way
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
+FOLLOWING = {  # what only those have whose live parameters change on the way
+    "followed": FOLLOWED,
+    "forget": FORGET,
+    "matrix": MATRIX,
+    "look": LOOK,
+    "renew": RENEW.replace("@model\n", indent(MODEL, 4 * " ")),
+    "calming": CALMING,
+    "follow": FOLLOW,
+}
 PLACE = "fActPosition"
 TAKEN = {  # inputs of each axis, by the arrays that hold them
     "aTarget": "fTarget",
@@ -115,6 +134,8 @@ class PlannerConstants:
         How fast some may change on the way, per s.
     calm : float
         m, sway up to which nothing is done about it.
+    doubt : float
+        Relative error that the frequencies may have.
     degrees : int
         Chebyshev polynomials per live parameter.
     exponents : (parameters, terms) array of int
@@ -135,6 +156,7 @@ class PlannerConstants:
     drift: tuple[float, ...]
     rates: Mapping[str, float]
     calm: float
+    doubt: float
     degrees: int
     exponents: NDArray[np.int64]
     modes: int
@@ -144,11 +166,12 @@ class PlannerConstants:
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
     body = PLANNING.replace("@request\n", REQUEST)
-    body = body.replace("@programme\n", PROGRAMME).replace("@calming\n", CALMING)
+    body = body.replace("@programme\n", PROGRAMME)
     body = body.replace("@extent\n", indent(EXTENT, 16 * " "))
     body = body.replace("@model\n", indent(MODEL, 16 * " "))
-    follow = FOLLOWING.replace("@model\n", indent(MODEL, 4 * " "))
-    text = HEADER + INTERFACE + INPUTS + SLOTS + PULSES + follow + body + OUTPUTS
+    text = HEADER + INTERFACE + INPUTS + SLOTS + PULSES + NEXT_JOB + body + OUTPUTS
+    for hole, statements in FOLLOWING.items():
+        text = text.replace(f"@{hole}\n", statements if constants.rates else "")
     values = _values(constants)
     return _narrow(_with_while_loops(re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)))
 
@@ -281,6 +304,8 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
         "live": max(1, len(c.live)),
         "mode": modes,
         "matrix": modes**2,
+        "sway": 12 * axes * modes,
+        "look": 4 * modes,
         "model": modes * (2 + modes),
         "column": WIDE,
         "wide": WIDE,
@@ -310,7 +335,6 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
     return {
         "cAxes": len(c.axes),
         "cModes": modes,
-        "cMatrices": modes if c.rates else 0,
         "cRows": rows,
         "cFresh": FRESH,
         "cCycleWork": _cycle_work(c),
@@ -322,6 +346,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cMost": MOST,
         "cHalf": MOST // 2,
         "cLongest": LONGEST,
+        "cLongestOnWay": LONGEST_ON_WAY,
         "cKernelFirst": 18,
         "cLongestKernel": _longest_kernel(c),
         "cLongKernel": 40,
@@ -339,7 +364,8 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
 
 def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
-    return 120 * len(c.axes) - 35 + (40 + 30 * c.modes**2 if c.rates else 0)
+    following = 30 + 4 * c.modes * (4 * c.modes + 15)
+    return (120 + (following if c.rates else 0)) * len(c.axes) - 35
 
 
 def _longest_kernel(c: PlannerConstants) -> int:
@@ -358,6 +384,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cInside": RESERVE if c.rates else INSIDE,
         "cReserve": RESERVE if c.rates else 0.0,
         "cCalm": c.calm,
+        "cDoubt": c.doubt,
         "cSpare": SPARE,
         "cMirrorDecay": MIRROR_DECAY,
         "cCentre": CENTRE,

@@ -85,7 +85,8 @@ VAR
     bWanted : BOOL; (* a motion is *)
     bWaits : BOOL; (* but live parameters are to be taken over first *)
     bTaken : BOOL; (* they were, since it is wanted *)
-    bSurrender : BOOL; (* planning failed: go there by pulses *)
+    bSurrender : BOOL; (* too far to plan, or planning failed: go there by pulses *)
+    fStretch : LREAL; (* so many pulses at least *)
     bBraked : BOOL; (* a stop was planned before the motion to the goal *)
     bBrakes : BOOL; (* is to be *)
     nLeast : DINT; (* slots of a plan that came too late *)
@@ -134,32 +135,17 @@ VAR
     aHalfIm : ARRAY [0..@last_mode] OF LREAL;
     aTurnRe : ARRAY [0..@last_mode] OF LREAL; (* in a slot, damped *)
     aTurnIm : ARRAY [0..@last_mode] OF LREAL;
-    aNow : ARRAY [0..@last_mode] OF LREAL;
     fRe : LREAL;
     fIm : LREAL;
     fSquare : LREAL;
     fGrowth : LREAL;
     fHalf : LREAL;
-
-    (* The machine followed: what sways where live parameters change on the way, and a pulse that takes it. *)
-    aMatrix : ARRAY [0..@last_matrix] OF LREAL; (* as the modes were taken over *)
-    nFresh : DINT; (* cycles since that of now was renewed *)
-    aSway : ARRAY [0..@last_mode] OF LREAL; (* m, of the loads *)
-    aSwayRate : ARRAY [0..@last_mode] OF LREAL; (* m/s *)
-    aSwayD2 : ARRAY [0..@last_mode] OF LREAL; (* further time derivatives *)
-    aSwayD3 : ARRAY [0..@last_mode] OF LREAL;
-    aSwayD4 : ARRAY [0..@last_mode] OF LREAL;
-    aSwayD5 : ARRAY [0..@last_mode] OF LREAL;
-    aSwayAt : ARRAY [0..@last_mode] OF LREAL; (* at the beginning of the slot *)
-    aSwayRateAt : ARRAY [0..@last_mode] OF LREAL;
-    aLeftRe : ARRAY [0..@last_mode] OF LREAL; (* m/s: what the committed future leaves in a mode *)
-    aLeftIm : ARRAY [0..@last_mode] OF LREAL;
-    fAccelerationBefore : LREAL;
-    fLeft : LREAL; (* m, all modes together *)
+@followed
     bSways : BOOL; (* any of them, more than little *)
     bOutdated : BOOL; (* the live parameters were taken over anew since the motion was planned *)
     bLook : BOOL; (* what is left in the modes is to be looked at *)
     bLooked : BOOL; (* it was last, so the live parameters come first *)
+    nCalmAxis : DINT; (* whose *)
     bCalming : BOOL; (* the pulse is due where the next slot begins *)
     aCalming : ARRAY [0..@last_column] OF LREAL; (* m/s *)
     aFactors : ARRAY [0..@last_gram] OF LREAL; (* of the kernel's conditions *)

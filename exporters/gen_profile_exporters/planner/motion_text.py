@@ -41,13 +41,7 @@ IF nState = 0 THEN
             bReady := FALSE;
             bSettled := TRUE;
             bCalming := FALSE;
-            bSways := FALSE;
-            nFresh := cFresh;
-            fAccelerationBefore := 0.0;
-            FOR nIndex := 0 TO cModes - 1 DO
-                aSway[nIndex] := 0.0;
-                aSwayRate[nIndex] := 0.0;
-            END_FOR;
+@forget
             bPulses := TRUE;
             nTick := 0;
             nJob := 0;
@@ -295,39 +289,7 @@ IF nState = 2 THEN
     END_FOR;
 END_IF;
 
-(* What the loads do: a Taylor step of the machine of now. *)
-IF cFollows AND (nState > 0) THEN
-    bSways := FALSE;
-    fDelta := (aAcceleration[0] - fAccelerationBefore) / cCycle;
-    FOR nRow := 0 TO cModes - 1 DO
-        aSwayD2[nRow] := fAccelerationBefore;
-        aSwayD3[nRow] := fDelta;
-        FOR nIndex := 0 TO cModes - 1 DO
-            aSwayD2[nRow] := aSwayD2[nRow] - aModel[(2 + nRow) * cModes + nIndex] * aSway[nIndex];
-            aSwayD3[nRow] := aSwayD3[nRow] - aModel[(2 + nRow) * cModes + nIndex] * aSwayRate[nIndex];
-        END_FOR;
-    END_FOR;
-    FOR nRow := 0 TO cModes - 1 DO
-        aSwayD4[nRow] := 0.0;
-        aSwayD5[nRow] := 0.0;
-        FOR nIndex := 0 TO cModes - 1 DO
-            aSwayD4[nRow] := aSwayD4[nRow] - aModel[(2 + nRow) * cModes + nIndex] * aSwayD2[nIndex];
-            aSwayD5[nRow] := aSwayD5[nRow] - aModel[(2 + nRow) * cModes + nIndex] * aSwayD3[nIndex];
-        END_FOR;
-    END_FOR;
-    FOR nRow := 0 TO cModes - 1 DO
-        aSway[nRow] := aSway[nRow] + cCycle * (aSwayRate[nRow] + cCycle / 2.0 * (aSwayD2[nRow]
-            + cCycle / 3.0 * (aSwayD3[nRow] + cCycle / 4.0 * (aSwayD4[nRow]
-            + cCycle / 5.0 * aSwayD5[nRow]))));
-        aSwayRate[nRow] := aSwayRate[nRow] + cCycle * (aSwayD2[nRow] + cCycle / 2.0 * (aSwayD3[nRow]
-            + cCycle / 3.0 * (aSwayD4[nRow] + cCycle / 4.0 * aSwayD5[nRow])));
-        IF ABS(aSway[nRow]) + ABS(aSwayRate[nRow]) / aFrequency[0] > cCalm THEN
-            bSways := bReady AND bSettled;
-        END_IF;
-    END_FOR;
-    fAccelerationBefore := aAcceleration[0];
-END_IF;
-
+@follow
 bPromise := bReady AND bSettled AND (nState > 0);
 nPromise := 0;
 IF NOT bReady THEN nPromise := 3; END_IF;
@@ -354,7 +316,10 @@ FOR nAxis := 0 TO cAxes - 1 DO
 END_FOR;
 bBusy := (nState > 1) OR bSways OR ((nState = 1) AND (nCommand = 1) AND NOT bDone);
 fTimeToGo := 0.0;
-IF nState = 2 THEN fTimeToGo := (DINT_TO_LREAL(nFuture) - fPart) * fSlot; END_IF;
+IF nState = 2 THEN
+    fTimeToGo := (DINT_TO_LREAL(nFuture) - fPart) * fSlot;
+    IF (nCommand = 1) AND bSurrender THEN fTimeToGo := fTimeToGo + (fStretch - 1.0) * fSlot; END_IF;
+END_IF;
 IF nState = 3 THEN fTimeToGo := fQuickEnd - fQuickTime; END_IF;
 @give_axes
 END_FUNCTION_BLOCK

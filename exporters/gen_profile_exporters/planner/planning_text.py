@@ -30,9 +30,9 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
         17: nCost := 3 * nColumns + 60;
         18: nCost := 32 * nOther + 80;
         19: nCost := 22 * nColumns + 60;
-        40: nCost := 80 * cModes;
-        41: nCost := 10 * nFuture + 20;
-        42: nCost := 60 * cModes + 2 * cConditions * cConditions;
+        40: nCost := 100 * cModes;
+        41: nCost := 20 * cChunk + 50;
+        42: nCost := 90 * cModes + 2 * cConditions * cConditions;
         43: nCost := (10 + 20 * cModes) * nKernel + 20;
     ELSE
         nCost := 4 * nColumns;
@@ -46,7 +46,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
             19: nCost := 15 * nColumns + 40;
         END_CASE;
     END_IF;
-    IF (nPhase = 10) AND NOT bMirror AND (bTurns OR (nSlots >= cLongest)) THEN
+    IF (nPhase = 10) AND NOT bMirror AND bTurns THEN
         nCost := nCost + 3 * nColumns;
     END_IF;
     bRoom := nWork + nCost <= cWork;
@@ -64,9 +64,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                 FOR nMode := 0 TO cModes - 1 DO
                     aFrequency[nMode] := aModel[nMode];
                 END_FOR;
-                FOR nIndex := 0 TO cMatrices * cModes - 1 DO
-                    aMatrix[nIndex] := aModel[2 * cModes + nIndex];
-                END_FOR;
+@matrix
                 IF cModes = 2 THEN
                     fSquare := aFrequency[0];
                     fHalf := 0.5 * (fSquare + SQRT(fSquare * fSquare - 4.0 * aFrequency[cModes - 1]));
@@ -314,7 +312,7 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                         END_IF;
                         nUnmeasured := nUnmeasured - 1;
                         nJob := 0;
-                    ELSIF bGood AND ((fSum >= fNeed) OR (nJob = 3) OR bTurns OR (nSlots >= cLongest)) THEN
+                    ELSIF bGood AND ((fSum >= fNeed) OR (nJob = 3) OR bTurns) THEN
                         bBraked := bBraked OR bTurns;
                         IF (nJob = 2) AND (fSum >= fNeed) THEN
                             aPlanEnd[nPlanAxis] := aGoal[nPlanAxis];
@@ -339,9 +337,9 @@ WHILE bRoom AND (nJob > 0) AND NOT bPlanned DO
                         bUnfolded := FALSE;
                         nPhase := 4;
                     ELSE
+                        bStopPlanned := nJob = 3;
+                        bSurrender := nJob = 2;
                         nJob := 0;
-                        bSurrender := TRUE;
-                        bStopPlanned := TRUE;
                     END_IF;
                 END_IF;
         END_CASE;

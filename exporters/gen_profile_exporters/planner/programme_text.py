@@ -229,8 +229,8 @@ PROGRAMME = """\
             10: (* normal matrix of five diagonals, its factors, and the right-hand side *)
                 FOR nIndex := 2 TO nColumns + 1 DO
                     fValue := aE[nIndex - 2] / DINT_TO_LREAL(nSlots);
-                    (* Where the way is longer than a plan, what comes first counts most. *)
-                    IF ((nSlots >= cLongest) OR bTurns) AND NOT bMirror THEN
+                    (* Of an axis that turns round, what comes first counts most. *)
+                    IF bTurns AND NOT bMirror THEN
                         fValue := fValue * (1.5 - DINT_TO_LREAL(nIndex) / DINT_TO_LREAL(nColumns));
                     END_IF;
                     nRow := cWide + nIndex;

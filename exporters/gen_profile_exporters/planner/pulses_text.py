@@ -45,7 +45,10 @@ IF (bNew OR bSoon) AND bReady AND ((nState = 1) OR (nState = 2)) THEN
     bDue := (nCommand = 1) AND bAway AND NOT bSurrender AND ((nState = 2) OR bMeasured OR bWithin);
     (* From rest, live parameters that changed are taken over first; once, as they may go on changing. *)
     bWanted := (nCommand = 1) AND bAway;
+    fStretch := 1.0;
     FOR nAxis := 0 TO cAxes - 1 DO
+        fValue := ABS(aGoal[nAxis] - aFinal[nAxis]) / ((1.0 - cReserve) * aTop[nAxis] * fSlot);
+        IF fValue > fStretch THEN fStretch := fValue; END_IF;
         bWanted := bWanted OR ((nCommand = 2) AND (aCommand[nAxis] <> 0.0));
     END_FOR;
     IF (nState = 2) OR NOT bWanted THEN bTaken := FALSE; END_IF;
@@ -89,10 +92,11 @@ IF (bNew OR bSoon) AND bReady AND ((nState = 1) OR (nState = 2)) THEN
             fHigh := aTop[nAxis] * fShare;
             IF bCalming THEN
                 fShare := 1.0;
-                fWanted := 1.0;
+                fWanted := 0.0;
+                IF nAxis = nCalmAxis THEN fWanted := 1.0; END_IF;
             ELSE
                 fWanted := aCommand[nAxis];
-                IF nCommand = 1 THEN fWanted := (aGoal[nAxis] - aFinal[nAxis]) / fSlot; END_IF;
+                IF nCommand = 1 THEN fWanted := (aGoal[nAxis] - aFinal[nAxis]) / (fStretch * fSlot); END_IF;
                 IF fWanted > fHigh THEN fWanted := fHigh; END_IF;
                 IF fWanted < -fHigh THEN fWanted := -fHigh; END_IF;
             END_IF;
@@ -176,6 +180,7 @@ IF (bNew OR bSoon) AND bReady AND ((nState = 1) OR (nState = 2)) THEN
             nWeighed := 0;
         ELSIF bNew AND (nState = 2) THEN
             nWeighed := 0;
+            bCalming := FALSE; (* it was for this slot *)
         END_IF;
     ELSE
         nWeighed := 0;

@@ -78,7 +78,7 @@ REQUEST = """\
                     fWanted := fNeed;
                     IF fOldSum > 0.0 THEN fWanted := fNeed + fOldSum; END_IF;
                     (* Beyond what was measured yet, each slot more is one at full speed. *)
-                    nNeeded := cLongest;
+                    nNeeded := cLongest + 1;
                     fHalf := fWanted - aReached[nPlanAxis];
                     IF fHalf < DINT_TO_LREAL(cLongest) THEN
                         nOther := nKernel;
@@ -128,7 +128,13 @@ REQUEST = """\
                         nSlots := nNeeded;
                         nSlowest := nPlanAxis;
                     END_IF;
-                    IF (nSized >= cAxes) AND bTurns THEN
+                    nLast := cLongest;
+                    IF NOT bMirror THEN nLast := cLongestOnWay; END_IF;
+                    IF (nSized >= cAxes) AND (nJob = 2) AND (nSlots > nLast)
+                        AND NOT (bTurns AND (nOld > nKernel + 4)) THEN (* far: by pulses *)
+                        bSurrender := TRUE;
+                        nJob := 0;
+                    ELSIF (nSized >= cAxes) AND bTurns THEN
                         IF nSlots <= cMost THEN bTurns := FALSE; ELSE nSlots := cMost; END_IF;
                         IF nSlots < nOld THEN nSlots := nOld; END_IF;
                     END_IF;

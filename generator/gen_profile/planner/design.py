@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
-from gen_profile.planner.machine import LiveModes, frequencies, live_modes, planned_axes
+from gen_profile.planner.machine import LiveModes, doubt, frequencies, live_modes, planned_axes
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, AxisConstants, PlannerConstants, block_text
 
@@ -69,6 +69,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         drift=tuple(STEADY * high for _, high in found.live.values()),
         rates=spec.planner.live_rate,
         calm=CALM * min(spec.check.residual_sway.values()),
+        doubt=doubt(spec),
         degrees=int(interpolant.exponents.max(initial=0)) + 1,
         exponents=interpolant.exponents,
         modes=found.modes,

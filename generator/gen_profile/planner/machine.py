@@ -22,6 +22,7 @@ MOST_LIVE = 2
 DEGREES = (3, 6, 9, 12)
 ACCURACY = 1e-5  # relative, of the frequencies over the live ranges
 MOST_TERMS = 60
+SAME = 1e-9  # relative difference
 STILL = 1e-9  # acceleration of a coordinate, relative to an axis's, that counts as none
 NEGLIGIBLE = 1e-7  # coefficient, relative to the largest of its function
 
@@ -112,6 +113,20 @@ def planned_axes(spec: Spec) -> dict[int, BlockAxis]:
     return {k: BlockAxis(name=axes[k].name if several else "", unit=axes[k].unit) for k in numbers}
 
 
+def doubt(spec: Spec) -> float:
+    """By which share the stated errors of the nominal machine's parameters change a frequency at most."""
+    nominal = spec.plant.parameters
+
+    def found(changed: Mapping[str, float]) -> Array:
+        return linearize(spec.machine(), {**nominal, **changed}, spec.move.start).frequencies
+
+    return sum(
+        max(float(np.abs(found({name: end}) / found({}) - 1.0).max()) for end in ends)
+        for name, ends in spec.checked_ranges().items()
+        if not (name in spec.planner.live and name in spec.check.spans)  # which says where it may be
+    )
+
+
 def _linearized(spec: Spec, point: Sequence[float]) -> Linearization:
     """Linearise the machine at a point of the live ranges, given in −1 … 1."""
     plant = spec.machine()
@@ -128,13 +143,32 @@ def _linearized(spec: Spec, point: Sequence[float]) -> Linearization:
 
 
 def _sway_matrix(found: Linearization) -> Array:
-    """Find A of sway'' = acceleration − A sway.
+    """Find A of sway'' = acceleration − A sway, along every axis that makes loads sway.
 
     A rope's rate appears in it nowhere: a load's horizontal acceleration is the rope's force by its mass, and
     that depends on where the loads are.
+
+    Raises
+    ------
+    ValueError
+        There is no such matrix, or not the same one for all axes.
     """
     gain = found.sway_gain
-    return np.asarray(gain @ found.stiffness @ np.linalg.inv(gain))
+    if gain.shape[0] != gain.shape[1]:
+        raise ValueError("fewer loads than coordinates")
+    whole, pushed = gain @ found.stiffness @ np.linalg.inv(gain), gain @ found.input
+    along = [
+        np.flatnonzero(np.abs(column - 1.0) <= SAME) for column in pushed.T if np.abs(column).max() > STILL
+    ]
+    if len({len(loads) for loads in along}) > 1:
+        raise ValueError("axes that push other numbers of loads")
+    first = whole[np.ix_(along[0], along[0])]
+    apart = np.zeros_like(whole)
+    for loads in along:
+        apart[np.ix_(loads, loads)] = first
+    if not np.allclose(apart, whole, rtol=SAME, atol=SAME):
+        raise ValueError("loads that sway otherwise along another axis")
+    return np.asarray(first)
 
 
 def _refuse_rates(spec: Spec) -> None:
@@ -148,13 +182,14 @@ def _refuse_rates(spec: Spec) -> None:
             "planner.live_rate: the planner block follows machines without damping only; set the damping "
             "to 0, which is the worse case."
         )
-    if len(planned_axes(spec)) > 1:
+    try:
+        if len(plant.bodies) != len(_sway_matrix(middle)):
+            raise ValueError("other bodies than loads")
+    except ValueError as error:
         raise SpecError(
-            "planner.live_rate: the planner block takes parameters that change on the way for one axis only; "
-            "leave it out, and the promise drops where they do."
-        )
-    if plant.bodies != plant.loads or middle.sway_gain.shape[0] != middle.sway_gain.shape[1]:
-        raise SpecError(f"planner.live_rate: the loads of a {plant.type} do not hang on ropes alone.")
+            f"planner.live_rate: the loads of a {plant.type} do not hang on ropes alone, or sway otherwise "
+            "along another axis."
+        ) from error
     for name in rates:
         if not _is_length(spec, name):
             raise SpecError(f"planner.live_rate.{name}: no rope's length; only these may change on the way.")
