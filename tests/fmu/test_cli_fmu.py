@@ -21,7 +21,8 @@ LIMITS += ("--set", "planner.live={L1=[0.4, 0.5]}")
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "version"), [*zip([kind for kind in KINDS if kind != "ssp"], cycle("23"), strict=False)]
+    ("kind", "version"),
+    [*zip([kind for kind in KINDS if not kind.endswith("ssp")], cycle("23"), strict=False)],
 )
 def test_writes_an_fmu_that_others_run(tmp_path, kind, version):
     path = tmp_path / "a.fmu"

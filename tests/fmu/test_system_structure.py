@@ -137,6 +137,55 @@ def test_ecos_takes_the_parameters(ecos, files, tmp_path):
         assert simulation.get_real("profile::cart.distance") == 0.3
 
 
+LIMITS = "limits={velocity=0.5, acceleration=1.0, jerk=20.0, travel=[-1.0, 1.0]}"
+
+
+@pytest.fixture(scope="module")
+def planned(version, tmp_path_factory):
+    path = tmp_path_factory.mktemp("planned") / "planned.ssp"
+    changes = (LIMITS, "planner.live={L1=[0.4, 0.5]}", f"export.cycle_time={STEP}")
+    done = run_here(
+        "fmu", "planned-ssp", "--fmi", version, *(f"--set={one}" for one in changes), "--out", path, "--json"
+    )
+    assert done.code == 0, done.err
+    assert done.document["model_identifier"] == "paper_planned"
+    return path
+
+
+def test_a_planner_leads_the_plant(planned):
+    with zipfile.ZipFile(planned) as opened:
+        names, structure = opened.namelist(), etree.fromstring(opened.read("SystemStructure.ssd"))
+    etree.XMLSchema(etree.parse(str(SCHEMAS / "SystemStructureDescription.xsd"))).assertValid(structure)
+    assert "resources/paper_planner.ssv" not in names  # as it has no parameters
+    (connection,) = structure.iterfind(".//ssd:Connection", SPACES)
+    assert dict(connection.attrib) == {
+        "startElement": "planner",
+        "startConnector": "cart.setpoint",
+        "endElement": "plant",
+        "endConnector": "cart.setpoint",
+    }
+    connectors = structure.iterfind(".//ssd:Component[@name='planner']//ssd:Connector", SPACES)
+    inputs = {one.get("name") for one in connectors if one.get("kind") == "input"}
+    assert {"enable", "execute", "velocity", "stop", "target", "live.L1"} < inputs
+
+
+def test_ecos_commands_a_planner(ecos, planned):
+    rows = []
+    with ecos.EcosSimulation(ssp_path=str(planned), step_size=STEP) as simulation:
+        simulation.init()
+        simulation.set_bool("planner::enable", True)
+        simulation.set_real("planner::target", 0.3)
+        simulation.set_real("planner::live.L1", 0.47)
+        for step in range(round(STOP / STEP)):
+            simulation.set_bool("planner::execute", step * STEP > 1.0)
+            simulation.step()
+            rows.append([simulation.get_real(f"plant::{name}") for name in ("cart.position", "sway.payload")])
+    position, sway = np.abs(rows).T
+    assert position[-1] == pytest.approx(0.3, abs=1e-12)
+    assert sway.max() > 1e-2
+    assert sway[-200:].max() < 1e-4
+
+
 @pytest.fixture
 def libcosim():
     """Give the parts of libcosim's package; its library prints much."""

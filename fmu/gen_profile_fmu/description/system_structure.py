@@ -1,4 +1,4 @@
-"""A profile and a plant as a system of FMUs: System Structure and Parameterization (SSP) 1.0.
+"""A plant and what leads it, as a system of FMUs: System Structure and Parameterization (SSP) 1.0.
 
 Importers look for the names of XML elements with the prefixes that the standard writes them with.
 """
@@ -58,15 +58,18 @@ class Component:
         return [v for v in self.model.variables.variables if v.kind.causality in causalities]
 
 
-def ssp(name: str, profile: Model, plant: Model, step: float, build: Callable[[Model], bytes]) -> bytes:
-    """Write a system in which a plant follows a profile.
+def ssp(
+    name: str, leader: Component, plant: Component, step: float, build: Callable[[Model], bytes]
+) -> bytes:
+    """Write a system in which a plant follows a profile or a planner.
 
     Parameters
     ----------
     name : str
         Of the system.
-    profile, plant : Model
-        Each output of the profile goes to the plant's input of the same name, where there is one.
+    leader, plant : Component
+        Each output of the leader goes to the plant's input of the same name, where there is one; other inputs
+        are for the master to set.
     step : float
         In which a master shall go on, in s.
     build : Model → bytes
@@ -77,11 +80,11 @@ def ssp(name: str, profile: Model, plant: Model, step: float, build: Callable[[M
     bytes
         The archive: the same for the same models, step and FMUs.
     """
-    components = Component(name="profile", model=profile), Component(name="plant", model=plant)
+    components = leader, plant
     return archive(
         {
             STRUCTURE: _structure(name, *components, step),
-            **{component.parameters: _parameters(component) for component in components},
+            **{one.parameters: _parameters(one) for one in components if one.variables("parameter")},
             **{component.fmu: build(component.model) for component in components},
         }
     )
@@ -94,27 +97,27 @@ def _root(tag: str, name: str, others: Iterable[str]) -> ElementTree.Element:
     return ElementTree.Element(tag, {**spaces, "version": "1.0", "name": name, "generationTool": tool})
 
 
-def _structure(name: str, profile: Component, plant: Component, step: float) -> bytes:
+def _structure(name: str, leader: Component, plant: Component, step: float) -> bytes:
     root = _root("ssd:SystemStructureDescription", name, ("ssc", "osp"))
     system = ElementTree.SubElement(root, "ssd:System", name=name)
     elements = ElementTree.SubElement(system, "ssd:Elements")
-    for place, component in enumerate((profile, plant)):
+    for place, component in enumerate((leader, plant)):
         _add_component(elements, component, place * (_WIDTH + _GAP))
     connections = ElementTree.SubElement(system, "ssd:Connections")
-    given = {variable.name for variable in profile.variables("output")}
+    given = {variable.name for variable in leader.variables("output")}
     for variable in plant.variables("input"):
         if variable.name in given:
             ElementTree.SubElement(
                 connections,
                 "ssd:Connection",
-                startElement=profile.name,
+                startElement=leader.name,
                 startConnector=variable.name,
                 endElement=plant.name,
                 endConnector=variable.name,
             )
-    connectors = [*_connectors(profile), *_connectors(plant)]
+    connectors = [*_connectors(leader), *_connectors(plant)]
     _add_units(ElementTree.SubElement(root, "ssd:Units"), connectors)
-    _add_experiment(root, max(profile.model.stop_time, plant.model.stop_time), step)
+    _add_experiment(root, max(leader.model.stop_time, plant.model.stop_time), step)
     return to_bytes(root)
 
 
@@ -142,8 +145,9 @@ def _add_component(elements: ElementTree.Element, component: Component, left: fl
         x2=repr(left + _WIDTH),
         y2=repr(_HEIGHT),
     )
-    bindings = ElementTree.SubElement(element, "ssd:ParameterBindings")
-    ElementTree.SubElement(bindings, "ssd:ParameterBinding", source=component.parameters)
+    if component.variables("parameter"):
+        bindings = ElementTree.SubElement(element, "ssd:ParameterBindings")
+        ElementTree.SubElement(bindings, "ssd:ParameterBinding", source=component.parameters)
 
 
 def _add_experiment(root: ElementTree.Element, stop_time: float, step: float) -> None:

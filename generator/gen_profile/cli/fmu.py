@@ -12,7 +12,7 @@ from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
 
 # spelled out here because --help must not wait for CasADi; a test holds them against those of designs/fmu.py
-KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp")
+KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")
 INPUTS = ("setpoint", "acceleration", "velocity")
 PLATFORMS = ("host", "linux-x86_64", "linux-arm64", "windows-x86_64", "macos-x86_64", "macos-arm64", "all")
 
@@ -54,7 +54,7 @@ def fmu(
     author: str | None,
     as_json: bool,
 ) -> None:
-    """Write an FMU of a plant, profile, planner, or a plant with either; or plant and profile as an SSP."""
+    """Write an FMU of a plant, profile, planner, or a plant with either; or two of them as an SSP."""
     if input_name is not None and kind not in {"plant", "ssp"}:
         raise SpecError(f"--input: the inputs of a {kind} are its own; leave it out, or write a plant.")
     if source_only and platform is not None:

@@ -23,7 +23,7 @@ from gen_profile.suggestion import suggestion
 from gen_profile_fmu.building.build import build_fmu
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
 from gen_profile_fmu.description.fmu_files import Version
-from gen_profile_fmu.description.system_structure import ssp
+from gen_profile_fmu.description.system_structure import Component, ssp
 from gen_profile_fmu.model.contents import (
     AUTHOR,
     Model,
@@ -37,7 +37,8 @@ from gen_profile_fmu.model.planner import planned_system_model, planner_model
 from gen_profile_fmu.model.plant_variables import InputKind, PlantInstance
 
 PERIODS = 2.0  # of the slowest swing, that a move takes of which the shortest duration is asked for
-KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp")
+KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")
+LEADERS = {"ssp": "profile", "planned-ssp": "planner"}  # of systems of two FMUs: what the plant follows
 
 
 @attrs.frozen(kw_only=True)
@@ -111,18 +112,20 @@ def export_fmu(
     """
     if kind not in KINDS:
         raise SpecError(f"There is no FMU of the kind {kind!r}{suggestion(kind, KINDS)}")
-    is_system = kind == "ssp"
-    identifier = identifier_of(spec.name if is_system else f"{spec.name} {kind}")
-    path = Path(path or f"{identifier}.{'ssp' if is_system else 'fmu'}")
+    systems = {"ssp": spec.name, "planned-ssp": f"{spec.name} planned"}
+    identifier = identifier_of(systems.get(kind, f"{spec.name} {kind}"))
+    path = Path(path or f"{identifier}.{'ssp' if kind in LEADERS else 'fmu'}")
     platforms = platform_names("host") if platforms is None else platforms
 
     def built(model: Model) -> bytes:
         return build_fmu(attrs.evolve(model, author=author), version, platforms, progress)
 
-    if is_system:
-        profile = _model(spec, "profile", input_kind, progress)
-        plant = _model(spec, "plant", input_kind, progress)
-        content = ssp(identifier, profile, plant, spec.export.cycle_time, built)
+    if kind in LEADERS:
+        leader, plant = (
+            Component(name=name, model=_model(spec, name, input_kind, progress))
+            for name in (LEADERS[kind], "plant")
+        )
+        content = ssp(identifier, leader, plant, spec.export.cycle_time, built)
     else:
         content = built(_model(spec, kind, input_kind, progress))
     deliver(path, content)
