@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
-from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.machine import live_modes
 from gen_profile.spec.reading import parse_spec, preset_spec
 
@@ -448,26 +447,6 @@ def test_a_fault_in_the_commands_is_told_with_its_line(text, commands, words):
 def test_what_is_no_block_is_refused(text, words):
     with pytest.raises(ExportError, match=words):
         play(text, "")
-
-
-@pytest.mark.parametrize(
-    ("body", "harmless", "harmful", "words"),
-    [
-        ("a[n] := 1.0; y := a[n];", [0, 2], [-1, 3, 2**30], "beyond the end of an array"),
-        ("WHILE n > 0 DO y := 1.0; END_WHILE;", [0], [1], "a loop without end"),
-        ("FOR k := 0 TO n DO k := 0; END_FOR;", [-1], [1], "a loop without end"),
-        ("k := 4 / n;", [1, -1], [0], "divides by zero"),
-    ],
-)
-def test_what_would_end_or_hang_the_process_ends_in_a_sentence(body, harmless, harmful, words):
-    block = BlockInstance(
-        "FUNCTION_BLOCK x VAR_INPUT n : DINT; END_VAR VAR_OUTPUT y : LREAL; END_VAR "
-        f"VAR k : DINT; a : ARRAY [0..2] OF LREAL; END_VAR {body} END_FUNCTION_BLOCK"
-    )
-    block.call(np.array([harmless], dtype=float).T)
-    for number in harmful:
-        with pytest.raises(ExportError, match=words):
-            block.call(np.array([[float(number)]]))
 
 
 def test_an_error_of_the_block_is_told(text):

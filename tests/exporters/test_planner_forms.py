@@ -14,7 +14,7 @@ from lxml import etree
 from system_parts import program as program_of
 
 import gen_profile as gp
-from gen_profile.errors import SpecError
+from gen_profile.errors import ExportError, SpecError
 from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
@@ -236,3 +236,24 @@ def test_the_command_line_plays_any_of_them(tmp_path, monkeypatch):
     assert len(tables) == 3
     assert tables[0].splitlines()[-1].split(",")[1] == "0.5"
     assert tables[1] == tables[2] == tables[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("body", "harmless", "harmful", "words"),
+    [
+        ("a[n] := 1.0; y := a[n];", [0, 2], [-1, 3, 2**30], "beyond the end of an array"),
+        ("WHILE n > 0 DO y := 1.0; END_WHILE;", [0], [1], "a loop without end"),
+        ("FOR k := 0 TO n DO k := 0; END_FOR;", [-1], [1], "a loop without end"),
+        ("k := 4 / n;", [1, -1], [0], "divides by zero"),
+    ],
+)
+def test_what_would_end_or_hang_the_process_ends_in_a_sentence(body, harmless, harmful, words):
+    block = BlockInstance(
+        "FUNCTION_BLOCK x VAR_INPUT n : DINT; END_VAR VAR_OUTPUT y : LREAL; END_VAR "
+        f"VAR k : DINT; a : ARRAY [0..2] OF LREAL; END_VAR {body} END_FUNCTION_BLOCK"
+    )
+    block.call(np.array([harmless], dtype=float).T)
+    for number in harmful:
+        with pytest.raises(ExportError, match=words):
+            block.call(np.array([[float(number)]]))
