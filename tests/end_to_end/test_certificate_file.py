@@ -4,6 +4,7 @@ import base64
 import json
 import shutil
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -69,8 +70,8 @@ def stated_share(document):
     document["share_proved"] = 0.5
 
 
-def a_box_less(document):
-    document["parts"][0] = document["parts"][1]
+def a_part_of_the_box(document):
+    document["parts"][0] = [[3, 5]]
 
 
 def limits_raised(document):
@@ -94,15 +95,27 @@ def scales_singular(document):
 
 
 def motion_altered(document):
-    document["coefficients"] = changed(document["coefficients"], "<i4", lambda c: c + c // 100)
+    document["motions"][0] = changed(document["motions"][0], "<i8", lambda c: c + c // 100)
 
 
 def motion_cut(document):
-    document["coefficients"]["shape"][0] += 1
+    document["motions"][0]["shape"][0] += 1
+
+
+def motion_missing(document):
+    document["motions"].clear()
+
+
+def sums_inexact(document):
+    document["motions"][0] = changed(document["motions"][0], "<i8", lambda c: c * 2**20)
 
 
 def quanta_odd(document):
-    document["quanta"][0] *= 3.0
+    document["motions"][0]["quanta"][0] *= 3.0
+
+
+def terms_fewer(document):
+    document["terms"][0] -= 1
 
 
 def another_file(document):
@@ -118,7 +131,7 @@ def changed(packed, kind, change):
 TAMPERED = {
     stated_lower: "does not prove what it says",
     stated_share: "does not cover all machines",
-    a_box_less: "does not cover all machines",
+    a_part_of_the_box: "does not cover all machines",
     limits_raised: "does not cover all machines",
     narrower: "does not cover all machines",
     knots_moved: "does not belong to the file's setpoints",
@@ -126,6 +139,9 @@ TAMPERED = {
     scales_singular: "does not prove what it says",
     motion_altered: "does not prove what it says",
     motion_cut: "is damaged",
+    motion_missing: "is damaged",
+    sums_inexact: "sums are not exact",
+    terms_fewer: "is damaged",
     quanta_odd: "is damaged",
     another_file: "about another file",
 }
@@ -155,6 +171,13 @@ def test_what_is_no_certificate_or_of_something_else_is_refused(copied):
     artefact.write_text(artefact.read_text().replace("1.0", "1.1", 1))
     with pytest.raises((CertificateError, gp.ExportError)):
         gp.check_certificate(artefact, beside)
+
+
+def test_a_certificate_of_the_first_release_that_wrote_them_still_holds():
+    """Its series had as many terms in each parameter, and errors were measured alike for all machines."""
+    first = Path(__file__).parent / "first_certificate" / "single-pendulum-crane.csv"
+    found = gp.check_certificate(first, first.with_name(f"{first.name}.certificate.json"))
+    assert found.proved and found.terms == (8,) and found.scales.shape[-1] == 1
 
 
 @pytest.mark.parametrize(

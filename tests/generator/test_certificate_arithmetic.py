@@ -9,8 +9,10 @@ import pytest
 from numpy.polynomial import chebyshev as series
 
 from gen_profile.certificate import balls, chebyshev
-from gen_profile.certificate.balls import Ball, ball, matmul
+from gen_profile.certificate.affine import Affine
+from gen_profile.certificate.balls import Ball, ball, matmul, shared
 from gen_profile.certificate.boxes import Ranges, covers, halves, whole
+from gen_profile.certificate.equations import OPERATIONS
 
 POINTS = 200
 
@@ -105,19 +107,112 @@ def edge(matrix, sign):
 
 def test_interpolation_misses_less_than_is_said():
     nodes, fine = chebyshev.nodes(9).mid, np.linspace(-1.0, 1.0, 801)
-    values = np.exp(nodes[:, None]) / (2.0 - nodes)
-    coefficients = chebyshev.coefficients_of(9).mid @ values @ chebyshev.coefficients_of(9).mid.T
+    coefficients = chebyshev.interpolate(np.exp(nodes[:, None]) / (2.0 - nodes), 2)
     off = np.abs(series.chebgrid2d(fine, fine, coefficients) - np.exp(fine[:, None]) / (2.0 - fine)).max()
-    rho = 3.0
-    reach = 0.5 * (rho + 1.0 / rho)
-    said = float(chebyshev.missed(np.array(np.exp(reach) / (2.0 - reach)), (rho, 9), (rho, 9), 1))
+    rhos = (2.0, 3.0, 6.0)
+    reach = 0.5 * (np.array(rhos) + 1.0 / np.array(rhos))
+    with np.errstate(all="ignore"):
+        most = np.stack([np.exp(reach), np.where(reach < 2.0, np.e / (2.0 - reach), np.inf)])
+    said = float(chebyshev.missed(most, rhos, (9, 9)))
     assert off <= said <= 1e3 * off
-    assert np.allclose(chebyshev.values_at_nodes(9, 9).mid @ chebyshev.coefficients_of(9).mid, np.eye(9))
+    assert np.allclose(chebyshev.values_at_nodes(9, 9) @ chebyshev.coefficients_of(9), np.eye(9))
     assert np.array_equal(chebyshev.derivative(6)[:-1], series.chebder(np.eye(6)))
-    wave = np.zeros(7)
-    wave[6] = 1.0
-    turned = series.chebval(np.cos(np.arange(0.5, 20.0) * np.pi / 20.0), wave)
-    assert np.abs(turned).max() * chebyshev.between_nodes(20, 6) >= 1.0
+
+
+def test_series_and_their_values_enclose_those_of_arb():
+    random = np.random.default_rng(6)
+    exact = random.normal(size=(2, 5, 4))
+    values = chebyshev.evaluated(exact, (7, 6))
+    again = chebyshev.interpolated(values, 2)
+    assert values.rad.shape == (2, 1, 1) and values.rad.max() < 1e-12 and again.rad.max() < 1e-10
+    places = [[(flint.arb.pi() * (2 * j + 1) / (2 * count)).cos() for j in range(count)] for count in (7, 6)]
+    for box, i, j in product(range(2), range(7), range(6)):
+        terms = (
+            flint.arb(float(exact[box, k, m])) * places[0][i].chebyshev_t(k) * places[1][j].chebyshev_t(m)
+            for k, m in product(range(5), range(4))
+        )
+        assert abs(sum(terms) - flint.arb(values.mid[box, i, j])) <= flint.arb(values.rad[box, 0, 0])
+    whole = np.zeros((2, 7, 6))
+    whole[:, :5, :4] = exact
+    assert (np.abs(again.mid - whole) <= again.rad).all()
+
+
+def test_the_greatest_value_of_a_series_is_bounded_closely():
+    random, fine = np.random.default_rng(7), np.linspace(-1.0, 1.0, 41)
+    for _ in range(4):
+        exact = random.normal(size=(2, 7, 6, 4)) / np.exp(np.add.outer(np.arange(7), np.arange(6)))[..., None]
+        truth = max(np.abs(series.chebgrid3d(fine, fine, fine, one)).max() for one in exact)
+        found = chebyshev.greatest(exact, np.array([0.0, 1e-3]), 0.0)
+        assert truth <= found <= 1.02 * truth
+        assert truth <= chebyshev.greatest(exact, np.zeros(2), 1.2 * truth) <= 1.2 * truth
+    assert np.isnan(chebyshev.greatest(np.full((1, 3), np.nan), np.zeros(1), 1.0))
+    for sign, matrix in zip((-1.0, 1.0), chebyshev.halves(9), strict=True):
+        one = random.normal(size=9)
+        assert np.allclose(series.chebval(fine, matrix @ one), series.chebval(0.5 * (fine + sign), one))
+
+
+def affine_numbers(random):
+    """Numbers of two parameters, balls of all that they may be, and some of these values in Arb."""
+    mid, slope, other = random.uniform(0.5, 2.0, (3, POINTS)) * np.array([[1.0], [0.05], [0.02]])
+    rad = mid * 10.0 ** random.uniform(-17.0, -2.0, POINTS)
+    x = Affine(mid, {0: slope, 1: other}, rad, REACH)
+    turn = random.choice([-1.0, 1.0], POINTS)
+
+    def value(first, second):
+        parts = zip(mid.tolist(), slope.tolist(), other.tolist(), (rad * turn).tolist(), strict=True)
+        return [
+            flint.acb(m) + flint.acb(a) * first + flint.acb(b) * second + flint.acb(r) for m, a, b, r in parts
+        ]
+
+    return x, value
+
+
+REACH = {0: np.array(1.0), 1: np.array(2.5)}
+AFFINE = {
+    **BINARY,
+    "sine": (lambda x, y: OPERATIONS["SIN"](x) * y, lambda a, b: a.sin() * b),
+    "cosine": (lambda x, y: OPERATIONS["COS"](x) * y, lambda a, b: a.cos() * b),
+    "exponential": (lambda x, y: OPERATIONS["EXP"](x) * y, lambda a, b: a.exp() * b),
+    "hyperbolic": (
+        lambda x, y: OPERATIONS["COSH"](x) - OPERATIONS["SINH"](y),
+        lambda a, b: a.cosh() - b.sinh(),
+    ),
+    "root": (lambda x, y: OPERATIONS["SQRT"](x) / y, lambda a, b: a.sqrt() / b),
+    "small difference": (
+        lambda x, y: x * y / (x * y - 0.5 * y * x),
+        lambda a, b: a * b / (a * b - b * a / 2),
+    ),
+}
+
+
+@pytest.mark.parametrize(("enclosed", "exact"), AFFINE.values(), ids=AFFINE.keys())
+def test_affine_numbers_enclose_all_values_around(enclosed, exact):
+    (x, x_at), (y, y_at) = (affine_numbers(np.random.default_rng(seed)) for seed in (8, 9))
+    for first, second in product(
+        (flint.acb(1), flint.acb(-1), flint.acb(0, 1)), (flint.acb(2.5), flint.acb(-1, 2))
+    ):
+        with np.errstate(all="ignore"):
+            found = enclosed(x, y)
+            pairs = zip(x_at(first, second), y_at(first, second), strict=True)
+            require_inside(found.ball, [exact(a, b) for a, b in pairs])
+
+
+def test_what_depends_on_parameters_alike_does_not_blow_up():
+    x, _ = affine_numbers(np.random.default_rng(8))
+    with np.errstate(all="ignore"):
+        close, wide = (x * x - 0.9 * (x * x)).ball, x.ball * x.ball - 0.9 * (x.ball * x.ball)
+        assert (close.rad < 0.3 * wide.rad).all()
+
+
+def test_numbers_that_share_a_radius_are_enclosed_like_others():
+    (x, _), (y, _) = (random_balls(np.random.default_rng(seed)) for seed in (2, 3))
+    for operation, _ in BINARY.values():
+        with np.errstate(all="ignore"):
+            alone = operation(x, y)
+            joint = operation(*(shared(Ball(one.mid, 1e-9 * one.mid), (0,)) for one in (x, y)))
+            exact = operation(*(Ball(one.mid, 1e-9 * one.mid) for one in (x, y)))
+        assert joint.rad.shape == (1,) and alone.rad.shape == (POINTS,)
+        assert np.array_equal(joint.mid, exact.mid) and (exact.rad <= joint.rad * (1.0 + 1e-12)).all()
 
 
 def test_boxes_that_do_not_cover_everything_once_are_told():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
@@ -11,11 +12,16 @@ from gen_profile.certificate.balls import Array
 from gen_profile.certificate.boxes import DyadicBox
 from gen_profile.certificate.theorem import Theorem
 from gen_profile.evaluation.simulation import PlantSimulation
-from gen_profile.problem.linearization import linear_terms, linearize
+from gen_profile.plants.plant import Plant
+from gen_profile.problem import symbolic as sym
+from gen_profile.problem.dynamics import dynamics
+from gen_profile.problem.linearization import linear_terms
+from gen_profile.problem.symbolic import Function
 
 TIME_TERMS = 12
-ACCURACY = 1e-9  # of the integration, relative
-FINE = 2.0**-29  # of the greatest value of each coordinate: what coefficients are rounded to
+ACCURACY = 1e-10  # of the integration, relative
+FINE = 2.0**-36  # of the greatest value of each coordinate: what coefficients are rounded to
+NOISE = 2.0**-34  # likewise, below which coefficients are left out
 NEGLIGIBLE = 1e-12
 
 
@@ -23,13 +29,7 @@ def approximate(theorem: Theorem, boxes: Sequence[DyadicBox]) -> Array:
     """Integrate machines at Chebyshev's nodes of some boxes; coefficients of `Approximation`."""
     spec, axes, ranges = theorem.spec, theorem.axes, theorem.ranges
     plant, profile = spec.machine(), axes.profile()
-    d, terms = len(ranges.names), theorem.terms
-    one = chebyshev.nodes(terms).mid
-    grid = (
-        np.stack([g.ravel() for g in np.meshgrid(*[one] * d, indexing="ij")], axis=1)
-        if d
-        else np.zeros((1, 0))
-    )
+    grid = _grid(theorem.terms)
     places = np.concatenate([ranges.values(box, grid) for box in boxes])
     machines = [
         {**spec.plant.parameters, **dict(zip(ranges.names, row, strict=True))} for row in places.tolist()
@@ -52,58 +52,95 @@ def approximate(theorem: Theorem, boxes: Sequence[DyadicBox]) -> Array:
     )
     x = np.concatenate([q_u, lifted], axis=2)
     x = x.reshape(len(boxes), len(grid), len(half), TIME_TERMS, -1)[:, :, :, ::-1]
-    to_series = chebyshev.coefficients_of(TIME_TERMS).mid
-    over_p = chebyshev.tensor(chebyshev.coefficients_of(terms), d).mid
-    c = np.einsum("kg,bgptx,jt->bpxjk", over_p, x, to_series, optimize=True)
-    return rounded(c)
+    values = x.transpose(0, 2, 4, 3, 1)
+    values = values.reshape(*values.shape[:4], *theorem.terms)
+    return rounded(chebyshev.interpolate(values, 1 + len(theorem.terms)).reshape(*values.shape[:4], -1))
+
+
+def _grid(terms: Sequence[int]) -> Array:
+    """List Chebyshev's nodes of all ranges, shape (places, ranges)."""
+    ones = [chebyshev.nodes(count).mid for count in terms]
+    return (
+        np.stack([g.ravel() for g in np.meshgrid(*ones, indexing="ij")], axis=1) if ones else np.zeros((1, 0))
+    )
 
 
 def rounded(coefficients: Array) -> Array:
-    """Round to whole multiples of a power of two for each coordinate, so that their sums are exact."""
-    greatest = np.abs(coefficients).max(axis=(0, 1, 3, 4))
+    """Round to whole multiples of a power of two for each coordinate, so that their sums are exact.
+
+    What is as small as the integration's errors is left out: it adds nothing but bytes.
+    """
+    greatest = np.abs(coefficients).max(axis=(0, 1, 3, 4))[:, None, None]
     quantum = 2.0 ** np.round(np.log2(np.maximum(greatest, NEGLIGIBLE) * FINE))
-    return np.asarray(np.round(coefficients / quantum[:, None, None]) * quantum[:, None, None])
+    kept = np.where(np.abs(coefficients) < NOISE * greatest, 0.0, coefficients)
+    return np.asarray(np.round(kept / quantum) * quantum)
 
 
 def scales(theorem: Theorem, boxes: Sequence[DyadicBox]) -> Array:
-    """Scale errors by the modes at the middle of every box and piece (or one): S of `Approximation`."""
+    """Scale errors by the energy of oscillations of every machine: coefficients of S of `Approximation`.
+
+    |S e|² is twice the energy, e'K e + ė'M ė, so that errors of a machine that swings freely do not grow. For
+    the middle of a box, coordinates are those of the modes. One piece stands for all where they are alike.
+    """
     spec, axes, ranges = theorem.spec, theorem.axes, theorem.ranges
-    plant = spec.machine()
+    plant, names = spec.machine(), list(spec.plant.parameters)
+    grid = np.concatenate([np.zeros((1, len(ranges.names))), _grid(theorem.scale_terms)])
+    machines = np.tile(list(spec.plant.parameters.values()), (len(boxes) * len(grid), 1))
+    machines[:, [names.index(name) for name in ranges.names]] = np.concatenate(
+        [ranges.values(box, grid) for box in boxes]
+    )
     middles = 0.5 * (axes.position[:-1] + axes.position[1:])
-    machine = np.array([list(spec.plant.parameters.values())])
-    still = [linear_terms(plant, machine, q_a)[0] for q_a in middles[:: max(1, len(middles) // 8)]]
-    if all(np.array_equal(one, still[0]) for one in still):
-        middles = middles[:1]  # modes do not depend on where the axes are
-    d = len(ranges.names)
-    ends = np.concatenate([np.zeros((1, d)), np.eye(d), -np.eye(d)])
-    found = []
-    for box in boxes:
-        values = ranges.values(box, ends)
-        machines = np.tile(list(spec.plant.parameters.values()), (len(values), 1))
-        machines[:, [list(spec.plant.parameters).index(name) for name in ranges.names]] = values
-        nominal = dict(zip(spec.plant.parameters, machines[0].tolist(), strict=True))
-
-        def scale(q_a: Array, machines: Array = machines, nominal: dict[str, float] = nominal) -> Array:
-            one = linearize(plant, nominal, q_a.tolist())
-            stiffness = linear_terms(plant, machines, q_a)[0]
-            modal = np.linalg.inv(one.modes) @ (stiffness[1:] - stiffness[0]) @ one.modes
-            inverse = _balance(np.abs(modal).sum(axis=0))[:, None] * np.linalg.inv(one.modes)
-            nothing = np.zeros_like(inverse)
-            return np.block([[one.frequencies[:, None] * inverse, nothing], [nothing, inverse]])
-
-        found.append([scale(q_a) for q_a in middles])
-    return np.array(found)
+    few = [_energies(plant, machines, q_a) for q_a in middles[:: max(1, len(middles) // 8)]]
+    alike = all(np.allclose(one, few[0], rtol=1e-12, atol=0.0) for one in few)
+    found = few[:1] if alike else [_energies(plant, machines, q_a) for q_a in middles]
+    energies = np.stack(found, axis=1)  # (2, pieces, machines, n_u, n_u)
+    energies = energies.reshape(2, len(found), len(boxes), len(grid), *energies.shape[3:]).swapaxes(1, 2)
+    mass, stiffness = 0.5 * (energies + np.swapaxes(energies, -1, -2))
+    root = _root(mass[:, -1:, :1], -0.5)  # at the end; S shall change little from piece to piece
+    modes = root @ np.linalg.eigh(root @ stiffness[:, -1:, :1] @ root)[1]
+    turned = (np.swapaxes(modes, -1, -2) @ one @ modes for one in (stiffness, mass))
+    blocks = [_root(one, 0.5) @ np.linalg.inv(modes) for one in turned]
+    whole = np.zeros((*mass.shape[:3], 2 * mass.shape[3], 2 * mass.shape[3]))
+    n_u = mass.shape[3]
+    whole[..., :n_u, :n_u], whole[..., n_u:, n_u:] = blocks
+    values = np.moveaxis(whole[:, :, 1:], 2, -1)
+    series = chebyshev.interpolate(values.reshape(*values.shape[:4], *theorem.scale_terms), len(ranges.names))
+    return _rounded_scales(series.reshape(*values.shape[:4], -1))
 
 
-def _balance(coupling: Array) -> Array:
-    """Find factors of modes that make a coupling of them as symmetric as can be (E. E. Osborne, 1960)."""
-    factors = np.ones(len(coupling))
-    off = coupling * (1.0 - np.eye(len(coupling))) + NEGLIGIBLE
-    for _ in range(20):
-        for mode in range(len(off)):
-            row, column = (
-                (off[mode] / factors).sum() * factors[mode],
-                (off[:, mode] * factors).sum() / factors[mode],
-            )
-            factors[mode] *= np.sqrt(column / row)
-    return factors
+def _energies(plant: Plant, machines: Array, q_a: Array) -> Array:
+    """Find matrices of inertia and stiffness at rest, (2, machines, n_u, n_u), that are symmetric."""
+    stiffness, inertia = linear_terms(plant, machines, q_a)[0], _inertia(plant)
+    if inertia is None:  # any energy will do that the machine keeps: that of its modes
+        back = np.linalg.inv(np.linalg.eig(stiffness)[1]).real
+        mass = np.swapaxes(back, -1, -2) @ back
+    else:
+        mass = inertia(np.array([q_a]), machines)
+    return np.stack([mass, mass @ stiffness])
+
+
+@cache
+def _inertia(plant: Plant) -> Function | None:
+    """Second derivative of the energy by the rates at rest, where the plant tells of its bodies."""
+    d = dynamics(plant)
+    if not plant.bodies:
+        return None
+    slopes = sym.jacobian(d.energy, d.dq_u).T
+    moving = {"q_u": d.q_u, "dq_u": d.dq_u, "dq_a": d.dq_a}
+    still = sym.jacobian(slopes, d.dq_u)
+    for symbol in moving.values():
+        still = sym.substitute(still, symbol, sym.column([0.0] * symbol.shape[0]))
+    return Function("inertia", {"q_a": d.q_a, "p": d.p}, still)
+
+
+def _root(matrices: Array, power: float) -> Array:
+    """Take a power of symmetric matrices."""
+    values, vectors = np.linalg.eigh(matrices)
+    values = np.maximum(values, NEGLIGIBLE * np.abs(values).max(axis=-1, keepdims=True))
+    return np.asarray((vectors * values[..., None, :] ** power) @ np.swapaxes(vectors, -1, -2))
+
+
+def _rounded_scales(series: Array) -> Array:
+    """Cut digits that need not be stored."""
+    quantum = 2.0 ** np.round(np.log2(np.abs(series).max() * FINE))
+    return np.asarray(np.round(series / quantum) * quantum)

@@ -20,7 +20,7 @@ DEGREE = 5
 FINER = 4  # points per setpoint at which differences are looked at
 FEWEST = 5  # setpoints in a piece
 ROUNDS = 12  # of halving pieces
-SAGITTA = 0.25  # share of what straight lines between setpoints leave out, to which a motion is fitted
+SAGITTA = 1.0  # share of what straight lines between setpoints leave out, to which a motion is fitted
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -89,7 +89,7 @@ def powers(coefficients: Ball, x: Ball, order: int) -> Ball:
     return result
 
 
-def widened(coefficients: Ball, reach: float, order: int) -> Ball:
+def widened(coefficients: Ball, reach: Array | float, order: int) -> Ball:
     """Enclose a derivative by x for all |x| ≤ reach, complex ones, too, shape (pieces, m)."""
     for _ in range(order):
         coefficients = coefficients[1:] * np.arange(1.0, len(coefficients.mid))[:, None, None]
@@ -258,7 +258,8 @@ def _between(values: Ball) -> Ball:
     finer = values[:-1][:, None] + steps * shares.reshape(1, FINER, *[1] * (len(values.shape) - 1))
     shape = (-1, *values.shape[1:])
     mid = np.concatenate([finer.mid.reshape(shape), values.mid[-1:]])
-    return Ball(mid, np.concatenate([finer.rad.reshape(shape), values[-1:].rad]))
+    rad = np.broadcast_to(finer.rad, finer.mid.shape).reshape(shape)
+    return Ball(mid, np.concatenate([rad, np.broadcast_to(values.rad, values.mid.shape)[-1:]]))
 
 
 def _running_sum(values: Ball) -> Ball:

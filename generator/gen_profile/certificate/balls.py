@@ -4,6 +4,9 @@ A ball is a disc of the complex plane with its midpoint on the real axis. So the
 rounding (tiny radii), ranges of real values, and the values of an analytic function on an ellipse around an
 interval, which bound what a polynomial misses of it.
 
+Numbers of an array may share a radius: along axes on which `rad` has length 1 and `mid` has not. Then it is
+the greatest of theirs, and operations cost little more than those on plain numbers.
+
 Radii are rounded up by a factor that is more than what the few operations of any formula here can lose.
 The four operations and roots of IEEE 754 are exact to half a unit; functions of NumPy's are taken to be
 exact to sixteen. A midpoint or radius that is not finite encloses everything, and proves nothing.
@@ -25,6 +28,7 @@ UNIT = 2.0**-52  # relative, twice what a basic operation errs by
 FUNCTION = 2.0**-49  # likewise of NumPy's functions
 UPWARD = 1.0 + 2.0**-47  # outweighs some thirty operations on radii
 LEAST = 1e-300  # outweighs underflow
+MOST_FACTORS = 16  # as which a power is multiplied out
 
 
 @attrs.frozen(eq=False, slots=True)
@@ -45,20 +49,18 @@ class Ball:
     def __add__(self, other: Operand) -> Ball:
         """Add."""
         b = ball(other)
-        mid = self.mid + b.mid
-        return _rounded(mid, self.rad + b.rad)
+        return _rounded(self.mid + b.mid, self.rad + b.rad)
 
     def __sub__(self, other: Operand) -> Ball:
         """Subtract."""
         b = ball(other)
-        mid = self.mid - b.mid
-        return _rounded(mid, self.rad + b.rad)
+        return _rounded(self.mid - b.mid, self.rad + b.rad)
 
     def __mul__(self, other: Operand) -> Ball:
         """Multiply."""
         b = ball(other)
-        mid = self.mid * b.mid
-        return _rounded(mid, np.abs(self.mid) * b.rad + self.rad * (np.abs(b.mid) + b.rad))
+        mid, (size, other_size) = self.mid * b.mid, _sizes(self, b)
+        return _rounded(mid, size * b.rad + self.rad * (other_size + b.rad))
 
     def __truediv__(self, other: Operand) -> Ball:
         """Divide; by what may be zero gives everything."""
@@ -66,7 +68,7 @@ class Ball:
         mid = self.mid / b.mid
         away = np.abs(b.mid) - b.rad
         missed = self.rad + np.abs(mid) * b.rad + UNIT * np.abs(self.mid)
-        return _rounded(mid, np.where(away > 0.0, missed / away, np.inf))
+        return _rounded(mid, _shared(np.where(away > 0.0, missed / away, np.inf), self.rad, b.rad))
 
     def __neg__(self) -> Ball:
         """Negate, exactly."""
@@ -86,6 +88,10 @@ class Ball:
     def __getitem__(self, key: Any) -> Ball:
         """Take some of the numbers."""
         return Ball(self.mid[key], self.rad[key])
+
+    def reshape(self, *shape: int) -> Ball:
+        """Take the numbers in another shape."""
+        return Ball(np.reshape(self.mid, shape), np.reshape(self.rad, shape))
 
     @property
     def most(self) -> Array:
@@ -131,13 +137,34 @@ def matmul(a: Operand, b: Operand) -> Ball:
     return Ball(mid_a @ mid_b, missed * (1.0 + 2 * terms * UNIT) * UPWARD + LEAST)
 
 
-def _rounded(mid: Any, missed: Any) -> Ball:
+def shared(x: Ball, axes: tuple[int, ...]) -> Ball:
+    """Let numbers share a radius along axes."""
+    rad = np.broadcast_to(x.rad, np.shape(x.mid))
+    return Ball(x.mid, rad.max(axis=axes, keepdims=True))
+
+
+def _shared(values: Any, *rads: Any) -> Any:
+    """Take the greatest of values for numbers that share a radius."""
+    shape, own = np.broadcast_shapes(*map(np.shape, rads)), np.shape(values)
+    if len(shape) != len(own) or shape == own:
+        return values
+    axes = tuple(axis for axis, (one, many) in enumerate(zip(shape, own, strict=True)) if one < many)
+    return values.max(axis=axes, keepdims=True)
+
+
+def _sizes(a: Ball, b: Ball) -> tuple[Any, Any]:
+    """Bound midpoints, for numbers that share a radius all at once."""
+    return _shared(np.abs(a.mid), a.rad, b.rad), _shared(np.abs(b.mid), a.rad, b.rad)
+
+
+def _rounded(mid: Any, missed: Any, unit: float = UNIT) -> Ball:
     """Add the rounding of a midpoint to what else it misses."""
-    return Ball(mid, (missed + UNIT * np.abs(mid)) * UPWARD + LEAST)
+    return Ball(mid, (missed + unit * _shared(np.abs(mid), missed)) * UPWARD + LEAST)
 
 
-def _evaluated(mid: Any, missed: Any) -> Ball:
-    return Ball(mid, (missed + FUNCTION * np.abs(mid)) * UPWARD + LEAST)
+def _evaluated(mid: Any, missed: Any, x: Ball) -> Ball:
+    """Take what a function of NumPy's gives, and what it misses over x."""
+    return _rounded(mid, _shared(missed, x.rad), FUNCTION)
 
 
 def _sine_like(value: Callable[[Any], Any], slope: Callable[[Any], Any]) -> Callable[[Ball], Ball]:
@@ -146,7 +173,7 @@ def _sine_like(value: Callable[[Any], Any], slope: Callable[[Any], Any]) -> Call
     def enclosed(x: Ball) -> Ball:
         rad = x.rad * UPWARD
         mid, along = value(x.mid), np.abs(slope(x.mid))
-        return _evaluated(mid, along * np.sinh(rad) + np.abs(mid) * 2.0 * np.sinh(0.5 * rad) ** 2)
+        return _evaluated(mid, along * np.sinh(rad) + np.abs(mid) * 2.0 * np.sinh(0.5 * rad) ** 2, x)
 
     return enclosed
 
@@ -160,7 +187,7 @@ cosh = _sine_like(np.cosh, np.sinh)
 def exp(x: Ball) -> Ball:
     """Enclose e to the power: |e^d − 1| ≤ e^|d| − 1."""
     mid = np.exp(x.mid)
-    return _evaluated(mid, mid * np.expm1(x.rad))
+    return _evaluated(mid, mid * np.expm1(x.rad), x)
 
 
 def sqrt(x: Ball) -> Ball:
@@ -168,14 +195,14 @@ def sqrt(x: Ball) -> Ball:
     share = np.where(x.rad < x.mid, x.rad / x.mid, np.nan) * UPWARD
     mid = np.sqrt(np.where(x.mid > 0.0, x.mid, np.nan))
     exact = (np.asarray(x.mid) == 0.0) & (np.asarray(x.rad) == 0.0)
-    found = _evaluated(mid, mid * share / (1.0 + np.sqrt(np.maximum(1.0 - share, 0.0))))
-    return Ball(np.where(exact, 0.0, found.mid), np.where(exact, 0.0, found.rad))
+    found = _evaluated(mid, mid * share / (1.0 + np.sqrt(np.maximum(1.0 - share, 0.0))), x)
+    return Ball(np.where(exact, 0.0, found.mid), _shared(np.where(exact, 0.0, found.rad), x.rad))
 
 
 def log(x: Ball) -> Ball:
     """Enclose the natural logarithm: off by most at the end next to zero."""
     share = np.where(x.rad < x.mid, x.rad / x.mid, np.nan) * UPWARD
-    return _evaluated(np.log(np.where(x.mid > 0.0, x.mid, np.nan)), -np.log1p(-share))
+    return _evaluated(np.log(np.where(x.mid > 0.0, x.mid, np.nan)), -np.log1p(-share), x)
 
 
 def tanh(x: Ball) -> Ball:
@@ -189,7 +216,7 @@ def tanh(x: Ball) -> Ball:
         2.0 * small * np.expm1(2.0 * x.rad) / away,
         np.inf,
     )
-    return _evaluated(mid, np.fmin(near, far))
+    return _evaluated(mid, np.fmin(near, far), x)
 
 
 def tan(x: Ball) -> Ball:
@@ -199,18 +226,18 @@ def tan(x: Ball) -> Ball:
 
 def absolute(x: Ball) -> Ball:
     """Enclose the absolute value where the sign is known, so that it is analytic."""
-    return Ball(np.abs(x.mid), np.where(x.rad < np.abs(x.mid), x.rad, np.nan))
+    return Ball(np.abs(x.mid), _shared(np.where(x.rad < np.abs(x.mid), x.rad, np.nan), x.rad))
 
 
 def sign(x: Ball) -> Ball:
     """Tell the sign where it is known."""
-    return Ball(np.sign(x.mid), np.where(x.rad < np.abs(x.mid), 0.0, np.nan))
+    return Ball(np.sign(x.mid), _shared(np.where(x.rad < np.abs(x.mid), 0.0, np.nan), x.rad))
 
 
-def power(x: Ball, exponent: float) -> Ball:
+def power(x: Any, exponent: float) -> Any:
     """Enclose a constant power."""
-    if exponent == int(exponent) and abs(exponent) <= 16:
-        product = ball(1.0)
+    if exponent == int(exponent) and abs(exponent) <= MOST_FACTORS:
+        product: Any = 1.0
         for _ in range(int(abs(exponent))):
             product = product * x
         return product if exponent >= 0.0 else 1.0 / product

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
+from functools import partial
 from math import prod
 
 import attrs
@@ -13,6 +14,8 @@ from gen_profile.certificate import approximation
 from gen_profile.certificate.axis_motion import fitted, track_of
 from gen_profile.certificate.balls import Array
 from gen_profile.certificate.boxes import DyadicBox, halves, whole
+from gen_profile.certificate.in_order import in_order
+from gen_profile.certificate.packing import Motions
 from gen_profile.certificate.theorem import Theorem, ranges_of
 from gen_profile.errors import CertificateError
 from gen_profile.evaluation.residual_sway import observation_time
@@ -20,14 +23,15 @@ from gen_profile.motion.profile import SampledProfile
 from gen_profile.problem.parameter_box import Box
 from gen_profile.spec.model import Spec
 
-PHASE = 1.0  # rad of the fastest mode that a piece of time covers at most
-TURN = 0.8  # rad by which a mode's phase at the end varies over a box at first
+PHASE = 3.0  # rad of the fastest mode that a piece of time covers at most
+TURN = 2.0  # rad by which a mode's phase at the end varies over a box at first
+FEWEST_TERMS, LEAST_TERM = 4, 1e-7  # of series in parameters; what they leave out, relative
 PLACES = 33  # along a range, at which phases are looked at
 CLOSE = 1.03  # of the greatest sway seen: how tight a bound is wanted
 SLACK = 1e-3  # relative, by which a bound is stated higher than it was found, lest other rounding break it
-CLOSE_TO_LIMIT = 5e-3  # of the limit, likewise
-MOST_NODES = 10**8  # at which equations are evaluated in all: some twenty minutes
-FRUITLESS = 2  # rounds in a row without a bound, after which no more are tried
+CLOSE_TO_LIMIT = 2e-3  # of the limit, likewise
+MOST_NODES = 5 * 10**8  # at which equations are evaluated in all: some twenty minutes
+FRUITLESS = 3  # rounds in a row without a bound, after which no more are tried
 DEEPEST = 6  # halvings beyond the first boxes, of all ranges in sum
 
 Progress = Callable[[int, int], None]
@@ -42,7 +46,8 @@ class Attempt:
     theorem : Theorem
     boxes : tuple of DyadicBox
         Of which a bound is proved.
-    coefficients, scales : array
+    motions : tuple of Motions
+    scales : array
         Of `Approximation`, for these boxes.
     bounds : (boxes, loads) array
         m.
@@ -54,7 +59,7 @@ class Attempt:
 
     theorem: Theorem
     boxes: tuple[DyadicBox, ...]
-    coefficients: Array
+    motions: tuple[Motions, ...]
     scales: Array
     bounds: Array
     seen: Array
@@ -80,7 +85,7 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
         Machines cannot be integrated.
     """
     theorem, spans = _prepared(spec, setpoints)
-    levels = [max(0, int(np.ceil(np.log2(max(span / TURN, 1e-9))))) for span in spans]
+    levels = [_halvings(span) for span in spans]
     most = MOST_NODES // theorem.nodes  # boxes
     if prod(2**level for level in levels) > most:
         raise CertificateError(
@@ -88,24 +93,20 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
             f"more than {most} boxes; narrow them, or let fewer parameters vary (check.uncertain)."
         )
     limits = np.array(list(spec.check.residual_sway.values()))
-    waiting, done, tried = whole(levels), {}, 0
+    waiting, done, tried = whole(levels), dict[DyadicBox, _Proof](), 0
     seen, fruitless = np.zeros(len(limits)), 0
     while waiting:
-        for batch in theorem.batches(waiting):
-            coefficients = approximation.approximate(theorem, batch)
-            scales = approximation.scales(theorem, batch)
-            found = theorem.enclosure(batch, coefficients, scales).bounds()
-            seen = np.fmax(seen, np.nanmax(found.seen, axis=0, initial=0.0))
-            for number, box in enumerate(batch):
-                done[box] = (coefficients[number], scales[number], found.sway[number])
+        prove = partial(_prove, theorem, _wanted(seen, limits))
+        for batch, proofs, here in in_order(prove, _integrated(theorem, waiting)):
+            done.update(zip(batch, proofs, strict=True))
+            seen = np.fmax(seen, here)
             tried += len(batch)
             progress(tried, tried + len(waiting))
-        wanted = np.maximum(CLOSE * seen, seen + CLOSE_TO_LIMIT * limits)
-        wanted = np.where(seen < limits, np.minimum(wanted, limits / (1.0 + SLACK)), wanted)
-        coarse = [box for box, (_, _, bound) in done.items() if not (bound <= wanted).all()]
+        wanted = _wanted(seen, limits)
+        coarse = [box for box, proof in done.items() if not (proof.bound <= wanted).all()]
         deepest = sum(levels) + DEEPEST
         coarse = [box for box in coarse if box and sum(level for level, _ in box) < deepest]
-        fruitless = 0 if any(np.isfinite(done[box][2]).all() for box in waiting) else fruitless + 1
+        fruitless = 0 if any(np.isfinite(done[box].bound).all() for box in waiting) else fruitless + 1
         if tried + 2 * len(coarse) > most or fruitless == FRUITLESS:
             break
         waiting = [part for box in coarse for part in halves(box, _widest(box, spans))]
@@ -114,18 +115,66 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
     return _attempt(theorem, done, seen)
 
 
-def _attempt(theorem: Theorem, done: dict[DyadicBox, tuple[Array, Array, Array]], seen: Array) -> Attempt:
+def _wanted(seen: Array, limits: Array) -> Array:
+    """Tell how low bounds should be, by the greatest sway seen."""
+    wanted = np.maximum(CLOSE * seen, seen + CLOSE_TO_LIMIT * limits)
+    return np.where(seen < limits, np.minimum(wanted, limits / (1.0 + SLACK)), wanted)
+
+
+def _halvings(span: float) -> int:
+    """Tell how often a range is halved at first, over which phases turn so far."""
+    return max(0, int(np.ceil(np.log2(max(span / TURN, 1e-9)))))
+
+
+def _terms(turn: float) -> int:
+    """Tell how many terms a series needs over a box in which phases turn so far: as cos(turn y / 2) does."""
+    size, terms = 1.0, 0
+    while size > LEAST_TERM or terms < FEWEST_TERMS:
+        terms += 1
+        size *= 0.25 * turn / terms
+    return terms
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Proof:
+    """Of one box: what it needs, and its bounds in m, or nan."""
+
+    motions: Motions
+    scales: Array
+    bound: Array
+
+
+def _integrated(
+    theorem: Theorem, boxes: Sequence[DyadicBox]
+) -> Iterator[tuple[Sequence[DyadicBox], Array, Array]]:
+    """Integrate machines of boxes: what a proof is to be of, and made of."""
+    for batch in theorem.batches(boxes):
+        yield batch, approximation.approximate(theorem, batch), approximation.scales(theorem, batch)
+
+
+def _prove(
+    theorem: Theorem, enough: Array, made: tuple[Sequence[DyadicBox], Array, Array]
+) -> tuple[Sequence[DyadicBox], list[_Proof], Array]:
+    """Prove bounds for a batch, and tell the greatest sway that was met."""
+    batch, coefficients, scales = made
+    found = theorem.enclosure(batch, coefficients, scales).bounds(enough)
+    proofs = [
+        _Proof(motions=Motions.of(motion), scales=scale, bound=bound)
+        for motion, scale, bound in zip(coefficients, scales, found.sway, strict=True)
+    ]
+    return batch, proofs, np.nanmax(found.seen, axis=0, initial=0.0)
+
+
+def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], seen: Array) -> Attempt:
     """Keep the boxes with a bound."""
-    proved = {box: found for box, found in done.items() if np.isfinite(found[2]).all()}
+    proved = {box: found for box, found in done.items() if np.isfinite(found.bound).all()}
     volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in proved), Fraction(0))
-    rows = list(proved.values())
-    coefficients, scales, bounds = (np.array([row[column] for row in rows]) for column in range(3))
     return Attempt(
         theorem=theorem,
         boxes=tuple(proved),
-        coefficients=coefficients,
-        scales=scales,
-        bounds=bounds.reshape(-1, len(seen)),
+        motions=tuple(proof.motions for proof in proved.values()),
+        scales=np.array([proof.scales for proof in proved.values()]),
+        bounds=np.array([proof.bound for proof in proved.values()]).reshape(-1, len(seen)),
         seen=seen,
         share=float(volume),
     )
@@ -159,4 +208,5 @@ def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[floa
     track = track_of(setpoints, np.array(spec.move.final_velocity))
     longest = PHASE * box.duration / fastest
     axes = fitted(track, float(setpoints.resolution.max()), longest, watch)
-    return Theorem(spec=spec, axes=axes, ranges=ranges, setpoints=setpoints), spans
+    terms = tuple(_terms(span / 2 ** _halvings(span)) for span in spans)
+    return Theorem(spec=spec, axes=axes, ranges=ranges, setpoints=setpoints, terms=terms), spans

@@ -1,22 +1,28 @@
 """Chebyshev series on balls: of functions of a time and of parameters, each on [−1, 1].
 
-A function that is analytic on the ellipses with foci ±1 and sums of half-axes ρ, and at most M there, has
-coefficients of at most 2 M ρ⁻ᵏ (and 2 for each further variable); so its interpolant at Chebyshev's nodes is
-off by at most the double of what those beyond the nodes come to. (L. N. Trefethen, Approximation theory and
-approximation practice, 2013, theorems 8.1 and 8.2; S. N. Bernstein, 1912.)
+A function that is analytic on the ellipse with foci ±1 and sum of half-axes ρ, and at most M there, differs
+from its interpolant at N of Chebyshev's nodes by at most 4 M ρ⁻ᴺ / (1 − 1/ρ). Interpolation at N nodes makes
+values greater by at most 1 + 2/π ln N. So variables may be taken one after the other, each with an ellipse of
+its own, while all others are real. (L. N. Trefethen, Approximation theory and approximation practice, 2013,
+theorem 8.2; S. N. Bernstein, 1912; T. J. Rivlin, The Chebyshev polynomials, 1974, theorem 1.2.)
+
+Arrays have an axis for each variable, after others.
 """
 
 from __future__ import annotations
 
-from functools import cache, reduce
-from math import prod
+from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gen_profile.certificate.balls import UNIT, UPWARD, Array, Ball
+from gen_profile.certificate.balls import UNIT, Array, Ball
 
 COSINE = 32 * UNIT  # by which a cosine here may be off, its argument's rounding included
+ROUND_UP = 1.0 + 1e-12
+TINY = 1e-5  # of a bound, up to which coefficients of the highest degrees are not halved any more
+PORTION, MOST_WORK = 2**18, 2**31  # coefficients that are halved at once, and in all
+NEAR = 1.005  # of the greatest value seen: how closely a bound is sought
 
 
 def nodes(count: int) -> Ball:
@@ -25,29 +31,96 @@ def nodes(count: int) -> Ball:
 
 
 @cache
-def values_at_nodes(count: int, terms: int) -> Ball:
-    """Matrix from coefficients to values at nodes, shape (count, terms)."""
-    return Ball(_cosines(count, terms), np.full((count, terms), COSINE))
+def values_at_nodes(count: int, terms: int) -> Array:
+    """Matrix from coefficients to values at nodes, shape (count, terms); entries are off by `COSINE`."""
+    return _cosines(count, terms)
 
 
 @cache
-def coefficients_of(count: int) -> Ball:
-    """Matrix from values at nodes to the interpolant's coefficients, shape (count, count)."""
+def coefficients_of(count: int) -> Array:
+    """Matrix from values at nodes to the interpolant's coefficients; entries are off by twice `COSINE`."""
     matrix = 2.0 / count * _cosines(count, count).T
     matrix[0] *= 0.5
-    return Ball(matrix, np.full((count, count), 2.0 * COSINE))
+    return matrix
 
 
-def tensor(matrix: Ball, dimensions: int) -> Ball:
-    """Let a matrix act on every one of some dimensions, flattened, the last one fastest."""
-    one = Ball(np.ones((1, 1)), np.zeros((1, 1)))
-    return reduce(_kronecker, [matrix] * dimensions, one)
+def evaluated(series: Array, counts: Sequence[int]) -> Ball:
+    """Evaluate series at nodes; all values of a series share a radius."""
+    terms = series.shape[series.ndim - len(counts) :]
+    matrices = [values_at_nodes(*sizes) for sizes in zip(counts, terms, strict=True)]
+    off = sum(2.0 * COSINE + (size + 4) * UNIT for size in terms)
+    return Ball(_turned(matrices, series), _sum(np.abs(series), len(counts)) * off * ROUND_UP)
 
 
-def _kronecker(a: Ball, b: Ball) -> Ball:
-    mid = np.kron(a.mid, b.mid)
-    rad = np.kron(np.abs(a.mid), b.rad) + np.kron(a.rad, np.abs(b.mid) + b.rad)
-    return Ball(mid, (rad + UNIT * np.abs(mid)) * UPWARD)
+def interpolated(values: Ball, variables: int) -> Ball:
+    """Interpolate values at nodes, which share a radius; coefficients do, too."""
+    counts = np.shape(values.mid)[np.ndim(values.mid) - variables :]
+    size = np.abs(values.mid).max(axis=tuple(range(-variables, 0)), keepdims=True)
+    most = 2.0**variables  # as no row of such a matrix sums to more than 2
+    off = sum(2.0 * COSINE * count + (count + 4) * UNIT for count in counts)
+    rad = most * (values.rad + size * off) * ROUND_UP
+    return Ball(_turned([coefficients_of(count) for count in counts], values.mid), rad)
+
+
+def interpolate(values: Array, variables: int) -> Array:
+    """Interpolate values, with the rounding of plain numbers."""
+    return _turned([coefficients_of(count) for count in values.shape[values.ndim - variables :]], values)
+
+
+def _turned(matrices: Sequence[Array], values: Array) -> Array:
+    """Let a matrix act on each of the last axes."""
+    first = values.ndim - len(matrices)
+    for matrix in matrices:  # each time the first of these axes becomes the last one
+        values = np.tensordot(values, matrix, axes=(first, 1))
+    return values
+
+
+def _sum(values: Array, variables: int) -> Array:
+    return np.asarray(values.sum(axis=tuple(range(-variables, 0)), keepdims=True))
+
+
+def total(series: Ball, variables: int) -> Array:
+    """Bound the absolute values of series: by the sum of their coefficients'."""
+    axes = tuple(range(-variables, 0))
+    rad = np.broadcast_to(series.rad, np.shape(series.mid))
+    return np.asarray((np.abs(series.mid).sum(axis=axes) + rad.sum(axis=axes)) * ROUND_UP)
+
+
+def weights(rho: Array, terms: Sequence[int]) -> list[Array]:
+    """Bound the terms of every variable on ellipses, each (ellipses, terms).
+
+    Parameters
+    ----------
+    rho : (ellipses, variables) array
+        Sums of half-axes.
+    terms : (variables,) sequence of int
+    """
+    return [rho[:, k, None] ** np.arange(count) for k, count in enumerate(terms)]
+
+
+def weighted(series: Array, weights: Sequence[Array]) -> Array:
+    """Sum absolute coefficients with weights of each variable's terms, (ellipses, …)."""
+    others, last = list(range(series.ndim - len(weights))), series.ndim
+    operands: list[object] = [np.abs(series), list(range(series.ndim))]
+    for axis, weight in enumerate(weights, start=len(others)):
+        operands += [weight, [last, axis]]
+    if not weights:
+        return np.abs(series)[None]
+    return np.asarray(np.einsum(*operands, [last, *others], optimize=True)) * ROUND_UP  # type: ignore[call-overload]
+
+
+def first(series: Array, variables: int) -> Array:
+    """Take the coefficients of degree 0 in all variables."""
+    for _ in range(variables):
+        series = series[..., 0]
+    return series
+
+
+def spread(series: Array, variables: int) -> Ball:
+    """Enclose exact series: their first coefficient, and the sum of all others."""
+    middle = first(series, variables)
+    sizes = np.abs(series).sum(axis=tuple(range(-variables, 0)))
+    return Ball(middle, (sizes - np.abs(middle)) * ROUND_UP + 1e-15 * sizes)
 
 
 @cache
@@ -60,32 +133,110 @@ def derivative(terms: int) -> Array:
     return matrix
 
 
-def degrees(terms: int, dimensions: int) -> NDArray[np.int_]:
-    """Sum of degrees of every term of a tensor, flattened like `tensor`'s."""
-    grids = np.meshgrid(*[np.arange(terms)] * dimensions, indexing="ij") if dimensions else [np.zeros(1, int)]
-    return np.asarray(sum(grid.ravel() for grid in grids))
+@cache
+def halves(terms: int) -> tuple[Array, Array]:
+    """Matrices from coefficients to those on [−1, 0] and [0, 1], dyadic numbers, shape (terms, terms)."""
+    found = []
+    for shift in (-1.0, 1.0):  # T_k((x ± 1)/2), by T_(k+1)(u) = 2 u T_k(u) − T_(k−1)(u)
+        matrix = np.eye(terms, terms)
+        if terms > 1:
+            matrix[:2, 1] = 0.5 * shift, 0.5
+        for power in range(2, terms):
+            before = matrix[:, power - 1]
+            matrix[:, power] = shift * before - matrix[:, power - 2]
+            matrix[1:, power] += 0.5 * before[:-1]
+            matrix[1, power] += 0.5 * before[0]
+            matrix[:-1, power] += 0.5 * before[1:]
+        found.append(matrix)
+    return found[0], found[1]
 
 
-def missed(most: Array, time: tuple[float, int], parameters: tuple[float, int], dimensions: int) -> Array:
-    """Bound how far an interpolant is off.
+def missed(most: Array, rhos: Sequence[float], counts: Sequence[int]) -> Array:
+    """Bound how far interpolants are off.
 
     Parameters
     ----------
-    most : array
-        Upper bounds on the ellipses.
-    time, parameters : (ρ, number of nodes)
-    dimensions : int
-        Number of parameters.
+    most : (variables, ellipses, …) array
+        Upper bounds, each on one variable's ellipse for all real values of the others.
+    rhos : (ellipses,) sequence of float
+    counts : (variables,) sequence of int
+        Nodes.
     """
-    variables = [time] + [parameters] * dimensions
-    whole = [1.0 / (1.0 - 1.0 / rho) for rho, _ in variables]
-    beyond = sum(rho**-count * prod(whole) for rho, count in variables)
-    return np.asarray(2.0 * 2.0 ** len(variables) * most * beyond * (1.0 + 1e-12))
+    found, lebesgue = np.zeros(most.shape[2:]), 1.0
+    for bounds, count in zip(most, counts, strict=True):
+        each = [
+            4.0 * rho**-count / (1.0 - 1.0 / rho) * bound for rho, bound in zip(rhos, bounds, strict=True)
+        ]
+        found = found + lebesgue * np.fmin.reduce(each)
+        lebesgue *= 1.0 + 2.0 / np.pi * np.log(count)
+    return np.asarray(found * ROUND_UP)
 
 
-def between_nodes(count: int, degree: int) -> float:
-    """Factor by which a polynomial may exceed its values at nodes (H. Ehlich and K. Zeller, 1964)."""
-    return float(1.0 / np.cos(0.5 * np.pi * degree / count) * (1.0 + 1e-12))
+def greatest(series: Array, off: Array, enough: float) -> float:
+    """Bound absolute values of series closely, by halving wherever they may exceed what was seen.
+
+    Parameters
+    ----------
+    series : (items, terms, …) array
+    off : (items,) array
+        How far values are from those of the series.
+    enough : float
+        A bound that is low enough.
+    """
+    variables, bound, seen = series.ndim - 1, 0.0, 0.0
+    waiting, work = [(series, off)], 0
+    while waiting:
+        items, missing = waiting.pop()
+        if not (np.isfinite(items).all() and np.isfinite(missing).all()):
+            return float("nan")
+        seen = max(seen, float(np.abs(_turned([_ends(n) for n in items.shape[1:]], items)).max()))
+        sizes = (_sum(np.abs(items), variables).ravel() + missing) * ROUND_UP
+        wide = sizes > max(enough, NEAR * seen)
+        work += items.size
+        if work > MOST_WORK:
+            wide &= False
+        bound = max(bound, float(sizes[~wide].max(initial=0.0)))
+        if wide.any():
+            waiting += _halved(*_shortened(items[wide], missing[wide], TINY * max(enough, seen)))
+    return bound
+
+
+def _shortened(items: Array, off: Array, tiny: float) -> tuple[Array, Array]:
+    """Leave out the highest degrees where their coefficients are tiny."""
+    for axis in range(1, items.ndim):
+        sizes = np.abs(items).sum(axis=tuple(other for other in range(1, items.ndim) if other != axis))
+        beyond = np.cumsum(sizes[:, ::-1], axis=1)[:, ::-1] * ROUND_UP  # what is left out from a degree on
+        kept = max(2, int((beyond.max(axis=0) > tiny).sum()))
+        if kept < items.shape[axis]:
+            off = off + beyond[:, kept]
+            items = items.take(range(kept), axis=axis)
+    return items, off
+
+
+def _halved(items: Array, off: Array) -> list[tuple[Array, Array]]:
+    """Halve each series' variable that makes its values differ most from a plane's, in portions."""
+    variables = items.ndim - 1
+    degree = sum(np.ix_(*map(np.arange, items.shape[1:])))
+    bent = np.abs(items) * (degree > 1)
+    whole = _sum(bent, variables).ravel()
+    still = [_sum(bent.take([0], axis=axis), variables).ravel() for axis in range(1, variables + 1)]
+    chosen = 1 + np.argmax(whole - np.array(still), axis=0)
+    found = []
+    for axis in np.unique(chosen).tolist():
+        own, rest, terms = items[chosen == axis], off[chosen == axis], items.shape[axis]
+        rest = rest + 2.0 * terms * (terms + 4) * UNIT * _sum(np.abs(own), variables).ravel()
+        for matrix in halves(terms):
+            part = np.moveaxis(np.tensordot(own, matrix, axes=(axis, 1)), -1, axis)
+            portions = -(-part.size // PORTION)
+            found += list(zip(np.array_split(part, portions), np.array_split(rest, portions), strict=True))
+    return [one for one in found if len(one[1])]
+
+
+@cache
+def _ends(terms: int) -> Array:
+    """Matrix from coefficients to values at −1, 0 and 1."""
+    power = np.arange(terms)
+    return np.array([(-1.0) ** power, np.cos(0.5 * np.pi * power), np.ones(terms)])
 
 
 @cache

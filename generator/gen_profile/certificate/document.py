@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import binascii
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +15,13 @@ import numpy as np
 from gen_profile.certificate.axis_motion import AxisMotion
 from gen_profile.certificate.balls import Array
 from gen_profile.certificate.boxes import DyadicBox
+from gen_profile.certificate.packing import Motions, pack, unpack
 from gen_profile.errors import CertificateError
 
 SUFFIX = ".certificate.json"
 FORMAT = "gen-profile certificate 1"
 MOST_HALVINGS = 50  # of a range, up to which shares of it are exact
-MOST_BYTES = 2**32  # of an array, lest a small file fill the memory
+FIRST_TERMS = (1, 8, 6, 5, 4)  # in each of so many parameters, where it is not stated
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -46,8 +46,12 @@ class Certificate:
         Of the ranges' box, of which the bounds are proved.
     axes : AxisMotion
     boxes : tuple of DyadicBox
-    coefficients, scales : array
-        Of `gen_profile.certificate.enclosure.Approximation`.
+    terms : tuple of int
+        Of series in each parameter.
+    motions : tuple of Motions
+        Of every box, for `gen_profile.certificate.enclosure.Approximation`.
+    scales : (boxes, pieces or 1, 2 n_u, 2 n_u, parameter terms or 1) array
+        Likewise.
     """
 
     spec_sha256: str
@@ -61,7 +65,8 @@ class Certificate:
     share: float
     axes: AxisMotion
     boxes: tuple[DyadicBox, ...]
-    coefficients: Array
+    terms: tuple[int, ...]
+    motions: tuple[Motions, ...]
     scales: Array
 
     @property
@@ -115,8 +120,7 @@ def encode(certificate: Certificate) -> bytes:
     """
     if not certificate.proved:
         raise CertificateError("Nothing is proved, so there is no certificate to write.")
-    axes, c = certificate.axes, certificate.coefficients
-    quanta = np.array([_quantum(c[:, :, row]) for row in range(c.shape[2])])
+    axes = certificate.axes
     document = {
         "format": FORMAT,
         "spec_sha256": certificate.spec_sha256,
@@ -126,9 +130,9 @@ def encode(certificate: Certificate) -> bytes:
             name: getattr(axes, name).tolist() for name in ("knots", "position", "velocity", "acceleration")
         },
         "parts": [[list(part) for part in box] for box in certificate.boxes],
-        "quanta": quanta.tolist(),
-        "coefficients": _packed(np.round(c / quanta[:, None, None]).astype("<i4")),
-        "scales": _packed(certificate.scales.astype("<f8")),
+        "terms": list(certificate.terms),
+        "motions": [{"quanta": list(one.quanta), **one.packed} for one in certificate.motions],
+        "scales": pack(certificate.scales.astype("<f8"), 2),
     }
     return (json.dumps(document, allow_nan=False) + "\n").encode("ascii")
 
@@ -146,7 +150,7 @@ def parse(content: bytes) -> Certificate:
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise CertificateError(f"This is no certificate that can be read here ({FORMAT!r}).")
         axes = {name: np.array(document["axes"][name], dtype=np.float64) for name in document["axes"]}
-        whole = _unpacked(document["coefficients"], "<i4")
+        scales = unpack(document["scales"], "<f8", 2)
         return Certificate(
             spec_sha256=str(document["spec_sha256"]),
             artefact_sha256=str(document["artefact_sha256"]),
@@ -159,8 +163,9 @@ def parse(content: bytes) -> Certificate:
             share=float(document["share_proved"]),
             axes=AxisMotion(**axes),
             boxes=tuple(tuple(_part(*part) for part in box) for box in document["parts"]),
-            coefficients=whole * _powers_of_two(document["quanta"])[:, None, None],
-            scales=_unpacked(document["scales"], "<f8"),
+            terms=_terms(document),
+            motions=tuple(_motions(document)),
+            scales=scales if scales.ndim == 5 else scales[..., None],
         )
     except (
         ValueError,
@@ -171,7 +176,31 @@ def parse(content: bytes) -> Certificate:
         binascii.Error,
         zlib.error,
     ) as error:
-        raise CertificateError(f"The certificate is damaged ({error}); certify the file again.") from error
+        raise damaged(error) from error
+
+
+def damaged(error: Exception) -> CertificateError:
+    """Say that a certificate is damaged, and how."""
+    return CertificateError(f"The certificate is damaged ({error}); certify the file again.")
+
+
+def _terms(document: Mapping[str, Any]) -> tuple[int, ...]:
+    """Tell how many terms series have in each parameter; the first certificates did not state it."""
+    if "terms" in document:
+        return tuple(int(count) for count in document["terms"])
+    ranges = len(document["ranges"])
+    return (FIRST_TERMS[min(ranges, len(FIRST_TERMS) - 1)],) * ranges
+
+
+def _motions(document: Mapping[str, Any]) -> Iterator[Motions]:
+    """List the motions of every box; the first certificates held them all in one array of 32 bits."""
+    if "motions" in document:
+        for one in document["motions"]:
+            yield Motions(quanta=tuple(one["quanta"]), packed={key: one[key] for key in ("shape", "zlib")})
+    else:
+        quanta = np.array(document["quanta"], dtype=np.float64)[:, None, None]
+        for whole in unpack(document["coefficients"], "<i4", 2):
+            yield Motions.of(whole * quanta)
 
 
 def _part(level: int, index: int) -> tuple[int, int]:
@@ -180,46 +209,5 @@ def _part(level: int, index: int) -> tuple[int, int]:
     return level, index
 
 
-def _powers_of_two(values: Any) -> Array:
-    """Take factors by which whole numbers are multiplied exactly."""
-    factors = np.array(values, dtype=np.float64)
-    if not (np.frexp(factors)[0] == 0.5).all():
-        raise ValueError("quanta that are no powers of two")
-    return factors
-
-
 def _numbers(named: Mapping[str, Any]) -> dict[str, float]:
     return {str(name): float(value) for name, value in named.items()}
-
-
-def _quantum(values: Array) -> float:
-    """Find the greatest power of two of which all values are whole multiples."""
-    used = values[values != 0.0]
-    if not used.size:
-        return 1.0
-    mantissa, exponent = np.frexp(used)
-    whole = (mantissa * 2.0**53).astype(np.int64)
-    zeros = np.log2((whole & -whole).astype(np.float64))  # trailing ones of the mantissa that are 0
-    return float(2.0 ** int((exponent - 53 + zeros).min()))
-
-
-def _packed(array: Any) -> dict[str, Any]:
-    """Compress an array, high degrees, which are small, side by side."""
-    turned = np.ascontiguousarray(np.moveaxis(array, (0, 1), (-2, -1)))
-    return {
-        "shape": list(array.shape),
-        "zlib": base64.b64encode(zlib.compress(turned.tobytes(), 9)).decode("ascii"),
-    }
-
-
-def _unpacked(packed: Mapping[str, Any], kind: str) -> Any:
-    shape = tuple(int(size) for size in packed["shape"])
-    inflater = zlib.decompressobj()
-    count = int(np.prod([float(size) for size in shape]))
-    if not 0 < count * np.dtype(kind).itemsize <= MOST_BYTES:
-        raise ValueError("an array of such a size")
-    content = inflater.decompress(
-        base64.b64decode(packed["zlib"], validate=True), count * np.dtype(kind).itemsize
-    )
-    array = np.frombuffer(content, dtype=kind).reshape(*shape[2:], *shape[:2])
-    return np.moveaxis(array, (-2, -1), (0, 1)).astype(np.float64)

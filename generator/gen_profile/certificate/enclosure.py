@@ -6,30 +6,26 @@ to be believed of the approximation: whatever it is, the bound holds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property, reduce
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any
 
 import attrs
 import numpy as np
 
 from gen_profile.certificate import chebyshev
+from gen_profile.certificate.affine import Affine
 from gen_profile.certificate.axis_motion import AxisMotion, Gap, powers, widened
-from gen_profile.certificate.balls import Array, Ball, ball, matmul, stack
+from gen_profile.certificate.balls import Array, Ball, ball, matmul, shared, stack
+from gen_profile.certificate.chebyshev import ROUND_UP
 from gen_profile.certificate.equations import EnclosedEquations
+from gen_profile.certificate.scaling import Scaling
 
 TIME_NODES, FEW_TIME_NODES = 16, 8  # for the defect, and for what need not be as close
-ELLIPSES = (
-    (3.0, 3.0),
-    (4.0, 5.0),
-    (6.0, 4.0),
-    (6.0, 7.0),
-    (6.0, 12.0),
-    (9.0, 10.0),
-    (12.0, 20.0),
-)  # ρ of both
-TIGHT_DEGREE, TIGHT_NODES = 6, 96  # for the greatest sway over a piece
-FIRST_GUESS, ATTEMPTS = 5e-3, 4  # how far a motion is off, as a share of its size; doubled and more
-ROUND_UP = 1.0 + 1e-12
+MORE_NODES, FEWER_NODES, FEWEST_NODES = 2, 2, 2  # than terms, in each parameter, likewise
+ELLIPSES = (1.7, 2.5, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0)  # ρ
+PORTION = 2**16  # numbers in an array over nodes, which a processor's cache holds
+FIRST_GUESS, WIDER, ATTEMPTS = 1e-4, 1.5, 8  # how far a motion is off, as a share of its size, and then
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -44,11 +40,9 @@ class Approximation:
         Which of the machine's parameters these are.
     nominal : (parameters,) array
         Values of all others.
-    terms : int
-        Of the series in each parameter.
-    coefficients : (boxes, pieces, 2 n_u, time terms, parameter terms) array
-        Of x = (q_u, w); parameter terms are flattened as `chebyshev.tensor` does.
-    scales : (boxes, pieces, 2 n_u, 2 n_u) array
+    series : (boxes, pieces, 2 n_u, time terms, terms of each parameter …) array
+        Of x = (q_u, w).
+    scaling : Scaling
         S, of the norm |S e| in which errors are measured.
     start : (2 n_u,) array
         x at time 0.
@@ -58,9 +52,8 @@ class Approximation:
     upper: Ball
     varied: tuple[int, ...]
     nominal: Array
-    terms: int
-    coefficients: Array
-    scales: Array
+    series: Array
+    scaling: Scaling
     start: Array
 
 
@@ -102,158 +95,186 @@ class Enclosure:
     approximation: Approximation
 
     @property
-    def fine(self) -> tuple[int, int]:
-        """Nodes in time and in each parameter."""
-        return TIME_NODES, self.approximation.terms + 3
+    def variables(self) -> int:
+        """Time and parameters."""
+        return 1 + len(self.approximation.varied)
 
     @property
-    def coarse(self) -> tuple[int, int]:
+    def fine(self) -> tuple[int, ...]:
+        """Nodes in time and in each parameter."""
+        return TIME_NODES, *(terms + MORE_NODES for terms in self.approximation.series.shape[4:])
+
+    @property
+    def coarse(self) -> tuple[int, ...]:
         """Nodes where a per cent will do."""
-        return FEW_TIME_NODES, self.approximation.terms
+        terms = self.approximation.series.shape[4:]
+        return FEW_TIME_NODES, *(max(FEWEST_NODES, count - FEWER_NODES) for count in terms)
 
-    def bounds(self) -> SwayBounds:
-        """Carry the proof out."""
+    def bounds(self, enough: Array) -> SwayBounds:
+        """Carry the proof out.
+
+        Parameters
+        ----------
+        enough : (loads,) array
+            Bounds in m below which lower ones are not sought.
+        """
         with np.errstate(all="ignore"):  # what is not finite proves nothing
-            return self._bounds()
+            return self._bounds(enough)
 
-    def _bounds(self) -> SwayBounds:
+    def _bounds(self, enough: Array) -> SwayBounds:
         defect = self.defect()
-        scale = self.approximation.scales
-        source = _norm(matmul_most(scale, defect))
-        inverse, slip = self._inverse()
-        size = _norm(matmul_most(scale, self._range(1.0, 1.0)[0].most))
-        reach = FIRST_GUESS * size.max(axis=1)
+        scaling = self.approximation.scaling
+        source = _norm(matmul_most(scaling.most, defect))
+        size = _norm(matmul_most(scaling.most, self._around.most))
+        reach = np.broadcast_to(FIRST_GUESS * size.max(axis=1, keepdims=True), size.shape)
         for _ in range(ATTEMPTS):
-            tube = (
-                reach[:, None, None]
-                * np.sqrt((inverse**2).sum(axis=-1))
-                * (1.0 + 2.0 * slip)[..., None]
-                * ROUND_UP
-            )
-            growth, disturbance, slopes, shift = self._tubes(tube, inverse, slip)
-            largest, at_watch = self._accumulated(growth, source + disturbance, inverse, slip)
-            closed = largest <= reach
-            if (closed | ~np.isfinite(largest)).all():
+            tube = reach[..., None] * _norm(scaling.inverse_most) * scaling.slack[..., None]
+            growth, disturbance, slopes, shift = self._tubes(tube * ROUND_UP)
+            error = self._accumulated(growth, source + disturbance)
+            closed = np.asarray((error <= reach).all(axis=1))
+            if (closed | ~np.isfinite(error).all(axis=1)).all():
                 break
-            reach = np.where(closed, reach, 2.0 * largest)
-        sway, seen = self._sway()
-        sway = sway + slopes * np.where(closed, at_watch, np.nan)[:, None] + shift
-        return SwayBounds(sway=sway * ROUND_UP, seen=seen)
+            reach = np.where(closed[:, None], reach, WIDER * error)
+        at_watch = error[:, self.watched :].max(axis=1)
+        off = (slopes * np.where(closed, at_watch, np.nan)[:, None] + shift) * ROUND_UP
+        sway, seen = self._sway(enough - off)
+        return SwayBounds(sway=(sway + off) * ROUND_UP, seen=seen)
 
     # the approximation
 
-    def _range(self, rho: float, rho_p: float) -> tuple[Ball, Ball]:
-        """Enclose x̃ and its slope on ellipses, each (boxes, pieces, 2 n_u)."""
-        c = self.approximation.coefficients
-        terms = c.shape[3]
-        over_p = rho_p ** chebyshev.degrees(self.approximation.terms, len(self.approximation.varied))
-        weights = rho ** np.arange(terms)[:, None] * over_p
-        sizes = np.abs(c)
-        total = np.einsum("bpxtk,tk->bpx", sizes, weights) * ROUND_UP
-        middle = c[..., 0, 0]
-        slope = np.abs(chebyshev.derivative(terms).T @ rho ** np.arange(terms))
-        rate = np.einsum("bpxtk,t,k->bpx", sizes, slope, over_p) * ROUND_UP
-        return Ball(middle, (total - np.abs(middle)) * ROUND_UP + 1e-15 * total), Ball(
-            np.zeros_like(rate), rate
-        ) / self.axes.halves[:, None]
+    @cached_property
+    def _around(self) -> Ball:
+        """Enclose x̃, (boxes, pieces, 2 n_u)."""
+        return chebyshev.spread(self.approximation.series, self.variables)
 
-    def _parameters(self, places: Ball | None, reach: float = 1.0) -> list[Ball]:
-        """All parameters: at places on [−1, 1] per range, shape (boxes, 1, 1, places), or all of them."""
-        a = self.approximation
+    def _ellipses(self) -> tuple[Array, Array]:
+        """List ρ and half-axes of each variable's ellipses, all others real, each (ellipses, variables)."""
+        each = np.ones((self.variables, len(ELLIPSES), self.variables))
+        for variable in range(self.variables):
+            each[variable, :, variable] = ELLIPSES
+        rho = each.reshape(-1, self.variables)
+        return rho, 0.5 * (rho + 1.0 / rho)
+
+    @cached_property
+    def _range(self) -> tuple[Ball, Ball]:
+        """Enclose x̃ and its slope on ellipses, each (ellipses, boxes, pieces, 2 n_u)."""
+        series, (rho, _) = self.approximation.series, self._ellipses()
+        over_time, *others = chebyshev.weights(rho, series.shape[3:])
+        total = chebyshev.weighted(series, [over_time, *others])
+        slope = over_time @ np.abs(chebyshev.derivative(series.shape[3]))
+        rate = chebyshev.weighted(series, [slope, *others])
+        middle = self._around.mid
+        state = Ball(middle, (total - np.abs(middle)) * ROUND_UP + 1e-15 * total)
+        return state, Ball(np.zeros_like(rate), rate) / self.axes.halves[:, None]
+
+    def _portions(self, counts: tuple[int, ...]) -> Iterator[slice]:
+        """Split pieces, so that arrays over their nodes are small."""
+        boxes, pieces = self.approximation.series.shape[:2]
+        step = max(1, PORTION // (boxes * int(np.prod(counts))))
+        for first in range(0, pieces, step):
+            yield slice(first, min(first + step, pieces))
+
+    def _state_at(self, counts: tuple[int, ...], rows: slice) -> tuple[list[Any], ...]:
+        """List all that equations depend on, at nodes of some pieces: each (boxes, pieces, nodes …)."""
+        x = chebyshev.evaluated(self.approximation.series[:, rows], counts)
+        return _columns(x, 2), *self._axes_at(counts[0], rows), self._parameters_at(counts[1:])
+
+    def _axes_at(self, count: int, rows: slice) -> tuple[list[Ball], list[Ball]]:
+        """Position and velocity of the smooth motion at nodes of time."""
+        c, nodes = self.axes.coefficients()[:, rows], chebyshev.nodes(count)
+        last = (1,) * (self.variables - 1)
+
+        def columns(values: Ball) -> list[Ball]:
+            mid, rad = (np.moveaxis(part, -1, 0)[:, None] for part in (values.mid, values.rad))
+            shape = (*mid.shape, *last)
+            return [
+                shared(Ball(*pair), tuple(range(2, 2 + self.variables)))
+                for pair in zip(mid.reshape(shape), rad.reshape(shape), strict=True)
+            ]
+
+        rate = powers(c, nodes, 1) / self.axes.halves[rows, None, None]
+        return columns(powers(c, nodes, 0)), columns(rate)
+
+    def _parameters_at(self, counts: tuple[int, ...]) -> list[Ball]:
+        """All parameters at nodes of those that vary."""
+        a, size = self.approximation, self.variables
         found: list[Ball] = [ball(value) for value in a.nominal.tolist()]
-        for column, number in enumerate(a.varied):
-            low, high = a.lower[:, column], a.upper[:, column]
-            middle, half = 0.5 * (low + high), 0.5 * (high - low)
-            if places is None:
-                found[number] = Ball(middle.mid, (middle.rad + half.most * reach) * ROUND_UP)[:, None]
-            else:
-                found[number] = middle[:, None, None, None] + half[:, None, None, None] * places[column]
+        for column, (number, count) in enumerate(zip(a.varied, counts, strict=True)):
+            middle, half = (part.reshape(-1, *[1] * (1 + size)) for part in self._middle(column))
+            nodes = chebyshev.nodes(count).reshape(*[1] * (3 + column), -1, *[1] * (size - 2 - column))
+            found[number] = shared(middle + half * nodes, tuple(range(2, 2 + size)))
         return found
 
-    def _places(self, count: int) -> Ball:
-        """Nodes in each range, shape (ranges, nodes ** ranges)."""
-        ranges = len(self.approximation.varied)
-        one = chebyshev.nodes(count)
-        if not ranges:
-            return Ball(np.zeros((0, 1)), np.zeros((0, 1)))
-        grids = [
-            np.stack([g.ravel() for g in np.meshgrid(*[part] * ranges, indexing="ij")])
-            for part in (one.mid, one.rad)
-        ]
-        return Ball(*grids)
+    def _middle(self, column: int) -> tuple[Ball, Ball]:
+        """Give the middle and the half-width of a range of every box."""
+        low, high = self.approximation.lower[:, column], self.approximation.upper[:, column]
+        return 0.5 * (low + high), 0.5 * (high - low)
 
-    def _at_nodes(self, coefficients: Array, counts: tuple[int, int]) -> Ball:
-        """Evaluate series, (…, time terms, parameter terms) → (…, time nodes, places)."""
-        a = self.approximation
-        ranges = len(a.varied)
-        over_p = chebyshev.tensor(chebyshev.values_at_nodes(counts[1], a.terms), ranges)
-        over_t = chebyshev.values_at_nodes(counts[0], coefficients.shape[-2])
-        return matmul(over_t, matmul(ball(coefficients), Ball(over_p.mid.T, over_p.rad.T)))
+    def _parameters(self, reach: Array | None = None) -> list[Ball | Affine]:
+        """All parameters: of whole boxes, (boxes, 1), or on ellipses, (ellipses, boxes, 1)."""
+        found: list[Ball | Affine] = [ball(value) for value in self.approximation.nominal.tolist()]
+        columns = range(len(self.approximation.varied))
+        far = {k: np.ones(()) if reach is None else reach[:, 1 + k, None, None] for k in columns}
+        for k, number in enumerate(self.approximation.varied):
+            middle, half = (part[:, None] for part in self._middle(k))
+            rad = (middle.rad + half.rad * far[k]) * ROUND_UP
+            found[number] = Affine(middle.mid, {k: half.mid}, rad, far)
+        return found
 
-    def defect(self) -> Array:
-        """Bound x̃' − f(x̃), (boxes, pieces, 2 n_u)."""
-        a, c = self.approximation, self.axes.coefficients()
-        n, ranges = a.coefficients.shape[2], len(a.varied)
-        half = self.axes.halves
-        x = self._at_nodes(a.coefficients, self.fine)
-        dx = self._at_nodes(chebyshev.derivative(a.coefficients.shape[3]) @ a.coefficients, self.fine)
-        nodes = chebyshev.nodes(self.fine[0])
-        q_a = powers(c, nodes, 0)[..., None]
-        v = powers(c, nodes, 1)[..., None] / half[:, None, None, None]
-        p = self._parameters(self._places(self.fine[1]))
-        f = self.equations.rate(_columns(x, 2), _columns(q_a, 2), _columns(v, 2), p)
-        found = [
-            _series(dx[:, :, i] / half[None, :, None, None] - f[i][0], ranges, self.fine).most.sum(
-                axis=(-1, -2)
-            )
-            * ROUND_UP
-            for i in range(n)
-        ]
-        return np.stack(found, axis=2) + self._missed(self._defect_on, self.fine)
+    def _state_on_ellipses(self) -> tuple[list[Any], ...]:
+        """List all that equations depend on, on ellipses: each (ellipses, boxes, pieces)."""
+        reach = self._ellipses()[1]
+        over_time = reach[:, :1, None, None]
+        q_a, v = (_columns(self._axes_on(over_time, order), -1) for order in (0, 1))
+        return _columns(self._range[0], -1), q_a, v, self._parameters(reach)
 
-    def _defect_on(self, rho: float, rho_p: float) -> Array:
-        """Bound the defect on ellipses."""
-        x, dx = self._range(rho, rho_p)
-        q_a, v, p = (
-            self._axes_on(rho),
-            self._axes_on(rho, 1),
-            self._parameters(None, 0.5 * (rho_p + 1.0 / rho_p)),
-        )
-        f = self.equations.rate(_columns(x, 2), _columns(q_a, 1), _columns(v, 1), p)
-        return stack([dx[..., i] - row[0] for i, row in enumerate(f)], axis=2).most
+    def _missed(self, most: Array, counts: tuple[int, ...]) -> Array:
+        """Bound what interpolation misses, by what there is at most on ellipses, (ellipses, boxes, …)."""
+        most = most.reshape(self.variables, len(ELLIPSES), *most.shape[1:])
+        return chebyshev.missed(most, ELLIPSES, counts)
 
-    def _missed(self, on: Callable[[float, float], Array], counts: tuple[int, int]) -> Array:
-        """Bound what interpolation misses, by the best ellipse."""
-        ranges = len(self.approximation.varied)
-        return reduce(
-            np.fmin,
-            (
-                chebyshev.missed(on(rho, rho_p), (rho, counts[0]), (rho_p, counts[1]), ranges)
-                for rho, rho_p in ELLIPSES
-            ),
-        )
-
-    def _axes_on(self, rho: float, order: int = 0, off: Array | None = None) -> Ball:
+    def _axes_on(self, reach: Array | float, order: int = 0, off: Array | None = None) -> Ball:
         """Enclose a derivative of the axes' smooth motion on ellipses, and what is as near, (pieces, m)."""
-        reach = 0.5 * (rho + 1.0 / rho)
         found = widened(self.axes.coefficients(), reach, order)
         for _ in range(order):
             found = found / self.axes.halves[:, None]
         return found if off is None else Ball(found.mid, (found.rad + off) * ROUND_UP)
 
+    def defect(self) -> Array:
+        """Bound x̃' − f(x̃), (boxes, pieces, 2 n_u)."""
+        series, half = self.approximation.series, self.axes.halves
+        slopes = np.moveaxis(np.tensordot(series, chebyshev.derivative(series.shape[3]), axes=(3, 1)), -1, 3)
+        found = []
+        for rows in self._portions(self.fine):
+            dx = _columns(chebyshev.evaluated(slopes[:, rows], self.fine), 2)
+            f = self.equations.rate(*self._state_at(self.fine, rows))
+            step = half[rows].reshape(-1, *[1] * self.variables)
+            each = (
+                self._whole(rate / step - row[0], self.fine, rows) for rate, row in zip(dx, f, strict=True)
+            )
+            sums = [
+                chebyshev.total(chebyshev.interpolated(one, self.variables), self.variables) for one in each
+            ]
+            found.append(np.stack(sums, axis=2))
+        rate = _columns(self._range[1], -1)
+        f = self.equations.rate(*self._state_on_ellipses())
+        most = stack([dx - row[0] for dx, row in zip(rate, f, strict=True)], axis=-1).most
+        return np.concatenate(found, axis=1) + self._missed(most, self.fine)
+
+    def _size(self, values: Ball, counts: tuple[int, ...], rows: slice) -> Array:
+        """Bound what is interpolated at nodes, (boxes, pieces)."""
+        series = chebyshev.interpolated(self._whole(values, counts, rows), self.variables)
+        return chebyshev.total(series, self.variables)
+
+    def _whole(self, values: Ball, counts: tuple[int, ...], rows: slice) -> Ball:
+        """Give values at nodes, of which some may be alike, their full shape."""
+        shape = self.approximation.series[:, rows].shape[:2]
+        mid = np.broadcast_to(values.mid, (*shape, *counts))
+        return Ball(mid, np.broadcast_to(values.rad, (*shape, *[1] * self.variables)))
+
     # the error
 
-    def _inverse(self) -> tuple[Array, Array]:
-        """Approximate S⁻¹, and bound |S S⁻¹ − I|."""
-        scale = self.approximation.scales
-        try:
-            inverse = np.asarray(np.linalg.inv(scale), dtype=np.float64)
-        except np.linalg.LinAlgError:
-            inverse = np.full(scale.shape, np.nan)
-        identity = matmul(ball(scale), ball(inverse)) - np.eye(scale.shape[-1])
-        return inverse, np.where((slip := identity.most.sum(axis=(-1, -2)) * ROUND_UP) < 0.5, slip, np.nan)
-
-    def _tubes(self, tube: Array, inverse: Array, slip: Array) -> tuple[Array, Array, Array, Array]:
+    def _tubes(self, tube: Array) -> tuple[Array, Array, Array, Array]:
         """Bound what depends on where the true motions are: within a tube around the approximate ones.
 
         Returns
@@ -263,33 +284,32 @@ class Enclosure:
         slopes, shift : (boxes, loads) arrays
             Sway per error, and what setpoints add.
         """
-        eq, around = self.equations, self._range(1.0, 1.0)[0]
-        shape, p = around.shape[:2], self._parameters(None)
+        eq, around, scaling = self.equations, self._around, self.approximation.scaling
+        shape, p = around.shape[:2], self._parameters()
         near, shifted = self._near(around, tube)
         n_u = around.shape[-1] // 2
-        seen = _columns(near[..., :n_u], 2), _columns(self._axes_on(1.0, 0, self.gap.position), 1), p
+        seen = _columns(near[..., :n_u], -1), _columns(self._axes_on(1.0, 0, self.gap.position), -1), p
         gain = _array(eq.sway_slopes(*seen), shape)
-        slopes = (
-            _norm(matmul(gain, ball(inverse[..., :n_u, :])).most) * (1.0 + 2.0 * slip)[..., None] * ROUND_UP
-        )
+        back = chebyshev.spread(scaling.inverse, scaling.variables)[:, :, :n_u]
+        slopes = _norm(matmul(gain, back).most) * scaling.slack[..., None] * ROUND_UP
         shift = np.einsum("bplx,bpx->bpl", gain.most, shifted[..., :n_u])
         shift += np.einsum("bpla,pa->bpl", _array(eq.sway_by_position(*seen), shape).most, self.gap.position)
-        disturbance = _norm(matmul_most(self.approximation.scales, self._disturbance(near, shifted)))
-        growth = self._growth(self._jacobian_change(near, Ball(0.0 * tube, tube)), inverse, slip)
+        disturbance = _norm(matmul_most(scaling.most, self._disturbance(near, shifted)))
+        growth = self._growth(near, tube)
         watched = slice(self.watched, None)
         return growth, disturbance, slopes[:, watched].max(axis=1), shift[:, watched].max(axis=1) * ROUND_UP
 
-    def _state(self, near: Ball) -> tuple[list[Ball], ...]:
+    def _state(self, near: Ball) -> tuple[list[Any], ...]:
         """List everything that equations depend on where the true motions may be."""
         q_a, v = self._axes_on(1.0, 0, self.gap.position), self._axes_on(1.0, 1, self.gap.velocity)
-        return _columns(near, 2), _columns(q_a, 1), _columns(v, 1), self._parameters(None)
+        return _columns(near, -1), _columns(q_a, -1), _columns(v, -1), self._parameters()
 
     def _near(self, around: Ball, tube: Array) -> tuple[Ball, Array]:
         """Enclose x, and bound x − z; nan where a first guess of it was too small."""
         guess, shifted = np.zeros(around.shape), np.zeros(around.shape)
         for _ in range(2):
             near = Ball(around.mid, (around.rad + tube + guess) * ROUND_UP)
-            state, ddq_a = self._state(near), _columns(self._axes_on(1.0, 2), 1)
+            state, ddq_a = self._state(near), _columns(self._axes_on(1.0, 2), -1)
             lift = _array(self.equations.lift(*state), near.shape[:2]).most
             pull = _array(self.equations.pull(*state, ddq_a), near.shape[:2]).most
             shifted = _times(lift, self.gap.position) + _times(pull, self.gap.integral)
@@ -302,13 +322,13 @@ class Enclosure:
         state, still = self._state(near), np.zeros(len(self.axes.halves.mid))
         nothing = [[Ball(still, still)] * len(column) for column in state[1:3]]
         parameters = [ball(0.0)] * len(state[3])
-        rows = self.equations.jacobian_change(*state, _columns(change, 2), *nothing, parameters)
+        rows = self.equations.jacobian_change(*state, _columns(change, -1), *nothing, parameters)
         return _array(rows, near.shape[:2])
 
     def _disturbance(self, near: Ball, shifted: Array) -> Array:
         """Bound r, what the setpoints make of the motion beside the smooth one, (boxes, pieces, 2 n_u)."""
         eq, gap, shape, state = self.equations, self.gap, near.shape[:2], self._state(near)
-        ddq_a, jerk = (_columns(self._axes_on(1.0, order), 1) for order in (2, 3))
+        ddq_a, jerk = (_columns(self._axes_on(1.0, order), -1) for order in (2, 3))
         lift = _array(eq.lift(*state), shape).most
         pull = _array(eq.pull(*state, ddq_a), shape).most
         jacobian = _array(eq.jacobian(*state), shape).most
@@ -319,103 +339,103 @@ class Enclosure:
         faster = _times(lift, gap.velocity) + _times(_array(eq.by_position(*state), shape).most, gap.position)
         faster = (faster + second) * ROUND_UP
         bent = self._jacobian_change(near, Ball(0.0 * shifted, shifted)).most
-        turned = _array(eq.lift_change(*state, _columns(Ball(0.0 * faster, faster), 2)), shape).most
+        turned = _array(eq.lift_change(*state, _columns(Ball(0.0 * faster, faster), -1)), shape).most
         changed = _array(eq.pull_change(*state, ddq_a, rate, jerk), shape).most
         found = _times(pull, gap.mean) + _times(changed, gap.integral) + _times(turned, gap.position) + second
         found += np.einsum("bpxy,bpy->bpx", jacobian, _times(pull, gap.integral))
         found += np.einsum("bpxy,bpy->bpx", bent, _times(lift, gap.position))
         return found * ROUND_UP
 
-    def _turned(self) -> Ball:
-        """Enclose S J S⁻¹ on the approximate motion itself, (boxes, pieces, 2 n_u, 2 n_u)."""
-        a, c, ranges = self.approximation, self.axes.coefficients(), len(self.approximation.varied)
-        x = self._at_nodes(a.coefficients, self.coarse)
-        nodes = chebyshev.nodes(self.coarse[0])
-        q_a = powers(c, nodes, 0)[..., None]
-        v = powers(c, nodes, 1)[..., None] / self.axes.halves[:, None, None, None]
-        p = self._parameters(self._places(self.coarse[1]))
-        rows = self.equations.jacobian(_columns(x, 2), _columns(q_a, 2), _columns(v, 2), p)
-        shape = (*x.shape[:2], *x.shape[3:])
-        series = [[_series(_full(one, shape), ranges, self.coarse) for one in row] for row in rows]
-        inside = stack(
-            [stack([Ball(one.mid[..., 0, 0], _rest(one)) for one in row], -1) for row in series], -2
-        )
-        missed = self._missed(self._jacobian_on, self.coarse)
-        return Ball(inside.mid, (inside.rad + missed) * ROUND_UP)
-
-    def _jacobian_on(self, rho: float, rho_p: float) -> Array:
-        x, p = self._range(rho, rho_p)[0], self._parameters(None, 0.5 * (rho_p + 1.0 / rho_p))
-        q_a, v = self._axes_on(rho), self._axes_on(rho, 1)
-        return _array(
-            self.equations.jacobian(_columns(x, 2), _columns(q_a, 1), _columns(v, 1), p), x.shape[:2]
-        ).most
-
-    def _growth(self, turn: Ball, inverse: Array, slip: Array) -> Array:
-        """Bound the logarithmic norm of S J S⁻¹, by Gershgorin's circles of its symmetric part."""
-        scale = ball(self.approximation.scales)
-        turned = matmul(matmul(scale, self._still + turn), ball(inverse))
-        flipped = Ball(np.swapaxes(turned.mid, -1, -2), np.swapaxes(turned.rad, -1, -2))
-        symmetric = 0.5 * (turned + flipped)
-        sides = (symmetric.most * (1.0 - np.eye(scale.mid.shape[-1]))).sum(axis=-1)
-        own = np.einsum("...ii->...i", symmetric.upper)
-        whole = np.sqrt((turned.most**2).sum(axis=(-1, -2)))
-        return np.asarray((own + sides).max(axis=-1) + whole * (2.0 * slip + 1e-12))
-
     @cached_property
-    def _still(self) -> Ball:
-        return self._turned()
+    def _still(self) -> Array:
+        """Bound the growth of errors on the approximate motions themselves, as `_gershgorin` does."""
+        a, counts = self.approximation, self.coarse
+        scaling, size = a.scaling, a.series.shape[2]
+        to, back = (chebyshev.evaluated(s, counts[1:]) for s in (scaling.series, scaling.inverse))
+        mids, rests = [], []
+        for rows in self._portions(counts):
+            jacobian = self.equations.jacobian(*self._state_at(counts, rows))
+            turned = _product(_product(_entries(to, rows), jacobian), _entries(back, rows))
+            for i, j in np.ndindex(size, size):
+                whole = self._whole(0.5 * (turned[i][j] + turned[j][i]), counts, rows)
+                series = chebyshev.interpolated(whole, self.variables)
+                first = chebyshev.first(series.mid, self.variables)
+                mids.append(first)
+                rests.append((chebyshev.total(series, self.variables) - np.abs(first)) * ROUND_UP)
 
-    def _accumulated(self, growth: Array, source: Array, inverse: Array, slip: Array) -> tuple[Array, Array]:
-        """Add errors up from piece to piece: the greatest, and the greatest while the sway counts."""
+        def joined(parts: list[Array]) -> Array:
+            split = [np.stack(parts[n : n + size**2], axis=-1) for n in range(0, len(parts), size**2)]
+            whole = np.concatenate(split, axis=1)
+            return whole.reshape(*whole.shape[:2], size, size)
+
+        most = self._turned_on_ellipses()
+        rest = joined(rests) + self._missed(0.5 * (most + np.swapaxes(most, -1, -2)), counts)
+        return _gershgorin(Ball(joined(mids), (rest + 1e-14 * np.abs(joined(mids))) * ROUND_UP))
+
+    def _turned_on_ellipses(self) -> Array:
+        """Bound S J S⁻¹ on ellipses, (ellipses, boxes, pieces, 2 n_u, 2 n_u)."""
+        rho, scaling = self._ellipses()[0], self.approximation.scaling
+        shape = (len(rho), *self.approximation.series.shape[:2])
+        jacobian = _array(self.equations.jacobian(*self._state_on_ellipses()), shape).most
+        to, back = (
+            chebyshev.weighted(series, chebyshev.weights(rho[:, 1:], series.shape[4:]))
+            for series in (scaling.series, scaling.inverse)
+        )
+        return np.asarray(to @ jacobian @ back * ROUND_UP)
+
+    def _growth(self, near: Ball, tube: Array) -> Array:
+        """Bound the logarithmic norm of S J S⁻¹ within a tube, (boxes, pieces)."""
+        scaling = self.approximation.scaling
+        jacobian = _array(self.equations.jacobian(*self._state(near)), near.shape[:2]).most
+        change = self._jacobian_change(near, Ball(0.0 * tube, tube)).most
+        turned, beside = (scaling.most @ one @ scaling.inverse_most for one in (jacobian, change))
+        symmetric = 0.5 * (beside + np.swapaxes(beside, -1, -2))
+        rows = self._still + _gershgorin(Ball(np.zeros_like(symmetric), symmetric))
+        whole = np.sqrt(((turned + beside) ** 2).sum(axis=(-1, -2)))
+        return np.asarray((rows.max(axis=-1) + whole * (2.0 * scaling.slip + 1e-12)) * ROUND_UP)
+
+    def _accumulated(self, growth: Array, source: Array) -> Array:
+        """Add errors up from piece to piece: the greatest on each, (boxes, pieces)."""
         a, lengths = self.approximation, 2.0 * self.axes.halves.most
-        ends = a.coefficients.sum(axis=3)
-        begins = (a.coefficients * (-1.0) ** np.arange(a.coefficients.shape[3])[:, None]).sum(axis=3)
-        begin = begins[:, 0].copy()
-        begin[..., 0] -= a.start
-        leaps = np.concatenate([begin[:, None], begins[:, 1:] - ends[:, :-1]], axis=1)
-        between = np.abs(leaps).sum(axis=-1) * ROUND_UP
-        leap = _norm(matmul_most(a.scales, between))
-        changed = np.ones(source.shape)
-        product = matmul(ball(a.scales[:, 1:]), ball(inverse[:, :-1])).most
-        sums = product.sum(axis=-1).max(axis=-1), product.sum(axis=-2).max(axis=-1)
-        changed[:, 1:] = np.sqrt(sums[0] * sums[1]) * (1.0 + 2.0 * slip[:, :-1]) * ROUND_UP
-        error, largest, counted = np.zeros((3, len(source)))
+        signs = (-1.0) ** np.arange(a.series.shape[3])
+        ends = a.series.sum(axis=3)
+        begins = np.tensordot(a.series, signs, axes=(3, 0))
+        start = np.zeros((len(begins), 1, len(a.start), begins[0, 0, 0].size))
+        start[..., 0] = a.start
+        before = np.concatenate([start.reshape(begins[:, :1].shape), ends[:, :-1]], axis=1)
+        between = np.abs(begins - before).sum(axis=tuple(range(3, begins.ndim))) * ROUND_UP
+        leap = _norm(matmul_most(a.scaling.most, between))
+        changed = a.scaling.changes(len(lengths))
+        error, greatest = np.zeros(len(source)), np.zeros(source.shape)
         for piece in range(source.shape[1]):
             error = (error * changed[:, piece] + leap[:, piece]) * ROUND_UP
             factor = np.exp(growth[:, piece] * lengths[piece])
             fed = source[:, piece] * lengths[piece] * np.maximum(factor, 1.0)
-            highest = (error * np.maximum(factor, 1.0) + fed) * ROUND_UP
+            greatest[:, piece] = (error * np.maximum(factor, 1.0) + fed) * ROUND_UP
             error = (error * factor + fed) * ROUND_UP
-            largest = np.maximum(largest, highest)
-            if piece >= self.watched:
-                counted = np.maximum(counted, highest)
-        return largest, counted
+        return greatest
 
     # the sway
 
-    def _sway(self) -> tuple[Array, Array]:
+    def _sway(self, enough: Array) -> tuple[Array, Array]:
         """Bound the approximate motions' sway, and give its greatest value at nodes, each (boxes, loads)."""
-        watched, ranges = slice(self.watched, None), len(self.approximation.varied)
-        n_u = self.approximation.coefficients.shape[2] // 2
-        c = self.axes.coefficients()[:, watched]
-        x = self._at_nodes(self.approximation.coefficients[:, watched, :n_u], self.fine)
-        q_a = powers(c, chebyshev.nodes(self.fine[0]), 0)[..., None]
-        p = self._parameters(self._places(self.fine[1]))
-        found = self.equations.sway(_columns(x, 2), _columns(q_a, 2), p)
-        shape = x[:, :, 0].shape
-        seen = np.stack([np.abs(_full(row[0], shape).mid).max(axis=(1, 2, 3)) for row in found], axis=1)
-        greatest = [_greatest(_full(row[0], shape), ranges, self.fine) for row in found]
-        missed = self._missed(self._sway_on, self.fine)[:, watched]
-        return (np.stack(greatest, axis=2) + missed).max(axis=1), seen
-
-    def _sway_on(self, rho: float, rho_p: float) -> Array:
-        n_u = self.approximation.coefficients.shape[2] // 2
-        x = self._range(rho, rho_p)[0][..., :n_u]
-        q_a, p = self._axes_on(rho), self._parameters(None, 0.5 * (rho_p + 1.0 / rho_p))
-        return stack(
-            [_full(row[0], x.shape[:2]) for row in self.equations.sway(_columns(x, 2), _columns(q_a, 1), p)],
-            axis=2,
-        ).most
+        watched, n_u = slice(self.watched, None), self.approximation.series.shape[2] // 2
+        x, q_a, _, p = self._state_at(self.fine, watched)
+        values = [row[0] for row in self.equations.sway(x[:n_u], q_a, p)]
+        x, q_a, _, p = self._state_on_ellipses()
+        shape = (*self._range[0].shape[:3],)
+        most = _array(self.equations.sway(x[:n_u], q_a, p), shape).most[..., watched, :, 0]
+        missed = self._missed(most, self.fine)
+        bounds, seen = np.zeros((2, shape[1], len(values)))
+        for load, one in enumerate(values):
+            whole = self._whole(one, self.fine, watched)
+            series = chebyshev.interpolated(whole, self.variables)
+            seen[:, load] = np.abs(whole.mid).max(axis=tuple(range(1, whole.mid.ndim)))
+            rounding = chebyshev.total(Ball(0.0 * series.mid, series.rad), self.variables)
+            for box in range(len(bounds)):
+                off = rounding[box] + missed[box, :, load]
+                bounds[box, load] = chebyshev.greatest(series.mid[box], off, float(enough[box, load]))
+        return bounds, seen
 
 
 def _columns(values: Ball, axis: int) -> list[Ball]:
@@ -448,25 +468,32 @@ def _norm(sizes: Array) -> Array:
     return np.asarray(np.sqrt((sizes**2).sum(axis=-1)) * ROUND_UP)
 
 
-def _series(values: Ball, ranges: int, counts: tuple[int, int]) -> Ball:
-    """Interpolate values (…, time nodes, places); coefficients (…, time terms, parameter terms)."""
-    over_p = chebyshev.tensor(chebyshev.coefficients_of(counts[1]), ranges)
-    return matmul(chebyshev.coefficients_of(counts[0]), matmul(values, Ball(over_p.mid.T, over_p.rad.T)))
+def _gershgorin(symmetric: Ball) -> Array:
+    """Bound where Gershgorin's circles of symmetric matrices end, (…, rows)."""
+    unit = np.eye(symmetric.shape[-1])
+    sides = (symmetric.most * (1.0 - unit)).sum(axis=-1)
+    return np.asarray(np.einsum("...ii->...i", symmetric.upper) + sides + 1e-12 * sides)
 
 
-def _rest(series: Ball) -> Array:
-    """Bound how far a series is from its first coefficient's midpoint."""
-    return np.asarray(
-        (series.most.sum(axis=(-1, -2)) - np.abs(series.mid[..., 0, 0])) * ROUND_UP
-        + 1e-14 * series.most[..., 0, 0]
+def _entries(values: Ball, rows: slice) -> list[list[Ball]]:
+    """Take matrices apart that do not change over a piece, nor from piece to piece where there is but one."""
+    rows = rows if values.mid.shape[1] > 1 else slice(None)
+    mid, rad = (
+        np.expand_dims(np.moveaxis(part[:, rows], (2, 3), (0, 1)), 4) for part in (values.mid, values.rad)
     )
+    return [[Ball(*pair) for pair in zip(*row, strict=True)] for row in zip(mid, rad, strict=True)]
 
 
-def _greatest(values: Ball, ranges: int, counts: tuple[int, int]) -> Array:
-    """Bound an interpolant closely: by sums over parameters, and by values over time."""
-    c = _series(values, ranges, counts)
-    terms = TIGHT_DEGREE + 1
-    low = matmul(chebyshev.values_at_nodes(TIGHT_NODES, terms), c[..., :terms, :])
-    rest = c[..., terms:, :].most.sum(axis=(-1, -2))
-    peak = low.most.sum(axis=-1).max(axis=-1)
-    return np.asarray((peak * chebyshev.between_nodes(TIGHT_NODES, TIGHT_DEGREE) + rest) * ROUND_UP)
+def _product(a: list[list[Ball]], b: list[list[Ball]]) -> list[list[Ball]]:
+    """Multiply matrices of balls, many of which are nothing."""
+    columns = list(zip(*b, strict=True))
+
+    def entry(row: list[Ball], column: tuple[Ball, ...]) -> Ball:
+        products = (x * y for x, y in zip(row, column, strict=True) if _is_some(x) and _is_some(y))
+        return sum(products, start=ball(0.0))
+
+    return [[entry(row, column) for column in columns] for row in a]
+
+
+def _is_some(x: Ball) -> bool:
+    return bool(np.any(x.rad)) or bool(np.any(x.mid))

@@ -14,12 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from typing import Any
 
 import attrs
 import numpy as np
 
-from gen_profile.certificate import balls
-from gen_profile.certificate.balls import Ball, Operand, ball
+from gen_profile.certificate import affine, balls
+from gen_profile.certificate.affine import Affine, AffineOperand, constant
+from gen_profile.certificate.balls import Ball, ball
 from gen_profile.errors import CertificateError
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
@@ -27,12 +29,32 @@ from gen_profile.problem.dynamics import dynamics
 from gen_profile.problem.symbolic import Function, Instruction
 
 
-def _power(x: Ball, exponent: Ball) -> Ball:
+def _power(x: Any, exponent: Any) -> Any:
     constant = np.ndim(exponent.mid) == 0 and np.ndim(exponent.rad) == 0 and float(exponent.rad) == 0.0
-    return balls.power(x, float(exponent.mid)) if constant else balls.exp(exponent * balls.log(x))
+    if not constant:
+        return OPERATIONS["EXP"](exponent * OPERATIONS["LOG"](x))
+    whole = float(exponent.mid) == int(exponent.mid) and abs(exponent.mid) <= balls.MOST_FACTORS
+    return (
+        balls.power(x, float(exponent.mid))
+        if whole
+        else _on(lambda one: balls.power(one, float(exponent.mid)))(x)
+    )
 
 
-OPERATIONS: Mapping[str, Callable[..., Ball]] = {
+def _on(
+    function: Callable[[Ball], Ball], closely: Callable[[Affine], Affine] | None = None
+) -> Callable[[Any], Any]:
+    """Evaluate a function of balls on what is no ball, too: closely, or as one."""
+
+    def evaluated(x: Ball | Affine) -> Ball | Affine:
+        if isinstance(x, Ball):
+            return function(x)
+        return closely(x) if closely else affine.constant(function(x.ball), x.reach)
+
+    return evaluated
+
+
+OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "ASSIGN": lambda x: x,
     "ADD": lambda x, y: x + y,
     "SUB": lambda x, y: x - y,
@@ -42,17 +64,17 @@ OPERATIONS: Mapping[str, Callable[..., Ball]] = {
     "SQ": lambda x: x * x,
     "TWICE": lambda x: 2.0 * x,
     "INV": lambda x: 1.0 / x,
-    "SIN": balls.sin,
-    "COS": balls.cos,
-    "TAN": balls.tan,
-    "SINH": balls.sinh,
-    "COSH": balls.cosh,
-    "TANH": balls.tanh,
-    "EXP": balls.exp,
-    "LOG": balls.log,
-    "SQRT": balls.sqrt,
-    "FABS": balls.absolute,
-    "SIGN": balls.sign,
+    "SIN": _on(balls.sin, affine.sine_like(np.sin, np.cos)),
+    "COS": _on(balls.cos, affine.sine_like(np.cos, lambda x: -np.sin(x))),
+    "TAN": _on(balls.tan),
+    "SINH": _on(balls.sinh, affine.sine_like(np.sinh, np.cosh)),
+    "COSH": _on(balls.cosh, affine.sine_like(np.cosh, np.sinh)),
+    "TANH": _on(balls.tanh),
+    "EXP": _on(balls.exp, affine.sine_like(np.exp, np.exp)),
+    "LOG": _on(balls.log),
+    "SQRT": _on(balls.sqrt),
+    "FABS": _on(balls.absolute),
+    "SIGN": _on(balls.sign),
     "POW": _power,
     "CONSTPOW": _power,
 }
@@ -86,25 +108,34 @@ class Enclosed:
             )
         self._rows, self._columns = function.shape
 
-    def __call__(self, *inputs: Sequence[Operand]) -> list[list[Ball]]:
-        """Evaluate on columns of balls; the result is nested rows."""
-        memory: dict[int, Ball] = {}
-        results: dict[int, Ball] = {}
+    def __call__(self, *inputs: Sequence[AffineOperand]) -> list[list[Ball]]:
+        """Evaluate on columns of balls, or of what knows its parameters; the result is nested rows."""
+        reach = next((x.reach for column in inputs for x in column if isinstance(x, Affine)), None)
+        memory: dict[int, Any] = {}
+        results: dict[int, Any] = {}
+
+        def taken(value: AffineOperand) -> Ball | Affine:
+            return (
+                value
+                if isinstance(value, Affine)
+                else ball(value)
+                if reach is None
+                else constant(value, reach)
+            )
+
         for step in self._instructions:
             if step.operation == "INPUT":
                 column, row = step.arguments
-                memory[step.results[0]] = ball(inputs[column][row])
+                memory[step.results[0]] = taken(inputs[column][row])
             elif step.operation == "CONST":
-                memory[step.results[0]] = ball(step.constant)
+                memory[step.results[0]] = taken(step.constant)
             elif step.operation == "OUTPUT":
                 results[step.results[1]] = memory[step.arguments[0]]
             else:
                 arguments = (memory[place] for place in step.arguments)
                 memory[step.results[0]] = OPERATIONS[step.operation](*arguments)
-        return [
-            [results[row + column * self._rows] for column in range(self._columns)]
-            for row in range(self._rows)
-        ]
+        found = [one if isinstance(one, Ball) else one.ball for _, one in sorted(results.items())]
+        return [found[row :: self._rows] for row in range(self._rows)]
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import attrs
@@ -10,9 +13,11 @@ import numpy as np
 from gen_profile.artefacts.manifest import FILENAME, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.artefacts.writing import deliver
+from gen_profile.certificate.balls import Array
 from gen_profile.certificate.boxes import covers
 from gen_profile.certificate.certify import SLACK, Attempt, Progress, attempt
-from gen_profile.certificate.document import Certificate, certificate_path, encode, parse
+from gen_profile.certificate.document import Certificate, certificate_path, damaged, encode, parse
+from gen_profile.certificate.in_order import in_order
 from gen_profile.certificate.theorem import Theorem, ranges_of
 from gen_profile.errors import CertificateError, OutputError
 from gen_profile.motion.profile import SampledProfile
@@ -106,21 +111,40 @@ def check_certificate(
     except OSError as error:
         raise OutputError(f"Cannot read {certificate}: {error.strerror}.") from error
     theorem = _require_about(found, artefact)
-    bounds = np.zeros(len(found.bounds))
+    bounds, stated = np.zeros(len(found.bounds)), np.array(list(found.bounds.values()))
     done = 0
-    for batch in theorem.batches(found.boxes):
-        rows = slice(done, done + len(batch))
-        again = theorem.enclosure(batch, found.coefficients[rows], found.scales[rows]).bounds()
-        bounds = np.maximum(bounds, again.sway.max(axis=0))  # which keeps nan
-        done += len(batch)
+    for count, again in in_order(
+        partial(_bound_again, theorem, found, stated), theorem.batches(range(len(found.boxes)))
+    ):
+        bounds = np.maximum(bounds, again)  # which keeps nan
+        done += count
         progress(done, len(found.boxes))
-    for (load, stated), bound in zip(found.bounds.items(), bounds.tolist(), strict=True):
-        if not bound <= stated:
+    for (load, said), bound in zip(found.bounds.items(), bounds.tolist(), strict=True):
+        if not bound <= said:
             raise CertificateError(
                 f"The certificate does not prove what it says: the {load} is bounded by "
-                f"{1e3 * bound:.4g} mm, and it states {1e3 * stated:.4g} mm."
+                f"{1e3 * bound:.4g} mm, and it states {1e3 * said:.4g} mm."
             )
     return found
+
+
+def _bound_again(
+    theorem: Theorem, found: Certificate, enough: Array, rows: Sequence[int]
+) -> tuple[int, Array]:
+    """Carry the proof out again for some boxes: how many, and bounds for all of them.
+
+    Raises
+    ------
+    CertificateError
+    """
+    boxes, scales = ([part[row] for row in rows] for part in (found.boxes, found.scales))
+    try:
+        coefficients = np.stack([found.motions[row].coefficients() for row in rows])
+    except (ValueError, TypeError, KeyError, zlib.error) as error:
+        raise damaged(error) from error
+    theorem.require_shapes(boxes, coefficients, np.array(scales))
+    again = theorem.enclosure(boxes, coefficients, np.array(scales)).bounds(enough)
+    return len(boxes), np.asarray(again.sway.max(axis=0))
 
 
 def _read(path: Path, spec: Spec | None) -> _Artefact:
@@ -147,7 +171,8 @@ def _certificate(artefact: _Artefact, found: Attempt) -> Certificate:
         share=found.share,
         axes=theorem.axes,
         boxes=found.boxes,
-        coefficients=found.coefficients,
+        terms=theorem.terms,
+        motions=found.motions,
         scales=found.scales,
     )
 
@@ -172,9 +197,14 @@ def _require_about(found: Certificate, artefact: _Artefact) -> Theorem:
     if found.spec_sha256 != artefact.spec.sha256():
         raise CertificateError("The certificate is about another spec: other machines or limits.")
     theorem = Theorem(
-        spec=artefact.spec, setpoints=artefact.setpoints, ranges=ranges_of(artefact.spec), axes=found.axes
+        spec=artefact.spec,
+        setpoints=artefact.setpoints,
+        ranges=ranges_of(artefact.spec),
+        axes=found.axes,
+        terms=found.terms,
     )
-    theorem.require_shapes(found.boxes, found.coefficients, found.scales)
+    if not len(found.boxes) == len(found.motions) == len(found.scales):
+        raise CertificateError("The certificate is damaged: its arrays do not fit together.")
     whole = found.share == 1.0 and dict(found.ranges) == _named(theorem) and covers(found.boxes)
     if not whole or dict(found.limits) != dict(artefact.spec.check.residual_sway) or not found.proved:
         raise CertificateError("The certificate does not cover all machines of the spec.")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from math import prod
+from typing import TypeVar
 
 import attrs
 import numpy as np
@@ -11,17 +13,20 @@ import numpy as np
 from gen_profile.certificate.axis_motion import AxisMotion, Gap, gap_between, track_of
 from gen_profile.certificate.balls import Array
 from gen_profile.certificate.boxes import DyadicBox, Ranges
-from gen_profile.certificate.enclosure import TIME_NODES, Approximation, Enclosure
+from gen_profile.certificate.enclosure import MORE_NODES, TIME_NODES, Approximation, Enclosure
 from gen_profile.certificate.equations import EnclosedEquations, enclosed_equations
+from gen_profile.certificate.scaling import Scaling
 from gen_profile.errors import CertificateError
 from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.spec.model import Spec
 
-PARAMETER_TERMS = (1, 8, 6, 5)  # in each of so many parameters
-FEWEST_TERMS = 4  # of more
-BATCH = 400_000  # numbers in an array over all nodes of a batch, which a processor's cache holds
+T = TypeVar("T")
+
+SCALE_TERMS = 3  # of S, in each parameter at most
+MOST_TERMS = 32  # of motions, likewise
+BATCH = 400_000  # numbers in an array over all nodes of a batch
 
 
 @attrs.frozen(kw_only=True)
@@ -36,6 +41,8 @@ class Theorem:
     ranges : Ranges
     axes : AxisMotion
         Beside the setpoints; any will do.
+    terms : tuple of int
+        Of motions' series, in each parameter; any will do.
 
     Raises
     ------
@@ -47,6 +54,7 @@ class Theorem:
     setpoints: SampledProfile
     ranges: Ranges
     axes: AxisMotion
+    terms: tuple[int, ...]
 
     def __attrs_post_init__(self) -> None:
         if self.spec.actuator.tau:
@@ -95,8 +103,11 @@ class Theorem:
             coefficients.ndim == 5
             and coefficients.shape[:3] == (count, pieces, size)
             and 1 <= coefficients.shape[3] <= TIME_NODES
-            and coefficients.shape[4] == self.terms**d
-            and scales.shape in ((count, 1, size, size), (count, pieces, size, size))
+            and len(self.terms) == d
+            and all(1 <= terms <= MOST_TERMS for terms in self.terms)
+            and coefficients.shape[4] == prod(self.terms)
+            and scales.shape[:4] in ((count, 1, size, size), (count, pieces, size, size))
+            and scales.shape[4:] in ((1,), (prod(self.scale_terms),))
             and all(len(box) == d for box in boxes)
         )
         if not fits or not (np.isfinite(coefficients).all() and np.isfinite(scales).all()):
@@ -113,15 +124,14 @@ class Theorem:
         return self.arrival + observation_time(self.spec)
 
     @property
-    def terms(self) -> int:
-        """Terms of a series in each parameter."""
-        ranges = len(self.ranges.names)
-        return PARAMETER_TERMS[ranges] if ranges < len(PARAMETER_TERMS) else FEWEST_TERMS
+    def scale_terms(self) -> tuple[int, ...]:
+        """Terms of S in each parameter."""
+        return tuple(min(SCALE_TERMS, count) for count in self.terms)
 
     @property
     def nodes(self) -> int:
         """Nodes of one box, over all pieces."""
-        return (len(self.axes.knots) - 1) * TIME_NODES * int((self.terms + 3) ** len(self.ranges.names))
+        return (len(self.axes.knots) - 1) * TIME_NODES * prod(count + MORE_NODES for count in self.terms)
 
     @cached_property
     def equations(self) -> EnclosedEquations:
@@ -137,7 +147,7 @@ class Theorem:
         """Enclose the machines of some boxes by an approximation of their motions, see `Approximation`."""
         nominal = self.spec.plant.parameters
         lower, upper = self.ranges.enclosed(boxes)
-        scales = np.broadcast_to(scales, (len(boxes), len(self.axes.knots) - 1, *scales.shape[2:]))
+        scale_terms = self.scale_terms if scales.shape[4] > 1 else (1,) * len(self.terms)
         return Enclosure(
             equations=self.equations,
             axes=self.axes,
@@ -148,15 +158,14 @@ class Theorem:
                 upper=upper,
                 varied=tuple(list(nominal).index(name) for name in self.ranges.names),
                 nominal=np.array(list(nominal.values())),
-                terms=self.terms,
-                coefficients=coefficients,
-                scales=scales,
+                series=coefficients.reshape(*coefficients.shape[:4], *self.terms),
+                scaling=Scaling(series=scales.reshape(*scales.shape[:4], *scale_terms)),
                 start=initial_state(self.spec.machine(), self.spec.move.initial),
             ),
         )
 
-    def batches(self, boxes: Sequence[DyadicBox]) -> Iterator[Sequence[DyadicBox]]:
-        """Split boxes into batches of a size to be worked on at once."""
+    def batches(self, boxes: Sequence[T]) -> Iterator[Sequence[T]]:
+        """Split boxes, or what belongs to them, into batches of a size to be worked on at once."""
         size = max(1, BATCH // self.nodes)
         for first in range(0, len(boxes), size):
             yield boxes[first : first + size]

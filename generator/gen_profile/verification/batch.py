@@ -51,7 +51,7 @@ def on_processors(count: int) -> Iterator[None]:
 @contextmanager
 def many_machines(plant: Plant, on_build: Callable[[], None] | None = None) -> Iterator[ManyRuns]:
     """Load the plant's FMU once for every processor that this process may use."""
-    with ManyRuns(plant_fmu(plant, on_build), Version.FMI2, workers=min(_present(), _most.get())) as runs:
+    with ManyRuns(plant_fmu(plant, on_build), Version.FMI2, workers=processors()) as runs:
         yield runs
 
 
@@ -112,11 +112,10 @@ def residual_peaks(
     return runs.peaks(feed.times, inputs, values, outputs, since=since, components=components)
 
 
-def _present() -> int:
-    """Count the processors that this process is let onto, where the system tells."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+def processors() -> int:
+    """Count the processors that this process may use."""
+    present = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(present, _most.get())
 
 
 def parameter_rows(plant: Plant, machines: Sequence[Mapping[str, float]]) -> Array:

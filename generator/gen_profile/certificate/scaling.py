@@ -1,0 +1,98 @@
+"""Norms |S(p) e| of errors: matrices that are polynomials of the parameters, and nearly their inverses."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import attrs
+import numpy as np
+
+from gen_profile.certificate import chebyshev
+from gen_profile.certificate.balls import Array, Ball
+from gen_profile.certificate.chebyshev import ROUND_UP
+
+MORE_TERMS = 3  # of an inverse, than of the matrix
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Scaling:
+    """S(p), and a polynomial V(p) that nearly is its inverse.
+
+    Attributes
+    ----------
+    series : (boxes, pieces, 2 n_u, 2 n_u, terms, …) array
+        S; one piece stands for all where they are alike.
+    """
+
+    series: Array
+
+    @property
+    def variables(self) -> int:
+        """How many parameters there are."""
+        return self.series.ndim - 4
+
+    @cached_property
+    def inverse(self) -> Array:
+        """V, like S."""
+        counts = [terms + MORE_TERMS * (terms > 1) for terms in self.series.shape[4:]]
+        values = np.moveaxis(chebyshev.evaluated(self.series, counts).mid, (2, 3), (-2, -1))
+        try:
+            found = np.linalg.inv(values)
+        except np.linalg.LinAlgError:
+            found = np.full(values.shape, np.nan)
+        return chebyshev.interpolate(np.moveaxis(found, (-2, -1), (2, 3)), self.variables)
+
+    @cached_property
+    def slip(self) -> Array:
+        """Bound |S V − I|, or nan where it is no small number, (boxes, pieces)."""
+        product = self._product(self.series, self.inverse)
+        off = chebyshev.total(product - _identity(product), self.variables).sum(axis=(-1, -2)) * ROUND_UP
+        return np.where(off < 0.5, off, np.nan)
+
+    @cached_property
+    def most(self) -> Array:
+        """Bound every entry of S, (boxes, pieces, 2 n_u, 2 n_u)."""
+        return chebyshev.total(Ball(self.series, 0.0), self.variables)
+
+    @cached_property
+    def inverse_most(self) -> Array:
+        """Bound every entry of V, likewise."""
+        return chebyshev.total(Ball(self.inverse, 0.0), self.variables)
+
+    @property
+    def slack(self) -> Array:
+        """Factor from bounds with V to such with the inverse of S, (boxes, pieces)."""
+        return (1.0 + 2.0 * self.slip) * ROUND_UP
+
+    def changes(self, pieces: int) -> Array:
+        """Bound the norm of S after a piece's beginning times the inverse of S before, (boxes, pieces)."""
+        changed = np.ones((len(self.series), pieces))
+        if self.series.shape[1] == 1:
+            return changed
+        product = chebyshev.total(self._product(self.series[:, 1:], self.inverse[:, :-1]), self.variables)
+        sums = product.sum(axis=-1).max(axis=-1), product.sum(axis=-2).max(axis=-1)
+        changed[:, 1:] = np.sqrt(sums[0] * sums[1]) * self.slack[:, :-1] * ROUND_UP
+        return changed
+
+    def _product(self, first: Array, second: Array) -> Ball:
+        """Multiply polynomials, at as many nodes as determine their product; as a series."""
+        counts = [one + other - 1 for one, other in zip(first.shape[4:], second.shape[4:], strict=True)]
+        a, b = (chebyshev.evaluated(series, counts) for series in (first, second))
+        size = a.mid.shape[2]
+        products = sum(
+            (
+                Ball(a.mid[:, :, :, k, None], a.rad[:, :, :, k, None])
+                * Ball(b.mid[:, :, None, k], b.rad[:, :, None, k])
+                for k in range(size)
+            ),
+            start=Ball(0.0, 0.0),
+        )
+        return chebyshev.interpolated(products, self.variables)
+
+
+def _identity(like: Ball) -> Array:
+    """Give the series of the unit matrix."""
+    shape = np.shape(like.mid)
+    found = np.zeros((*shape[2:4], int(np.prod(shape[4:]))))
+    found[..., 0] = np.eye(shape[2])
+    return found.reshape(shape[2:])
