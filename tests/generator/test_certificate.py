@@ -10,9 +10,11 @@ import pytest
 from numpy.polynomial import chebyshev as series
 
 import gen_profile as gp
+from gen_profile.certificate import theorem
 from gen_profile.certificate.axis_motion import track_of
 from gen_profile.certificate.certify import attempt
 from gen_profile.motion.profile import SampledProfile
+from gen_profile.verification.batch import on_processors
 
 CLOSE = 1.05  # how far a bound may be above the truth
 
@@ -190,6 +192,37 @@ def test_several_parameters_make_one_box_together():
     # a bound is not narrowed further than to half a per cent of what is allowed
     nearly = CLOSE * worst + 5e-3 * spec.check.residual_sway["payload"]
     assert found.share == 1.0 and worst <= greatest(found)[0] <= nearly
+
+
+def test_how_many_processors_there_are_changes_nothing(monkeypatch):
+    monkeypatch.setattr(theorem, "BATCH", 1)
+    spec, setpoints = planned(
+        "single-pendulum-crane", "robustness.uncertain={L0=0.2}", "export.cycle_time=0.02"
+    )
+    found = []
+    for count in (1, 3):
+        with on_processors(count):
+            one = attempt(spec, setpoints)
+        packed = [(motions.quanta, motions.packed) for motions in one.motions]
+        found.append((one.boxes, packed, one.scales.tobytes(), one.bounds.tobytes()))
+    assert len(found[0][0]) > 1 and found[0] == found[1]
+
+
+@pytest.mark.slow
+def test_three_parameters_of_two_pendulums_are_proved_together():
+    """Whose determinant of inertia is a small difference; and no machine of a grid sways more."""
+    ranges = "robustness.uncertain={L1=0.01, L2=0.01, m2=0.01}"
+    spec, setpoints = planned("double-pendulum-crane", ranges, "export.cycle_time=0.004")
+    found = attempt(spec, setpoints)
+    shares = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 2)] * 3), -1).reshape(-1, 3).T
+    grid = {
+        name: low + share * (high - low)
+        for (name, (low, high)), share in zip(spec.checked_ranges().items(), shares, strict=True)
+    }
+    worst = gp.residual_sways(spec, setpoints, grid).max(axis=0)
+    limits = np.array(list(spec.check.residual_sway.values()))
+    assert found.share == 1.0
+    assert (worst <= greatest(found)).all() and (greatest(found) <= CLOSE * worst + 5e-3 * limits).all()
 
 
 def test_a_limit_that_only_a_machine_between_breaks_is_never_proved():

@@ -20,7 +20,7 @@ DEGREE = 5
 FINER = 4  # points per setpoint at which differences are looked at
 FEWEST = 5  # setpoints in a piece
 ROUNDS = 12  # of halving pieces
-SAGITTA = 1.0  # share of what straight lines between setpoints leave out, to which a motion is fitted
+SAGITTA = 0.25  # share of what straight lines between setpoints leave out, to which a motion is fitted
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -26,12 +26,14 @@ from gen_profile.spec.model import Spec
 PHASE = 3.0  # rad of the fastest mode that a piece of time covers at most
 TURN = 2.0  # rad by which a mode's phase at the end varies over a box at first
 FEWEST_TERMS, LEAST_TERM = 4, 1e-7  # of series in parameters; what they leave out, relative
+LEAST_POWER, WIDEST = 1e-6, 0.5  # likewise, where motions change little; how wide a range counts as, relative
 PLACES = 33  # along a range, at which phases are looked at
 CLOSE = 1.03  # of the greatest sway seen: how tight a bound is wanted
 SLACK = 1e-3  # relative, by which a bound is stated higher than it was found, lest other rounding break it
 CLOSE_TO_LIMIT = 2e-3  # of the limit, likewise
 MOST_NODES = 5 * 10**8  # at which equations are evaluated in all: some twenty minutes
-FRUITLESS = 3  # rounds in a row without a bound, after which no more are tried
+FRUITLESS = 3  # rounds in a row that bring no bound nearer, after which no more are tried
+FRUITFUL = 0.8  # of what the worst bound was too high by: how far it is to come down in a round
 DEEPEST = 6  # halvings beyond the first boxes, of all ranges in sum
 
 Progress = Callable[[int, int], None]
@@ -85,16 +87,11 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
         Machines cannot be integrated.
     """
     theorem, spans = _prepared(spec, setpoints)
-    levels = [_halvings(span) for span in spans]
     most = MOST_NODES // theorem.nodes  # boxes
-    if prod(2**level for level in levels) > most:
-        raise CertificateError(
-            f"The ranges of {', '.join(theorem.ranges.names)} are too wide for a certificate: it takes "
-            f"more than {most} boxes; narrow them, or let fewer parameters vary (check.uncertain)."
-        )
+    first = _first_boxes(theorem, spans, most)
     limits = np.array(list(spec.check.residual_sway.values()))
-    waiting, done, tried = whole(levels), dict[DyadicBox, _Proof](), 0
-    seen, fruitless = np.zeros(len(limits)), 0
+    waiting, done, tried = first, dict[DyadicBox, _Proof](), 0
+    seen, fruitless, before = np.zeros(len(limits)), 0, np.inf
     while waiting:
         prove = partial(_prove, theorem, _wanted(seen, limits))
         for batch, proofs, here in in_order(prove, _integrated(theorem, waiting)):
@@ -104,15 +101,36 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
             progress(tried, tried + len(waiting))
         wanted = _wanted(seen, limits)
         coarse = [box for box, proof in done.items() if not (proof.bound <= wanted).all()]
-        deepest = sum(levels) + DEEPEST
+        deepest = sum(level for level, _ in first[0]) + DEEPEST
         coarse = [box for box in coarse if box and sum(level for level, _ in box) < deepest]
-        fruitless = 0 if any(np.isfinite(done[box].bound).all() for box in waiting) else fruitless + 1
+        above = np.array([done[box].bound - wanted for box in waiting])
+        found = np.isfinite(above).all(axis=1)
+        worst = float(above.max()) if found.all() else np.inf
+        nearer = worst < FRUITFUL * before if found.all() else bool(found.any())
+        fruitless, before = 0 if nearer else fruitless + 1, min(before, worst)
         if tried + 2 * len(coarse) > most or fruitless == FRUITLESS:
             break
         waiting = [part for box in coarse for part in halves(box, _widest(box, spans))]
         for box in coarse:
             del done[box]
     return _attempt(theorem, done, seen)
+
+
+def _first_boxes(theorem: Theorem, spans: Sequence[float], most: int) -> list[DyadicBox]:
+    """Cut ranges until phases turn little over each box.
+
+    Raises
+    ------
+    CertificateError
+        There are too many.
+    """
+    levels = [_halvings(span) for span in spans]
+    if prod(2**level for level in levels) > most:
+        raise CertificateError(
+            f"The ranges of {', '.join(theorem.ranges.names)} are too wide for a certificate: it takes "
+            f"more than {most} boxes; narrow them, or let fewer parameters vary (check.uncertain)."
+        )
+    return whole(levels)
 
 
 def _wanted(seen: Array, limits: Array) -> Array:
@@ -126,10 +144,10 @@ def _halvings(span: float) -> int:
     return max(0, int(np.ceil(np.log2(max(span / TURN, 1e-9)))))
 
 
-def _terms(turn: float) -> int:
-    """Tell how many terms a series needs over a box in which phases turn so far: as cos(turn y / 2) does."""
+def _terms(turn: float, width: float) -> int:
+    """Tell how many terms a series needs over a box: as cos(turn y / 2) does, and 1 / (1 + width y)."""
     size, terms = 1.0, 0
-    while size > LEAST_TERM or terms < FEWEST_TERMS:
+    while terms < FEWEST_TERMS or size > LEAST_TERM or (0.5 * width) ** terms > LEAST_POWER:
         terms += 1
         size *= 0.25 * turn / terms
     return terms
@@ -208,5 +226,8 @@ def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[floa
     track = track_of(setpoints, np.array(spec.move.final_velocity))
     longest = PHASE * box.duration / fastest
     axes = fitted(track, float(setpoints.resolution.max()), longest, watch)
-    terms = tuple(_terms(span / 2 ** _halvings(span)) for span in spans)
+    middles, half = 0.5 * (ranges.upper + ranges.lower), 0.5 * (ranges.upper - ranges.lower)
+    widths = np.minimum(half / np.maximum(np.abs(middles), half), WIDEST).tolist()
+    parts = [2 ** _halvings(span) for span in spans]
+    terms = tuple(_terms(span / n, width / n) for span, width, n in zip(spans, widths, parts, strict=True))
     return Theorem(spec=spec, axes=axes, ranges=ranges, setpoints=setpoints, terms=terms), spans

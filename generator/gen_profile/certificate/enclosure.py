@@ -22,7 +22,7 @@ from gen_profile.certificate.equations import EnclosedEquations
 from gen_profile.certificate.scaling import Scaling
 
 TIME_NODES, FEW_TIME_NODES = 16, 8  # for the defect, and for what need not be as close
-MORE_NODES, FEWER_NODES, FEWEST_NODES = 2, 2, 2  # than terms, in each parameter, likewise
+MORE_NODES, FEWER_NODES, FEWEST_NODES = 2, 2, 5  # than terms, in each parameter, likewise
 ELLIPSES = (1.7, 2.5, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0)  # ρ
 PORTION = 2**16  # numbers in an array over nodes, which a processor's cache holds
 FIRST_GUESS, WIDER, ATTEMPTS = 1e-4, 1.5, 8  # how far a motion is off, as a share of its size, and then
