@@ -1,31 +1,43 @@
-"""The planner block as Structured Text: constants of a machine put into the portable text."""
+"""The planner block as Structured Text: constants of a machine put into the portable text.
+
+The text stands in ``text/``. ``@name`` alone on a line is the part of that name, indented like it, or a value
+as elsewhere; what stands between ``@where_followed`` and ``@end`` is left out where no live parameter changes
+on the way.
+
+- ``interface.st``: header and declarations.
+- ``inputs.st``, ``slots.st``, ``outputs.st``: what runs in every cycle; between them the committed future,
+  which is a velocity for every slot.
+- ``pulses.st`` adds pulses to it where a slot begins. Of each as much is admitted as keeps every limit over
+  the whole committed time.
+- ``next_job.st``, ``planning.st``: some steps in each cycle, which find modes, kernel, motion to a target,
+  stop. A plan is a linear programme: the coefficients of the velocity's spline that go farthest within the
+  limits on value, difference and second difference, so that the modes and their derivatives by frequency are
+  left at rest. ``request.st`` begins one: which way is left, from which slot on, over how many. (One that
+  takes longer than the motion lasts comes too late; one over too few slots does not get there.)
+- ``programme.st`` solves it by a primal-dual interior-point method (Mehrotra 1992, with a fixed centring);
+  the normal matrix has five diagonals, and the conditions enter by its Schur complement.
+- ``follow.st`` follows the linear machine of now, ``sway'' = acceleration - matrix * sway``, cycle by cycle,
+  and its slope by the logarithm of the frequencies, ``slope'' = -matrix * (slope + 2 sway)``: what is unknown
+  of them changes sway and slope alike along all that was driven, so it adds up where the slope is not known.
+- ``calming.st`` calms what sways since live parameters changed. With the left eigenvectors l of the matrix a
+  mode is l * sway; what it will be left with by the committed future is a sum over its coefficients, as of a
+  plan, and so is its slope. A pulse that ends where it begins and leaves the opposite of both takes them
+  away: of the kernel's shape, by the factors of the kernel's conditions.
+- ``model.st`` evaluates the modes at the live parameters; ``extent.st`` tells how many columns a row fills.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
 from textwrap import indent
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile_exporters.planner.calming_text import (
-    CALMING,
-    FOLLOW,
-    FOLLOWED,
-    FORGET,
-    LOOK,
-    MATRIX,
-    NEXT_JOB,
-    RENEW,
-)
-from gen_profile_exporters.planner.interface_text import HEADER, INTERFACE
-from gen_profile_exporters.planner.motion_text import INPUTS, OUTPUTS, SLOTS
-from gen_profile_exporters.planner.planning_text import MODEL, PLANNING
-from gen_profile_exporters.planner.programme_text import EXTENT, PROGRAMME
-from gen_profile_exporters.planner.pulses_text import PULSES
-from gen_profile_exporters.planner.request_text import REQUEST
 from gen_profile_exporters.playback.structured_text import block_name, initialiser, literal
 
 Array = NDArray[np.float64]
@@ -54,15 +66,9 @@ FRESH = 8  # cycles, for which the machine that is followed counts as constant
 RESERVE = 0.1  # share of the limits that only calming takes up, where live parameters change on the way
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
-FOLLOWING = {  # what only those have whose live parameters change on the way
-    "followed": FOLLOWED,
-    "forget": FORGET,
-    "matrix": MATRIX,
-    "look": LOOK,
-    "renew": RENEW.replace("@model\n", indent(MODEL, 4 * " ")),
-    "calming": CALMING,
-    "follow": FOLLOW,
-}
+FOLLOWED = re.compile(r"(?ms)^@where_followed\n(.*?)^@end\n")
+PART = re.compile(r"(?m)^( *)@(\w+)\n")
+TEXT = Path(__file__).with_name("text")
 PLACE = "fActPosition"
 TAKEN = {  # inputs of each axis, by the arrays that hold them
     "aTarget": "fTarget",
@@ -165,15 +171,19 @@ class PlannerConstants:
 
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
-    body = PLANNING.replace("@request\n", REQUEST)
-    body = body.replace("@programme\n", PROGRAMME)
-    body = body.replace("@extent\n", indent(EXTENT, 16 * " "))
-    body = body.replace("@model\n", indent(MODEL, 16 * " "))
-    text = HEADER + INTERFACE + INPUTS + SLOTS + PULSES + NEXT_JOB + body + OUTPUTS
-    for hole, statements in FOLLOWING.items():
-        text = text.replace(f"@{hole}\n", statements if constants.rates else "")
+    text = FOLLOWED.sub(r"\1" if constants.rates else "", _part("block"))
     values = _values(constants)
     return _narrow(_with_while_loops(re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)))
+
+
+@cache
+def _part(name: str, margin: str = "") -> str:
+    """Read a part of the text, with those that it names where it names them."""
+
+    def named(hole: re.Match[str]) -> str:
+        return _part(hole[2], hole[1]) if (TEXT / f"{hole[2]}.st").is_file() else hole[0]
+
+    return indent(PART.sub(named, (TEXT / f"{name}.st").read_text("ascii")), margin)
 
 
 def _with_while_loops(text: str) -> str:
