@@ -32,10 +32,14 @@ class Hand:
     """A worker that answers when a test says so."""
 
     def __init__(self, hear):
-        self.hear, self.jobs, self.ended = hear, [], False
+        self.hear, self.jobs, self.ended, self.still = hear, [], False, False
 
     def ask(self, job):
         self.jobs.append(job)
+        self.still = False
+
+    def pause(self):
+        self.still = True
 
     def say(self, name, job=None):
         job = job or self.jobs[-1]
@@ -173,3 +177,21 @@ def test_a_page_that_is_closed_takes_no_worker_any_more():
     desk.close()
     clock.wait(2 * CALM)
     assert len(hands.taken) == 1 and hands.taken[0].ended
+
+
+def test_what_looks_deeper_stands_still_while_a_hand_waits():
+    clock, hands, _, desk = page()
+    desk.show(0, "state 0")
+    picture = hands.taken[0]
+    for name in (BEGUN, "verdict", ENDED):
+        picture.say(name)
+    clock.wait(CALM)
+    deeper = hands.taken[1]
+    deeper.say(BEGUN)
+    assert not deeper.still
+    desk.show(1, "state 1")
+    assert deeper.still and not picture.still
+    for name in (BEGUN, "verdict", ENDED):
+        picture.say(name)
+    clock.wait(CALM)
+    assert not deeper.still and deeper.jobs[-1].number == 1

@@ -8,7 +8,7 @@ from time import sleep
 
 import pytest
 
-from gen_profile.studio.workers import BEGUN, Job, Workers
+from gen_profile.studio.workers import BEGUN, ENDED, Job, Workers
 
 HANG = 300.0  # s without any answer
 
@@ -26,3 +26,20 @@ def test_one_that_dies_while_it_waits_answers_nothing(monkeypatch):
     workers.take(lambda _, message: heard.put(message.name)).ask(Job(number=0, kind="picture", question=None))
     assert heard.get(timeout=HANG) == BEGUN
     workers.close()
+
+
+@pytest.mark.slow
+def test_one_that_stands_still_goes_on_when_it_is_asked():
+    heard, workers = Queue(), Workers()
+    worker = workers.take(lambda _, message: heard.put(message.name))
+    worker.ask(Job(number=0, kind="picture", question=None))
+    while heard.get(timeout=HANG) != ENDED:
+        pass
+    worker.pause()
+    worker.ask(Job(number=1, kind="picture", question=None))
+    assert heard.get(timeout=HANG) == BEGUN
+    worker.pause()
+    workers.close()
+    for process in active_children():
+        process.join(HANG)
+        assert not process.is_alive()

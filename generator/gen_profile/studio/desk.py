@@ -53,6 +53,11 @@ class QuestionLine:
         if waits:
             self._loop.call_later(PATIENCE, self._overtake, number)
 
+    def pause(self) -> None:
+        """Let the worker stand still until it is asked again."""
+        if self._worker is not None:
+            self._worker.pause()
+
     def stop(self) -> None:
         """Let go of the worker, whatever it does."""
         if self._worker is not None:
@@ -121,6 +126,7 @@ class Desk:
         """Ask for the picture of a state."""
         if question != self._question:
             self._newest, self._question = number, question
+            self._depth.pause()
             self._picture.ask(number, question)
 
     def make(self, order: Any) -> None:

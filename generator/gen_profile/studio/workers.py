@@ -110,8 +110,20 @@ class Worker:
 
     def ask(self, job: Job) -> None:
         """Hand over a question; what is being answered is left unfinished at the next part."""
+        self._signal("SIGCONT")
         with suppress(OSError):  # a process that has ended is heard of
             self._connection.send(job)
+
+    def pause(self) -> None:
+        """Let the process stand still until it is asked again."""
+        self._signal("SIGSTOP")
+
+    def _signal(self, name: str) -> None:
+        """Send the process a signal, where the system knows it, which Windows does not."""
+        pid = self._process.pid
+        if pid is not None and hasattr(signal, name):
+            with suppress(OSError):
+                os.kill(pid, getattr(signal, name))
 
     def end(self) -> None:
         """End the process at once, and hear no more of it."""
