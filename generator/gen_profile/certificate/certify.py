@@ -32,7 +32,7 @@ CLOSE = 1.03  # of the greatest sway seen: how tight a bound is wanted
 SLACK = 1e-3  # relative, by which a bound is stated higher than it was found, lest other rounding break it
 CLOSE_TO_LIMIT = 2e-3  # of the limit, likewise
 MOST_NODES = 5 * 10**8  # at which equations are evaluated in all: some twenty minutes
-FRUITLESS = 3  # rounds in a row that bring no bound nearer, after which no more are tried
+FRUITLESS = 4  # rounds in a row that bring no bound nearer, after which no more are tried
 FRUITFUL = 0.8  # of what the worst bound was too high by: how far it is to come down in a round
 DEEPEST = 6  # halvings beyond the first boxes, of all ranges in sum
 
