@@ -10,11 +10,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
+import dask
 from distributed import Client, LocalCluster
 
 from gen_profile.artefacts.manifest import versions
 from gen_profile.errors import SpecError
 
+# else workers look at their own stack every 10 ms, and remember it for 1000 s: 80 MB
+UNWATCHED = {"distributed.worker.profile.enabled": False}
 ANSWER_TIME = "30s"  # that a scheduler and its first worker have to answer
 
 
@@ -50,6 +53,7 @@ def _local_cluster(workers: int) -> LocalCluster:
     """Start processes of this computer, which never hear Ctrl-C where that can be had from the start."""
     logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # which tells of processes that are stopped
     with ExitStack() as stack:
+        stack.enter_context(dask.config.set(UNWATCHED))
         if sys.platform != "win32":
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             stack.callback(signal.pthread_sigmask, signal.SIG_SETMASK, before)

@@ -2,8 +2,10 @@
 
 import os
 
+import dask
 import pytest
 
+from gen_profile import cluster
 from gen_profile.artefacts.manifest import versions
 from gen_profile.plants.registry import find_plant
 from gen_profile.sweep.case import Recipe, run_case
@@ -88,3 +90,14 @@ def test_a_case_of_a_sweep_takes_one(workers, monkeypatch):
     )
     assert run_case(recipe, 0, {}).record["status"] in {"passed", "check failed"}
     assert set(workers) == {1}
+
+
+def test_workers_of_a_sweep_keep_no_record_of_their_own_stack(monkeypatch):
+    seen = []
+
+    def begun(**_):
+        seen.append(dask.config.get("distributed.worker.profile.enabled"))
+
+    monkeypatch.setattr(cluster, "LocalCluster", begun)
+    cluster._local_cluster(1)
+    assert seen == [False]
