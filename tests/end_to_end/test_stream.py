@@ -104,7 +104,7 @@ def full_disk(monkeypatch):
     def refuse(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(delivery.Staging, "write", refuse)
+    monkeypatch.setattr(delivery.StagingFolder, "write", refuse)
 
 
 FULL = r"Cannot write to the folder .*: No space left on device; choose another one\."
