@@ -20,6 +20,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 
 import can
@@ -45,6 +46,12 @@ SIOCSIFFLAGS = 0x8914  # linux/sockios.h
 ATTEMPTS = 8  # for a fair trial
 UNDER_WAY = 0.6  # s after the beginning of the stream
 FROZEN = 0.5  # s
+NAP = 0.005  # s
+STALL = 0.04  # s, less than the tests allow a drive to speak up
+
+
+class _StalledError(Exception):
+    """The machine did nothing for a while."""
 
 
 def run(place, log, queue, disturb):
@@ -69,7 +76,7 @@ def run(place, log, queue, disturb):
             running = "aborted" not in (place / "stream.err").read_text()
             try:
                 disturb(streamer, drive)
-            except ProcessLookupError:  # it has ended by itself
+            except (ProcessLookupError, _StalledError):  # it has ended by itself, or nobody could act
                 running = False
         codes = {"stream": _ended(streamer), "drive": _ended(drive, patience=10.0)}
         time.sleep(0.1)
@@ -142,9 +149,15 @@ def _signal_streamer(number):
 
 
 def _freeze(streamer, _):
+    """Stop the streamer for a while, in which the drive must be able to act."""
     os.kill(streamer.pid, signal.SIGSTOP)
-    time.sleep(FROZEN)
+    instants = [time.monotonic()]
+    while instants[-1] < instants[0] + FROZEN:
+        time.sleep(NAP)
+        instants.append(time.monotonic())
     os.kill(streamer.pid, signal.SIGCONT)
+    if max(after - before for before, after in pairwise(instants)) > NAP + STALL:
+        raise _StalledError
 
 
 def _bus_down(*_):
