@@ -45,7 +45,7 @@ def _complete_forms(_: click.Context, __: click.Parameter, incomplete: str) -> l
     return [CompletionItem(name) for name in (*containers(), "c") if name.startswith(incomplete)]
 
 
-@cli.group(cls=PlannerGroup, epilog="Example: gen-profile planner crane.toml --out deploy")
+@cli.group(cls=PlannerGroup, epilog="Example: gen-profile planner --preset bay-crane --out deploy")
 def planner() -> None:
     """Write a PLC block that plans every motion itself, and execute it.
 
@@ -53,7 +53,7 @@ def planner() -> None:
     """
 
 
-@planner.command(epilog="Example: gen-profile planner crane.toml --export siemens-scl --out deploy")
+@planner.command(epilog="Example: gen-profile planner --preset bay-crane --export siemens-scl --out deploy")
 @spec_options
 @click.option(
     "--export",
