@@ -13,7 +13,9 @@ from command_line import run_here
 import gen_profile as gp
 from gen_profile.errors import CertificateError, OutputError, SpecError
 
-SPEC = ("--preset", "single-pendulum-crane", "--set", "export.cycle_time=0.01")
+PRESET, CYCLE, ON_THE_WAY = "single-pendulum-crane", "export.cycle_time=0.01", "limits.sway=0.25"
+BARE = ("--preset", PRESET, "--set", CYCLE)
+SPEC = (*BARE, "--set", ON_THE_WAY)
 
 
 @pytest.fixture(scope="module")
@@ -40,11 +42,16 @@ def test_a_certificate_is_made_beside_the_file_and_holds_when_checked_again(cert
     worst = max(row["residual_peaks_m"]["payload"] for row in check["scenarios"])
     assert said["proved"] and said["share_proved"] == 1.0 and said["reasons"] == []
     assert worst <= said["bounds_m"]["payload"] <= 1.05 * worst < said["limits_m"]["payload"]
+    swung = max(row["sway_peak_m"] for row in check["scenarios"])
+    way = said["on_the_way"]
+    assert way["load"] == "payload" and way["limit_m"] == 1.01 * check["sway_limit_m"]
+    assert swung <= way["bound_m"] <= 1.05 * swung < way["limit_m"]
     assert said["ranges"] == {"L0": pytest.approx([2.7, 3.3])}
     again = run_here("check", artefact, "--certificate", beside, "--json")
     assert again.code == 0 and again.document["certificate"] == said
     text = run_here("check", artefact, "--certificate", beside).out
     assert "all with L0 from 2.7 to 3.3" in text and f"{1e3 * said['bounds_m']['payload']:.4g} mm" in text
+    assert f"payload {1e3 * way['bound_m']:.4g} mm at any time" in text
 
 
 def test_a_limit_below_the_bound_is_not_proved_though_the_check_passes(copied):
@@ -53,17 +60,29 @@ def test_a_limit_below_the_bound_is_not_proved_though_the_check_passes(copied):
     worst = run_here("check", artefact, "--json").document["check"]["scenarios"]
     limit = max(row["residual_peaks_m"]["payload"] for row in worst) * 1.0005
     refused = run_here(
-        "check", artefact, *SPEC, "--set", f"check.residual_sway={limit}", "--certify", "--json"
+        "check", artefact, *BARE, "--set", f"check.residual_sway={limit}", "--certify", "--json"
     )
     assert refused.code == 4 and not beside.exists()
     assert refused.document["check"]["passed"] and not refused.document["certificate"]["proved"]
     assert refused.errors[0].startswith("Not proved: The payload is proved to sway by at most")
+    limit = max(row["sway_peak_m"] for row in worst) / 1.0095
+    refused = run_here("check", artefact, *BARE, "--set", f"limits.sway={limit}", "--certify", "--json")
+    assert refused.code == 4 and refused.document["check"]["passed"]
+    assert "mm on the way" in refused.errors[0] and "(1.01 of limits.sway)" in refused.errors[0]
     failed = run_here("check", artefact, *SPEC, "--set", "check.residual_sway=0.003", "--certify", "--json")
     assert failed.code == 4 and failed.document["certificate"] is None
 
 
 def stated_lower(document):
     document["bounds_m"]["payload"] *= 0.99
+
+
+def stated_lower_on_the_way(document):
+    document["on_the_way"]["bound_m"] *= 0.99
+
+
+def limit_on_the_way_raised(document):
+    document["on_the_way"]["limit_m"] *= 2.0
 
 
 def stated_share(document):
@@ -130,12 +149,14 @@ def changed(packed, kind, change):
 
 TAMPERED = {
     stated_lower: "does not prove what it says",
+    stated_lower_on_the_way: "does not prove what it says",
+    limit_on_the_way_raised: "does not cover all machines and limits",
     stated_share: "does not cover all machines",
     a_part_of_the_box: "does not cover all machines",
     limits_raised: "does not cover all machines",
     narrower: "does not cover all machines",
     knots_moved: "does not belong to the file's setpoints",
-    later: "other loads or another time",
+    later: "about another time",
     scales_singular: "does not prove what it says",
     motion_altered: "does not prove what it says",
     motion_cut: "is damaged",
@@ -163,9 +184,7 @@ def test_what_is_no_certificate_or_of_something_else_is_refused(copied):
         gp.check_certificate(artefact, artefact.with_name("manifest.json"))
     with pytest.raises(OutputError, match="Cannot read"):
         gp.check_certificate(artefact, artefact.with_name("none.json"))
-    wider = gp.preset_spec(
-        "single-pendulum-crane", ["export.cycle_time=0.01", "robustness.uncertain={L0=0.11}"]
-    )
+    wider = gp.preset_spec(PRESET, [CYCLE, ON_THE_WAY, "robustness.uncertain={L0=0.11}"])
     with pytest.raises(CertificateError, match="about another spec"):
         gp.check_certificate(artefact, beside, wider)
     artefact.write_text(artefact.read_text().replace("1.0", "1.1", 1))
@@ -180,6 +199,15 @@ def test_a_certificate_of_the_first_release_that_wrote_them_still_holds():
     assert found.proved and found.terms == (8,) and found.scales.shape[-1] == 1
 
 
+def test_a_certificate_from_before_sway_on_the_way_was_proved_still_holds(copied):
+    artefact, beside = copied
+    document = json.loads(beside.read_text())
+    del document["on_the_way"]
+    beside.write_text(json.dumps(document))
+    found = gp.check_certificate(artefact, beside)
+    assert found.proved and found.on_the_way is None and found.to_dict()["on_the_way"] is None
+
+
 @pytest.mark.parametrize(
     ("override", "error", "said"),
     [
@@ -188,7 +216,7 @@ def test_a_certificate_of_the_first_release_that_wrote_them_still_holds():
     ],
 )
 def test_what_no_proof_is_written_for_is_refused(copied, override, error, said):
-    spec = gp.preset_spec("single-pendulum-crane", ["export.cycle_time=0.01", override])
+    spec = gp.preset_spec(PRESET, [CYCLE, override])
     with pytest.raises(error, match=said):
         gp.certify_artefact(copied[0], spec)
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev as series
 
-from gen_profile.certificate import balls, chebyshev
-from gen_profile.certificate.affine import Affine
-from gen_profile.certificate.balls import Ball, ball, matmul, shared
+from gen_profile.certificate.arithmetic import balls, chebyshev
+from gen_profile.certificate.arithmetic.affine import Affine
+from gen_profile.certificate.arithmetic.balls import Ball, ball, matmul, shared
 from gen_profile.certificate.boxes import Ranges, covers, halves, whole
 from gen_profile.certificate.equations import OPERATIONS
 

@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from gen_profile.certificate import chebyshev
-from gen_profile.certificate.balls import Array
+from gen_profile.certificate.arithmetic import chebyshev
+from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.boxes import DyadicBox
 from gen_profile.certificate.theorem import Theorem
 from gen_profile.evaluation.simulation import PlantSimulation

@@ -12,7 +12,7 @@ from itertools import pairwise
 import attrs
 import numpy as np
 
-from gen_profile.certificate.balls import UNIT, Array, Ball, ball, stack
+from gen_profile.certificate.arithmetic.balls import UNIT, Array, Ball, ball, stack
 from gen_profile.errors import CertificateError
 from gen_profile.motion.profile import Profile, SampledProfile
 

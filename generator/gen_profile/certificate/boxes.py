@@ -9,7 +9,7 @@ from math import prod
 import attrs
 import numpy as np
 
-from gen_profile.certificate.balls import Array, Ball, ball
+from gen_profile.certificate.arithmetic.balls import Array, Ball, ball
 
 DyadicBox = tuple[
     tuple[int, int], ...

@@ -11,11 +11,12 @@ import attrs
 import numpy as np
 
 from gen_profile.certificate import approximation
+from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axis_motion import fitted, track_of
-from gen_profile.certificate.balls import Array
 from gen_profile.certificate.boxes import DyadicBox, halves, whole
 from gen_profile.certificate.in_order import in_order
 from gen_profile.certificate.packing import Motions
+from gen_profile.certificate.sway_limits import limits_of
 from gen_profile.certificate.theorem import Theorem, ranges_of
 from gen_profile.errors import CertificateError
 from gen_profile.evaluation.residual_sway import observation_time
@@ -51,9 +52,9 @@ class Attempt:
     motions : tuple of Motions
     scales : array
         Of `Approximation`, for these boxes.
-    bounds : (boxes, loads) array
-        m.
-    seen : (loads,) array
+    bounds : (boxes, limits) array
+        m, of `Theorem.limits`.
+    seen : (limits,) array
         Greatest sway that was met, in m.
     share : float
         Of the whole box, of which a bound is proved.
@@ -89,7 +90,7 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
     theorem, spans = _prepared(spec, setpoints)
     most = MOST_NODES // theorem.nodes  # boxes
     first = _first_boxes(theorem, spans, most)
-    limits = np.array(list(spec.check.residual_sway.values()))
+    limits = np.array([limit.allowed for limit in theorem.limits])
     waiting, done, tried = first, dict[DyadicBox, _Proof](), 0
     seen, fruitless, before = np.zeros(len(limits)), 0, np.inf
     while waiting:
@@ -230,4 +231,6 @@ def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[floa
     widths = np.minimum(half / np.maximum(np.abs(middles), half), WIDEST).tolist()
     parts = [2 ** _halvings(span) for span in spans]
     terms = tuple(_terms(span / n, width / n) for span, width, n in zip(spans, widths, parts, strict=True))
-    return Theorem(spec=spec, axes=axes, ranges=ranges, setpoints=setpoints, terms=terms), spans
+    return Theorem(
+        spec=spec, axes=axes, ranges=ranges, limits=limits_of(spec), setpoints=setpoints, terms=terms
+    ), spans

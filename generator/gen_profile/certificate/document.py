@@ -12,10 +12,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axis_motion import AxisMotion
-from gen_profile.certificate.balls import Array
 from gen_profile.certificate.boxes import DyadicBox
 from gen_profile.certificate.packing import Motions, pack, unpack
+from gen_profile.certificate.sway_limits import ProvedSway, SwayLimit
 from gen_profile.errors import CertificateError
 
 SUFFIX = ".certificate.json"
@@ -36,12 +37,8 @@ class Certificate:
         Of the machine's parameters.
     arrival, until : float
         Time in s in which the sway is bounded.
-    limits : mapping of str to float
-        Allowed residual sway of every load in m.
-    bounds : mapping of str to float
-        Proved ones, of all machines that there are any of; none where there are not.
-    seen : mapping of str to float
-        Greatest sways that were met on the way, in m; of these nothing is proved.
+    sways : tuple of ProvedSway
+        Of every load after the move, and of the end load on the way where that is limited.
     share : float
         Of the ranges' box, of which the bounds are proved.
     axes : AxisMotion
@@ -59,9 +56,7 @@ class Certificate:
     ranges: Mapping[str, tuple[float, float]]
     arrival: float
     until: float
-    limits: Mapping[str, float]
-    bounds: Mapping[str, float]
-    seen: Mapping[str, float]
+    sways: tuple[ProvedSway, ...]
     share: float
     axes: AxisMotion
     boxes: tuple[DyadicBox, ...]
@@ -81,21 +76,48 @@ class Certificate:
                 f"Bounds are proved for {100.0 * self.share:.3g} % of the machines; others swing too far, "
                 "or differ too much: narrow the ranges (check.uncertain), or take more time.",
             )
-        return tuple(
-            f"The {load} is proved to sway by at most {1e3 * bound:.4g} mm after the move, and "
-            f"{1e3 * self.limits[load]:.4g} mm are allowed (check.residual_sway); the greatest sway met is "
-            f"{1e3 * self.seen[load]:.4g} mm."
-            for load, bound in self.bounds.items()
-            if not bound <= self.limits[load]
-        )
+        return tuple(sway.reason for sway in self.sways if sway.reason is not None)
+
+    @property
+    def after(self) -> tuple[ProvedSway, ...]:
+        """What is proved of every load after the move."""
+        return tuple(sway for sway in self.sways if not sway.limit.on_the_way)
+
+    @property
+    def on_the_way(self) -> ProvedSway | None:
+        """What is proved of the end load on the way."""
+        return next((sway for sway in self.sways if sway.limit.on_the_way), None)
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """Allowed residual sway in m of every load."""
+        return {sway.limit.load: sway.limit.allowed for sway in self.after}
+
+    @property
+    def seen(self) -> dict[str, float]:
+        """Greatest residual sway in m of every load that was met; of it nothing is proved."""
+        return {sway.limit.load: sway.seen for sway in self.after}
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """Proved residual sway in m of every load, of all machines that there are any of."""
+        return {sway.limit.load: sway.bound for sway in self.after if sway.bound is not None}
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON, without what only the proof needs."""
         return {
             "proved": self.proved,
-            "bounds_m": dict(self.bounds),
-            "limits_m": dict(self.limits),
-            "largest_met_m": dict(self.seen),
+            "bounds_m": self.bounds,
+            "limits_m": self.limits,
+            "largest_met_m": self.seen,
+            "on_the_way": None
+            if (way := self.on_the_way) is None
+            else {
+                "load": way.limit.load,
+                "bound_m": way.bound,
+                "limit_m": way.limit.allowed,
+                "largest_met_m": way.seen,
+            },
             "ranges": {name: list(ends) for name, ends in self.ranges.items()},
             "share_proved": self.share,
             "boxes": len(self.boxes),
@@ -157,9 +179,7 @@ def parse(content: bytes) -> Certificate:
             ranges={name: (float(low), float(high)) for name, (low, high) in document["ranges"].items()},
             arrival=float(document["from_s"]),
             until=float(document["until_s"]),
-            limits=_numbers(document["limits_m"]),
-            bounds=_numbers(document["bounds_m"]),
-            seen=_numbers(document["largest_met_m"]),
+            sways=tuple(_sways(document)),
             share=float(document["share_proved"]),
             axes=AxisMotion(**axes),
             boxes=tuple(tuple(_part(*part) for part in box) for box in document["parts"]),
@@ -209,5 +229,13 @@ def _part(level: int, index: int) -> tuple[int, int]:
     return level, index
 
 
-def _numbers(named: Mapping[str, Any]) -> dict[str, float]:
-    return {str(name): float(value) for name, value in named.items()}
+def _sways(document: Mapping[str, Any]) -> Iterator[ProvedSway]:
+    """List what is proved; the first certificates did not tell of the way."""
+    for load, allowed in document["limits_m"].items():
+        limit = SwayLimit(load=load, allowed=float(allowed))
+        bound, seen = (float(document[name][load]) for name in ("bounds_m", "largest_met_m"))
+        yield ProvedSway(limit=limit, bound=bound, seen=seen)
+    if (way := document.get("on_the_way")) is not None:
+        allowed, bound, seen = (float(way[name]) for name in ("limit_m", "bound_m", "largest_met_m"))
+        limit = SwayLimit(load=str(way["load"]), allowed=allowed, on_the_way=True)
+        yield ProvedSway(limit=limit, bound=bound, seen=seen)

@@ -13,11 +13,22 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.certificate import chebyshev
-from gen_profile.certificate.affine import Affine
+from gen_profile.certificate.arithmetic import balls, chebyshev
+from gen_profile.certificate.arithmetic.affine import Affine
+from gen_profile.certificate.arithmetic.balls import Array, Ball, ball, matmul, shared, stack
+from gen_profile.certificate.arithmetic.chebyshev import ROUND_UP
+from gen_profile.certificate.arithmetic.matrices import (
+    array,
+    entries,
+    full,
+    gershgorin,
+    matmul_most,
+    norm,
+    product,
+    split,
+    times,
+)
 from gen_profile.certificate.axis_motion import AxisMotion, Gap, powers, widened
-from gen_profile.certificate.balls import Array, Ball, ball, matmul, shared, stack
-from gen_profile.certificate.chebyshev import ROUND_UP
 from gen_profile.certificate.equations import EnclosedEquations
 from gen_profile.certificate.scaling import Scaling
 
@@ -57,16 +68,32 @@ class Approximation:
     start: Array
 
 
+@attrs.frozen(kw_only=True)
+class WatchedSway:
+    """A sway whose greatest value is wanted.
+
+    Attributes
+    ----------
+    loads : slice
+        Of the machine's; of several directions the vector's length counts.
+    first : int
+        Piece from which on.
+    """
+
+    loads: slice
+    first: int
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class SwayBounds:
     """What is proved, or nan.
 
     Attributes
     ----------
-    sway : (boxes, loads) array
-        Greatest residual sway in m.
-    seen : (boxes, loads) array
-        Greatest residual sway in m that the approximation has at some nodes; nothing is proved of it.
+    sway : (boxes, watches) array
+        Greatest sway in m.
+    seen : (boxes, watches) array
+        Greatest sway in m that the approximation has at some nodes; nothing is proved of it.
     """
 
     sway: Array
@@ -83,15 +110,14 @@ class Enclosure:
     axes : AxisMotion
     gap : Gap
         How far the axes are from `axes`.
-    watched : int
-        First piece in which the sway counts.
+    watches : tuple of WatchedSway
     approximation : Approximation
     """
 
     equations: EnclosedEquations
     axes: AxisMotion
     gap: Gap
-    watched: int
+    watches: tuple[WatchedSway, ...]
     approximation: Approximation
 
     @property
@@ -115,7 +141,7 @@ class Enclosure:
 
         Parameters
         ----------
-        enough : (loads,) array
+        enough : (watches,) array
             Bounds in m below which lower ones are not sought.
         """
         with np.errstate(all="ignore"):  # what is not finite proves nothing
@@ -124,21 +150,19 @@ class Enclosure:
     def _bounds(self, enough: Array) -> SwayBounds:
         defect = self.defect()
         scaling = self.approximation.scaling
-        source = _norm(matmul_most(scaling.most, defect))
-        size = _norm(matmul_most(scaling.most, self._around.most))
+        source = norm(matmul_most(scaling.most, defect))
+        size = norm(matmul_most(scaling.most, self._around.most))
         reach = np.broadcast_to(FIRST_GUESS * size.max(axis=1, keepdims=True), size.shape)
         for _ in range(ATTEMPTS):
-            tube = reach[..., None] * _norm(scaling.inverse_most) * scaling.slack[..., None]
+            tube = reach[..., None] * norm(scaling.inverse_most) * scaling.slack[..., None]
             growth, disturbance, slopes, shift = self._tubes(tube * ROUND_UP)
             error = self._accumulated(growth, source + disturbance)
             closed = np.asarray((error <= reach).all(axis=1))
             if (closed | ~np.isfinite(error).all(axis=1)).all():
                 break
             reach = np.where(closed[:, None], reach, WIDER * error)
-        at_watch = error[:, self.watched :].max(axis=1)
-        off = (slopes * np.where(closed, at_watch, np.nan)[:, None] + shift) * ROUND_UP
-        sway, seen = self._sway(enough - off)
-        return SwayBounds(sway=(sway + off) * ROUND_UP, seen=seen)
+        error = np.where(closed[:, None], error, np.nan)
+        return self._sway((slopes * error[..., None] + shift) * ROUND_UP, enough)
 
     # the approximation
 
@@ -177,7 +201,7 @@ class Enclosure:
     def _state_at(self, counts: tuple[int, ...], rows: slice) -> tuple[list[Any], ...]:
         """List all that equations depend on, at nodes of some pieces: each (boxes, pieces, nodes …)."""
         x = chebyshev.evaluated(self.approximation.series[:, rows], counts)
-        return _columns(x, 2), *self._axes_at(counts[0], rows), self._parameters_at(counts[1:])
+        return split(x, 2), *self._axes_at(counts[0], rows), self._parameters_at(counts[1:])
 
     def _axes_at(self, count: int, rows: slice) -> tuple[list[Ball], list[Ball]]:
         """Position and velocity of the smooth motion at nodes of time."""
@@ -225,8 +249,8 @@ class Enclosure:
         """List all that equations depend on, on ellipses: each (ellipses, boxes, pieces)."""
         reach = self._ellipses()[1]
         over_time = reach[:, :1, None, None]
-        q_a, v = (_columns(self._axes_on(over_time, order), -1) for order in (0, 1))
-        return _columns(self._range[0], -1), q_a, v, self._parameters(reach)
+        q_a, v = (split(self._axes_on(over_time, order), -1) for order in (0, 1))
+        return split(self._range[0], -1), q_a, v, self._parameters(reach)
 
     def _missed(self, most: Array, counts: tuple[int, ...]) -> Array:
         """Bound what interpolation misses, by what there is at most on ellipses, (ellipses, boxes, …)."""
@@ -246,7 +270,7 @@ class Enclosure:
         slopes = np.moveaxis(np.tensordot(series, chebyshev.derivative(series.shape[3]), axes=(3, 1)), -1, 3)
         found = []
         for rows in self._portions(self.fine):
-            dx = _columns(chebyshev.evaluated(slopes[:, rows], self.fine), 2)
+            dx = split(chebyshev.evaluated(slopes[:, rows], self.fine), 2)
             f = self.equations.rate(*self._state_at(self.fine, rows))
             step = half[rows].reshape(-1, *[1] * self.variables)
             each = (
@@ -256,7 +280,7 @@ class Enclosure:
                 chebyshev.total(chebyshev.interpolated(one, self.variables), self.variables) for one in each
             ]
             found.append(np.stack(sums, axis=2))
-        rate = _columns(self._range[1], -1)
+        rate = split(self._range[1], -1)
         f = self.equations.rate(*self._state_on_ellipses())
         most = stack([dx - row[0] for dx, row in zip(rate, f, strict=True)], axis=-1).most
         return np.concatenate(found, axis=1) + self._missed(most, self.fine)
@@ -281,38 +305,37 @@ class Enclosure:
         -------
         growth, disturbance : (boxes, pieces) arrays
             Logarithmic norm in 1/s, and what setpoints add.
-        slopes, shift : (boxes, loads) arrays
+        slopes, shift : (boxes, pieces, loads) arrays
             Sway per error, and what setpoints add.
         """
         eq, around, scaling = self.equations, self._around, self.approximation.scaling
         shape, p = around.shape[:2], self._parameters()
         near, shifted = self._near(around, tube)
         n_u = around.shape[-1] // 2
-        seen = _columns(near[..., :n_u], -1), _columns(self._axes_on(1.0, 0, self.gap.position), -1), p
-        gain = _array(eq.sway_slopes(*seen), shape)
+        seen = split(near[..., :n_u], -1), split(self._axes_on(1.0, 0, self.gap.position), -1), p
+        gain = array(eq.sway_slopes(*seen), shape)
         back = chebyshev.spread(scaling.inverse, scaling.variables)[:, :, :n_u]
-        slopes = _norm(matmul(gain, back).most) * scaling.slack[..., None] * ROUND_UP
+        slopes = norm(matmul(gain, back).most) * scaling.slack[..., None] * ROUND_UP
         shift = np.einsum("bplx,bpx->bpl", gain.most, shifted[..., :n_u])
-        shift += np.einsum("bpla,pa->bpl", _array(eq.sway_by_position(*seen), shape).most, self.gap.position)
-        disturbance = _norm(matmul_most(scaling.most, self._disturbance(near, shifted)))
+        shift += np.einsum("bpla,pa->bpl", array(eq.sway_by_position(*seen), shape).most, self.gap.position)
+        disturbance = norm(matmul_most(scaling.most, self._disturbance(near, shifted)))
         growth = self._growth(near, tube)
-        watched = slice(self.watched, None)
-        return growth, disturbance, slopes[:, watched].max(axis=1), shift[:, watched].max(axis=1) * ROUND_UP
+        return growth, disturbance, slopes, shift * ROUND_UP
 
     def _state(self, near: Ball) -> tuple[list[Any], ...]:
         """List everything that equations depend on where the true motions may be."""
         q_a, v = self._axes_on(1.0, 0, self.gap.position), self._axes_on(1.0, 1, self.gap.velocity)
-        return _columns(near, -1), _columns(q_a, -1), _columns(v, -1), self._parameters()
+        return split(near, -1), split(q_a, -1), split(v, -1), self._parameters()
 
     def _near(self, around: Ball, tube: Array) -> tuple[Ball, Array]:
         """Enclose x, and bound x − z; nan where a first guess of it was too small."""
         guess, shifted = np.zeros(around.shape), np.zeros(around.shape)
         for _ in range(2):
             near = Ball(around.mid, (around.rad + tube + guess) * ROUND_UP)
-            state, ddq_a = self._state(near), _columns(self._axes_on(1.0, 2), -1)
-            lift = _array(self.equations.lift(*state), near.shape[:2]).most
-            pull = _array(self.equations.pull(*state, ddq_a), near.shape[:2]).most
-            shifted = _times(lift, self.gap.position) + _times(pull, self.gap.integral)
+            state, ddq_a = self._state(near), split(self._axes_on(1.0, 2), -1)
+            lift = array(self.equations.lift(*state), near.shape[:2]).most
+            pull = array(self.equations.pull(*state, ddq_a), near.shape[:2]).most
+            shifted = times(lift, self.gap.position) + times(pull, self.gap.integral)
             previous, guess = guess, 2.0 * shifted + 1e-14 * near.most
         near = Ball(np.where(shifted < previous, near.mid, np.nan), near.rad)
         return near, shifted * ROUND_UP
@@ -322,28 +345,28 @@ class Enclosure:
         state, still = self._state(near), np.zeros(len(self.axes.halves.mid))
         nothing = [[Ball(still, still)] * len(column) for column in state[1:3]]
         parameters = [ball(0.0)] * len(state[3])
-        rows = self.equations.jacobian_change(*state, _columns(change, -1), *nothing, parameters)
-        return _array(rows, near.shape[:2])
+        rows = self.equations.jacobian_change(*state, split(change, -1), *nothing, parameters)
+        return array(rows, near.shape[:2])
 
     def _disturbance(self, near: Ball, shifted: Array) -> Array:
         """Bound r, what the setpoints make of the motion beside the smooth one, (boxes, pieces, 2 n_u)."""
         eq, gap, shape, state = self.equations, self.gap, near.shape[:2], self._state(near)
-        ddq_a, jerk = (_columns(self._axes_on(1.0, order), -1) for order in (2, 3))
-        lift = _array(eq.lift(*state), shape).most
-        pull = _array(eq.pull(*state, ddq_a), shape).most
-        jacobian = _array(eq.jacobian(*state), shape).most
+        ddq_a, jerk = (split(self._axes_on(1.0, order), -1) for order in (2, 3))
+        lift = array(eq.lift(*state), shape).most
+        pull = array(eq.pull(*state, ddq_a), shape).most
+        jacobian = array(eq.jacobian(*state), shape).most
         rate = [row[0] for row in eq.rate(*state)]
         both = np.concatenate([gap.position, gap.velocity], axis=1)
         squares = (both[:, :, None] * both[:, None, :]).reshape(len(both), -1)
-        second = 0.5 * _times(_array(eq.curvature(*state), shape).most, squares)
-        faster = _times(lift, gap.velocity) + _times(_array(eq.by_position(*state), shape).most, gap.position)
+        second = 0.5 * times(array(eq.curvature(*state), shape).most, squares)
+        faster = times(lift, gap.velocity) + times(array(eq.by_position(*state), shape).most, gap.position)
         faster = (faster + second) * ROUND_UP
         bent = self._jacobian_change(near, Ball(0.0 * shifted, shifted)).most
-        turned = _array(eq.lift_change(*state, _columns(Ball(0.0 * faster, faster), -1)), shape).most
-        changed = _array(eq.pull_change(*state, ddq_a, rate, jerk), shape).most
-        found = _times(pull, gap.mean) + _times(changed, gap.integral) + _times(turned, gap.position) + second
-        found += np.einsum("bpxy,bpy->bpx", jacobian, _times(pull, gap.integral))
-        found += np.einsum("bpxy,bpy->bpx", bent, _times(lift, gap.position))
+        turned = array(eq.lift_change(*state, split(Ball(0.0 * faster, faster), -1)), shape).most
+        changed = array(eq.pull_change(*state, ddq_a, rate, jerk), shape).most
+        found = times(pull, gap.mean) + times(changed, gap.integral) + times(turned, gap.position) + second
+        found += np.einsum("bpxy,bpy->bpx", jacobian, times(pull, gap.integral))
+        found += np.einsum("bpxy,bpy->bpx", bent, times(lift, gap.position))
         return found * ROUND_UP
 
     @cached_property
@@ -355,7 +378,7 @@ class Enclosure:
         mids, rests = [], []
         for rows in self._portions(counts):
             jacobian = self.equations.jacobian(*self._state_at(counts, rows))
-            turned = _product(_product(_entries(to, rows), jacobian), _entries(back, rows))
+            turned = product(product(entries(to, rows), jacobian), entries(back, rows))
             for i, j in np.ndindex(size, size):
                 whole = self._whole(0.5 * (turned[i][j] + turned[j][i]), counts, rows)
                 series = chebyshev.interpolated(whole, self.variables)
@@ -370,13 +393,13 @@ class Enclosure:
 
         most = self._turned_on_ellipses()
         rest = joined(rests) + self._missed(0.5 * (most + np.swapaxes(most, -1, -2)), counts)
-        return _gershgorin(Ball(joined(mids), (rest + 1e-14 * np.abs(joined(mids))) * ROUND_UP))
+        return gershgorin(Ball(joined(mids), (rest + 1e-14 * np.abs(joined(mids))) * ROUND_UP))
 
     def _turned_on_ellipses(self) -> Array:
         """Bound S J S⁻¹ on ellipses, (ellipses, boxes, pieces, 2 n_u, 2 n_u)."""
         rho, scaling = self._ellipses()[0], self.approximation.scaling
         shape = (len(rho), *self.approximation.series.shape[:2])
-        jacobian = _array(self.equations.jacobian(*self._state_on_ellipses()), shape).most
+        jacobian = array(self.equations.jacobian(*self._state_on_ellipses()), shape).most
         to, back = (
             chebyshev.weighted(series, chebyshev.weights(rho[:, 1:], series.shape[4:]))
             for series in (scaling.series, scaling.inverse)
@@ -386,11 +409,11 @@ class Enclosure:
     def _growth(self, near: Ball, tube: Array) -> Array:
         """Bound the logarithmic norm of S J S⁻¹ within a tube, (boxes, pieces)."""
         scaling = self.approximation.scaling
-        jacobian = _array(self.equations.jacobian(*self._state(near)), near.shape[:2]).most
+        jacobian = array(self.equations.jacobian(*self._state(near)), near.shape[:2]).most
         change = self._jacobian_change(near, Ball(0.0 * tube, tube)).most
         turned, beside = (scaling.most @ one @ scaling.inverse_most for one in (jacobian, change))
         symmetric = 0.5 * (beside + np.swapaxes(beside, -1, -2))
-        rows = self._still + _gershgorin(Ball(np.zeros_like(symmetric), symmetric))
+        rows = self._still + gershgorin(Ball(np.zeros_like(symmetric), symmetric))
         whole = np.sqrt(((turned + beside) ** 2).sum(axis=(-1, -2)))
         return np.asarray((rows.max(axis=-1) + whole * (2.0 * scaling.slip + 1e-12)) * ROUND_UP)
 
@@ -404,7 +427,7 @@ class Enclosure:
         start[..., 0] = a.start
         before = np.concatenate([start.reshape(begins[:, :1].shape), ends[:, :-1]], axis=1)
         between = np.abs(begins - before).sum(axis=tuple(range(3, begins.ndim))) * ROUND_UP
-        leap = _norm(matmul_most(a.scaling.most, between))
+        leap = norm(matmul_most(a.scaling.most, between))
         changed = a.scaling.changes(len(lengths))
         error, greatest = np.zeros(len(source)), np.zeros(source.shape)
         for piece in range(source.shape[1]):
@@ -417,83 +440,39 @@ class Enclosure:
 
     # the sway
 
-    def _sway(self, enough: Array) -> tuple[Array, Array]:
-        """Bound the approximate motions' sway, and give its greatest value at nodes, each (boxes, loads)."""
-        watched, n_u = slice(self.watched, None), self.approximation.series.shape[2] // 2
-        x, q_a, _, p = self._state_at(self.fine, watched)
-        values = [row[0] for row in self.equations.sway(x[:n_u], q_a, p)]
+    def _sway(self, off: Array, enough: Array) -> SwayBounds:
+        """Bound every sway that is watched; approximate ones are off by so much, (boxes, pieces, loads)."""
+        begun, n_u = min(watch.first for watch in self.watches), self.approximation.series.shape[2] // 2
+        pieces = slice(begun, None)
+        x, q_a, _, p = self._state_at(self.fine, pieces)
+        at_nodes = [self._whole(row[0], self.fine, pieces) for row in self.equations.sway(x[:n_u], q_a, p)]
         x, q_a, _, p = self._state_on_ellipses()
         shape = (*self._range[0].shape[:3],)
-        most = _array(self.equations.sway(x[:n_u], q_a, p), shape).most[..., watched, :, 0]
-        missed = self._missed(most, self.fine)
-        bounds, seen = np.zeros((2, shape[1], len(values)))
-        for load, one in enumerate(values):
-            whole = self._whole(one, self.fine, watched)
-            series = chebyshev.interpolated(whole, self.variables)
-            seen[:, load] = np.abs(whole.mid).max(axis=tuple(range(1, whole.mid.ndim)))
-            rounding = chebyshev.total(Ball(0.0 * series.mid, series.rad), self.variables)
-            for box in range(len(bounds)):
-                off = rounding[box] + missed[box, :, load]
-                bounds[box, load] = chebyshev.greatest(series.mid[box], off, float(enough[box, load]))
-        return bounds, seen
+        far = [full(row[0], shape) for row in self.equations.sway(x[:n_u], q_a, p)]
+        bounds, seen = np.zeros((2, len(off), len(self.watches)))
+        for column, watch in enumerate(self.watches):
+            loads, since = watch.loads, slice(watch.first - begun, None)
+            away = norm(off[:, watch.first :, loads]).max(axis=1)
+            bounds[:, column], seen[:, column] = self._greatest(
+                [one[:, since] for one in at_nodes[loads]],
+                [one[:, :, watch.first :] for one in far[loads]],
+                enough[column] - away,
+            )
+            bounds[:, column] = (bounds[:, column] + away) * ROUND_UP
+        return SwayBounds(sway=bounds, seen=seen)
 
+    def _greatest(self, at_nodes: list[Ball], far: list[Ball], enough: Array) -> tuple[Array, Array]:
+        """Bound a vector of the approximate motions, and give its greatest length at nodes, each (boxes,).
 
-def _columns(values: Ball, axis: int) -> list[Ball]:
-    """Split along an axis."""
-    mids, rads = (np.moveaxis(part, axis, 0) for part in (values.mid, values.rad))
-    return [Ball(mid, rad) for mid, rad in zip(mids, rads, strict=True)]
-
-
-def _array(rows: list[list[Ball]], shape: tuple[int, ...]) -> Ball:
-    """Join nested rows to one array, the matrix' axes last."""
-    return stack([stack([_full(one, shape) for one in row], axis=-1) for row in rows], axis=-2)
-
-
-def _full(one: Ball, shape: tuple[int, ...]) -> Ball:
-    return Ball(np.broadcast_to(one.mid, shape), np.broadcast_to(one.rad, shape))
-
-
-def matmul_most(matrix: Array, sizes: Array) -> Array:
-    """Bound a matrix times a vector whose entries have at most some sizes."""
-    return np.asarray(np.einsum("...ij,...j->...i", np.abs(matrix), sizes) * ROUND_UP)
-
-
-def _times(matrix: Array, sizes: Array) -> Array:
-    """Bound matrices (boxes, pieces, rows, columns) times vectors (pieces, columns)."""
-    return np.asarray(np.einsum("bpxa,pa->bpx", matrix, sizes))
-
-
-def _norm(sizes: Array) -> Array:
-    """Euclidean length."""
-    return np.asarray(np.sqrt((sizes**2).sum(axis=-1)) * ROUND_UP)
-
-
-def _gershgorin(symmetric: Ball) -> Array:
-    """Bound where Gershgorin's circles of symmetric matrices end, (…, rows)."""
-    unit = np.eye(symmetric.shape[-1])
-    sides = (symmetric.most * (1.0 - unit)).sum(axis=-1)
-    return np.asarray(np.einsum("...ii->...i", symmetric.upper) + sides + 1e-12 * sides)
-
-
-def _entries(values: Ball, rows: slice) -> list[list[Ball]]:
-    """Take matrices apart that do not change over a piece, nor from piece to piece where there is but one."""
-    rows = rows if values.mid.shape[1] > 1 else slice(None)
-    mid, rad = (
-        np.expand_dims(np.moveaxis(part[:, rows], (2, 3), (0, 1)), 4) for part in (values.mid, values.rad)
-    )
-    return [[Ball(*pair) for pair in zip(*row, strict=True)] for row in zip(mid, rad, strict=True)]
-
-
-def _product(a: list[list[Ball]], b: list[list[Ball]]) -> list[list[Ball]]:
-    """Multiply matrices of balls, many of which are nothing."""
-    columns = list(zip(*b, strict=True))
-
-    def entry(row: list[Ball], column: tuple[Ball, ...]) -> Ball:
-        products = (x * y for x, y in zip(row, column, strict=True) if _is_some(x) and _is_some(y))
-        return sum(products, start=ball(0.0))
-
-    return [[entry(row, column) for column in columns] for row in a]
-
-
-def _is_some(x: Ball) -> bool:
-    return bool(np.any(x.rad)) or bool(np.any(x.mid))
+        Of several components the squared length is interpolated, which is as smooth as they are.
+        """
+        power = 1 if len(at_nodes) == 1 else 2
+        whole, most = (
+            sum((balls.power(one, power) for one in each), start=ball(0.0)) for each in (at_nodes, far)
+        )
+        series = chebyshev.interpolated(whole, self.variables)
+        rounding = chebyshev.total(Ball(0.0 * series.mid, series.rad), self.variables)
+        off, enough = rounding + self._missed(most.most, self.fine), np.maximum(enough, 0.0) ** power
+        found = [chebyshev.greatest(*one) for one in zip(series.mid, off, enough.tolist(), strict=True)]
+        seen = np.abs(whole.mid).max(axis=tuple(range(1, whole.mid.ndim)))
+        return np.array(found) ** (1.0 / power) * ROUND_UP, seen ** (1.0 / power)

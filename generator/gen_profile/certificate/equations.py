@@ -19,9 +19,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.certificate import affine, balls
-from gen_profile.certificate.affine import Affine, AffineOperand, constant
-from gen_profile.certificate.balls import Ball, ball
+from gen_profile.certificate.arithmetic import affine, balls
+from gen_profile.certificate.arithmetic.affine import Affine, AffineOperand, constant
+from gen_profile.certificate.arithmetic.balls import Ball, ball
 from gen_profile.errors import CertificateError
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym

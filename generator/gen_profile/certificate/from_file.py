@@ -13,11 +13,12 @@ import numpy as np
 from gen_profile.artefacts.manifest import FILENAME, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.artefacts.writing import deliver
-from gen_profile.certificate.balls import Array
+from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.boxes import covers
 from gen_profile.certificate.certify import SLACK, Attempt, Progress, attempt
 from gen_profile.certificate.document import Certificate, certificate_path, damaged, encode, parse
 from gen_profile.certificate.in_order import in_order
+from gen_profile.certificate.sway_limits import ProvedSway, limits_of
 from gen_profile.certificate.theorem import Theorem, ranges_of
 from gen_profile.errors import CertificateError, OutputError
 from gen_profile.motion.profile import SampledProfile
@@ -111,7 +112,7 @@ def check_certificate(
     except OSError as error:
         raise OutputError(f"Cannot read {certificate}: {error.strerror}.") from error
     theorem = _require_about(found, artefact)
-    bounds, stated = np.zeros(len(found.bounds)), np.array(list(found.bounds.values()))
+    bounds, stated = np.zeros(len(found.sways)), np.array([sway.bound for sway in found.sways])
     done = 0
     for count, again in in_order(
         partial(_bound_again, theorem, found, stated), theorem.batches(range(len(found.boxes)))
@@ -119,10 +120,10 @@ def check_certificate(
         bounds = np.maximum(bounds, again)  # which keeps nan
         done += count
         progress(done, len(found.boxes))
-    for (load, said), bound in zip(found.bounds.items(), bounds.tolist(), strict=True):
+    for sway, said, bound in zip(found.sways, stated.tolist(), bounds.tolist(), strict=True):
         if not bound <= said:
             raise CertificateError(
-                f"The certificate does not prove what it says: the {load} is bounded by "
+                f"The certificate does not prove what it says: the {sway.limit.load} is bounded by "
                 f"{1e3 * bound:.4g} mm, and it states {1e3 * said:.4g} mm."
             )
     return found
@@ -157,17 +158,16 @@ def _read(path: Path, spec: Spec | None) -> _Artefact:
 
 def _certificate(artefact: _Artefact, found: Attempt) -> Certificate:
     """State what came out."""
-    loads, theorem = list(artefact.spec.check.residual_sway), found.theorem
-    bounds = found.bounds.max(axis=0).tolist() if found.boxes else []
+    theorem = found.theorem
+    bounds = (found.bounds.max(axis=0) * (1.0 + SLACK)).tolist() if found.boxes else [None] * len(found.seen)
+    sways = zip(theorem.limits, bounds, found.seen.tolist(), strict=True)
     return Certificate(
         spec_sha256=artefact.spec.sha256(),
         artefact_sha256=artefact.sha256,
         ranges=_named(theorem),
         arrival=theorem.arrival,
         until=theorem.until,
-        limits=dict(artefact.spec.check.residual_sway),
-        bounds={load: bound * (1.0 + SLACK) for load, bound in zip(loads, bounds, strict=False)},
-        seen=dict(zip(loads, found.seen.tolist(), strict=True)),
+        sways=tuple(ProvedSway(limit=limit, bound=bound, seen=seen) for limit, bound, seen in sways),
         share=found.share,
         axes=theorem.axes,
         boxes=found.boxes,
@@ -200,18 +200,17 @@ def _require_about(found: Certificate, artefact: _Artefact) -> Theorem:
         spec=artefact.spec,
         setpoints=artefact.setpoints,
         ranges=ranges_of(artefact.spec),
+        limits=tuple(sway.limit for sway in found.sways),
         axes=found.axes,
         terms=found.terms,
     )
     if not len(found.boxes) == len(found.motions) == len(found.scales):
         raise CertificateError("The certificate is damaged: its arrays do not fit together.")
     whole = found.share == 1.0 and dict(found.ranges) == _named(theorem) and covers(found.boxes)
-    if not whole or dict(found.limits) != dict(artefact.spec.check.residual_sway) or not found.proved:
-        raise CertificateError("The certificate does not cover all machines of the spec.")
-    if (
-        list(found.bounds) != list(found.limits)
-        or found.until > theorem.until
-        or found.arrival != theorem.arrival
-    ):
-        raise CertificateError("The certificate is about other loads or another time.")
+    limits = limits_of(artefact.spec)
+    of_the_spec = theorem.limits in (limits, tuple(limit for limit in limits if not limit.on_the_way))
+    if not (whole and of_the_spec and found.proved):
+        raise CertificateError("The certificate does not cover all machines and limits of the spec.")
+    if found.until > theorem.until or found.arrival != theorem.arrival:
+        raise CertificateError("The certificate is about another time.")
     return theorem

@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from gen_profile.certificate.balls import Array
+from gen_profile.certificate.arithmetic.balls import Array
 
 MOST_BYTES = 2**32  # of an array, lest a small file fill the memory
 GREATEST = 2.0**45  # whole number that is a coefficient, so that sums of them are exact

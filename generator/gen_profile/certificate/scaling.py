@@ -7,9 +7,9 @@ from functools import cached_property
 import attrs
 import numpy as np
 
-from gen_profile.certificate import chebyshev
-from gen_profile.certificate.balls import Array, Ball
-from gen_profile.certificate.chebyshev import ROUND_UP
+from gen_profile.certificate.arithmetic import chebyshev
+from gen_profile.certificate.arithmetic.balls import Array, Ball
+from gen_profile.certificate.arithmetic.chebyshev import ROUND_UP
 
 MORE_TERMS = 3  # of an inverse, than of the matrix
 

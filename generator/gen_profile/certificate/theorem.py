@@ -10,12 +10,13 @@ from typing import TypeVar
 import attrs
 import numpy as np
 
+from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axis_motion import AxisMotion, Gap, gap_between, track_of
-from gen_profile.certificate.balls import Array
 from gen_profile.certificate.boxes import DyadicBox, Ranges
-from gen_profile.certificate.enclosure import MORE_NODES, TIME_NODES, Approximation, Enclosure
+from gen_profile.certificate.enclosure import MORE_NODES, TIME_NODES, Approximation, Enclosure, WatchedSway
 from gen_profile.certificate.equations import EnclosedEquations, enclosed_equations
 from gen_profile.certificate.scaling import Scaling
+from gen_profile.certificate.sway_limits import SwayLimit
 from gen_profile.errors import CertificateError
 from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.motion.profile import SampledProfile
@@ -31,7 +32,7 @@ BATCH = 400_000  # numbers in an array over all nodes of a batch
 
 @attrs.frozen(kw_only=True)
 class Theorem:
-    """No machine of some ranges sways by more than a bound, from the arrival on, under a file's setpoints.
+    """No machine of some ranges sways by more than a bound, after a file's motion or at any time.
 
     Attributes
     ----------
@@ -39,6 +40,8 @@ class Theorem:
     setpoints : SampledProfile
         Replayed from an artefact.
     ranges : Ranges
+    limits : tuple of SwayLimit
+        What bounds are wanted of.
     axes : AxisMotion
         Beside the setpoints; any will do.
     terms : tuple of int
@@ -53,6 +56,7 @@ class Theorem:
     spec: Spec
     setpoints: SampledProfile
     ranges: Ranges
+    limits: tuple[SwayLimit, ...]
     axes: AxisMotion
     terms: tuple[int, ...]
 
@@ -152,7 +156,7 @@ class Theorem:
             equations=self.equations,
             axes=self.axes,
             gap=self.gap,
-            watched=int(np.searchsorted(self.axes.knots, self.arrival, side="right")) - 1,
+            watches=self._watches(),
             approximation=Approximation(
                 lower=lower,
                 upper=upper,
@@ -163,6 +167,19 @@ class Theorem:
                 start=initial_state(self.spec.machine(), self.spec.move.initial),
             ),
         )
+
+    def _watches(self) -> tuple[WatchedSway, ...]:
+        """Tell where and when to look, for each of the limits."""
+        plant = self.spec.machine()
+        arrived = int(np.searchsorted(self.axes.knots, self.arrival, side="right")) - 1
+
+        def watch(limit: SwayLimit) -> WatchedSway:
+            if limit.on_the_way:
+                return WatchedSway(loads=plant.end_load, first=0)
+            load = plant.loads.index(limit.load)
+            return WatchedSway(loads=slice(load, load + 1), first=arrived)
+
+        return tuple(map(watch, self.limits))
 
     def batches(self, boxes: Sequence[T]) -> Iterator[Sequence[T]]:
         """Split boxes, or what belongs to them, into batches of a size to be worked on at once."""

@@ -115,8 +115,10 @@ def _proved(found: Certificate) -> Iterator[tuple[str, str]]:
     share = "" if found.share == 1.0 else f"{100.0 * found.share:.3g} % of "
     yield "machines", f"{share}all with {machines}" if machines else "the nominal one"
     bounds = ", ".join(f"{load} {mm(bound)}" for load, bound in found.bounds.items())
-    said = f"at most {bounds}, from {found.arrival:.4g} s on" if bounds else "no bound"
-    yield "proved" if found.proved else "not proved", said
+    said = [f"{bounds}, from {found.arrival:.4g} s on"] if bounds else []
+    if (way := found.on_the_way) is not None and way.bound is not None:
+        said.append(f"{way.limit.load} {mm(way.bound)} at any time")
+    yield "proved" if found.proved else "not proved", f"at most {'; '.join(said)}" if said else "no bound"
 
 
 def deployment(outcome: Deployment) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 import attrs
 import numpy as np
 
-from gen_profile.certificate.balls import LEAST, UNIT, UPWARD, Array, Ball, Operand, ball
+from gen_profile.certificate.arithmetic.balls import LEAST, UNIT, UPWARD, Array, Ball, Operand, ball
 
 
 @attrs.frozen(eq=False, slots=True)

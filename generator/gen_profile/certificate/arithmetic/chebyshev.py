@@ -16,7 +16,7 @@ from functools import cache
 
 import numpy as np
 
-from gen_profile.certificate.balls import UNIT, Array, Ball
+from gen_profile.certificate.arithmetic.balls import UNIT, Array, Ball
 
 COSINE = 32 * UNIT  # by which a cosine here may be off, its argument's rounding included
 ROUND_UP = 1.0 + 1e-12

@@ -1,0 +1,68 @@
+"""Limits of sway, and what is proved of each."""
+
+from __future__ import annotations
+
+import attrs
+
+from gen_profile.problem.limits import SWAY_TOLERANCE
+from gen_profile.spec.model import Spec
+
+
+@attrs.frozen(kw_only=True)
+class SwayLimit:
+    """How much a load may sway.
+
+    Attributes
+    ----------
+    load : str
+    allowed : float
+        m.
+    on_the_way : bool
+        Whether it holds at any time, or after the move only. It is of the end load as a whole, then.
+    """
+
+    load: str
+    allowed: float
+    on_the_way: bool = False
+
+
+@attrs.frozen(kw_only=True)
+class ProvedSway:
+    """What is proved of a limit.
+
+    Attributes
+    ----------
+    limit : SwayLimit
+    bound : float or None
+        Proved one in m, of all machines that there are any of.
+    seen : float
+        Greatest sway that was met, in m; of it nothing is proved.
+    """
+
+    limit: SwayLimit
+    bound: float | None
+    seen: float
+
+    @property
+    def reason(self) -> str | None:
+        """Say that the limit is not proved to be kept; nothing where it is, or where there is no bound."""
+        limit, bound = self.limit, self.bound
+        if bound is None or bound <= limit.allowed:
+            return None
+        when, place = "after the move", "check.residual_sway"
+        if limit.on_the_way:
+            when, place = "on the way", f"{SWAY_TOLERANCE:g} of limits.sway"
+        return (
+            f"The {limit.load} is proved to sway by at most {1e3 * bound:.4g} mm {when}, and "
+            f"{1e3 * limit.allowed:.4g} mm are allowed ({place}); the greatest sway met is "
+            f"{1e3 * self.seen:.4g} mm."
+        )
+
+
+def limits_of(spec: Spec) -> tuple[SwayLimit, ...]:
+    """List what the check allows: every load after the move, and the end load on the way where limited."""
+    after = tuple(SwayLimit(load=load, allowed=limit) for load, limit in spec.check.residual_sway.items())
+    if spec.limits.sway is None:
+        return after
+    allowed = SWAY_TOLERANCE * spec.limits.sway
+    return (*after, SwayLimit(load=spec.machine().end_load_name, allowed=allowed, on_the_way=True))
