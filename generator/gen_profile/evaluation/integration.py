@@ -20,11 +20,13 @@ from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
 
 NODES = 12
-PHASE, ACCURACY = 3.0, 1e-6  # rad of a machine's fastest mode that a step covers at first, for an accuracy
+PHASE, ACCURACY = 4.0, 1e-6  # rad of a machine's fastest mode that a step covers at first, for an accuracy
 WIDEST, MOST = 64, 2048  # steps that are solved at once, and coordinates of all machines in them
 MOST_ITERATIONS = 12  # after which the first step is halved, if not even that one is settled
 SHORTEST = 1e-9  # of the whole time: a step that must be shorter fails
 TAIL = 2  # highest coefficients of a step's polynomial, which tell how well it converges
+BEYOND = 0.1  # of them, that the coefficients which the polynomial lacks come to at most
+SETTLED = 0.03  # of the allowed error, that one more iteration would change at the pace of the last two
 
 Accelerations = Callable[[Array], Callable[[Array, Array], Array]]
 Linear = Callable[[float], tuple[Array, Array]]
@@ -215,21 +217,22 @@ class _Window:
         accelerations = self._accelerations((steps[:, 0] + np.multiply.outer(TIMES, length)).ravel())
         a = np.zeros((NODES, len(steps), start.shape[1]))
         h, nodes = length[:, None], TIMES[:, None, None]
-        done = 0
+        done, before = 0, np.zeros(len(steps))
         for _ in range(MOST_ITERATIONS):
             q, v = _states(a, h, start)
             at = (q + nodes * h * v + h**2 * _along(_POSITION, a), v + h * _along(_VELOCITY, a))
             found = accelerations(*(part.reshape(NODES * len(steps), -1) for part in at)).reshape(a.shape)
             change = _solved(found - a, alike)
             a += change
-            allowed = self._least + self._accuracy * (np.abs(q).max(axis=1) + length * np.abs(v).max(axis=1))
-            accurate = length**2 * np.abs(change).max(axis=(0, 2)) <= 0.1 * allowed
-            done = _leading(accurate)
+            allowed = self._least + self._accuracy * np.abs(at[0]).max(axis=(0, 2))
+            moved = length**2 * np.abs(change).max(axis=(0, 2))
+            done = _leading(moved**2 <= SETTLED * allowed * np.maximum(before, moved))
+            before = moved
             if done == len(steps):
                 break
         q, v = _states(a, h, start)
         position, velocity = h**2 * _along(_TWICE, a), h * _along(_ONCE, a)
-        fine = np.abs(position[-TAIL:]).max(axis=(0, 2)) <= allowed
+        fine = BEYOND * np.abs(position[-TAIL:]).max(axis=(0, 2)) <= allowed
         position[0] += q + 0.5 * h * v
         position[1] += 0.5 * h * v
         velocity[0] += v
