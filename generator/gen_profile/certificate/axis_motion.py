@@ -13,11 +13,11 @@ import attrs
 import numpy as np
 
 from gen_profile.certificate.arithmetic.balls import UNIT, Array, Ball, ball, stack
+from gen_profile.certificate.axis_track import FINER, Track
 from gen_profile.errors import CertificateError
-from gen_profile.motion.profile import Profile, SampledProfile
+from gen_profile.motion.profile import Profile
 
 DEGREE = 5
-FINER = 4  # points per setpoint at which differences are looked at
 FEWEST = 5  # setpoints in a piece
 ROUNDS = 12  # of halving pieces
 SAGITTA = 0.25  # share of what straight lines between setpoints leave out, to which a motion is fitted
@@ -97,31 +97,8 @@ def widened(coefficients: Ball, reach: Array | float, order: int) -> Ball:
     return Ball(coefficients[0].mid, (coefficients[0].rad + rest) * (1.0 + 1e-12))
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Track:
-    """Where the axes are asked to be: straight lines between points.
-
-    Attributes
-    ----------
-    times : (points,) array
-        s.
-    position : (points, m) array
-    velocity : (m,) array
-        After the last point.
-    """
-
-    times: Array
-    position: Array
-    velocity: Array
-
-
-def track_of(setpoints: SampledProfile, velocity: Array) -> Track:
-    """Take the setpoints as drives interpolate them."""
-    return Track(times=setpoints.times, position=setpoints.position, velocity=velocity)
-
-
 def fitted(track: Track, resolution: float, longest: float, watch: float) -> AxisMotion:
-    """Fit a motion to setpoints: splines with as many knots as it takes.
+    """Fit a motion to that of the axes: splines with as many knots as it takes.
 
     Parameters
     ----------
@@ -140,20 +117,18 @@ def fitted(track: Track, resolution: float, longest: float, watch: float) -> Axi
     """
     from scipy.interpolate import make_lsq_spline  # noqa: PLC0415  (loads slowly)
 
-    times, position = track.times, track.position
-    bent = position.copy()  # by the mean of what straight lines leave out
-    bent[1:-1] += np.diff(position, 2, axis=0) / 12.0
+    times, position, bent = track.times[::FINER], track.position.mid[::FINER], _smoothed(track)
     last = len(times) - 1
     if last < 2 * FEWEST:
         raise CertificateError(
             f"The file has {last + 1} setpoints; a certificate needs at least {2 * FEWEST + 1} of them: "
             "choose a shorter cycle (export.cycle_time)."
         )
-    count = max(2, int(np.ceil((times[-1] - times[0]) / longest)))
-    knots = np.unique(np.linspace(0, last, min(count, last // FEWEST) + 1).round().astype(int))
+    knots = np.unique(np.concatenate([_spread(times, *part, longest) for part in pairwise(track.parts)]))
+    leaps = track.parts[1:-1] * (DEGREE - 2)  # up to where only the velocity is continuous
     allowed = np.maximum(SAGITTA * np.abs(np.diff(position, 2, axis=0)).max() / 8.0, 0.6 * resolution)
     for _ in range(ROUNDS):
-        inner = times[knots[1:-1]]
+        inner = times[np.sort([*knots[1:-1], *leaps])]
         ends = [times[:1].repeat(DEGREE + 1), inner, times[-1:].repeat(DEGREE + 1)]
         spline = make_lsq_spline(times, bent, np.concatenate(ends), DEGREE)
         off = np.abs(spline(times) - bent).max(axis=1)
@@ -165,19 +140,38 @@ def fitted(track: Track, resolution: float, longest: float, watch: float) -> Axi
         if not halved:
             break
         knots = np.unique([*knots, *halved])
-    return _with_rest(
-        track, times[knots], [spline(times[knots], nu=order) for order in range(3)], longest, watch
-    )
+    begun, ended = (np.nextafter(times[knots], side) for side in (times[-1], times[0]))
+    bends = np.stack([spline(begun[:-1], nu=2), spline(ended[1:], nu=2)], axis=1)
+    values = [spline(times[knots], nu=order) for order in range(2)]
+    return _with_rest(track, times[knots], (*values, bends), longest, watch)
 
 
-def _with_rest(track: Track, knots: Array, values: list[Array], longest: float, watch: float) -> AxisMotion:
+def _spread(times: Array, first: int, last: int, longest: float) -> Array:
+    """Choose knots evenly in a part of a motion."""
+    count = max(2, int(np.ceil((times[last] - times[first]) / longest)))
+    return np.linspace(first, last, min(count, (last - first) // FEWEST) + 1).round().astype(int)
+
+
+def _smoothed(track: Track) -> Array:
+    """Take the track's means over a cycle around every setpoint, less what a bend adds to a mean."""
+    areas, half = track.areas.mid, FINER // 2
+    sums = areas[half:-half].reshape(-1, FINER, areas.shape[1]).sum(axis=1)
+    ends = track.times[half::FINER]
+    smooth = track.position.mid[::FINER].copy()
+    smooth[1:-1] = sums / np.diff(ends)[:, None]
+    smooth[1:-1] -= np.diff(smooth, 2, axis=0) / 24.0
+    return np.asarray(smooth)
+
+
+def _with_rest(
+    track: Track, knots: Array, values: tuple[Array, Array, Array], longest: float, watch: float
+) -> AxisMotion:
     """Begin at rest at the first setpoint, and go on after the last one."""
-    position, velocity, acceleration = values
-    position[0], velocity[0] = track.position[0], 0.0
-    position[-1], velocity[-1] = track.position[-1], track.velocity
+    position, velocity, bends = values
+    position[0], velocity[0] = track.position.mid[0], 0.0
+    position[-1], velocity[-1] = track.position.mid[-1], track.velocity
     after = knots[-1] + np.linspace(0.0, watch, 1 + int(np.ceil(watch / longest)))[1:]
-    onward = track.position[-1] + (after - knots[-1])[:, None] * track.velocity
-    bends = np.stack([acceleration[:-1], acceleration[1:]], axis=1)
+    onward = track.position.mid[-1] + (after - knots[-1])[:, None] * track.velocity
     return AxisMotion(
         knots=np.concatenate([knots, after]),
         position=np.concatenate([position, onward]),
@@ -210,56 +204,63 @@ class Gap:
 
 
 def gap_between(motion: AxisMotion, track: Track) -> Gap:
-    """Bound how far straight lines between points are from a motion.
+    """Bound how far the axes are from a motion.
 
-    Between two points the axes move at a constant velocity, so all differences are bounded by their values at
-    the points and in between, and by the motion's greatest acceleration a: |a| h²/8 and |a| h/2.
+    Between two points, the axes are away from a straight line by |a| h²/8 at most, and from its velocity by
+    |a| h/2, with a their acceleration; so is the motion.
     """
     c, half = motion.coefficients(), motion.halves
     bend = (widened(c, 1.0, 2) / (half * half)[:, None]).most
     ends = np.minimum(np.searchsorted(track.times, motion.knots), len(track.times) - 1)
     rows = []
     for piece, (first, last) in enumerate(pairwise(ends.tolist())):
-        inside = last > first
-        times = track.times[first : last + 1] if inside else motion.knots[piece : piece + 2]
-        at = _points(track, times, slice(first, last + 1) if inside else None)
-        rows.append(_piece_gap(c[:, piece : piece + 1], half[piece], bend[piece], ball(times) + 0.0, at))
+        part = _part(track, first, last) if last > first else _beyond(track, motion.knots[piece : piece + 2])
+        rows.append(_piece_gap(c[:, piece : piece + 1], half[piece], bend[piece], part))
     position, velocity, mean, integral = np.moveaxis(np.array(rows), 1, 0) * (1.0 + 1e-12)
     return Gap(position=position, velocity=velocity, mean=mean, integral=integral)
 
 
-def _piece_gap(c: Ball, half: Ball, bend: Array, times: Ball, at: Ball) -> list[Array]:
-    """Bound ε, η, ε̄ and ψ over one piece, which straight lines between points span, each (m,)."""
+def _part(track: Track, first: int, last: int) -> Track:
+    """Cut a part out of a track."""
+    points, between = slice(first, last + 1), slice(first, last)
+    return attrs.evolve(
+        track,
+        times=track.times[points],
+        position=track.position[points],
+        areas=track.areas[between],
+        bend=track.bend[between],
+    )
+
+
+def _beyond(track: Track, times: Array) -> Track:
+    """Go straight on after the track's last point."""
+    onward = (ball(times) - track.times[-1])[:, None] * track.velocity + track.position[-1]
+    position = Ball(onward.mid, onward.rad + track.creep)
+    area = 0.5 * (ball(times[1:]) - times[:-1])[:, None] * (position[1:] + position[:-1])
+    return attrs.evolve(track, times=times, position=position, areas=area, bend=track.late_bend[None])
+
+
+def _piece_gap(c: Ball, half: Ball, bend: Array, track: Track) -> list[Array]:
+    """Bound ε, η, ε̄ and ψ over one piece, each (m,)."""
+    times, at = ball(track.times), track.position
     begin, end = times[:1], times[-1:]
     x_of = partial(_place, 0.5 * (begin + end), half)
     step = times[1:] - times[:-1]
     middle = 0.5 * (times[1:] + times[:-1])
+    longest, bends = step.most.max(), bend + track.bend.max(axis=0)
     faster = ((at[1:] - at[:-1]) / step[:, None] - powers(c, x_of(middle), 1)[0] / half).most.max(axis=0)
-    faster = faster + bend * step.most.max() / 2.0
-    times, at = _between(times), _between(at)
-    step = times[1:] - times[:-1]
-    apart = (at - powers(c, x_of(times), 0)[0]).most.max(axis=0) + bend * step.most.max() ** 2 / 8.0
+    faster = faster + bends * longest / 2.0
+    apart = (at - powers(c, x_of(times), 0)[0]).most.max(axis=0) + bends * longest**2 / 8.0
     primitives = stack([0.0 * c[0], *(c[k] / (k + 1.0) for k in range(DEGREE + 1))])
     primitive = powers(primitives, x_of(times), 0)[0]
-    gone = _running_sum(0.5 * step[:, None] * (at[1:] + at[:-1])) - half * (primitive - primitive[:1])
+    gone = _running_sum(track.areas) - half * (primitive - primitive[:1])
     mean = gone[-1:] / (end - begin)
-    swung = (gone - mean * (times - begin)[:, None]).most.max(axis=0) + faster * step.most.max() ** 2 / 8.0
+    swung = (gone - mean * (times - begin)[:, None]).most.max(axis=0) + faster * longest**2 / 8.0
     return [apart, faster, mean.most[0], swung]
 
 
 def _place(middle: Ball, half: Ball, times: Ball) -> Ball:
     return (times - middle) / half
-
-
-def _between(values: Ball) -> Ball:
-    """Add points between others, on straight lines, each way `FINER` as many."""
-    shares = np.arange(FINER) / FINER
-    steps = (values[1:] - values[:-1])[:, None]
-    finer = values[:-1][:, None] + steps * shares.reshape(1, FINER, *[1] * (len(values.shape) - 1))
-    shape = (-1, *values.shape[1:])
-    mid = np.concatenate([finer.mid.reshape(shape), values.mid[-1:]])
-    rad = np.broadcast_to(finer.rad, finer.mid.shape).reshape(shape)
-    return Ball(mid, np.concatenate([rad, np.broadcast_to(values.rad, values.mid.shape)[-1:]]))
 
 
 def _running_sum(values: Ball) -> Ball:
@@ -271,12 +272,3 @@ def _running_sum(values: Ball) -> Ball:
 
     rad = summed(values.rad) + terms * UNIT * summed(np.abs(values.mid))
     return Ball(summed(values.mid), rad * (1.0 + 2 * terms * UNIT))
-
-
-def _points(track: Track, times: Array, known: slice | None) -> Ball:
-    """Positions of the axes at times, shape (times, m)."""
-    if known is not None:
-        return ball(track.position[known]) + np.zeros((len(times), 1))
-    beyond = ball(times) - track.times[-1]
-    onward: Ball = beyond[:, None] * track.velocity + track.position[-1]
-    return onward

@@ -12,12 +12,12 @@ import numpy as np
 
 from gen_profile.certificate import approximation
 from gen_profile.certificate.arithmetic.balls import Array
-from gen_profile.certificate.axis_motion import fitted, track_of
+from gen_profile.certificate.axis_motion import fitted
 from gen_profile.certificate.boxes import DyadicBox, halves, whole
 from gen_profile.certificate.in_order import in_order
 from gen_profile.certificate.packing import Motions
 from gen_profile.certificate.sway_limits import limits_of
-from gen_profile.certificate.theorem import Theorem, ranges_of
+from gen_profile.certificate.theorem import Theorem, followed, ranges_of
 from gen_profile.errors import CertificateError
 from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.motion.profile import SampledProfile
@@ -207,6 +207,7 @@ def _widest(box: DyadicBox, spans: Sequence[float]) -> int:
 def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[float]]:
     """State the theorem, and tell how much the modes' phases vary over each range, in rad."""
     plant, ranges, watch = spec.machine(), ranges_of(spec), observation_time(spec)
+    track = followed(spec, setpoints)
     box = Box(
         plant=plant,
         nominal=spec.plant.parameters,
@@ -214,7 +215,7 @@ def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[floa
             zip(ranges.names, zip(ranges.lower.tolist(), ranges.upper.tolist(), strict=True), strict=True)
         ),
         ends=(spec.move.start, spec.move.target),
-        duration=float(setpoints.times[-1]) + watch,
+        duration=float(track.times[-1]) + watch,
     )
     middle = np.full((PLACES, len(ranges.names)), 0.5)
     spans, fastest = [], float(box.phases(middle[:1]).max())
@@ -224,7 +225,6 @@ def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[floa
         phases = box.phases(line)
         spans.append(float(np.abs(np.diff(phases, axis=0)).sum(axis=0).max()))
         fastest = max(fastest, float(phases.max()))
-    track = track_of(setpoints, np.array(spec.move.final_velocity))
     longest = PHASE * box.duration / fastest
     axes = fitted(track, float(setpoints.resolution.max()), longest, watch)
     middles, half = 0.5 * (ranges.upper + ranges.lower), 0.5 * (ranges.upper - ranges.lower)

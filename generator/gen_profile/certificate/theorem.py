@@ -11,7 +11,8 @@ import attrs
 import numpy as np
 
 from gen_profile.certificate.arithmetic.balls import Array
-from gen_profile.certificate.axis_motion import AxisMotion, Gap, gap_between, track_of
+from gen_profile.certificate.axis_motion import AxisMotion, Gap, gap_between
+from gen_profile.certificate.axis_track import Track, track_of
 from gen_profile.certificate.boxes import DyadicBox, Ranges
 from gen_profile.certificate.enclosure import MORE_NODES, TIME_NODES, Approximation, Enclosure, WatchedSway
 from gen_profile.certificate.equations import EnclosedEquations, enclosed_equations
@@ -61,11 +62,6 @@ class Theorem:
     terms: tuple[int, ...]
 
     def __attrs_post_init__(self) -> None:
-        if self.spec.actuator.tau:
-            raise CertificateError(
-                "actuator.tau: a certificate is for drives that follow their setpoints; drives that lag are "
-                "checked by co-simulation only."
-            )
         if self.spec.check.foreign is not None:
             raise CertificateError(
                 "check.fmu: a certificate is of this project's own equations of the machine; "
@@ -77,8 +73,8 @@ class Theorem:
             )
 
     def _axes_fit(self) -> bool:
-        """Whether pieces end at setpoints, the last one, too, and go on for as long as the sway counts."""
-        axes, times, m = self.axes, self.setpoints.times, self.setpoints.position.shape[1]
+        """Whether pieces end at points of the track, the last one, too, and go on while the sway counts."""
+        axes, times, m = self.axes, self.track.times, self.setpoints.position.shape[1]
         knots, pieces = axes.knots, len(axes.knots) - 1
         shapes = (axes.position.shape, axes.velocity.shape, axes.acceleration.shape)
         if knots.ndim != 1 or shapes != ((pieces + 1, m), (pieces + 1, m), (pieces, 2, m)):
@@ -120,7 +116,7 @@ class Theorem:
     @property
     def arrival(self) -> float:
         """When the sway begins to count, in s."""
-        return float(self.setpoints.times[-1])
+        return float(self.track.times[-1])
 
     @property
     def until(self) -> float:
@@ -143,9 +139,14 @@ class Theorem:
         return enclosed_equations(self.spec.machine())
 
     @cached_property
+    def track(self) -> Track:
+        """Motion of the axes."""
+        return followed(self.spec, self.setpoints)
+
+    @cached_property
     def gap(self) -> Gap:
-        """How far the setpoints are from the smooth motion."""
-        return gap_between(self.axes, track_of(self.setpoints, np.array(self.spec.move.final_velocity)))
+        """How far the axes are from the smooth motion."""
+        return gap_between(self.axes, self.track)
 
     def enclosure(self, boxes: Sequence[DyadicBox], coefficients: Array, scales: Array) -> Enclosure:
         """Enclose the machines of some boxes by an approximation of their motions, see `Approximation`."""
@@ -186,6 +187,11 @@ class Theorem:
         size = max(1, BATCH // self.nodes)
         for first in range(0, len(boxes), size):
             yield boxes[first : first + size]
+
+
+def followed(spec: Spec, setpoints: SampledProfile) -> Track:
+    """Move the axes as a spec's drives follow setpoints."""
+    return track_of(setpoints, np.array(spec.move.final_velocity), spec.actuator.tau or 0.0)
 
 
 def ranges_of(spec: Spec) -> Ranges:

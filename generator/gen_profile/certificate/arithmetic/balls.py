@@ -87,7 +87,7 @@ class Ball:
 
     def __getitem__(self, key: Any) -> Ball:
         """Take some of the numbers."""
-        return Ball(self.mid[key], self.rad[key])
+        return Ball(self.mid[key], self.rad[key] if np.ndim(self.rad) else self.rad)
 
     def reshape(self, *shape: int) -> Ball:
         """Take the numbers in another shape."""
@@ -122,6 +122,12 @@ def stack(balls: list[Ball], axis: int = 0) -> Ball:
     shape = np.broadcast_shapes(*(one.shape for one in balls))
     mids = [np.broadcast_to(one.mid, shape) for one in balls]
     return Ball(np.stack(mids, axis), np.stack([np.broadcast_to(one.rad, shape) for one in balls], axis))
+
+
+def concatenate(balls: list[Ball]) -> Ball:
+    """Join balls along their first axis."""
+    rads = [np.broadcast_to(one.rad, np.shape(one.mid)) for one in balls]
+    return Ball(np.concatenate([one.mid for one in balls]), np.concatenate(rads))
 
 
 def matmul(a: Operand, b: Operand) -> Ball:
