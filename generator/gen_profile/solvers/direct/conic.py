@@ -115,7 +115,7 @@ class ConicProgram:
         matrix = (sparse.vstack(self._rows) @ units).tocsc()
         settings.iterative_refinement_enable = False  # which takes a third of the time, mostly in vain
         solution = self._run(scaled, slope, matrix, settings)
-        if str(solution.status) not in ("Solved", "PrimalInfeasible"):
+        if str(solution.status) not in ("Solved", "AlmostSolved", "PrimalInfeasible"):
             settings.iterative_refinement_enable = True
             solution = self._run(scaled, slope, matrix, settings)
         if str(solution.status) == "NumericalError":  # steepest costs are better scaled by our units alone

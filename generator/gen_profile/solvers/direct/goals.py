@@ -251,7 +251,12 @@ def amplitudes(
     return Amplitudes(rows=rows * scale[: 2 * n_u], shares=gains / greatest)
 
 
-def bound_worst(program: ConicProgram, transcription: Transcription, tried: Sequence[Amplitudes]) -> int:
+def bound_worst(
+    program: ConicProgram,
+    transcription: Transcription,
+    tried: Sequence[Amplitudes],
+    maps: Sequence[IntervalMaps],
+) -> int:
     """Bound what every load of every machine can swing to by one variable, the program's last.
 
     The program must have been posed with `worst_case_variables` extra ones.
@@ -264,12 +269,12 @@ def bound_worst(program: ConicProgram, transcription: Transcription, tried: Sequ
     worst = program.variables - 1
     column = transcription.variables
     for index, machine in enumerate(tried):
-        end = transcription.node_columns(index)[-1:]
+        end, offset = transcription.end_state(index, maps, program.variables)
         modes = np.arange(column, column + len(machine.rows))
         for mode, rows in zip(modes, machine.rows, strict=True):
-            quadratures = place(-rows[None], end, program.variables)
             radius = place(-np.ones((1, 1, 1)), np.array([mode]), program.variables)
-            program.within_cones(sparse.vstack([radius, quadratures]), np.zeros((1, 3)))
+            sides = np.append(0.0, rows @ offset)
+            program.within_cones(sparse.vstack([radius, -sparse.csc_matrix(rows) @ end]), sides[None])
         sums = place(machine.shares[None], modes[:1], program.variables)
         most = place(np.ones((1, len(machine.shares), 1)), np.array([worst]), program.variables)
         program.at_most(sums - most, np.zeros(len(machine.shares)))

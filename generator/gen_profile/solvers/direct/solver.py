@@ -252,7 +252,7 @@ class CostProgram:
         if self.sway_limit is not None:
             goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0])
         if self.worst is not None:
-            column = goals.bound_worst(program, transcription, self.setup.tried)
+            column = goals.bound_worst(program, transcription, self.setup.tried, maps)
             row = sparse.csc_matrix(([1.0], ([0], [column])), shape=(1, program.variables))
             program.at_most(row, np.array([self.worst]))
         scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / self.setup.cost_scale)
@@ -292,7 +292,7 @@ class LeastWorst:
         goals.keep_limits(program, self.setup.problem, transcription)
         if sway_limit is not None:
             goals.keep_sway(program, transcription, sway_limit, iterate, maps[0])
-        column = goals.bound_worst(program, transcription, self.setup.tried)
+        column = goals.bound_worst(program, transcription, self.setup.tried, maps)
         linear = np.zeros(program.variables)
         linear[column] = 1.0
         return self.trace * transcription.effort(self.setup.forms, program.variables), linear
@@ -387,7 +387,7 @@ def _nodes(found: ProgramSequence) -> tuple[Array, Array]:
     moved = np.concatenate([local[:, :, :orders], (local[-1:] @ last.T)])
     moved_costates = np.concatenate([-multipliers[0], multipliers[1]]).reshape(intervals + 1, axes, orders)
     units = reach[:, None] / duration ** np.arange(orders)
-    swung, swung_costates = transcription.nodes(x, 0), -multipliers[2].reshape(intervals + 1, -1)
+    swung, swung_costates = transcription.nodes(x), -multipliers[2].reshape(intervals + 1, -1)
     half = 2 * len(problem.plant.unactuated)
 
     def in_order(pendulum: Array, chain: Array) -> Array:

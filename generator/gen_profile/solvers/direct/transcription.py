@@ -1,8 +1,9 @@
 """A problem as conic programs over piecewise polynomial motions and the machines' states at the nodes.
 
 Variables, all dimensionless: for every interval the local coordinates of every axis (see
-`solvers.bezier.Piece`), then for every machine its state y at every node, then what a goal adds. Whatever
-couples, couples neighbours only, so the work grows with the number of intervals.
+`solvers.bezier.Piece`), then the nominal machine's state y at every node, then what a goal adds. Whatever
+couples, couples neighbours only, so the work grows with the number of intervals. Of other machines only the
+state at the end counts: their states at the nodes are eliminated.
 """
 
 from __future__ import annotations
@@ -112,7 +113,7 @@ class Transcription:
     @property
     def variables(self) -> int:
         """Number of variables without those of a goal."""
-        return int(self.node_columns(len(self.machines))[0])
+        return int(self.node_columns[-1]) + len(self.machines[0].scale)
 
     @property
     def units(self) -> Array:
@@ -135,11 +136,10 @@ class Transcription:
         """First column of every interval's axis coordinates."""
         return np.arange(self.intervals) * self.breadth
 
-    def node_columns(self, machine: int) -> IntArray:
-        """First column of a machine's state at every node."""
-        before = sum(len(other.scale) for other in self.machines[:machine]) * (self.intervals + 1)
-        size = len(self.machines[machine].scale) if machine < len(self.machines) else 0
-        return self.intervals * self.breadth + before + np.arange(self.intervals + 1) * size
+    @property
+    def node_columns(self) -> IntArray:
+        """First column of the nominal machine's state at every node."""
+        return self.intervals * self.breadth + np.arange(self.intervals + 1) * len(self.machines[0].scale)
 
     def rest(self) -> Iterate:
         """Stand still at the start."""
@@ -173,10 +173,10 @@ class Transcription:
         return tuple(found)
 
     def program(self, maps: Sequence[IntervalMaps], extra: int = 0) -> ConicProgram:
-        """Pose the motion: continuous, from rest to its target, and every machine moved by it.
+        """Pose the motion: continuous, from rest to its target, and the nominal machine moved by it.
 
-        The constraints, in the order of their multipliers: continuity of the axes, their end, then for every
-        machine its states (the costates at the nodes, negative) and its end.
+        The constraints, in the order of their multipliers: continuity of the axes, their end, then the
+        machine's states (the costates at the nodes, negative) and its end.
         """
         width = self.variables + extra
         program = ConicProgram(np.concatenate([self.units, np.ones(extra)]))
@@ -192,15 +192,14 @@ class Transcription:
         end = np.zeros((len(self.target), orders))
         end[:, 0], end[:, 1] = self.target, self.final_velocity
         program.equal(place(last[-1:], columns[-1:], width), end.ravel())
-        for index, (machine, linear) in enumerate(zip(self.machines, maps, strict=True)):
-            n = len(machine.scale)
-            nodes = self.node_columns(index)
-            moved = place(linear.transition, nodes[:-1], width) + place(linear.drive, columns, width)
-            program.equal(
-                self._repeat(np.eye(n), nodes, width) - _after(moved, n),
-                np.concatenate([machine.start, linear.offset.ravel()]),
-            )
-            program.equal(place(machine.end[None], nodes[-1:], width), np.zeros(len(machine.end)))
+        machine, linear, nodes = self.machines[0], maps[0], self.node_columns
+        n = len(machine.scale)
+        moved = place(linear.transition, nodes[:-1], width) + place(linear.drive, columns, width)
+        program.equal(
+            self._repeat(np.eye(n), nodes, width) - _after(moved, n),
+            np.concatenate([machine.start, linear.offset.ravel()]),
+        )
+        program.equal(place(machine.end[None], nodes[-1:], width), np.zeros(len(machine.end)))
         return program
 
     def bound(
@@ -255,7 +254,7 @@ class Transcription:
         directions = found.shape[2]
         matrix = place(
             by_local.reshape(self.intervals, STAGES * directions, -1), self.local_columns, width
-        ) + place(by_node.reshape(self.intervals, STAGES * directions, -1), self.node_columns(0)[:-1], width)
+        ) + place(by_node.reshape(self.intervals, STAGES * directions, -1), self.node_columns[:-1], width)
         offset = (
             found
             + np.einsum("ksda,ksa->ksd", by_state, maps.stage_offset - stages)
@@ -273,17 +272,39 @@ class Transcription:
     def iterate(self, x: Array, maps: Sequence[IntervalMaps]) -> Iterate:
         """Read a motion and the machines' states off a program's solution."""
         local = x[: self.intervals * self.breadth].reshape(self.intervals, -1)
-        nodes = [self.nodes(x, index) for index in range(len(self.machines))]
         return Iterate(
             local=local,
-            stages=tuple(linear.stages(y[:-1], local) for linear, y in zip(maps, nodes, strict=True)),
+            stages=tuple(
+                linear.stages((self.followed(machine, linear, local) if index else self.nodes(x))[:-1], local)
+                for index, (machine, linear) in enumerate(zip(self.machines, maps, strict=True))
+            ),
         )
 
-    def nodes(self, x: Array, machine: int) -> Array:
-        """Read a machine's dimensionless states at the nodes off a program's solution."""
-        columns = self.node_columns(machine)
-        n = len(self.machines[machine].scale)
-        return x[columns[0] : columns[-1] + n].reshape(self.intervals + 1, n)
+    def nodes(self, x: Array) -> Array:
+        """Read the nominal machine's dimensionless states at the nodes off a program's solution."""
+        first, n = self.node_columns[0], len(self.machines[0].scale)
+        return x[first : first + n * (self.intervals + 1)].reshape(-1, n)
+
+    def followed(self, machine: TranscribedMachine, linear: IntervalMaps, local: Array) -> Array:
+        """Carry a machine's dimensionless states from node to node of a motion."""
+        states = [machine.start]
+        driven = np.einsum("kal,kl->ka", linear.drive, local) + linear.offset
+        for transition, added in zip(linear.transition, driven, strict=True):
+            states.append(transition @ states[-1] + added)
+        return np.array(states)
+
+    def end_state(self, index: int, maps: Sequence[IntervalMaps], width: int) -> tuple[Matrix, Array]:
+        """Give a machine's dimensionless state at the end as ``matrix x + offset``."""
+        machine, linear = self.machines[index], maps[index]
+        n = len(machine.scale)
+        if index == 0:
+            return place(np.eye(n)[None], self.node_columns[-1:], width), np.zeros(n)
+        onwards, matrix, offset = np.eye(n), np.zeros((n, self.intervals, self.breadth)), np.zeros(n)
+        for k in reversed(range(self.intervals)):
+            matrix[:, k] = onwards @ linear.drive[k]
+            offset += onwards @ linear.offset[k]
+            onwards = onwards @ linear.transition[k]
+        return place(matrix.reshape(1, n, -1), np.zeros(1), width), offset + onwards @ machine.start
 
     def quadrature(self) -> Array:
         """Weights of the collocation points for integrals over dimensionless time, shape (points,)."""
