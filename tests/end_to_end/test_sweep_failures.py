@@ -158,34 +158,43 @@ def test_a_scheduler_without_workers_is_named(tmp_path, monkeypatch):
 
 DEADLY = """
 import multiprocessing, os
+import attrs
 from gen_profile.plants.registry import find_plant
-PLANT = find_plant("double-pendulum-crane")
-if multiprocessing.parent_process() is not None:
-    os._exit(1)
+CRANE = find_plant("double-pendulum-crane")
+
+def equations(q_u, dq_u, q_a, dq_a, p):
+    if isinstance(p.m1, float) and p.m1 == 0.21 and multiprocessing.parent_process() is not None:
+        os._exit(1)
+    return CRANE.equations(q_u, dq_u, q_a, dq_a, p)
+
+PLANT = attrs.evolve(CRANE, equations=equations)
 """
 
 
 @pytest.mark.slow
-def test_a_case_that_kills_its_process_is_a_row(tmp_path):
+def test_a_case_that_kills_its_process_is_a_row_and_those_beside_it_are_worked_at(tmp_path):
     (tmp_path / "deadly.py").write_text(DEADLY, "utf-8")
     text = preset_text("paper-beta0").replace('type = "double-pendulum-crane"', 'file = "deadly.py"')
     (tmp_path / "spec.toml").write_text(text, "utf-8")
     assert multiprocessing.parent_process() is None
+    masses = ("0.19", "0.2", "0.21", "0.22", "0.23", "0.24")  # two in a task of one worker
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
         outcome = run_here(
             "sweep",
             tmp_path / "spec.toml",
             "--vary",
-            "move.duration=3",
+            f"plant.m1={','.join(masses)}",
             "--workers",
             "1",
             "--out",
             tmp_path / "out",
         )
     assert outcome.code == 0
-    (row,) = pq.read_table(tmp_path / "out" / "sweep.parquet").to_pylist()
-    assert row["status"] == "crashed"
-    assert row["reason"] == "Every process that worked at it ended: it lacks memory, or a library crashes."
+    rows = pq.read_table(tmp_path / "out" / "sweep.parquet").to_pylist()
+    assert [row["status"] for row in rows] == ["crashed" if mass == "0.21" else "passed" for mass in masses]
+    assert (
+        rows[2]["reason"] == "Every process that worked at it ended: it lacks memory, or a library crashes."
+    )
 
 
 @pytest.mark.parametrize(
@@ -199,7 +208,7 @@ def test_workers_that_cannot_work_stop_the_sweep(tmp_path, monkeypatch, raised, 
     def unable(*_):
         raise raised
 
-    monkeypatch.setattr(workflow, "run_case", unable)
+    monkeypatch.setattr(workflow, "run_cases", unable)
     with (
         LocalCluster(n_workers=1, processes=False, **LOOPBACK) as cluster,
         pytest.raises(seen, match=sentence),

@@ -102,6 +102,11 @@ class CaseOutcome:
         return bool(self.record["status"] == PASSED)
 
 
+def run_cases(recipe: Recipe, cases: Mapping[int, Mapping[str, Any]]) -> list[CaseOutcome]:
+    """Work out cases, each given by its number and the values of the keys varied; raises as `run_case`."""
+    return [run_case(recipe, case, values) for case, values in cases.items()]
+
+
 def run_case(recipe: Recipe, case: int, values: Mapping[str, Any]) -> CaseOutcome:
     """Design, export and check one case; whatever is wrong with it becomes its record.
 

@@ -1,29 +1,30 @@
 """Sweeps: all cases of a grid designed, checked and exported, on as many processes as there are.
 
 The cases run on Dask workers, those of this computer or of a cluster. This process alone writes: workers hand
-it what they made, case by case. So whatever stops them or this process, what is finished stays, and a sweep
-that is started again works out the rest.
+it what they made, a few cases at a time. So whatever stops them or this process, what was written stays, and
+a sweep that is started again works out the rest.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
 import attrs
 from dask.system import CPU_COUNT
-from distributed import Future, KilledWorker, as_completed
+from distributed import Client, Future, KilledWorker, as_completed
 
 from gen_profile.cluster import client_of, processes, unable
 from gen_profile.errors import GenProfileError, SpecError
-from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, failed, run_case
+from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, failed, run_cases
 from gen_profile.sweep.reading import swept_table
 from gen_profile.sweep.store import Keeper, Store, opened
 
-CASES_AHEAD = 3  # per process: one at work, and what keeps it busy while this process takes results in
+CASES_PER_TASK = 4  # at most; Dask's work for a task is a tenth of that for a case
+TASKS_AHEAD = 3  # per process: one at work, and what keeps it busy while this process takes results in
 
 
 @attrs.frozen(kw_only=True)
@@ -132,40 +133,65 @@ def _work(
     workers: int | None,
     progress: Callable[[CasesDone], None],
 ) -> None:
-    """Hand the cases to workers, a few ahead, and keep what comes back."""
-    total, failures = len(store.grid), 0
+    """Hand the cases to workers, a few ahead, and keep what comes back.
+
+    Where a process ends, each case that it may have ended of is worked at again by itself.
+    """
+    grid, total, failures = store.grid, len(store.grid), 0
     done = total - len(unfinished)
     progress(CasesDone(done=done, failed=failures, total=total))
-    waiting = iter(unfinished)
-    with client_of(scheduler, min(workers or CPU_COUNT, len(unfinished))) as client:
-        running: dict[Future, int] = {}
-        completed = as_completed(loop=client.loop)
 
-        def begin(case: int) -> None:
-            future = client.submit(run_case, store.recipe, case, store.grid[case], pure=False)
-            running[future] = case
-            completed.add(future)
-
-        for case in islice(waiting, CASES_AHEAD * processes(client)):
-            begin(case)
-        for future in completed:
-            case = running.pop(future)
-            outcome = _outcome(future, case, store.grid[case])
-            kept.keep(case, outcome)
+    def keep(outcomes: Sequence[CaseOutcome]) -> None:
+        nonlocal done, failures
+        for outcome in outcomes:
+            kept.keep(outcome.record["case"], outcome)
             done, failures = done + 1, failures + (not outcome.passed)
             progress(CasesDone(done=done, failed=failures, total=total))
-            for following in islice(waiting, 1):
-                begin(following)
+
+    with client_of(scheduler, min(workers or CPU_COUNT, len(unfinished))) as client:
+        ahead = TASKS_AHEAD * processes(client)
+        size = max(1, min(CASES_PER_TASK, len(unfinished) // ahead))
+        tasks = (unfinished[first : first + size] for first in range(0, len(unfinished), size))
+        suspects: list[int] = []
+        for cases, future in _worked(client, store, tasks, ahead):
+            try:
+                keep(_outcomes(future))
+            except KilledWorker:
+                suspects += cases
+        for (case,), future in _worked(client, store, [[case] for case in suspects], ahead=1):
+            try:
+                keep(_outcomes(future))
+            except KilledWorker:
+                reason = "Every process that worked at it ended: it lacks memory, or a library crashes."
+                keep([failed(case, grid[case], CRASHED, reason)])
 
 
-def _outcome(future: Future, case: int, values: Mapping[str, Any]) -> CaseOutcome:
-    """Take a case's outcome in, whatever became of its process."""
+def _worked(
+    client: Client, store: Store, tasks: Iterable[Sequence[int]], ahead: int
+) -> Iterator[tuple[Sequence[int], Future]]:
+    """Hand tasks of some cases each to workers, so many ahead; those that are over, in any order."""
+    running: dict[Future, Sequence[int]] = {}
+    completed = as_completed(loop=client.loop)
+    waiting = iter(tasks)
+
+    def begin(count: int) -> None:
+        for cases in islice(waiting, count):
+            values = {case: store.grid[case] for case in cases}
+            future = client.submit(run_cases, store.recipe, values, pure=False)
+            running[future] = cases
+            completed.add(future)
+
+    begin(ahead)
+    for future in completed:
+        yield running.pop(future), future
+        begin(1)
+
+
+def _outcomes(future: Future) -> list[CaseOutcome]:
+    """Take the outcomes of some cases in."""
     try:
-        return cast("CaseOutcome", future.result())
-    except GenProfileError:
+        return cast("list[CaseOutcome]", future.result())
+    except (GenProfileError, KilledWorker):
         raise
-    except KilledWorker:
-        reason = "Every process that worked at it ended: it lacks memory, or a library crashes."
-        return failed(case, values, CRASHED, reason)
     except Exception as error:
         raise SpecError(f"{unable(error)} What is finished is kept: sweep again.") from error
