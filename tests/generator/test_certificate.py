@@ -141,7 +141,8 @@ def test_the_axes_are_as_near_to_the_smooth_motion_as_is_said(find, tau):
         assert abs(mean) <= gap.mean[piece, 0] + 1e-11  # of the trapezoids
         assert np.abs(integral).max() <= gap.integral[piece, 0] + 1e-14
     moving = gap.position[gap.position > 1e-12]
-    assert moving.max() < 2e-5 * np.abs(np.ptp(setpoints.position))
+    assert moving.max() < 2e-5 * np.ptp(setpoints.position)
+    assert gap.mean.max() < 1e-4 * moving.max()
 
 
 @pytest.mark.parametrize("tau", [0.0, 0.03])

@@ -118,7 +118,7 @@ def fitted(track: Track, resolution: float, longest: float, watch: float) -> Axi
     from scipy.interpolate import make_lsq_spline  # noqa: PLC0415  (loads slowly)
 
     times, position, bent = track.times[::FINER], track.position.mid[::FINER], _smoothed(track)
-    last = len(times) - 1
+    last = track.parts[1]
     if last < 2 * FEWEST:
         raise CertificateError(
             f"The file has {last + 1} setpoints; a certificate needs at least {2 * FEWEST + 1} of them: "
@@ -143,7 +143,7 @@ def fitted(track: Track, resolution: float, longest: float, watch: float) -> Axi
     begun, ended = (np.nextafter(times[knots], side) for side in (times[-1], times[0]))
     bends = np.stack([spline(begun[:-1], nu=2), spline(ended[1:], nu=2)], axis=1)
     values = [spline(times[knots], nu=order) for order in range(2)]
-    return _with_rest(track, times[knots], (*values, bends), longest, watch)
+    return _balanced(track, _with_rest(track, times[knots], (*values, bends), longest, watch))
 
 
 def _spread(times: Array, first: int, last: int, longest: float) -> Array:
@@ -180,12 +180,23 @@ def _with_rest(
     )
 
 
+def _balanced(track: Track, motion: AxisMotion) -> AxisMotion:
+    """Bend every piece by a multiple of (1 − x²)², so that its mean is that of the axes."""
+    ends = np.searchsorted(track.times, motion.knots[motion.knots <= track.times[-1]])
+    gone = np.concatenate([0.0 * track.areas.mid[:1], np.cumsum(track.areas.mid, axis=0)])
+    c, half = motion.coefficients().mid[:, : len(ends) - 1], motion.halves.mid[: len(ends) - 1, None]
+    off = np.diff(gone[ends], axis=0) / (2.0 * half) - (c[0] + c[2] / 3.0 + c[4] / 5.0)
+    acceleration = motion.acceleration.copy()
+    acceleration[: len(off)] += (15.0 * off / half**2)[:, None]
+    return attrs.evolve(motion, acceleration=acceleration)
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Gap:
     """How far the axes are from a smooth motion of theirs at most: bounds over every piece, (pieces, m).
 
     The difference ε of positions has the form ε̄ + ψ' on every piece, where ψ vanishes at both ends: setpoints
-    lie on both sides of a motion that is fitted to them, so ψ is smaller than ε by far.
+    lie on both sides of a motion that is fitted to them, with the same means, so ψ is smaller than ε by far.
 
     Attributes
     ----------
