@@ -15,7 +15,9 @@ on the way.
   left at rest. ``request.st`` begins one: which way is left, from which slot on, over how many. (One that
   takes longer than the motion lasts comes too late; one over too few slots does not get there.)
 - ``programme.st`` solves it by a primal-dual interior-point method (Mehrotra 1992, with a fixed centring);
-  the normal matrix has five diagonals, and the conditions enter by its Schur complement.
+  the normal matrix has five diagonals, and the conditions enter by its Schur complement. Second derivatives
+  by frequency, where stated errors make them count, are soft conditions: the square of what is left costs
+  way, which adds its weight's inverse to the complement's diagonal. The last projection leaves them out.
 - ``follow.st`` follows the linear machine of now, ``sway'' = acceleration - matrix * sway``, cycle by cycle,
   and its slope by the logarithm of the frequencies, ``slope'' = -matrix * (slope + 2 sway)``: what is unknown
   of them changes sway and slope alike along all that was driven, so it adds up where the slope is not known.
@@ -142,6 +144,10 @@ class PlannerConstants:
         m, sway up to which nothing is done about it.
     doubt : float
         Relative error that the frequencies may have.
+    second_order : (modes,) array
+        Weights in 1/m of what errors of the frequencies leave in each mode: of the integral of velocity and
+        wave, in which slots count by the square of their phase from the middle. 1 is worth half a slot at
+        full speed; 0 is no condition.
     degrees : int
         Chebyshev polynomials per live parameter.
     exponents : (parameters, terms) array of int
@@ -163,6 +169,7 @@ class PlannerConstants:
     rates: Mapping[str, float]
     calm: float
     doubt: float
+    second_order: Array
     degrees: int
     exponents: NDArray[np.int64]
     modes: int
@@ -305,8 +312,7 @@ def _interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
 
 def _lengths(c: PlannerConstants) -> dict[str, int]:
     """Lengths of the block's arrays."""
-    modes, axes = c.modes, len(c.axes)
-    conditions = 1 + 4 * modes
+    modes, axes, conditions = c.modes, len(c.axes), _conditions(c)
     return {
         "axis": axes,
         "future": axes * FUTURE,
@@ -335,13 +341,14 @@ def _constants(c: PlannerConstants) -> str:
     lines += [_array(name, "LREAL", [literal(v) for v in values]) for name, values in _arrays(c).items()]
     exponents = c.exponents if c.live else np.zeros((1, c.model.shape[1]), dtype=np.int64)
     lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))
+    before = np.cumsum(np.sign(c.second_order)) - 1.0
+    lines.append(_array("cSecond", "DINT", [str(int(number)) for number in before]))
     lines.append(_array("cReachSlots", "DINT", [str(v) for v in REACH_SLOTS]))
     return "\n".join(lines)
 
 
 def _whole_constants(c: PlannerConstants) -> dict[str, int]:
-    modes, (rows, terms) = c.modes, c.model.shape
-    conditions = 1 + 4 * modes
+    modes, (rows, terms), conditions = c.modes, c.model.shape, _conditions(c)
     return {
         "cAxes": len(c.axes),
         "cModes": modes,
@@ -349,6 +356,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cFresh": FRESH,
         "cCycleWork": _cycle_work(c),
         "cConditions": conditions,
+        "cSeconds": np.count_nonzero(c.second_order),
         "cLives": len(c.live),
         "cTerms": terms,
         "cDegrees": c.degrees,
@@ -372,6 +380,11 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
     }
 
 
+def _conditions(c: PlannerConstants) -> int:
+    """Conditions of a plan: its sum; four of each mode, and two of second order where these are needed."""
+    return 1 + 4 * c.modes + 2 * int(np.count_nonzero(c.second_order))
+
+
 def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
     following = 30 + 4 * c.modes * (4 * c.modes + 15)
@@ -381,7 +394,7 @@ def _cycle_work(c: PlannerConstants) -> int:
 def _longest_kernel(c: PlannerConstants) -> int:
     """Slots of the longest kernel whose last step fits into one cycle at rest: the block's own count."""
     conditions = 1 + 4 * c.modes
-    left = WORK - _cycle_work(c) - 20 - conditions * conditions * (conditions + 6) // 3 - 100
+    left = WORK - _cycle_work(c) - 20 - conditions * conditions - 100
     return min(KERNEL_SLOTS, left // (2 * conditions + 8))
 
 
@@ -416,6 +429,7 @@ def _arrays(c: PlannerConstants) -> dict[str, Sequence[float] | Array]:
         "cTravelHigh": [axis.travel[1] for axis in c.axes],
         "cTargetLow": [axis.targets[0] for axis in c.axes],
         "cTargetHigh": [axis.targets[1] for axis in c.axes],
+        "cSecondOrder": c.second_order,
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveDrift": c.drift or (0.0,),

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 
 import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
-from gen_profile.planner.machine import LiveModes, doubt, frequencies, live_modes, planned_axes
+from gen_profile.planner.machine import (
+    LiveModes,
+    corners,
+    frequencies,
+    frequency_errors,
+    live_modes,
+    planned_axes,
+    second_order_sway,
+)
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, AxisConstants, PlannerConstants, block_text
 
@@ -18,6 +25,9 @@ FEWEST_CYCLES = 4  # in a slot
 STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
 CALM = 0.1  # of the allowed sway, which the block leaves as it is
 MARGIN = 2.0  # between targets and the travel's ends, relative to the allowed sway, for calming
+HALF_A_SLOT = 0.07  # of the allowed sway: where stated errors leave so much, it is worth that time
+USUAL = 20.0  # slots in half a motion
+LITTLE = 0.3  # weight that does not count
 QUICK = 2.0  # default deceleration of a quick stop, relative to the limit of the acceleration
 QUICK_JERK = 4.0
 
@@ -53,7 +63,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
     if faults := [fault for number, axis in planned.items() for fault in _faults(spec, number, axis.suffix)]:
         raise SpecError(*faults)
     axes = tuple(_axis(spec, number, axis.suffix) for number, axis in planned.items())
-    fastest = max(_rates(found, point)[0][0] for point in _corners(found))
+    fastest = max(_rates(found, point)[0][0] for point in corners(found.live))
     if 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * spec.export.cycle_time) < FEWEST_CYCLES:
         most = 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * FEWEST_CYCLES)
         raise SpecError(f"export.cycle_time: at most {most:.2g} s for a machine that swings this fast.")
@@ -69,7 +79,8 @@ def planner_block(spec: Spec) -> PlannerBlock:
         drift=tuple(STEADY * high for _, high in found.live.values()),
         rates=spec.planner.live_rate,
         calm=CALM * min(spec.check.residual_sway.values()),
-        doubt=doubt(spec),
+        doubt=float(frequency_errors(spec).max(initial=0.0)),
+        second_order=_second_order(spec, found),
         degrees=int(interpolant.exponents.max(initial=0)) + 1,
         exponents=interpolant.exponents,
         modes=found.modes,
@@ -119,6 +130,18 @@ def _faults(spec: Spec, number: int, suffix: str) -> list[str]:
     return faults
 
 
+def _second_order(spec: Spec, found: LiveModes) -> Array:
+    """Weigh what the stated errors leave in each mode, where it counts in a motion of usual length."""
+    weights = second_order_sway(spec) / (HALF_A_SLOT * min(spec.check.residual_sway.values()))
+    velocity = max(spec.limits.of(number).velocity or 0.0 for number in planned_axes(spec))
+    slot_angle = 2.0 * np.pi / SLOTS_PER_PERIOD
+    usual = [
+        velocity * weights * slot_angle / rates[0] * (USUAL * slot_angle * rates / rates[0]) ** 2
+        for rates, _ in (_rates(found, point) for point in corners(found.live))
+    ]
+    return np.where(np.max(usual, axis=0) > LITTLE, weights, 0.0)
+
+
 def _axis(spec: Spec, number: int, suffix: str) -> AxisConstants:
     axis, own = spec.machine().actuated[number], spec.limits.of(number)
     velocity, acceleration, jerk, travel = own.velocity, own.acceleration, own.jerk, own.travel
@@ -151,10 +174,6 @@ def _nominal(spec: Spec, name: str) -> float:
     )
     low, high = spec.planner.live[name]
     return min(max(value, low), high)
-
-
-def _corners(found: LiveModes) -> list[Sequence[float]]:
-    return list(product((-1.0, 1.0), repeat=len(found.live)))
 
 
 def _rates(found: LiveModes, point: Sequence[float]) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import product
 from types import SimpleNamespace
 
@@ -113,22 +113,51 @@ def planned_axes(spec: Spec) -> dict[int, BlockAxis]:
     return {k: BlockAxis(name=axes[k].name if several else "", unit=axes[k].unit) for k in numbers}
 
 
-def doubt(spec: Spec) -> float:
-    """By which share the stated errors of the nominal machine's parameters change a frequency at most."""
-    nominal = spec.plant.parameters
-
-    def found(changed: Mapping[str, float]) -> Array:
-        return linearize(spec.machine(), {**nominal, **changed}, spec.move.start).frequencies
-
-    return sum(
-        max(float(np.abs(found({name: end}) / found({}) - 1.0).max()) for end in ends)
-        for name, ends in spec.checked_ranges().items()
-        if not (name in spec.planner.live and name in spec.check.spans)  # which says where it may be
+def frequency_errors(spec: Spec) -> Array:
+    """By which share the stated errors change each mode's frequency at most, at the live ranges' corners."""
+    return np.asarray(
+        np.max([_frequency_errors(spec, point) for point in corners(spec.planner.live)], axis=0)
     )
 
 
-def _linearized(spec: Spec, point: Sequence[float]) -> Linearization:
-    """Linearise the machine at a point of the live ranges, given in −1 … 1."""
+def second_order_sway(spec: Spec) -> Array:
+    """Greatest sway of a load that the stated errors leave in each mode, in m by m, to second order.
+
+    For a motion that leaves the mode at rest whatever its frequency to first order: by the integral of its
+    velocity times a wave of the mode, weighed by the square of the wave's phase.
+    """
+    found = []
+    for point in corners(spec.planner.live):
+        at = _linearized(spec, point)
+        shown = np.abs(at.sway_gain @ at.modes).max(axis=0)
+        driven = np.abs(np.linalg.solve(at.modes, at.input)).max(axis=1)
+        modes = np.abs(at.frequencies[:, None] - at.distinct_frequencies).argmin(axis=1)
+        share = np.zeros_like(at.distinct_frequencies)
+        np.maximum.at(share, modes, shown * driven)
+        found.append(0.5 * share * _frequency_errors(spec, point) ** 2)
+    return np.asarray(np.max(found, axis=0))
+
+
+def corners(live: Collection[str]) -> list[Sequence[float]]:
+    """Give the corners of the live ranges, each mapped to −1 … 1."""
+    return list(product((-1.0, 1.0), repeat=len(live)))
+
+
+def _frequency_errors(spec: Spec, point: Sequence[float]) -> Array:
+    nominal, told = spec.plant.parameters, _linearized(spec, point).distinct_frequencies
+    errors = np.zeros_like(told)
+    for name, ends in spec.checked_ranges().items():
+        if nominal[name] == 0.0 or (name in spec.planner.live and name in spec.check.spans):
+            continue  # of nothing there is no share, and a live one's span says where it may be
+        wrong = [_linearized(spec, point, {name: end / nominal[name]}) for end in ends]
+        errors += np.max([np.abs(one.distinct_frequencies / told - 1.0) for one in wrong], axis=0)
+    return errors
+
+
+def _linearized(
+    spec: Spec, point: Sequence[float], errors: Mapping[str, float] | None = None
+) -> Linearization:
+    """Linearise the machine at a point of the live ranges, given in −1 … 1, some parameters times errors."""
     plant = spec.machine()
     values = {
         name: 0.5 * (low + high + x * (high - low))
@@ -138,6 +167,8 @@ def _linearized(spec: Spec, point: Sequence[float]) -> Linearization:
     parameters = dict(spec.plant.parameters) | {
         name: max(value, bounds[name].lower) for name, value in values.items() if name in bounds
     }
+    for name, error in (errors or {}).items():
+        parameters[name] *= error
     q_a = [values.get(axis.name, start) for axis, start in zip(plant.actuated, spec.move.start, strict=True)]
     return linearize(plant, parameters, q_a)
 
