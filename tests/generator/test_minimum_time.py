@@ -45,7 +45,9 @@ def shortest(frequencies, distances, guess, desensitized, **limits):
     ],
 )
 def test_of_the_papers_crane(limits, desensitized):
-    found = choice.minimum_time(crane_problem(desensitized=desensitized, limits=LimitsSpec(**limits)))
+    found = choice.minimum_time(
+        crane_problem(desensitized=desensitized, limits=LimitsSpec(**limits))
+    ).duration
     frequencies, _ = modes(CRANE.nominal())
     best = shortest(frequencies, [0.3], found, frequencies if desensitized else [], **limits)
     assert 0.998 * best < found < 1.02 * best
@@ -54,7 +56,7 @@ def test_of_the_papers_crane(limits, desensitized):
 @pytest.mark.slow
 def test_with_a_limit_of_the_sway_on_the_way():
     limits = LimitsSpec(acceleration=0.5, sway=0.02)
-    found = choice.minimum_time(crane_problem(desensitized=("L1",), limits=limits))
+    found = choice.minimum_time(crane_problem(desensitized=("L1",), limits=limits)).duration
     frequencies, _ = modes(CRANE.nominal())
     swung = (CRANE.nominal(), 0.02)
     best = shortest(frequencies, [0.3], found, frequencies, acceleration=0.5, sway=swung)
@@ -107,7 +109,7 @@ def test_of_other_machines(preset, method):
         ],
     )
     problem, found = problem_of(spec), frequencies(spec.plant.parameters)
-    duration = choice.minimum_time(problem)
+    duration = choice.minimum_time(problem).duration
     uncertain = [] if method == "none" else found
     best = shortest(found, np.abs(problem.distance), duration, uncertain, **limits)
     assert 0.998 * best < duration < 1.02 * best
@@ -117,7 +119,7 @@ def test_of_other_machines(preset, method):
 def test_a_hoisting_machine_s_shortest_move_is_not_that_of_the_rope_at_the_start():
     """Programs linearised at rest find nothing in less than 11.4 s."""
     problem = problem_of(preset_spec("single-pendulum-crane", ["limits.acceleration=0.5"]))
-    duration = choice.minimum_time(problem)
+    duration = choice.minimum_time(problem).duration
     assert duration < 10.5
     assert choice.keeps_limits(choice.attempt(attrs.evolve(problem, duration=duration + 0.01)))
 
@@ -173,15 +175,41 @@ def test_the_shortest_duration_found_before_the_work_is_used_up_is_taken(search)
 
 
 def test_no_motion_is_designed_twice_for_durations_that_end_on_the_same_cycle(monkeypatch):
+    tried = {"roughly": [], "exactly": []}
+
+    def unrest(duration, where, enough):
+        tried[where].append(duration)
+        return -math.inf if duration > enough else math.inf
+
+    def roughly(duration):
+        return unrest(duration, "roughly", 0.049)
+
+    def exactly(duration):
+        return unrest(duration, "exactly", 0.05), SimpleNamespace(
+            spec=attrs.evolve(spec, move=attrs.evolve(spec.move, duration=duration))
+        )
+
+    spec = preset_spec("paper", ["export.cycle_time=0.001"])
+    assert planning._calm(spec, 0.048, roughly, exactly).spec.move.duration == 0.051
+    for durations in tried.values():
+        assert durations and len(durations) == len(set(durations))
+
+
+@pytest.mark.parametrize("coarser", [-0.05, 0.0, 0.05])
+def test_what_few_intervals_leave_besides_is_learned_from_few_motions_on_many(coarser):
+    """They take half a second each."""
     tried = []
 
-    def unrest(found):
-        tried.append(found.spec.move.duration)
-        return -math.inf if found.spec.move.duration > 0.05 else math.inf
+    def rest(duration):
+        return (3.0 - duration) + 0.5 * (3.0 - duration) ** 2
 
-    monkeypatch.setattr(planning.choice, "minimum_time", lambda *_, **__: 0.048)
-    monkeypatch.setattr(planning, "_solved", lambda spec, **_: SimpleNamespace(spec=spec))
-    monkeypatch.setattr(planning, "_unrest", unrest)
-    spec = preset_spec("paper", ["move.duration=minimum", "limits.acceleration=1", "export.cycle_time=0.001"])
-    assert planning.timed(spec).move.duration == 0.051
-    assert len(tried) == len(set(tried))
+    def exactly(duration):
+        tried.append(duration)
+        return rest(duration), SimpleNamespace(
+            spec=attrs.evolve(spec, move=attrs.evolve(spec.move, duration=duration))
+        )
+
+    spec = preset_spec("paper")
+    found = planning._calm(spec, 2.7, lambda duration: rest(duration) + coarser, exactly)
+    assert 3.0 <= found.spec.move.duration < 3.0 + 2.0 * planning.UNNOTICED
+    assert len(tried) <= 3

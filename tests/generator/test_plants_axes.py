@@ -199,7 +199,7 @@ def test_the_shortest_move_waits_for_the_slowest_axis():
     """6 m of hoisting at 0.3 m/s take 20 s, whatever the cart could do."""
     limits = ["limits.acceleration=0.5", "limits.axis.hoist.velocity=0.3"]
     spec = preset_spec("single-pendulum-crane", ["cost.sway_weight=0", "move.duration=minimum", *limits])
-    shortest = choice.minimum_time(problem_of(spec))
+    shortest = choice.minimum_time(problem_of(spec)).duration
     assert 20.0 < shortest < 22.0
 
 

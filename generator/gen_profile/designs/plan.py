@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache, cached_property, partial
 
 import attrs
 import numpy as np
@@ -20,7 +21,8 @@ from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.minimum_time import least_beyond
+from gen_profile.solvers.direct.relaxation import Relaxed
+from gen_profile.solvers.minimum_time import PRECISION, least_beyond
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
@@ -31,7 +33,11 @@ CALM = 0.99  # share of the limits of residual sway, which leaves room for the s
 EXPLAINING = "looking for what would do"
 SEARCHING = 18.0  # s of work to find the shortest duration
 SPREADING = 0.6  # of the work that is left for it to find the shortest duration, all machines considered
-SPREADS = 2  # times that it is measured how much more than the nominal machine others sway on the way
+SPREADS = 3  # times that it is measured how much more than the nominal machine others sway on the way
+NEARLY = 2e-3  # relative, by which it may be another than was supposed
+CORRECTIONS = 3  # of how much calmer motions are on many intervals than on few
+ROUGHLY = 5e-3  # of the duration, to see on few intervals how much calmer longer motions are
+UNNOTICED = 5e-3  # logarithm of the share of the limits of residual sway that a calm motion may leave unused
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
@@ -55,6 +61,12 @@ class Draft:
     solution: Solution | None
     motion: Profile | None
     solver_time: float
+
+    @cached_property
+    def evaluation(self) -> MotionEvaluation:
+        """Of the motion, which must be there, on all machines."""
+        assert self.motion is not None
+        return evaluate(self.spec, self.motion)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -129,17 +141,16 @@ def _timed(spec: Spec, progress: Progress) -> tuple[Spec, Draft | None]:
 
 def _shortest(spec: Spec, progress: Progress) -> Draft:
     problem = problem_of(spec)
-    shortest = choice.minimum_time(problem, progress)
+    swayed = transient_sway.limited(spec, problem)
+    shortest = choice.minimum_time(problem, progress, roughly=swayed)
     with suppress(OutOfWork), budget(SPREADING * left()):
         for _ in range(SPREADS):
-            if shortest is None:
+            if shortest is None or not swayed:
                 break
-            lasting = attrs.evolve(problem, duration=_lasting(spec, shortest).move.duration)
-            more = transient_sway.measured_spread(spec, lasting)
-            if more <= problem.sway_spread:
-                break
+            more = transient_sway.spread(spec, shortest.solution)
+            swayed = abs(more - problem.sway_spread) > NEARLY * more
             problem = attrs.evolve(problem, sway_spread=more)
-            shortest = choice.minimum_time(problem, progress, beyond=shortest)
+            shortest = choice.minimum_time(problem, progress, shortest)
     if shortest is None:
         cure = (
             choice.requirements(_slow(spec), partial(transient_sway.as_asked_next, spec))
@@ -149,25 +160,78 @@ def _shortest(spec: Spec, progress: Progress) -> Draft:
             f"move.duration: no duration keeps the limits and brings the load to rest. {cure}"
         )
 
-    @cache  # for many a duration ends on the same cycle
-    def attempted(duration: float) -> tuple[float, Draft]:
+    def exactly(duration: float) -> tuple[float, Draft]:
         progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
-        found = _solved(_lasting(spec, duration), spread=problem.sway_spread)
+        found = _solved(_lasting(spec, duration), spread=problem.sway_spread, near=shortest)
         return _unrest(found), found
 
-    def in_cycles(duration: float) -> tuple[float, Draft]:
-        return attempted(_lasting(spec, duration).move.duration)
+    def roughly(duration: float) -> float:
+        solution = shortest.solution
+        if duration > _in_cycles(spec, shortest.duration):
+            timed = attrs.evolve(problem, duration=duration)
+            solution = choice.attempt(timed, "direct", coarse=True, near=shortest)
+        motion = None if solution.optimum is None else optimal_profile(solution)
+        lasting = _lasting(spec, duration)
+        return _unrest(Draft(spec=lasting, solution=solution, motion=motion, solver_time=0.0))
 
-    unrest, quickest = in_cycles(shortest)
-    if unrest <= 0.0:
-        return quickest
-    calm = least_beyond(lambda duration: in_cycles(duration)[0], shortest, LONGEST * shortest, unrest)
-    if calm is None:
+    if problem.worst_case is None:
+        return _calm(spec, shortest.duration, roughly, exactly)
+    return _calm(spec, shortest.duration, lambda duration: exactly(duration)[0], exactly)
+
+
+def _calm(
+    spec: Spec,
+    shortest: float,
+    roughly: Callable[[float], float],
+    exactly: Callable[[float], tuple[float, Draft]],
+) -> Draft:
+    """Find the shortest motion of a duration or more that leaves little enough sway.
+
+    Parameters
+    ----------
+    spec : Spec
+    shortest : float
+        s.
+    roughly, exactly : float → float, float → (float, Draft)
+        The excess of sway of a duration, on few intervals, and on as many as it takes, with the motion. What
+        they differ by hardly depends on the duration.
+    """
+    roughly, exactly = cache(roughly), cache(exactly)  # for many a duration ends on the same cycle
+    start = _in_cycles(spec, shortest)
+    best: Draft | None = None
+
+    def least(excess: Callable[[float], float], precision: float = PRECISION) -> float | None:
+        def in_cycles(duration: float) -> float:
+            return excess(_in_cycles(spec, duration))
+
+        if in_cycles(start) <= 0.0:
+            return start
+        found = least_beyond(in_cycles, start, LONGEST * start, in_cycles(start), precision)
+        return None if found is None else _in_cycles(spec, found)
+
+    duration = least(roughly, ROUGHLY)
+    for _ in range(CORRECTIONS):
+        if duration is None:
+            break
+        unrest, found = exactly(duration)
+        if unrest <= 0.0 and (best is None or duration < best.spec.move.duration):
+            best = found
+        if unrest <= 0.0 and (duration == start or unrest > -UNNOTICED):
+            break
+        beside = start if duration > start else _in_cycles(spec, (1.0 + ROUGHLY) * start)
+        falls = (roughly(duration) - roughly(beside)) / (beside - duration)
+        if not 0.0 < falls < math.inf:
+            break
+        duration = max(start, _in_cycles(spec, duration + (unrest + UNNOTICED / 2.0) / falls))
+    if best is None:
+        enough = least(lambda duration: exactly(duration)[0])
+        best = None if enough is None else exactly(enough)[1]
+    if best is None:
         raise InfeasibleProblem(
             "check.residual_sway: no duration leaves so little sway on every machine of "
             "robustness.uncertain; allow more, or narrow the ranges."
         )
-    return in_cycles(calm)[1]
+    return best
 
 
 def _slow(spec: Spec) -> Problem:
@@ -178,10 +242,15 @@ def _slow(spec: Spec) -> Problem:
     return transient_sway.with_usual_spread(spec, slow)
 
 
+def _in_cycles(spec: Spec, duration: float) -> float:
+    """Round a duration up to a cycle of a spec's controller."""
+    cycle = spec.export.cycle_time
+    return float(grid_times(grid_length(duration, cycle), cycle)[-1])
+
+
 def _lasting(spec: Spec, duration: float) -> Spec:
     """Give a spec a duration, rounded up to a cycle of its controller."""
-    cycle = spec.export.cycle_time
-    whole = float(grid_times(grid_length(duration, cycle), cycle)[-1])
+    whole = _in_cycles(spec, duration)
     return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=whole, shortest=False))
 
 
@@ -189,7 +258,7 @@ def _unrest(found: Draft) -> float:
     """Tell how much more sway a draft leaves than it should, as a logarithm; infinite without a motion."""
     if found.motion is None or found.solution is None:
         return math.inf
-    evaluation, limit = evaluate(found.spec, found.motion), found.solution.problem.limits.sway
+    evaluation, limit = found.evaluation, found.solution.problem.limits.sway
     if limit is not None and evaluation.figures["sway_transient_worst_m"] > SWAY_TOLERANCE * limit:
         return math.inf
     share = share_of_residual_sway(found.spec, evaluation)
@@ -237,7 +306,9 @@ def draft(spec: Spec, progress: Progress = untold) -> Draft:
     return found or _solved(spec, progress)
 
 
-def _solved(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Draft:
+def _solved(
+    spec: Spec, progress: Progress = untold, spread: float = 1.0, near: Relaxed | None = None
+) -> Draft:
     """Solve a spec with a duration, or shape a move for it."""
     began = time.perf_counter()
     solution: Solution | None = None
@@ -245,7 +316,7 @@ def _solved(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Dra
     if spec.solver.shaper is not None:
         motion = shaped_motion(spec, spec.solver.shaper)
     else:
-        solution = transient_sway.attempt(spec, progress, spread)
+        solution = transient_sway.attempt(spec, progress, spread, near)
         if solution.optimum is not None:
             motion = optimal_profile(solution)
     return Draft(spec=spec, solution=solution, motion=motion, solver_time=time.perf_counter() - began)
@@ -261,7 +332,9 @@ def judged(found: Draft, progress: Progress = untold) -> Plan:
         Nothing is left of a budget.
     """
     spec = found.spec
-    evaluation = evaluate(spec, _motion(found, progress))
+    if found.motion is None:
+        found = attrs.evolve(found, motion=_motion(found, progress))
+    evaluation = found.evaluation
     figures = evaluation.figures
     swing = max(figures["sway_transient_peak_m"], figures["sway_transient_worst_m"] / SWAY_TOLERANCE)
     broken = breaches(spec.limits, evaluation.command, swing)

@@ -23,7 +23,7 @@ from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct.relaxation import Relaxation
+from gen_profile.solvers.direct.relaxation import Relaxation, Relaxed
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
@@ -60,12 +60,14 @@ def measured_spread(spec: Spec, problem: Problem) -> float:
     problem : Problem
         Whose spread is supposed, and returned where all keep the limit with it or nothing is known.
     """
-    if not _limited(spec, problem):
+    if not limited(spec, problem):
         return problem.sway_spread
     return _kept(spec, problem, partial(choice.attempt, method="direct", coarse=True)).problem.sway_spread
 
 
-def attempt(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Solution:
+def attempt(
+    spec: Spec, progress: Progress = untold, spread: float = 1.0, near: Relaxed | None = None
+) -> Solution:
     """Solve a spec so that no machine of its ranges sways more on the way than its limit.
 
     Parameters
@@ -75,6 +77,8 @@ def attempt(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Sol
     progress : Progress
     spread : float
         How many times as much as the nominal machine the worst one sways, as far as that is known.
+    near : Relaxed, optional
+        A motion near by that takes all of the limits, so that the direct method may begin there at once.
 
     Returns
     -------
@@ -82,7 +86,11 @@ def attempt(spec: Spec, progress: Progress = untold, spread: float = 1.0) -> Sol
         Without an optimum where there is none; its problem says how much less the nominal machine is allowed.
     """
     problem = attrs.evolve(problem_of(spec), sway_spread=spread)
-    solution = _attempt(spec, problem, spec.solver.solver, progress)
+    if near is not None and spec.solver.solver != "indirect":
+        begun = partial(choice.attempt, method="direct", near=near)
+        solution = _kept(spec, problem, begun, NEARLY_ENOUGH, progress)
+    else:
+        solution = _attempt(spec, problem, spec.solver.solver, progress)
     if solution.optimum is None and solution.problem.sway_spread == 1.0:
         return attrs.evolve(solution, problem=with_usual_spread(spec, problem))
     return solution
@@ -127,7 +135,7 @@ def kept_by_all(spec: Spec, problem: Problem, method: SolverName, progress: Prog
     method : str
     progress : Progress
     """
-    if not _limited(spec, problem):
+    if not limited(spec, problem):
         return choice.attempt(problem, method)
     if problem.worst_case is None:
         if method == "indirect":  # which knows no limits
@@ -139,7 +147,8 @@ def kept_by_all(spec: Spec, problem: Problem, method: SolverName, progress: Prog
     return _kept(spec, problem, choice.directly, NEARLY_ENOUGH, progress)
 
 
-def _limited(spec: Spec, problem: Problem) -> bool:
+def limited(spec: Spec, problem: Problem) -> bool:
+    """Whether a limit of the sway on the way holds for machines that may sway more than the nominal one."""
     return problem.limits.sway is not None and bool(spec.checked_ranges())
 
 
@@ -168,7 +177,7 @@ def _kept(
 
 def _too_much(spec: Spec, solution: Solution, enough: float) -> tuple[float, float] | None:
     """Tell how much the nominal machine and the worst one sway in m, where that is too much."""
-    if not _limited(spec, solution.problem):
+    if not limited(spec, solution.problem):
         return None
     nominal, worst = sways(spec, solution.problem, optimal_profile(solution))
     if worst <= max(enough * (solution.problem.limits.sway or 0.0), nominal) < math.inf:
@@ -195,15 +204,18 @@ def _spread(limit: float, before: tuple[float, float], found: tuple[float, float
 
 def with_usual_spread(spec: Spec, problem: Problem) -> Problem:
     """Tell a problem without a motion what spread one with wider limits has, for what is named to help."""
-    if not _limited(spec, problem):
+    if not limited(spec, problem):
         return problem
     easiest = Relaxation(problem).least(tuple(problem.limits.stated()))
-    if easiest is None or easiest.solution.optimum is None:
-        return problem
-    nominal, worst = sways(spec, problem, optimal_profile(easiest.solution))
-    if not 0.0 < nominal <= worst < math.inf:
-        return problem
-    return attrs.evolve(problem, sway_spread=MARGIN * worst / nominal)
+    return problem if easiest is None else attrs.evolve(problem, sway_spread=spread(spec, easiest.solution))
+
+
+def spread(spec: Spec, solution: Solution) -> float:
+    """Tell how many times as much as the nominal machine the worst one sways in a motion; 1 where unknown."""
+    if not limited(spec, solution.problem) or solution.optimum is None:
+        return 1.0
+    nominal, worst = sways(spec, solution.problem, optimal_profile(solution))
+    return worst / nominal if 0.0 < nominal <= worst < math.inf else 1.0
 
 
 def sways(spec: Spec, problem: Problem, motion: Profile) -> tuple[float, float]:

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from itertools import count
 
 import attrs
 
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
+from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct import worst_case
-from gen_profile.solvers.direct.relaxation import Relaxation, Relaxed
-from gen_profile.solvers.direct.transient_sway import sway_on_the_way
+from gen_profile.solvers.direct.relaxation import Relaxation, Relaxed, shortest
+from gen_profile.solvers.direct.transient_sway import SLACK, sway_on_the_way
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.infeasibility import CandidateTest, cures, longer
-from gen_profile.solvers.minimum_time import shorter_duration, shortest_duration
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import WIDER, Solution, Status
 from gen_profile.spec.model import LimitsSpec
@@ -28,7 +28,6 @@ from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]
 Trial = Callable[[Problem], Solution]  # of a problem by the direct method, as the next run would solve it
-SHORTEST = "looking for the shortest duration"
 ANSWER = 24.0, 28.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 8.0  # s of work for a method
 LOOKING = 0.5  # likewise to see whether limits can be kept at all
@@ -40,6 +39,7 @@ IN_VAIN = (
     "to do. Not tried: fewer limits, or fewer parameters in robustness.uncertain. See whether all numbers of "
     "the spec are in its units."
 )
+PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
 RANGE = 2.0  # times the work for a whole range
 
 
@@ -59,7 +59,9 @@ def solve(problem: Problem, method: SolverName = "auto") -> Solution:
         return given_up(problem)
 
 
-def attempt(problem: Problem, method: SolverName = "auto", *, coarse: bool = False) -> Solution:
+def attempt(
+    problem: Problem, method: SolverName = "auto", *, coarse: bool = False, near: Relaxed | None = None
+) -> Solution:
     """Solve a problem without finding out what would help where that fails.
 
     Parameters
@@ -67,11 +69,13 @@ def attempt(problem: Problem, method: SolverName = "auto", *, coarse: bool = Fal
     problem : Problem
     method : str
     coarse : bool
-        Where limits bind, on few intervals only, for the nominal machine, and from rest.
+        Where limits bind, on few intervals only, for the nominal machine, and from one motion.
+    near : Relaxed, optional
+        A motion at which the direct method begins, in place of rest.
     """
     if problem.worst_case is not None and not coarse:
         return _in_time(_over_a_range, problem, DIRECTLY)
-    solve = partial(_direct, coarse=coarse)
+    solve = partial(_direct, coarse=coarse, near=near)
     if method == "direct" or problem.worst_case is not None:
         return _in_time(solve, attrs.evolve(problem, worst_case=None), DIRECTLY)
     solution = _in_time(partial(indirect.solve, far=partial(_within_reach, problem)), problem, SOLVING)
@@ -150,16 +154,16 @@ def given_up(problem: Problem) -> Solution:
     )
 
 
-def _direct(problem: Problem, *, coarse: bool) -> Solution:
-    """Begin at rest, and where that misleads, at the motion that is most easily within the limits."""
-    solution = direct.solve(problem, coarse=coarse)
+def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution:
+    """Begin near by, or at rest; where that misleads, at the motion most easily within the limits."""
+    solution = direct.solve(problem, None if near is None else near.iterate, coarse=coarse)
     if coarse or keeps_limits(solution) or not problem.limits.stated():
         return solution
     other = _from_the_easiest(problem)
     return solution if other.optimum is None else other
 
 
-def _from_the_easiest(problem: Problem, *, coarse: bool = False) -> Solution:
+def _from_the_easiest(problem: Problem) -> Solution:
     """Begin at the motion that is most easily within the limits, unless that breaks them."""
     easiest = _easiest(problem)
     if easiest is None:
@@ -168,7 +172,7 @@ def _from_the_easiest(problem: Problem, *, coarse: bool = False) -> Solution:
         return attrs.evolve(
             easiest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, cure=WIDER
         )
-    return direct.solve(problem, easiest.iterate, coarse=coarse)
+    return direct.solve(problem, easiest.iterate)
 
 
 def _easiest(problem: Problem) -> Relaxed | None:
@@ -204,28 +208,26 @@ def sufficient_duration(problem: Problem, tried: Trial) -> str:
     return longer(problem, CandidateTest(tried, keeps_limits, welcome=lambda _: True)) or ""
 
 
-def minimum_time(problem: Problem, progress: Progress = untold, beyond: float | None = None) -> float | None:
-    """Find the shortest duration in s for a problem's limits and robustness; None where none was found.
+def minimum_time(
+    problem: Problem, progress: Progress = untold, near: Relaxed | None = None, *, roughly: bool = False
+) -> Relaxed | None:
+    """Find the shortest motion for a problem's limits and robustness; None where none was found.
 
     Parameters
     ----------
     problem : Problem
+        Whose duration does not matter.
     progress : Progress
-    beyond : float, optional
-        A duration in s than which none is shorter.
+    near : Relaxed, optional
+        A motion that is about as long.
+    roughly : bool
+        Whether a duration a few hundredths longer will do.
     """
-    tries = count(1)
-
-    def attempted(solve: Callable[[Problem], Solution], other: Problem) -> Solution:
-        progress(SHORTEST, remark=f"trying {other.duration:.3g} s ({next(tries)})")
-        return _in_time(solve, other, SOLVING)
-
-    if problem.worst_case is not None:
-        return shortest_duration(problem, partial(attempted, worst_case.solve_within_limits), beyond)
-    found = shortest_duration(problem, partial(attempted, partial(direct.solve, coarse=True)), beyond)
-    if found is None:
-        return None
-    return shorter_duration(problem, partial(attempted, partial(_from_the_easiest, coarse=True)), found)
+    slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
+    guess = near or PERIODS * 2.0 * math.pi / float(slowest)
+    if problem.worst_case is None:
+        return shortest(problem, guess, progress=progress, roughly=roughly)
+    return worst_case.shortest_motion(problem, guess, progress)
 
 
 def keeps_limits(solution: Solution) -> bool:
@@ -235,6 +237,7 @@ def keeps_limits(solution: Solution) -> bool:
     problem = solution.problem
     if problem.limits == LimitsSpec():
         return True
-    sway = 0.0 if problem.limits.sway is None else problem.sway_spread * sway_on_the_way(solution)
+    sway = 0.0 if problem.limits.sway is None else sway_on_the_way(solution)
+    sway = max(sway, problem.sway_spread * sway / SLACK)
     command = lag_compensated(optimal_profile(solution), problem.tau)
     return not breaches(problem.limits, command, sway)

@@ -1,90 +1,19 @@
-"""The shortest duration in which a problem can be solved within its limits."""
+"""The least value that will do, where every greater one does."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
 
-import attrs
-
-from gen_profile.problem.linearization import linearize
-from gen_profile.problem.problem import Problem
-from gen_profile.solvers.solution import Solution
 from gen_profile.work import OutOfWork, budget, left
 
 PRECISION = 1e-3  # relative, of the duration; what is returned is the feasible end
-LONGEST = 1e3  # slowest periods, after which the search gives up
-SHORTER = 5e-3  # relative, by which a duration is tried to be shorter still
 STRIDE = 1.5
 BISECTING = 0.6  # share of the work that is left
 LONGER = 8.0  # from stride to stride away from a duration that is too short
+BEYOND = 1.2  # times the distance to where a line through two tries crosses zero
 ASIDE = 0.4  # of the precision, by which a try lies beside where a line crosses zero, for a narrow bracket
-
-
-def shortest_duration(
-    problem: Problem, solve: Callable[[Problem], Solution], beyond: float | None = None
-) -> float | None:
-    """Bisect the duration.
-
-    Parameters
-    ----------
-    problem : Problem
-        Whose duration does not matter.
-    solve : Problem → Solution
-        A solver that keeps limits.
-    beyond : float, optional
-        A duration in s than which none is shorter.
-
-    Returns
-    -------
-    float or None
-        s; None where no duration was found to do.
-    """
-    feasible = _feasible(problem, solve)
-
-    def excess(duration: float) -> float:
-        return -math.inf if feasible(duration) else math.inf
-
-    slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
-    period = 2.0 * math.pi / float(slowest)
-    if beyond is not None:
-        return least_beyond(excess, beyond, LONGEST * period)
-    return least(feasible, period, LONGEST * period)
-
-
-def shorter_duration(problem: Problem, solve: Callable[[Problem], Solution], known: float) -> float:
-    """Look for durations shorter than one that is known to do, by a slower solver that may find more.
-
-    Parameters
-    ----------
-    problem : Problem
-        Whose duration does not matter.
-    solve : Problem → Solution
-    known : float
-        s.
-
-    Returns
-    -------
-    float
-        s.
-    """
-    feasible, less = _feasible(problem, solve), (1.0 - SHORTER) * known
-    with suppress(OutOfWork), budget(BISECTING * left()):
-        if feasible(less):
-            return least(feasible, less, known) or known
-    return known
-
-
-def _feasible(problem: Problem, solve: Callable[[Problem], Solution]) -> Callable[[float], bool]:
-    """Tell of durations whether a solver finds a motion, whatever its sway on the way."""
-
-    @cache
-    def feasible(duration: float) -> bool:
-        return solve(attrs.evolve(problem, duration=duration, sway_weight=0.0)).optimum is not None
-
-    return feasible
 
 
 def least(
@@ -129,7 +58,11 @@ def least(
 
 
 def least_beyond(
-    excess: Callable[[float], float], short: float, most: float, short_excess: float = math.inf
+    excess: Callable[[float], float],
+    short: float,
+    most: float,
+    short_excess: float = math.inf,
+    precision: float = PRECISION,
 ) -> float | None:
     """Find the least duration that will do beyond one that will not, which is often next to it.
 
@@ -143,21 +76,26 @@ def least_beyond(
         Where to give up, in s.
     short_excess : float
         Of the one that is too short.
+    precision : float
+        Relative.
 
     Returns
     -------
     float or None
         s; None where none up to `most` was found to do.
     """
-    start, stride, found = short, PRECISION, (short, short_excess)
+    stride, found = precision, (short, short_excess)
     while True:
-        enough = (1.0 + stride) * start
+        enough = (1.0 + stride) * short
         beyond = excess(enough)
         if beyond <= 0.0:
-            return _between(excess, found, (enough, beyond), PRECISION)
+            return _between(excess, found, (enough, beyond), precision)
         if enough > most:
             return None
-        found, stride = (enough, beyond), LONGER * stride
+        farthest, falls = LONGER * stride, (found[1] - beyond) / (enough - found[0])
+        if 0.0 < falls < math.inf:  # a little beyond where a line crosses zero
+            farthest = min(farthest, stride + BEYOND * beyond / falls / short)
+        found, stride = (enough, beyond), max(farthest, stride + precision)
 
 
 def _between(

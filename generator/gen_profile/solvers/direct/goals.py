@@ -256,18 +256,24 @@ def bound_worst(
     transcription: Transcription,
     tried: Sequence[Amplitudes],
     maps: Sequence[IntervalMaps],
+    most: float | None = None,
 ) -> int:
-    """Bound what every load of every machine can swing to by one variable, the program's last.
+    """Bound what every load of every machine can swing to by one variable.
 
-    The program must have been posed with `worst_case_variables` extra ones.
+    The program must have been posed with `worst_case_variables` extra ones, the first of its goal's.
+
+    Parameters
+    ----------
+    most : float, optional
+        Bound of that variable itself.
 
     Returns
     -------
     int
         Column of that variable: the worst share of a limit.
     """
-    worst = program.variables - 1
     column = transcription.variables
+    worst = column + worst_case_variables(tried) - 1
     for index, machine in enumerate(tried):
         end, offset = transcription.end_state(index, maps, program.variables)
         modes = np.arange(column, column + len(machine.rows))
@@ -276,9 +282,11 @@ def bound_worst(
             sides = np.append(0.0, rows @ offset)
             program.within_cones(sparse.vstack([radius, -sparse.csc_matrix(rows) @ end]), sides[None])
         sums = place(machine.shares[None], modes[:1], program.variables)
-        most = place(np.ones((1, len(machine.shares), 1)), np.array([worst]), program.variables)
-        program.at_most(sums - most, np.zeros(len(machine.shares)))
+        all_shares = place(np.ones((1, len(machine.shares), 1)), np.array([worst]), program.variables)
+        program.at_most(sums - all_shares, np.zeros(len(machine.shares)))
         column += len(modes)
+    if most is not None:
+        program.at_most(place(np.ones((1, 1, 1)), np.array([worst]), program.variables), np.array([most]))
     return worst
 
 

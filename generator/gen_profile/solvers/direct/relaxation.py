@@ -8,7 +8,7 @@ falls smoothly with the duration: where it is 1, the limits can just be kept.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property
 
 import attrs
@@ -17,6 +17,7 @@ import numpy as np
 from gen_profile.motion.profile import Array
 from gen_profile.problem.problem import Problem
 from gen_profile.problem.sway_cost import SwayCost
+from gen_profile.progress import Progress, untold
 from gen_profile.solvers.direct import goals
 from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
@@ -33,18 +34,23 @@ from gen_profile.solvers.direct.solver import (
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import LimitsSpec
+from gen_profile.work import OutOfWork, budget, left
 
 PRICES = (1e-5, 1e-3, 1e-1)  # of the effort without limits: ever less sway would take ever more of it
 CHANGE = 1e-4  # of the share, relative, that is worth another program
 ENOUGH = 5e-3  # by which the share's logarithm may exceed 0
 CLOSE = 0.05  # by which it may fall short of 0: the duration found is then tried
+KEPT, CLOSEST = 2e-4, 1e-3  # likewise of the shortest duration: by how much it must, and may besides
+RESTS = 0.985  # share of a load's limit that the worst machine may take after the move
 POWER = 1.8  # with which shares fall over the duration, more or less
 POWERS = (1.0, 4.0)  # between which what two durations tell of it is believed
 STEPS = (math.log(1.1), math.log(2.0))  # of the duration's logarithm
 KNOWN_STEPS = (1e-3, math.log(30.0))  # likewise where two durations tell the power
 LITTLE = 0.01  # by which the share's logarithm must fall within the longer of them
 ROUNDS = 12
-CLOSER = 3  # rounds at most, once a duration is long enough
+CLOSER = 8  # rounds at most, once a duration is long enough
+NEARBY = math.log(1.2)  # to a duration's logarithm, from where a motion is a start for the next one
+SEARCHING = 0.6  # share of the work that is left, to find the shortest duration
 UNSETTLED = math.log(1e6)  # in place of the logarithm of a share that was not found
 TINY = 1e-6  # share below which how small it is does not matter
 
@@ -56,6 +62,7 @@ class LeastShare:
     Attributes
     ----------
     setup : Setup
+        Its machines tried keep their loads' limits after the move.
     loosened : tuple of str
         Places of the limits that are widened; travel by so many times its width, less one, at either end.
     price : float
@@ -68,8 +75,8 @@ class LeastShare:
 
     @property
     def extra(self) -> int:
-        """Number of variables of its own: the share."""
-        return 1
+        """Number of variables of its own: the share is the last one."""
+        return self.setup.extra + 1
 
     def pose(
         self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
@@ -80,6 +87,8 @@ class LeastShare:
         if problem.nominal_sway is not None:
             loose = "limits.sway" in self.loosened
             goals.keep_sway(program, transcription, problem.nominal_sway, iterate, maps[0], loosened=loose)
+        if self.setup.tried:
+            goals.bound_worst(program, transcription, self.setup.tried, maps, most=RESTS)
         linear = np.zeros(program.variables)
         linear[-1] = 1.0
         program.at_most(-linear[None], np.zeros(1))
@@ -113,6 +122,11 @@ class Relaxed:
     found: ProgramSequence
 
     @property
+    def duration(self) -> float:
+        """Of the motion, in s."""
+        return self.found.setup.problem.duration
+
+    @property
     def iterate(self) -> Iterate:
         """The motion, on its mesh."""
         return self.found.iterate
@@ -129,28 +143,40 @@ class Relaxation:
     Parameters
     ----------
     problem : Problem
-        With limits; where it has a `worst_case`, no residual sway is asked for.
+        With limits.
+    tried : sequence of mapping of str to float
+        Machines whose residual sway is bounded, where the problem has a `worst_case`; without any none is.
+    near : Relaxed, optional
+        A motion to begin at, in place of what the problem would take without limits.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(
+        self, problem: Problem, tried: Sequence[Mapping[str, float]] = (), near: Relaxed | None = None
+    ) -> None:
         self.problem = problem
         self.least = cache(self._least)
+        self._tried, self._near = tried, near
 
     @cached_property
     def _begun(self) -> tuple[Setup, ProgramSequence]:
         """Transcribe the problem, and find about what motion it would take without limits."""
         problem = self.problem
-        setup, redundant = set_up(problem)
+        setup, redundant = set_up(problem, self._tried)
         if redundant:
             kept = tuple(name for name in problem.desensitized if name not in redundant)
-            setup, _ = set_up(attrs.evolve(problem, desensitized=kept))
-        setup = attrs.evolve(setup, tried=())
+            setup, _ = set_up(attrs.evolve(problem, desensitized=kept), self._tried)
+        unbounded = attrs.evolve(setup, tried=())
+        if not self._tried:
+            setup = unbounded
+        rest = setup.transcription.rest()
+        if self._near is not None and self._near.iterate.like(rest):
+            return setup, self._near.found
         free = CostProgram(
-            setup=attrs.evolve(setup, problem=attrs.evolve(setup.problem, limits=LimitsSpec())),
+            setup=attrs.evolve(unbounded, problem=attrs.evolve(setup.problem, limits=LimitsSpec())),
             sway_cost=SwayCost(beta=0.0, gamma=1.0),
             sway_limit=None,
         )
-        return setup, sequence(setup.transcription.rest(), free, ROUGH)
+        return setup, sequence(rest, free, ROUGH)
 
     def _least(self, loosened: tuple[str, ...]) -> Relaxed | None:
         """Find how many times as wide limits must be, where those not loosened stay as they are.
@@ -197,18 +223,98 @@ def least_duration(relaxation: Relaxation) -> float | None:
         found = (relaxation if log_duration == asked else Relaxation(lasting)).least(places)
         return UNSETTLED if found is None else math.log(max(found.share, TINY)) - ENOUGH
 
-    short = asked
-    if not places or excess(short) <= 0.0:
+    if not places or excess(asked) <= 0.0:
         return problem.duration
-    lowest, power, steps = short, POWER, STEPS
+    found = _least_above(excess, asked, CLOSE)
+    return None if found is None else math.exp(found)
+
+
+def shortest(
+    problem: Problem,
+    guess: float | Relaxed,
+    tried: Sequence[Mapping[str, float]] = (),
+    progress: Progress = untold,
+    *,
+    roughly: bool = False,
+) -> Relaxed | None:
+    """Find the shortest motion that keeps all limits.
+
+    Parameters
+    ----------
+    problem : Problem
+        With limits; its duration does not matter.
+    guess : float or Relaxed
+        About how long it takes in s, or a motion that is about as long.
+    tried : sequence of mapping of str to float
+        Machines whose residual sway is bounded.
+    progress : Progress
+    roughly : bool
+        Whether a duration that exceeds the shortest by a few hundredths will do.
+
+    Returns
+    -------
+    Relaxed or None
+        None where no duration was found to do.
+    """
+    places, kept = tuple(problem.limits.stated()), list[Relaxed]()
+    last, begun = (guess, guess.duration) if isinstance(guess, Relaxed) else (None, guess)
+
+    @cache
+    def excess(log_duration: float) -> float:
+        nonlocal last
+        lasting = attrs.evolve(problem, duration=math.exp(log_duration))
+        progress("looking for the shortest duration", remark=f"trying {lasting.duration:.3g} s")
+        near = last if last and abs(math.log(lasting.duration / last.duration)) < NEARBY else None
+        last = Relaxation(lasting, tried, near).least(places)
+        if last is None:
+            return UNSETTLED
+        if last.share <= 1.0 - KEPT:
+            kept.append(last)
+        return math.log(max(last.share, TINY)) - math.log(1.0 - KEPT)
+
+    try:
+        with budget(SEARCHING * left()):
+            short = enough = math.log(begun)
+            close, steps = CLOSE if roughly else CLOSEST, (KNOWN_STEPS[0], STEPS[1])
+            while excess(short) <= 0.0:
+                enough, short = short, short - float(np.clip((close - excess(short)) / POWER, *steps))
+            if enough > short:
+                _close_to_zero(excess, short, enough, close)
+            else:
+                _least_above(excess, short, close, steps)
+    except OutOfWork:
+        if not kept:
+            raise
+    return min(kept, key=lambda relaxed: relaxed.duration, default=None)
+
+
+def _least_above(
+    excess: Callable[[float], float], asked: float, close: float, steps: tuple[float, float] = STEPS
+) -> float | None:
+    """Find where an excess that falls comes close to 0 from a place on where it is positive.
+
+    Parameters
+    ----------
+    excess : float → float
+    asked : float
+    close : float
+        How little it may fall short of 0.
+    steps : (float, float)
+        Least and greatest first step.
+
+    Returns
+    -------
+    float or None
+        None where it falls no more; where nothing is known of it, the place itself.
+    """
+    short = lowest = asked
+    power = POWER
     for _ in range(ROUNDS):
-        enough = short + float(np.clip((excess(short) + CLOSE / 2.0) / power, *steps))
-        if -CLOSE < excess(enough) <= 0.0:
-            return math.exp(enough)
+        enough = short + float(np.clip((excess(short) + close / 2.0) / power, *steps))
         if excess(enough) <= 0.0:
-            return math.exp(_close_to_zero(excess, short, enough))
+            return _close_to_zero(excess, short, enough, close)
         if excess(enough) >= UNSETTLED > excess(lowest):
-            return math.exp(enough)  # by all that is known
+            return enough  # by all that is known
         if excess(enough) < excess(lowest) - LITTLE:
             lowest = enough
         elif excess(enough) < UNSETTLED and enough - lowest > STEPS[1]:
@@ -217,15 +323,20 @@ def least_duration(relaxation: Relaxation) -> float | None:
         settled = excess(short) < UNSETTLED and POWERS[0] < known < POWERS[1]
         power, steps = (known, KNOWN_STEPS) if settled else (POWER, STEPS)
         short = enough
-    return problem.duration
+    return asked
 
 
-def _close_to_zero(excess: Callable[[float], float], short: float, enough: float) -> float:
+def _close_to_zero(excess: Callable[[float], float], short: float, enough: float, close: float) -> float:
     """Interpolate between two values, until the excess of the greater one falls little short of 0."""
+    tried = [short, enough]
     for _ in range(CLOSER):
-        if excess(enough) > -CLOSE or excess(short) >= UNSETTLED:
+        if excess(enough) > -close:
             break
-        slope = (excess(enough) - excess(short)) / (enough - short)
-        middle = enough - (excess(enough) + CLOSE / 2.0) / slope
+        nearest, near = sorted(tried, key=lambda place: abs(excess(place)))[:2]
+        slope = (excess(nearest) - excess(near)) / (nearest - near)
+        middle = nearest - (excess(nearest) + close / 2.0) / slope if slope < 0.0 else math.inf
+        if not short < middle < enough or excess(short) >= UNSETTLED:
+            middle = (short + enough) / 2.0
+        tried.append(middle)
         short, enough = (short, middle) if excess(middle) <= 0.0 else (middle, enough)
     return enough

@@ -97,7 +97,7 @@ def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False
     ----------
     problem : Problem
     near : Iterate, optional
-        A motion to begin at, in place of standing still.
+        A motion to begin at, in place of standing still, if it is on as many intervals.
     coarse : bool
         On even intervals only, which tell as well whether there is a motion.
 
@@ -112,7 +112,9 @@ def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False
         solution = solve(attrs.evolve(problem, desensitized=kept), near, coarse=coarse)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     sway_cost, iterations = resolve_sway_cost(problem)
-    start = near or setup.transcription.rest()
+    start = setup.transcription.rest()
+    if near is not None and near.like(start):
+        start = near
 
     def attempt(sway_limit: float | None) -> Solution:
         nonlocal setup, iterations, start
@@ -124,7 +126,7 @@ def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False
         setup, start, iterations = found.setup, found.iterate, iterations + found.iterations
         return conclude(found, sway_cost, iterations)
 
-    return within_sway(problem.nominal_sway, attempt)
+    return within_sway(problem, attempt)
 
 
 def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
@@ -252,9 +254,7 @@ class CostProgram:
         if self.sway_limit is not None:
             goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0])
         if self.worst is not None:
-            column = goals.bound_worst(program, transcription, self.setup.tried, maps)
-            row = sparse.csc_matrix(([1.0], ([0], [column])), shape=(1, program.variables))
-            program.at_most(row, np.array([self.worst]))
+            goals.bound_worst(program, transcription, self.setup.tried, maps, self.worst)
         scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / self.setup.cost_scale)
         quadratic, linear = goals.cost(transcription, self.setup.forms, scaled, iterate, maps[0])
         return _widen(quadratic, program.variables), np.pad(linear, (0, program.variables - len(linear)))

@@ -64,6 +64,11 @@ class Iterate:
     local: Array
     stages: tuple[Array, ...]
 
+    def like(self, other: Iterate) -> bool:
+        """Whether another one has as many intervals and machines."""
+        shapes = [[each.shape for each in (one.local, *one.stages)] for one in (self, other)]
+        return shapes[0] == shapes[1]
+
     def flat(self) -> Array:
         """Put everything into one row."""
         return np.concatenate([self.local.ravel(), *(stages.ravel() for stages in self.stages)])

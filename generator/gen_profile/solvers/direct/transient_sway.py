@@ -8,10 +8,12 @@ from collections.abc import Callable
 import attrs
 
 from gen_profile.evaluation.simulation import greatest_sway
+from gen_profile.problem.problem import Problem
 from gen_profile.solvers.direct.goals import WITHIN
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution, Status
 
+SLACK = 1.001  # times what is left to the nominal machine
 SWAY_ROUNDS = 4  # to account for what the sway does between collocation points
 
 
@@ -22,17 +24,18 @@ def sway_on_the_way(solution: Solution) -> float:
     return float(greatest_sway(problem.plant, motion, [problem.parameters], problem.initial)[0])
 
 
-def within_sway(limit: float | None, attempt: Callable[[float | None], Solution]) -> Solution:
+def within_sway(problem: Problem, attempt: Callable[[float | None], Solution]) -> Solution:
     """Ask for less sway at the collocation points until that between them is within the limit, too.
 
     Parameters
     ----------
-    limit : float or None
-        m.
+    problem : Problem
+        With or without a limit of the sway, which need not be kept as exactly where the worst machine sways
+        more than the nominal one.
     attempt : float or None → Solution
         Solves with a limit at the collocation points.
     """
-    asked = limit
+    asked = limit = problem.nominal_sway
     for _ in range(SWAY_ROUNDS):
         solution = attempt(asked)
         if limit is None or asked is None or solution.optimum is None:
@@ -40,7 +43,7 @@ def within_sway(limit: float | None, attempt: Callable[[float | None], Solution]
         sway = sway_on_the_way(solution)
         if sway == math.inf:  # it could not be followed
             return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
-        if sway <= limit:
+        if sway <= min(SLACK * limit, problem.limits.sway or limit):
             break
         asked *= WITHIN * limit / sway
     return solution

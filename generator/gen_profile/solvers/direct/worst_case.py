@@ -21,11 +21,12 @@ from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.problem.parameter_box import FEW, box_of, start, worst_places
 from gen_profile.problem.problem import Problem, WorstCase
+from gen_profile.progress import Progress, untold
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.conic import ConicStatus
+from gen_profile.solvers.direct.relaxation import Relaxed, shortest
 from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.solver import (
-    COARSE,
     ROUGH,
     CostProgram,
     LeastWorst,
@@ -38,7 +39,7 @@ from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import within_sway
 from gen_profile.solvers.minimum_time import least
 from gen_profile.solvers.motion import optimal_profile
-from gen_profile.solvers.solution import Solution, Status
+from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import AxisLimitsSpec
 from gen_profile.work import OutOfWork, budget, left, spend
 
@@ -79,7 +80,7 @@ def solve(problem: Problem) -> Solution:
         limits = attrs.evolve(problem.limits, sway=sway_limit)
         return _bounded(attrs.evolve(problem, limits=limits, sway_spread=1.0))
 
-    return attrs.evolve(within_sway(problem.nominal_sway, attempt), problem=problem)
+    return attrs.evolve(within_sway(problem, attempt), problem=problem)
 
 
 def _bounded(problem: Problem) -> Solution:
@@ -114,32 +115,29 @@ def _held_back(problem: Problem, free: Sequence[int]) -> Problem | None:
     return attrs.evolve(problem, limits=attrs.evolve(limits, axis=own))
 
 
-def solve_within_limits(problem: Problem) -> Solution:
-    """Find any motion whose worst residual sway keeps every load's limit; the cost chooses among them.
+def shortest_motion(problem: Problem, guess: float | Relaxed, progress: Progress = untold) -> Relaxed | None:
+    """Find the shortest motion that keeps all limits, and after which no machine breaks its loads' ones.
 
-    Returns
-    -------
-    Solution
-        Infeasible where there is none.
+    Parameters
+    ----------
+    problem : Problem
+        With a `worst_case`; its duration does not matter.
+    guess : float or Relaxed
+        About how long it takes in s, or a motion that is about as long.
+    progress : Progress
     """
     worst_case, problem = _taken_apart(problem)
-    sway_cost, iterations = resolve_sway_cost(problem)
-    tried = ends(problem, worst_case)
+    tried, found = ends(problem, worst_case), guess
     for _ in range(ROUNDS):
-        setup, _ = set_up(problem, tried)
-        goal = CostProgram(
-            setup=setup, sway_cost=sway_cost, sway_limit=problem.nominal_sway, worst=1.0 - MARGIN
-        )
-        found = sequence(setup.transcription.rest(), goal, COARSE)
-        iterations += found.iterations
-        solution = conclude(found, sway_cost, iterations)
-        if solution.optimum is None:
-            return solution
-        worse = worse_machines(problem, worst_case, optimal_profile(solution), 1.0)
+        shortest_yet = shortest(problem, found, tried, progress)
+        if shortest_yet is None or shortest_yet.solution.optimum is None:
+            return shortest_yet
+        found = shortest_yet
+        worse = worse_machines(problem, worst_case, optimal_profile(found.solution), 1.0)
         if not worse:
-            return solution
+            return found
         tried = [*tried, *worse]
-    return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
+    return None
 
 
 def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
