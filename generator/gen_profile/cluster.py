@@ -16,8 +16,13 @@ from distributed import Client, LocalCluster
 from gen_profile.artefacts.manifest import versions
 from gen_profile.errors import SpecError
 
-# else workers look at their own stack every 10 ms, and remember it for 1000 s: 80 MB
-UNWATCHED = {"distributed.worker.profile.enabled": False}
+# else workers look at their own stack every 10 ms, and remember it for 1000 s: 80 MB; and all look at their
+# event loops every 20 ms, and at the whole computer twice a second
+UNWATCHED = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "10s",
+}
 ANSWER_TIME = "30s"  # that a scheduler and its first worker have to answer
 
 
