@@ -12,7 +12,9 @@ from gen_profile.certificate.arithmetic import balls, chebyshev
 from gen_profile.certificate.arithmetic.affine import Affine
 from gen_profile.certificate.arithmetic.balls import Ball, ball, matmul, shared
 from gen_profile.certificate.boxes import Ranges, covers, halves, whole
-from gen_profile.certificate.equations import OPERATIONS
+from gen_profile.certificate.equations import OPERATIONS, Enclosed, over_sinh
+from gen_profile.problem import symbolic as sym
+from gen_profile.problem.symbolic import Function
 
 POINTS = 200
 
@@ -43,6 +45,7 @@ BINARY = {
     "subtract": (lambda x, y: x - y, lambda a, b: a - b),
     "multiply": (lambda x, y: x * y, lambda a, b: a * b),
     "divide": (lambda x, y: x / y, lambda a, b: a / b),
+    "divide by sinh": (over_sinh, lambda a, b: a / b.sinh()),
 }
 
 
@@ -78,6 +81,16 @@ def test_operations_enclose_all_complex_values_around(enclosed, exact):
     (x, rim), (y, other) = (random_balls(np.random.default_rng(seed)) for seed in (2, 3))
     with np.errstate(all="ignore"):
         require_inside(enclosed(x, y), [exact(a, b) for a, b in zip(rim, other, strict=True)])
+
+
+@pytest.mark.parametrize("numerator", [lambda x: 1.0, lambda x: 3.0 * x])
+def test_what_a_hyperbolic_sine_divides_stays_small_where_that_is_large(numerator):
+    """As in the damping of a tank's higher modes, where sinh x varies by a factor of fifty."""
+    x, wide = sym.symbols("x", 1), Ball(9.5, 2.0)
+    ((found,),) = Enclosed(Function("damping", {"x": x}, numerator(x) / np.sinh(x)), "a test")([wide])
+    ends = np.array([7.5, 11.5])
+    assert (np.abs(numerator(ends) / np.sinh(ends) - found.mid) <= found.rad).all() and found.most < 0.1
+    assert np.isinf((1.0 / balls.sinh(wide)).rad)
 
 
 def test_what_may_be_zero_or_beyond_a_branch_proves_nothing():

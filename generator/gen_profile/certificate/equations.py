@@ -80,6 +80,19 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
 }
 
 
+def over_sinh(numerator: Any, x: Any) -> Any:
+    """Divide by sinh x so that little is left where x is large, however wide it is."""
+    small = OPERATIONS["EXP"](-x)
+    return 2.0 * numerator * small / (1.0 - small * small)
+
+
+def _applied(operation: str, arguments: Sequence[Any], angle: Any) -> Any:
+    """Apply an operation; the last argument may be the hyperbolic sine of an angle."""
+    if angle is not None and operation in {"DIV", "INV"}:
+        return over_sinh(arguments[0] if operation == "DIV" else 1.0, angle)
+    return OPERATIONS[operation](*arguments)
+
+
 class Enclosed:
     """An expression that is evaluated on balls.
 
@@ -112,6 +125,7 @@ class Enclosed:
         """Evaluate on columns of balls, or of what knows its parameters; the result is nested rows."""
         reach = next((x.reach for column in inputs for x in column if isinstance(x, Affine)), None)
         memory: dict[int, Any] = {}
+        angles: dict[int, Any] = {}  # of places that hold a hyperbolic sine
         results: dict[int, Any] = {}
 
         def taken(value: AffineOperand) -> Ball | Affine:
@@ -124,16 +138,20 @@ class Enclosed:
             )
 
         for step in self._instructions:
+            if step.operation == "OUTPUT":
+                results[step.results[1]] = memory[step.arguments[0]]
+                continue
+            angle = None
             if step.operation == "INPUT":
                 column, row = step.arguments
-                memory[step.results[0]] = taken(inputs[column][row])
+                value = taken(inputs[column][row])
             elif step.operation == "CONST":
-                memory[step.results[0]] = taken(step.constant)
-            elif step.operation == "OUTPUT":
-                results[step.results[1]] = memory[step.arguments[0]]
+                value = taken(step.constant)
             else:
-                arguments = (memory[place] for place in step.arguments)
-                memory[step.results[0]] = OPERATIONS[step.operation](*arguments)
+                arguments = [memory[place] for place in step.arguments]
+                value = _applied(step.operation, arguments, angles[step.arguments[-1]])
+                angle = arguments[0] if step.operation == "SINH" else None
+            memory[step.results[0]], angles[step.results[0]] = value, angle
         found = [one if isinstance(one, Ball) else one.ball for _, one in sorted(results.items())]
         return [found[row :: self._rows] for row in range(self._rows)]
 
