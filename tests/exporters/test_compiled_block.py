@@ -144,7 +144,7 @@ def test_it_plays_replay_and_agrees_with_the_interpreter(name, layout, tmp_path)
     played = run([*waiting, *[inputs_of(table, bExecute=True)] * 51])[100:]
     for quantity in QUANTITIES:
         issued = np.array([row[f"f{quantity}"] for row in played]).reshape(51, -1)
-        np.testing.assert_array_equal(issued + 0.0, getattr(table.played(), quantity))
+        np.testing.assert_array_equal(issued + 0.0, getattr(table.played, quantity))
     assert [row["bdone"] for row in played] == [False] * 50 + [True]
     rows = waiting + scenes(table, random.Random(5))
     outputs = run(rows)

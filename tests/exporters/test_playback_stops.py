@@ -33,7 +33,7 @@ class Laws:
     def __init__(self, profile, layout, cycle=CYCLE):
         self.text, self.cycle = encoded(profile, layout, cycle_time=cycle), cycle
         table = tabulate(profile, goal_of(profile, layout, cycle_time=cycle))
-        self.velocity, self.acceleration, self.jerk = *table.peaks()[:2], table.limits().jerk
+        self.velocity, self.acceleration, self.jerk = *table.peaks[:2], table.limits.jerk
         count = 1.0 if layout == "counts" else 0.0  # positions are whole there, between cycles too nearly
         span = np.sort([table.start, table.target], axis=0)
         self.least, self.most = span[0] - count - 1e-12, span[1] + count + 1e-12

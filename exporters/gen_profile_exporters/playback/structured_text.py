@@ -153,7 +153,7 @@ def _table_values(table: PlaybackTable) -> dict[str, str]:
 
 
 def _constants(table: PlaybackTable) -> dict[str, str]:
-    limits, rows = table.limits(), table.columns[0].size
+    limits, rows = table.limits, table.columns[0].size
     last = 0 if table.first is None else len(table.first) - 1
     segments = {} if table.first is None else {"last_segment": str(last), "segments": f"[0..{last}]"}
     return segments | {
@@ -204,8 +204,8 @@ def _checked(table: PlaybackTable) -> int:
 
 def axis_lines(table: PlaybackTable) -> list[str]:
     """Tell for each axis from where to where it moves, its peaks, and what the machine allows."""
-    velocity, acceleration, _ = table.peaks()
-    jerk = table.limits().jerk
+    velocity, acceleration, _ = table.peaks
+    jerk = table.limits.jerk
     return [
         f"    Axis {number + 1}, {plain(axis.name)}: {table.start[number]:g} to {table.target[number]:g} "
         f"{axis.unit}, peaks {velocity[number]:.4g} {axis.unit}/s and {acceleration[number]:.4g} "

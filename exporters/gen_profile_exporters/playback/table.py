@@ -103,15 +103,12 @@ class PlaybackTable:
         """Cycle from which a stop by the motion's own peaks would end no sooner than the motion."""
         if self.stated_play_on is not None:
             return self.stated_play_on
-        _, velocity, acceleration = _quantities(self.played())
-        return latest_stop(self.limits(), velocity, acceleration, self.cycle_time)
-
-    def played(self) -> AxisTable:
-        """List what the block issues every cycle when nothing disturbs it, in axis units."""
-        return self._played
+        _, velocity, acceleration = _quantities(self.played)
+        return latest_stop(self.limits, velocity, acceleration, self.cycle_time)
 
     @cached_property
-    def _played(self) -> AxisTable:
+    def played(self) -> AxisTable:
+        """What the block issues every cycle when nothing disturbs it, in axis units."""
         position, velocity, acceleration = (
             self.columns if self.first is None else self._segments().at_cycles()
         )
@@ -125,15 +122,12 @@ class PlaybackTable:
 
     def motion(self) -> SampledProfile:
         """Convert what the block issues to SI units."""
-        motion = motion_of(self.played(), self.axes)
+        motion = motion_of(self.played, self.axes)
         return motion if self.first is None else attrs.evolve(motion, resolution=np.zeros(len(self.axes)))
 
-    def peaks(self) -> Array:
-        """Bound the magnitudes of velocity, acceleration and jerk along the path, shape (3, axes)."""
-        return self._peaks
-
     @cached_property
-    def _peaks(self) -> Array:
+    def peaks(self) -> Array:
+        """Bounds of the magnitudes of velocity, acceleration and jerk along the path, shape (3, axes)."""
         if self.first is not None:
             return self._segments().peaks()
         _, velocity, acceleration = np.abs(self.columns)
@@ -141,9 +135,10 @@ class PlaybackTable:
         speed = np.abs(np.diff(self.columns[1], axis=0)).max(axis=0) / self.cycle_time
         return np.array([velocity.max(axis=0), np.maximum(acceleration.max(axis=0), speed), jerk])
 
+    @cached_property
     def limits(self) -> PathLimits:
         """How the block may slow down and speed up."""
-        return path_limits(self.peaks())
+        return path_limits(self.peaks)
 
     def _segments(self) -> QuinticSegments:
         first = np.array([] if self.first is None else self.first, dtype=np.int64)

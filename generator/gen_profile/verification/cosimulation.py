@@ -67,6 +67,7 @@ def cosimulate(
         The FMU cannot be built or run, or FMPy finds something else.
     """
     tau = spec.actuator.tau or 0.0
+    settle = STANDSTILL * tau + observation_time(spec)
     with PlantCosimulation(spec.machine(), on_build) as fmu:
 
         def run(machine: Scenario, *, by_fmpy: bool = False) -> Response:
@@ -75,7 +76,7 @@ def cosimulate(
                 machine.parameters,
                 tau=tau,
                 max_step=max_step(spec, machine),
-                settle=STANDSTILL * tau + observation_time(spec),
+                settle=settle,
                 output_step=output_step,
                 initial=spec.move.initial,
                 final_velocity=spec.move.final_velocity,
