@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import attrs
 from gen_profile.artefacts.manifest import Artefact, sha256
 from gen_profile.artefacts.writing import staged
 from gen_profile.designs.design import deliver_judged
+from gen_profile.designs.planner_cures import Cure, cures
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
 from gen_profile.progress import Progress, untold
@@ -34,6 +36,8 @@ class Deployment:
     folder : Path
     files : tuple of Artefact
         What was delivered; empty when the proof failed.
+    cures : tuple of Cure
+        Changes of a refused spec with which its block passes.
     """
 
     spec: Spec
@@ -41,6 +45,7 @@ class Deployment:
     proof: Proof | None
     folder: Path
     files: tuple[Artefact, ...]
+    cures: tuple[Cure, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
@@ -58,6 +63,7 @@ class Deployment:
             "live": {name: list(ends) for name, ends in self.spec.planner.live.items()},
             "frequency_error": self.block.frequency_error,
             "proof": None if self.proof is None else self.proof.to_dict(),
+            "cures": [{"values": dict(cure.values), "share": cure.share} for cure in self.cures],
         }
 
 
@@ -86,7 +92,7 @@ def deploy_planner(
     check : bool
         Without it the manifest says ``"unverified"``.
     keep_failed : bool
-        Deliver even what failed, marked so in the manifest.
+        Deliver even what failed, marked so in the manifest. Otherwise changes are looked for that pass.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers run the histories.
     progress : callable
@@ -105,14 +111,19 @@ def deploy_planner(
         written = {file.filename: staging.write(file.filename, file.content) for file in files}
         text = _executed(block, written)
         proof = None
+        prove_on = partial(prove, histories=histories, scheduler=scheduler, progress=progress)
         if check:
-            proof = prove(spec, text, histories=histories, scheduler=scheduler, progress=progress)
+            proof = prove_on(spec, text)
         artefacts = tuple(
             Artefact(format=FORMAT, path=name, sha256=sha256(content), bytes=len(content))
             for name, content in written.items()
         )
         kept = deliver_judged(staging, spec, artefacts, proof, profile_sha256="", keep_failed=keep_failed)
-    return Deployment(spec=spec, block=block, proof=proof, folder=folder, files=kept)
+    found: tuple[Cure, ...] = ()
+    if proof is not None and not proof.passed and not keep_failed:
+        progress("looking for what would pass")
+        found = cures(spec, proof, lambda changed: prove_on(changed, planner_block(changed).text))
+    return Deployment(spec=spec, block=block, proof=proof, folder=folder, files=kept, cures=found)
 
 
 def _executed(block: PlannerBlock, written: Mapping[str, bytes]) -> str:

@@ -1,0 +1,70 @@
+"""What is named to whoever's planner block leaves too much sway."""
+
+from types import SimpleNamespace
+
+import pytest
+from command_line import run_here
+from generator.planned_machines import BAY, HOIST
+
+from gen_profile.designs.planner_cures import cures
+from gen_profile.errors import SpecError
+from gen_profile.spec.reading import parse_spec
+
+
+def proof(share, faults=(), broken=()):
+    judged = SimpleNamespace(faults=broken)
+    return SimpleNamespace(
+        share=lambda _: share, faults=faults, judged=(judged,), worst=judged, passed=share <= 1.0
+    )
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
+def test_each_change_is_made_as_large_as_it_must_be(power):
+    """Whatever power of the errors, the velocity, and the allowed sway the sway goes with."""
+    spec = parse_spec(BAY)
+
+    def swaying(changed):
+        limits, check = changed.limits, changed.check
+        assert limits.acceleration / limits.velocity == pytest.approx(0.3, rel=0.1)
+        uncertain = changed.checked_ranges()["L1"][1] / 6.0 - 1.0
+        share = 5.0 * (uncertain / 0.05) ** (2.0 * power) * limits.velocity**power
+        return proof(share * (0.05 / check.residual_sway["hook"]) ** power)
+
+    surer, slower, more = cures(spec, proof(5.0), swaying)
+    assert surer.values["check.uncertain.L1"] < 0.05
+    assert set(slower.values) == {"limits.velocity", "limits.acceleration", "limits.jerk"}
+    assert more.values["check.residual_sway"] > 0.05
+    assert all(cure.share <= 1.0 for cure in (surer, slower, more))
+
+
+def test_nothing_is_named_that_does_not_help_or_cannot_be():
+    spec = parse_spec(HOIST, ["check.uncertain={}"])
+    assert cures(spec, proof(5.0), lambda _: proof(3.0)) == ()
+
+    def refused(changed):
+        if changed.limits != spec.limits:
+            raise SpecError("too slow")
+        return proof(0.5)
+
+    assert [list(cure.values) for cure in cures(spec, proof(5.0), refused)] == [["check.residual_sway"]]
+    assert cures(spec, proof(5.0, faults=("altered",)), lambda _: proof(0.5)) == ()
+    assert cures(spec, proof(5.0, broken=("a limit is broken",)), lambda _: proof(0.5)) == ()
+
+
+@pytest.mark.slow
+def test_what_a_refusal_names_passes(tmp_path):
+    (tmp_path / "bay.toml").write_text(BAY.replace("residual_sway = 0.05", "residual_sway = 0.002"))
+    options = ("planner", "write", tmp_path / "bay.toml", "--out", tmp_path / "out", "--histories", 20)
+    failed = run_here(*options, "--json")
+    assert failed.code == 4
+    assert "It would pass" in failed.err
+    named = failed.document["cures"]
+    assert [next(iter(cure["values"])) for cure in named] == [
+        "check.uncertain.L1",
+        "limits.velocity",
+        "check.residual_sway",
+    ]
+    ((place, share),) = named[0]["values"].items()
+    passed = run_here(*options, "--set", f"{place}={share}", "--json")
+    assert passed.code == 0
+    assert passed.document["proof"]["share"] == named[0]["share"]
