@@ -15,7 +15,8 @@ from gen_profile.errors import CertificateError, OutputError, SpecError
 
 PRESET, CYCLE, ON_THE_WAY = "single-pendulum-crane", "export.cycle_time=0.01", "limits.sway=0.25"
 BARE = ("--preset", PRESET, "--set", CYCLE)
-SPEC = (*BARE, "--set", ON_THE_WAY)
+AXES = "limits.acceleration=0.9"
+SPEC = (*BARE, "--set", ON_THE_WAY, "--set", AXES, "--set", "limits.jerk=3")
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +55,26 @@ def test_a_certificate_is_made_beside_the_file_and_holds_when_checked_again(cert
     assert f"payload {1e3 * way['bound_m']:.4g} mm at any time" in text
 
 
+def test_what_the_setpoints_ask_of_the_axes_is_what_differences_of_the_file_say(certified):
+    artefact, made = certified
+    table, said = (
+        np.genfromtxt(artefact, delimiter=",", names=True),
+        made.document["certificate"]["setpoints"],
+    )
+    for axis in ("cart", "hoist"):
+        position = 1e-3 * np.pad(table[f"{axis}_position_mm"], 2, mode="edge")
+        for order, kind, limit in ((2, "acceleration", 0.9), (3, "jerk", 3.0)):
+            found, told = np.abs(np.diff(position, order)).max() / 0.01**order, said[axis][kind]
+            assert told["bound"] == pytest.approx(found, rel=1e-6) and told["limit"] == limit
+        assert said[axis]["acceleration"]["unit"] == "m/s²" and "velocity" not in said[axis]
+
+
+def test_setpoints_that_break_a_limit_are_not_certified(copied):
+    spec = gp.preset_spec(PRESET, [CYCLE, "limits.velocity=0.5"])
+    with pytest.raises(CertificateError, match=r"ask cart for 1\.468 m/s, and limits\.velocity allows 0\.5"):
+        gp.certify_artefact(copied[0], spec)
+
+
 def test_a_limit_below_the_bound_is_not_proved_though_the_check_passes(copied):
     artefact, beside = copied
     beside.unlink()
@@ -79,6 +100,10 @@ def stated_lower(document):
 
 def stated_lower_on_the_way(document):
     document["on_the_way"]["bound_m"] *= 0.99
+
+
+def asked_less(document):
+    document["setpoints"]["hoist"]["acceleration"]["bound"] *= 0.99
 
 
 def limit_on_the_way_raised(document):
@@ -150,6 +175,7 @@ def changed(packed, kind, change):
 TAMPERED = {
     stated_lower: "does not prove what it says",
     stated_lower_on_the_way: "does not prove what it says",
+    asked_less: "does not prove what it says of the setpoints",
     limit_on_the_way_raised: "does not cover all machines and limits",
     stated_share: "does not cover all machines",
     a_part_of_the_box: "does not cover all machines",
@@ -184,7 +210,7 @@ def test_what_is_no_certificate_or_of_something_else_is_refused(copied):
         gp.check_certificate(artefact, artefact.with_name("manifest.json"))
     with pytest.raises(OutputError, match="Cannot read"):
         gp.check_certificate(artefact, artefact.with_name("none.json"))
-    wider = gp.preset_spec(PRESET, [CYCLE, ON_THE_WAY, "robustness.uncertain={L0=0.11}"])
+    wider = gp.preset_spec(PRESET, [CYCLE, ON_THE_WAY, AXES, "robustness.uncertain={L0=0.11}"])
     with pytest.raises(CertificateError, match="about another spec"):
         gp.check_certificate(artefact, beside, wider)
     artefact.write_text(artefact.read_text().replace("1.0", "1.1", 1))
@@ -199,10 +225,10 @@ def test_a_certificate_of_the_first_release_that_wrote_them_still_holds():
     assert found.proved and found.terms == (8,) and found.scales.shape[-1] == 1
 
 
-def test_a_certificate_from_before_sway_on_the_way_was_proved_still_holds(copied):
+def test_a_certificate_from_before_more_than_residual_sway_was_proved_still_holds(copied):
     artefact, beside = copied
     document = json.loads(beside.read_text())
-    del document["on_the_way"]
+    del document["on_the_way"], document["setpoints"]
     beside.write_text(json.dumps(document))
     found = gp.check_certificate(artefact, beside)
     assert found.proved and found.on_the_way is None and found.to_dict()["on_the_way"] is None

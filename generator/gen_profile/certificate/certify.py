@@ -12,7 +12,7 @@ import numpy as np
 
 from gen_profile.certificate import approximation
 from gen_profile.certificate.arithmetic.balls import Array
-from gen_profile.certificate.axis_motion import fitted
+from gen_profile.certificate.axes.axis_motion import fitted
 from gen_profile.certificate.boxes import DyadicBox, halves, whole
 from gen_profile.certificate.in_order import in_order
 from gen_profile.certificate.packing import Motions

@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 
 from gen_profile.certificate.arithmetic.balls import Array
-from gen_profile.certificate.axis_motion import AxisMotion
+from gen_profile.certificate.axes.axis_motion import AxisMotion
+from gen_profile.certificate.axes.setpoint_limits import Asked
 from gen_profile.certificate.boxes import DyadicBox
 from gen_profile.certificate.packing import Motions, pack, unpack
 from gen_profile.certificate.sway_limits import ProvedSway, SwayLimit
@@ -39,6 +40,8 @@ class Certificate:
         Time in s in which the sway is bounded.
     sways : tuple of ProvedSway
         Of every load after the move, and of the end load on the way where that is limited.
+    asked : mapping or None
+        Of the axes, see `gen_profile.certificate.axes.setpoint_limits.asked_of_axes`; None in the first ones.
     share : float
         Of the ranges' box, of which the bounds are proved.
     axes : AxisMotion
@@ -57,6 +60,7 @@ class Certificate:
     arrival: float
     until: float
     sways: tuple[ProvedSway, ...]
+    asked: Asked | None
     share: float
     axes: AxisMotion
     boxes: tuple[DyadicBox, ...]
@@ -118,6 +122,7 @@ class Certificate:
                 "limit_m": way.limit.allowed,
                 "largest_met_m": way.seen,
             },
+            "setpoints": self.asked,
             "ranges": {name: list(ends) for name, ends in self.ranges.items()},
             "share_proved": self.share,
             "boxes": len(self.boxes),
@@ -180,6 +185,7 @@ def parse(content: bytes) -> Certificate:
             arrival=float(document["from_s"]),
             until=float(document["until_s"]),
             sways=tuple(_sways(document)),
+            asked=document.get("setpoints"),
             share=float(document["share_proved"]),
             axes=AxisMotion(**axes),
             boxes=tuple(tuple(_part(*part) for part in box) for box in document["parts"]),

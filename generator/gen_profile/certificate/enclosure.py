@@ -28,7 +28,7 @@ from gen_profile.certificate.arithmetic.matrices import (
     split,
     times,
 )
-from gen_profile.certificate.axis_motion import AxisMotion, Gap, powers, widened
+from gen_profile.certificate.axes.axis_motion import AxisMotion, Gap, powers, widened
 from gen_profile.certificate.equations import EnclosedEquations
 from gen_profile.certificate.scaling import Scaling
 

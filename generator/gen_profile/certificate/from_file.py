@@ -14,6 +14,7 @@ from gen_profile.artefacts.manifest import FILENAME, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.artefacts.writing import deliver
 from gen_profile.certificate.arithmetic.balls import Array
+from gen_profile.certificate.axes.setpoint_limits import Asked, asked_of_axes
 from gen_profile.certificate.boxes import covers
 from gen_profile.certificate.certify import SLACK, Attempt, Progress, attempt
 from gen_profile.certificate.document import Certificate, certificate_path, damaged, encode, parse
@@ -69,12 +70,13 @@ def certify_artefact(
     Raises
     ------
     CertificateError
-        No proof is written for this machine, or what the spec asks.
+        No proof is written for this machine, or what the spec asks; or setpoints break limits of the axes.
     OutputError, ExportError, SpecError, CosimulationError
         As of `gen_profile.check_artefact`.
     """
     artefact = _read(Path(path), spec)
-    certificate = _certificate(artefact, attempt(artefact.spec, artefact.setpoints, progress))
+    asked = asked_of_axes(artefact.spec, artefact.setpoints)
+    certificate = _certificate(artefact, asked, attempt(artefact.spec, artefact.setpoints, progress))
     if write and certificate.proved:
         deliver(certificate_path(artefact.path), encode(certificate))
     return certificate
@@ -156,7 +158,7 @@ def _read(path: Path, spec: Spec | None) -> _Artefact:
     return _Artefact(path=path, sha256=sha256(content), spec=spec, setpoints=setpoints)
 
 
-def _certificate(artefact: _Artefact, found: Attempt) -> Certificate:
+def _certificate(artefact: _Artefact, asked: Asked, found: Attempt) -> Certificate:
     """State what came out."""
     theorem = found.theorem
     bounds = (found.bounds.max(axis=0) * (1.0 + SLACK)).tolist() if found.boxes else [None] * len(found.seen)
@@ -167,6 +169,7 @@ def _certificate(artefact: _Artefact, found: Attempt) -> Certificate:
         ranges=_named(theorem),
         arrival=theorem.arrival,
         until=theorem.until,
+        asked=asked,
         sways=tuple(ProvedSway(limit=limit, bound=bound, seen=seen) for limit, bound, seen in sways),
         share=found.share,
         axes=theorem.axes,
@@ -204,6 +207,8 @@ def _require_about(found: Certificate, artefact: _Artefact) -> Theorem:
         axes=found.axes,
         terms=found.terms,
     )
+    if found.asked is not None and found.asked != asked_of_axes(artefact.spec, artefact.setpoints):
+        raise CertificateError("The certificate does not prove what it says of the setpoints.")
     if not len(found.boxes) == len(found.motions) == len(found.scales):
         raise CertificateError("The certificate is damaged: its arrays do not fit together.")
     whole = found.share == 1.0 and dict(found.ranges) == _named(theorem) and covers(found.boxes)

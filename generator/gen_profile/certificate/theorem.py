@@ -11,8 +11,8 @@ import attrs
 import numpy as np
 
 from gen_profile.certificate.arithmetic.balls import Array
-from gen_profile.certificate.axis_motion import AxisMotion, Gap, gap_between
-from gen_profile.certificate.axis_track import Track, track_of
+from gen_profile.certificate.axes.axis_motion import AxisMotion, Gap, gap_between
+from gen_profile.certificate.axes.axis_track import Track, track_of
 from gen_profile.certificate.boxes import DyadicBox, Ranges
 from gen_profile.certificate.enclosure import MORE_NODES, TIME_NODES, Approximation, Enclosure, WatchedSway
 from gen_profile.certificate.equations import EnclosedEquations, enclosed_equations

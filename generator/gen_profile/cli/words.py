@@ -119,6 +119,9 @@ def _proved(found: Certificate) -> Iterator[tuple[str, str]]:
     if (way := found.on_the_way) is not None and way.bound is not None:
         said.append(f"{way.limit.load} {mm(way.bound)} at any time")
     yield "proved" if found.proved else "not proved", f"at most {'; '.join(said)}" if said else "no bound"
+    for axis, kinds in (found.asked or {}).items():
+        bounds = ", ".join(f"{told['bound']:.4g} {told['unit']}" for told in kinds.values())
+        yield "setpoints", f"ask {axis} for at most {bounds}"
 
 
 def deployment(outcome: Deployment) -> str:

@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from gen_profile.certificate.arithmetic.balls import UNIT, Array, Ball, ball, stack
-from gen_profile.certificate.axis_track import FINER, Track
+from gen_profile.certificate.axes.axis_track import FINER, Track
 from gen_profile.errors import CertificateError
 from gen_profile.motion.profile import Profile
 
