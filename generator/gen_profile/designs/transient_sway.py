@@ -51,20 +51,6 @@ def solve(spec: Spec) -> Solution:
         return choice.given_up(problem_of(spec))
 
 
-def measured_spread(spec: Spec, problem: Problem) -> float:
-    """Tell how many times as much as the nominal machine the worst one sways, by motions on few intervals.
-
-    Parameters
-    ----------
-    spec : Spec
-    problem : Problem
-        Whose spread is supposed, and returned where all keep the limit with it or nothing is known.
-    """
-    if not limited(spec, problem):
-        return problem.sway_spread
-    return _kept(spec, problem, partial(choice.attempt, method="direct", coarse=True)).problem.sway_spread
-
-
 def attempt(
     spec: Spec, progress: Progress = untold, spread: float = 1.0, near: Relaxed | None = None
 ) -> Solution:
@@ -90,16 +76,10 @@ def attempt(
         begun = partial(choice.attempt, method="direct", near=near)
         solution = _kept(spec, problem, begun, NEARLY_ENOUGH, progress)
     else:
-        solution = _attempt(spec, problem, spec.solver.solver, progress)
+        solution = kept_by_all(spec, problem, spec.solver.solver, progress)
     if solution.optimum is None and solution.problem.sway_spread == 1.0:
         return attrs.evolve(solution, problem=with_usual_spread(spec, problem))
     return solution
-
-
-def _attempt(spec: Spec, problem: Problem, method: SolverName, progress: Progress = untold) -> Solution:
-    if problem.worst_case is not None:  # whose least residual takes longest to find
-        problem = attrs.evolve(problem, sway_spread=measured_spread(spec, problem))
-    return kept_by_all(spec, problem, method, progress)
 
 
 def as_asked_next(spec: Spec, problem: Problem) -> Solution:
@@ -116,7 +96,7 @@ def as_asked_next(spec: Spec, problem: Problem) -> Solution:
             found = choice.keeps_limits(smooth) and _too_much(spec, smooth, ENOUGH) is None
             if found or smooth.status is Status.INFEASIBLE:
                 return smooth
-    solution = _attempt(spec, problem, "direct")
+    solution = kept_by_all(spec, problem, "direct")
     if solution.optimum is None or _too_much(spec, solution, SWAY_TOLERANCE) is None:
         return solution
     return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)

@@ -69,15 +69,15 @@ def attempt(
     problem : Problem
     method : str
     coarse : bool
-        Where limits bind, on few intervals only, for the nominal machine, and from one motion.
+        Where limits bind, on few intervals only and from one motion; over a range, not to the last digit.
     near : Relaxed, optional
         A motion at which the direct method begins, in place of rest.
     """
-    if problem.worst_case is not None and not coarse:
-        return _in_time(_over_a_range, problem, DIRECTLY)
+    if problem.worst_case is not None:
+        return _in_time(partial(_over_a_range, coarse=coarse), problem, DIRECTLY)
     solve = partial(_direct, coarse=coarse, near=near)
-    if method == "direct" or problem.worst_case is not None:
-        return _in_time(solve, attrs.evolve(problem, worst_case=None), DIRECTLY)
+    if method == "direct":
+        return _in_time(solve, problem, DIRECTLY)
     solution = _in_time(partial(indirect.solve, far=partial(_within_reach, problem)), problem, SOLVING)
     if method == "indirect" or keeps_limits(solution) or solution.status is Status.INFEASIBLE:
         return solution
@@ -190,11 +190,11 @@ def _within_reach(problem: Problem) -> bool:
     return easiest is None or easiest.share <= NEARLY
 
 
-def _over_a_range(problem: Problem) -> Solution:
+def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:
     """Look for the least worst case only where the nominal machine's motion can keep the limits."""
     easiest = _easiest(problem)
     if easiest is None or easiest.share <= NEARLY:
-        return worst_case.solve(problem)
+        return worst_case.solve(problem, coarse=coarse)
     return attrs.evolve(easiest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, cure=WIDER)
 
 

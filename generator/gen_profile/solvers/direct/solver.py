@@ -278,6 +278,7 @@ class LeastWorst:
 
     setup: Setup
     trace: float
+    sway_limit: float | None
 
     @property
     def extra(self) -> int:
@@ -288,10 +289,10 @@ class LeastWorst:
         self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
     ) -> tuple[Matrix, Array]:
         """Add the bounds to a program: P and q."""
-        transcription, sway_limit = self.setup.transcription, self.setup.problem.nominal_sway
+        transcription = self.setup.transcription
         goals.keep_limits(program, self.setup.problem, transcription)
-        if sway_limit is not None:
-            goals.keep_sway(program, transcription, sway_limit, iterate, maps[0])
+        if self.sway_limit is not None:
+            goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0])
         column = goals.bound_worst(program, transcription, self.setup.tried, maps)
         linear = np.zeros(program.variables)
         linear[column] = 1.0

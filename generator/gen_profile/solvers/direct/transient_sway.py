@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import attrs
@@ -30,20 +29,28 @@ def within_sway(problem: Problem, attempt: Callable[[float | None], Solution]) -
     Parameters
     ----------
     problem : Problem
-        With or without a limit of the sway, which need not be kept as exactly where the worst machine sways
-        more than the nominal one.
+        With or without a limit of the sway.
     attempt : float or None → Solution
         Solves with a limit at the collocation points.
     """
-    asked = limit = problem.nominal_sway
+    asked = problem.nominal_sway
     for _ in range(SWAY_ROUNDS):
         solution = attempt(asked)
-        if limit is None or asked is None or solution.optimum is None:
+        stricter = to_be_asked(problem, solution, asked)
+        if stricter == asked:
             break
-        sway = sway_on_the_way(solution)
-        if sway == math.inf:  # it could not be followed
+        if stricter == 0.0:  # it could not be followed
             return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
-        if sway <= min(SLACK * limit, problem.limits.sway or limit):
-            break
-        asked *= WITHIN * limit / sway
+        asked = stricter
     return solution
+
+
+def to_be_asked(problem: Problem, solution: Solution, asked: float | None) -> float | None:
+    """Tell how much sway at the collocation points in m may be asked for: as much as was, or less.
+
+    The nominal machine's limit need not be kept as exactly where it is for others, which sway more.
+    """
+    if asked is None or problem.limits.sway is None or solution.optimum is None:
+        return asked
+    sway, limit = sway_on_the_way(solution), problem.limits.sway / problem.sway_spread
+    return asked if sway <= min(SLACK * limit, problem.limits.sway) else asked * WITHIN * limit / sway

@@ -27,7 +27,9 @@ from gen_profile.solvers.direct.conic import ConicStatus
 from gen_profile.solvers.direct.relaxation import Relaxed, shortest
 from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.solver import (
+    COARSE,
     ROUGH,
+    STEP_TOLERANCE,
     CostProgram,
     LeastWorst,
     ProgramSequence,
@@ -36,7 +38,7 @@ from gen_profile.solvers.direct.solver import (
     sequence,
 )
 from gen_profile.solvers.direct.transcription import Iterate
-from gen_profile.solvers.direct.transient_sway import within_sway
+from gen_profile.solvers.direct.transient_sway import to_be_asked
 from gen_profile.solvers.minimum_time import least
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
@@ -62,32 +64,24 @@ ACCURACY = 1e-6  # of a machine's integration, relative
 Parameters = Mapping[str, float]
 
 
-def solve(problem: Problem) -> Solution:
+def solve(problem: Problem, *, coarse: bool = False) -> Solution:
     """Minimise the worst residual sway, each load in shares of its limit, then the cost.
 
     Parameters
     ----------
     problem : Problem
         With a `worst_case`.
+    coarse : bool
+        Only about, which tells as well how much machines sway.
 
     Returns
     -------
     Solution
         Its `worst_case_bound` is what no motion on the same intervals goes below where angles are small.
     """
-
-    def attempt(sway_limit: float | None) -> Solution:
-        limits = attrs.evolve(problem.limits, sway=sway_limit)
-        return _bounded(attrs.evolve(problem, limits=limits, sway_spread=1.0))
-
-    return attrs.evolve(within_sway(problem, attempt), problem=problem)
-
-
-def _bounded(problem: Problem) -> Solution:
-    """Solve a problem, with limits of the effort for the axes that have none."""
     free = [axis for axis in range(len(problem.target)) if not _limits_effort(problem.limits.of(axis))]
     bounded = _held_back(problem, free) if free else problem
-    return _solve(bounded or problem, TRACES)
+    return attrs.evolve(_solve(bounded or problem, TRACES, coarse=coarse), problem=problem)
 
 
 def _limits_effort(own: AxisLimitsSpec) -> bool:
@@ -101,7 +95,8 @@ def _held_back(problem: Problem, free: Sequence[int]) -> Problem | None:
     Without such a limit, ever less sway would ask for ever more acceleration.
     """
     names = tuple(problem.worst_case.uncertain) if problem.worst_case is not None else ()
-    exact = direct.solve(attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0))
+    quiet = attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0)
+    exact = direct.solve(quiet, coarse=True)
     if exact.optimum is None:
         return None
     motion, limits = optimal_profile(exact), problem.limits
@@ -140,12 +135,12 @@ def shortest_motion(problem: Problem, guess: float | Relaxed, progress: Progress
     return None
 
 
-def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
+def _solve(problem: Problem, traces: Sequence[float], *, coarse: bool) -> Solution:
     """Go from round to round as long as work and programs allow; the last motion is the best."""
     solutions: list[Solution] = []
     try:
         with budget(EXCHANGING * left()):
-            solutions.extend(_rounds(problem, traces))
+            solutions.extend(_rounds(problem, traces, coarse=coarse))
     except OutOfWork:
         spend(0.0)
         if not solutions:
@@ -154,21 +149,23 @@ def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
     return (motions or solutions)[-1]
 
 
-def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
-    """Solve for a few machines, search for worse ones, and solve again with them, until there are none."""
+def _rounds(problem: Problem, traces: Sequence[float], *, coarse: bool) -> Iterator[Solution]:
+    """Solve for a few machines, about, search for worse ones, and solve again with them.
+
+    Where there are none, and none that sway too much between collocation points, solve exactly.
+    """
     worst_case, problem = _taken_apart(problem)
     sway_cost, iterations = resolve_sway_cost(problem)
-    tried, bound, found = ends(problem, worst_case), 0.0, None
+    tried, bound, found, precision = ends(problem, worst_case), 0.0, None, COARSE
+    swaying = problem.nominal_sway
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
-        goal = CostProgram(
-            setup=setup, sway_cost=sway_cost, sway_limit=problem.nominal_sway, worst=GOOD_ENOUGH
-        )
+        goal = CostProgram(setup=setup, sway_cost=sway_cost, sway_limit=swaying, worst=GOOD_ENOUGH)
         start = _begun(setup, found)
         # the bound only rises with more machines: what was not good enough before is not now
-        found = sequence(start, goal) if bound <= GOOD_ENOUGH else None
+        found = sequence(start, goal, precision) if bound <= GOOD_ENOUGH else None
         if found is None or found.verdict is not ConicStatus.SOLVED:
-            best = _least_worst(setup, traces)
+            best = _least_worst(goal, traces)
             iterations += best.iterations
             bound, enough = float(best.solutions[0].x[-1]), SLACK * float(best.solutions[-1].x[-1]) + MARGIN
             if best.verdict is ConicStatus.FAILED and (bisected := _bisected(start, goal)) is not None:
@@ -177,7 +174,7 @@ def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
                 yield conclude(best, sway_cost, iterations)
                 return
             goal = attrs.evolve(goal, worst=enough)
-            found = sequence(best.iterate if best.verdict is ConicStatus.SOLVED else start, goal)
+            found = sequence(best.iterate if best.verdict is ConicStatus.SOLVED else start, goal, precision)
         iterations += found.iterations
         solution = conclude(found, sway_cost, iterations)
         yield attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
@@ -185,15 +182,19 @@ def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
             return
         enough = WORSE * float(goal.worst or 0.0)
         worse = worse_machines(problem, worst_case, optimal_profile(solution), enough)
-        if not worse:
-            return
+        asked, swaying = swaying, to_be_asked(problem, solution, swaying)
+        if not worse and asked == swaying:
+            if coarse or precision < COARSE:
+                return
+            precision = STEP_TOLERANCE
         tried = [*tried, *worse]
 
 
-def _least_worst(setup: Setup, traces: Sequence[float]) -> ProgramSequence:
+def _least_worst(goal: CostProgram, traces: Sequence[float]) -> ProgramSequence:
     """Minimise the worst share, for as little effort besides as the programs can tell from none."""
     for trace in traces:
-        best = sequence(setup.transcription.rest(), LeastWorst(setup=setup, trace=trace))
+        least_worst = LeastWorst(setup=goal.setup, trace=trace, sway_limit=goal.sway_limit)
+        best = sequence(goal.setup.transcription.rest(), least_worst)
         if best.verdict is not ConicStatus.FAILED:
             break
     return best
