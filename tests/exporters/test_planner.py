@@ -63,13 +63,13 @@ def frequencies(L1, m2, m1=350.0, L2=1.5):
     return np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)
 
 
-def require_limits(out, rounding=1e-9):
+def require_limits(out, rounding=1e-9, limits=(VELOCITY, ACCELERATION, JERK, HIGH)):
     velocity, acceleration, position = out["fVelocity"], out["fAcceleration"], out["fPosition"]
-    assert np.abs(velocity).max() <= VELOCITY + rounding
-    assert np.abs(acceleration).max() <= ACCELERATION + rounding
-    assert np.abs(np.diff(acceleration)).max() <= (JERK + rounding) * CYCLE
+    assert np.abs(velocity).max() <= limits[0] + rounding
+    assert np.abs(acceleration).max() <= limits[1] + rounding
+    assert np.abs(np.diff(acceleration)).max() <= (limits[2] + rounding) * CYCLE
     assert position.min() >= LOW - rounding
-    assert position.max() <= HIGH + rounding
+    assert position.max() <= limits[3] + rounding
     # the three agree: acceleration is linear within a slot
     advance = CYCLE * (velocity[1:] + velocity[:-1]) / 2 - CYCLE**2 * np.diff(acceleration) / 12
     assert np.abs(np.diff(position) - advance).max() < rounding
@@ -112,16 +112,25 @@ def test_any_commands_keep_the_limits_and_leave_no_sway(text, seed):
     assert residual(out, rates) < 1e-8
 
 
-@pytest.mark.parametrize("changes", [[], FOLLOWING])
-def test_it_computes_what_the_text_says(changes):
+ORDERS = [
+    (40, {}),
+    (160, {"bExecute": 1.0, "fTarget": 3.0}),
+    (140, {"bExecute": 1.0, "fTarget": 9.0}),
+    (120, {"bVelocity": 1.0, "fVelocityCommand": -0.4, "fL1": 5.95}),
+    (20, {"bQuickStop": 1.0}),
+]
+STICK = [
+    (100, {}),
+    (200, {"bVelocity": 1.0, "fVelocityCommand": 1.0}),
+    (60, {"fVelocityCommand": -0.5}),
+    (20, {"bQuickStop": 1.0}),
+]
+SLOW = ["limits.acceleration=0.05", "export.cycle_time=0.04"]  # pulses that grow and decline
+
+
+@pytest.mark.parametrize(("changes", "orders"), [([], ORDERS), (FOLLOWING, ORDERS), (SLOW, STICK)])
+def test_it_computes_what_the_text_says(changes, orders):
     text = planner_block(parse_spec(BAY, changes)).text
-    orders = [
-        (40, {}),
-        (160, {"bExecute": 1.0, "fTarget": 3.0}),
-        (140, {"bExecute": 1.0, "fTarget": 9.0}),
-        (120, {"bVelocity": 1.0, "fVelocityCommand": -0.4, "fL1": 5.95}),
-        (20, {"bQuickStop": 1.0}),
-    ]
     last = require_interpreted(text, CountedBlock(compiled(text)), orders)
     assert not last["bPromise"]
     assert last["fVelocity"] != 0.0
@@ -414,6 +423,30 @@ def test_a_motion_far_longer_than_a_swing_is_as_insensitive_as_a_short_one(text,
         rates = (1.0 + error) * frequencies(9.0, 1776.0)
         left = np.trapezoid(out["fAcceleration"] * np.exp(1j * rates[:, None] * time), dx=CYCLE)
         assert np.sum(np.abs(left) / rates) < 0.005
+
+
+@pytest.mark.parametrize("rope", [3.0, 9.0])
+@pytest.mark.parametrize("limits", [(2.0, 0.2, 1.0), (1.1, 0.05, 1.5), (1.1, 0.3, 0.1)])
+def test_full_speed_is_reached_and_kept_by_a_drive_that_is_slow_beside_the_swing(limits, rope):
+    """Not in jolts, as when each pulse takes what it finds and leaves nothing to the next."""
+    velocity, acceleration, jerk = limits
+    travel = [LOW, 150.0]
+    stated = f"limits={{velocity={velocity}, acceleration={acceleration}, jerk={jerk}, travel={travel}}}"
+    rates = frequencies(rope, 2000.0)
+    quickest = velocity / acceleration + acceleration / jerk + 2.0 * np.pi * np.sum(1.0 / rates)
+
+    driver = Driver(planner_block(parse_spec(BAY, [stated])).text, fL1=rope, fm2=2000.0).hold(3.0)
+    rising = driver.hold(1.5 * quickest, bVelocity=1, fVelocityCommand=velocity).outputs["fVelocity"]
+    assert np.diff(rising).min() >= -1e-12
+    assert rising[-1] == pytest.approx(velocity)
+    driver.hold(quickest, fVelocityCommand=-0.2 * velocity).hold(1.5 * quickest, bVelocity=0)
+    target = driver.outputs["fPosition"][-1] + 60.0
+    driver.hold(1.15 * (60.0 / velocity + quickest), bExecute=1, fTarget=target)
+    out = driver.outputs
+    assert (out["bDone"][-1], out["fPosition"][-1]) == (1.0, target)
+    require_limits(out, limits=(*limits, travel[1]))
+    assert residual(out, rates) < 1e-8
+    assert out["operations"].max() <= 3000
 
 
 @pytest.mark.parametrize(

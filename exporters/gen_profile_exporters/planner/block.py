@@ -8,7 +8,8 @@ on the way.
 - ``inputs.st``, ``slots.st``, ``outputs.st``: what runs in every cycle; between them the committed future,
   which is a velocity for every slot.
 - ``pulses.st`` adds pulses to it where a slot begins. Of each as much is admitted as keeps every limit over
-  the whole committed time.
+  the whole committed time. Where full speed is too much for one pulse, they grow and decline from slot to
+  slot; ``shape.st`` and ``shape_value.st`` tell what that adds to the decline that is committed already.
 - ``next_job.st``, ``planning.st``: some steps in each cycle, which find modes, kernel, motion to a target,
   stop. A plan is a linear programme: the coefficients of the velocity's spline that go farthest within the
   limits on value, difference and second difference, so that the modes and their derivatives by frequency are
@@ -49,6 +50,7 @@ FUTURE = 140  # slots of a committed future
 LONGEST = 132  # of a plan; farther targets are approached by pulses, as a stick would
 MOST = 48  # unknowns of a plan; in a longer one the slots in the middle have the same velocity
 KERNEL_SLOTS = 56
+LONG_KERNEL = 40  # slots, from which on no longer one is sought
 WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
 REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
 CHUNK = 45  # slots that a phase takes at once
@@ -65,6 +67,7 @@ AGAINST = 0.1  # share of full speed away from a new target, from which an axis 
 NEARER = 6.0  # slots at full speed, by which a new target is so much nearer that the axis brakes first
 STEP = 0.93  # share of the way to the nearest bound that it goes
 FRESH = 8  # cycles, for which the machine that is followed counts as constant
+AT_ONCE = 2.0  # of full speed, from a slot's pulse to the next: no bound
 RESERVE = 0.1  # share of the limits that only calming takes up, where live parameters change on the way
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
@@ -367,7 +370,8 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cLongestOnWay": LONGEST_ON_WAY,
         "cKernelFirst": 18,
         "cLongestKernel": _longest_kernel(c),
-        "cLongKernel": 40,
+        "cLongKernel": min(LONG_KERNEL, _longest_kernel(c)),
+        "cPulseChunk": _pulse_chunk(c),
         "cWide": WIDE,
         "cChunk": CHUNK,
         "cFuture": FUTURE,
@@ -398,6 +402,12 @@ def _longest_kernel(c: PlannerConstants) -> int:
     return min(KERNEL_SLOTS, left // (2 * conditions + 8))
 
 
+def _pulse_chunk(c: PlannerConstants) -> int:
+    """Slots of a long pulse that can be weighed in one cycle, in which pulses may be added, too."""
+    axes = len(c.axes)
+    return (WORK - _cycle_work(c) - 80 - FUTURE - 3 * axes * FUTURE) // 55
+
+
 def _real_constants(c: PlannerConstants) -> dict[str, float]:
     return {
         "cCycle": c.cycle,
@@ -407,6 +417,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cInside": RESERVE if c.rates else INSIDE,
         "cReserve": RESERVE if c.rates else 0.0,
         "cCalm": c.calm,
+        "cAtOnce": AT_ONCE,
         "cDoubt": c.doubt,
         "cSpare": SPARE,
         "cMirrorDecay": MIRROR_DECAY,

@@ -15,7 +15,7 @@ from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.proof.histories import Histories, History
+from gen_profile.proof.histories import SLOWEST, Histories, History
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
@@ -172,10 +172,15 @@ class ClosedLoop:
         )
 
     def _crossing(self, axis: int) -> float:
-        """Find the time in s that an axis needs from end to end at its greatest velocity."""
+        """Find the time in s that an axis needs from end to end by a history's slowest command, at most.
+
+        The sum of what it would need within each of its limits alone.
+        """
         limits = self._spec.limits.of(axis)
-        assert limits.velocity and limits.travel
-        return (limits.travel[1] - limits.travel[0]) / limits.velocity
+        assert limits.velocity and limits.acceleration and limits.jerk and limits.travel
+        travel = limits.travel[1] - limits.travel[0]
+        by_velocity = travel / (SLOWEST * limits.velocity)
+        return by_velocity + 2.0 * math.sqrt(travel / limits.acceleration) + math.cbrt(32.0 * travel / limits.jerk)
 
     def _hoisted(self, history: History, begins: list[int], inputs: Array) -> tuple[Sequence[int], Array]:
         """Give a row to every cycle in which live parameters change."""
