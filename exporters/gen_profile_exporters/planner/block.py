@@ -213,7 +213,7 @@ def _with_while_loops(text: str) -> str:
 
 
 def _narrow(text: str) -> str:
-    """Indent by two columns: controllers bound how long a text may be."""
+    """Indent by two columns, as a block shall be no longer than 100 kB."""
     return re.sub("(?m)^ +", lambda margin: margin[0][: len(margin[0]) // 2], text)
 
 

@@ -36,10 +36,11 @@ class Interpolant:
         return np.asarray(self.coefficients @ np.prod([np.ones(self.exponents.shape[1]), *factors], axis=0))
 
     def without(self, negligible: float) -> Interpolant:
-        """Leave out terms whose coefficients are all that small, each relative to its function's largest."""
-        scale = np.abs(self.coefficients).max(axis=1, keepdims=True)
-        kept = (np.abs(self.coefficients) > negligible * np.where(scale > 0.0, scale, 1.0)).any(axis=0)
-        return Interpolant(exponents=self.exponents[:, kept], coefficients=self.coefficients[:, kept])
+        """Leave out coefficients that small beside their function's largest, and terms of no others."""
+        least = negligible * np.abs(self.coefficients).max(axis=1, keepdims=True)
+        coefficients = np.where(np.abs(self.coefficients) > least, self.coefficients, 0.0)
+        kept = coefficients.any(axis=0)
+        return Interpolant(exponents=self.exponents[:, kept], coefficients=coefficients[:, kept])
 
 
 def interpolate(function: Callable[[Sequence[float]], Array], variables: int, degree: int) -> Interpolant:

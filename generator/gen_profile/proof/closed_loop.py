@@ -179,8 +179,12 @@ class ClosedLoop:
         limits = self._spec.limits.of(axis)
         assert limits.velocity and limits.acceleration and limits.jerk and limits.travel
         travel = limits.travel[1] - limits.travel[0]
-        by_velocity = travel / (SLOWEST * limits.velocity)
-        return by_velocity + 2.0 * math.sqrt(travel / limits.acceleration) + math.cbrt(32.0 * travel / limits.jerk)
+        alone = (
+            travel / (SLOWEST * limits.velocity),
+            2.0 * math.sqrt(travel / limits.acceleration),
+            math.cbrt(32.0 * travel / limits.jerk),
+        )
+        return sum(alone)
 
     def _hoisted(self, history: History, begins: list[int], inputs: Array) -> tuple[Sequence[int], Array]:
         """Give a row to every cycle in which live parameters change."""
