@@ -32,7 +32,7 @@ from gen_profile.verification.batch import on_processors
 from gen_profile.verification.verdict import Check
 
 _ALONE = threading.Lock()  # FMUs are no guests for threads, and a Dask worker may have several
-EVERY = 20  # case is co-simulated by FMPy, too, which must agree with the compiled loop
+EVERY = 50  # case is co-simulated by FMPy, too, which must agree with the compiled loop
 PASSED, CHECK_FAILED, CRASHED = "passed", "check failed", "crashed"
 STATUSES: dict[type[GenProfileError], str] = {
     SpecError: "faulty spec",
