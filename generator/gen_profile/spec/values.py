@@ -102,7 +102,8 @@ def found(value: object) -> str:
         case Mapping():
             return "a table"
         case list() | tuple():
-            return "an array"
+            short = len(value) <= 3 and all(type(item) in {int, float} for item in value)
+            return str(list(value)) if short else "an array"
         case _:
             return "a date or time"
 
