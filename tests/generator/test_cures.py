@@ -198,10 +198,14 @@ def test_no_hint_of_the_indirect_method_is_told_where_there_are_limits(monkeypat
     unlimited = attrs.evolve(
         choice.given_up(problem), method="indirect", cure="Allow about 1.42 s (move.duration)."
     )
-    assert choice.diagnosed(unlimited, "auto", tried=choice.given_up).cure == choice.IN_VAIN
+
+    def tried(other, *, coarse=False):
+        return choice.given_up(other)
+
+    assert choice.diagnosed(unlimited, "auto", tried=tried).cure == choice.IN_VAIN
     monkeypatch.setattr(choice, "cures", lambda *_: "It takes 4 s.")
     for method, told in (("auto", ""), ("indirect", 'Set solver.method = "auto". ')):
-        assert choice.diagnosed(unlimited, method, tried=choice.given_up).cure == f"{told}It takes 4 s."
+        assert choice.diagnosed(unlimited, method, tried=tried).cure == f"{told}It takes 4 s."
 
 
 def test_a_limit_that_the_next_run_refuses_as_implausible_is_not_named():
@@ -239,7 +243,7 @@ def test_a_value_that_takes_too_much_work_leaves_enough_for_an_ample_one():
 
 def test_a_longer_move_is_tried_without_binding_limits_first(monkeypatch):
     spec = preset_spec("paper", ["limits.sway=0.02"])
-    monkeypatch.setattr(transient_sway, "kept_by_all", lambda *_: pytest.fail("limits do not bind"))
+    monkeypatch.setattr(transient_sway, "kept_by_all", lambda *_, **__: pytest.fail("limits do not bind"))
     found = transient_sway.as_asked_next(spec, attrs.evolve(problem_of(spec), duration=8.0))
     assert found.method == "indirect"
     assert choice.keeps_limits(found)
@@ -272,7 +276,7 @@ def test_the_least_duration_is_found_in_few_steps_however_far_it_is(monkeypatch,
 def test_a_trial_begins_with_what_the_next_run_knows(monkeypatch):
     spec, begun = preset_spec("paper", ["limits.sway=0.02"]), []
 
-    def kept_by_all(_, problem, *__):
+    def kept_by_all(_, problem, *__, **___):
         begun.append(problem)
         return choice.given_up(problem)
 

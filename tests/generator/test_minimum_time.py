@@ -1,7 +1,6 @@
 """Shortest moves against bisections on linear programs, of several machines and axes."""
 
 import math
-from types import SimpleNamespace
 
 import attrs
 import numpy as np
@@ -10,10 +9,15 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import feasible, modes
 from scipy.linalg import eigvalsh
 
-from gen_profile.designs import plan as planning
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.minimum_time import PRECISION, least, least_beyond
+from gen_profile.solvers.minimum_time import (
+    PRECISION,
+    UNNOTICED,
+    least,
+    least_beyond,
+    least_corrected,
+)
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
 from gen_profile.work import OutOfWork, budget, spend
@@ -174,23 +178,25 @@ def test_the_shortest_duration_found_before_the_work_is_used_up_is_taken(search)
         search(feasible)
 
 
-def test_no_motion_is_designed_twice_for_durations_that_end_on_the_same_cycle(monkeypatch):
+def in_cycles(duration):
+    return math.ceil(1e3 * duration - 1e-6) / 1e3
+
+
+def test_no_motion_is_designed_twice_for_durations_that_end_on_the_same_cycle():
     tried = {"roughly": [], "exactly": []}
 
-    def unrest(duration, where, enough):
+    def excess(duration, where, enough):
         tried[where].append(duration)
         return -math.inf if duration > enough else math.inf
 
-    def roughly(duration):
-        return unrest(duration, "roughly", 0.049)
-
-    def exactly(duration):
-        return unrest(duration, "exactly", 0.05), SimpleNamespace(
-            spec=attrs.evolve(spec, move=attrs.evolve(spec.move, duration=duration))
-        )
-
-    spec = preset_spec("paper", ["export.cycle_time=0.001"])
-    assert planning._calm(spec, 0.048, roughly, exactly).spec.move.duration == 0.051
+    found = least_corrected(
+        lambda duration: excess(duration, "roughly", 0.049),
+        lambda duration: (excess(duration, "exactly", 0.05), duration),
+        0.048,
+        1.0,
+        in_cycles,
+    )
+    assert found == 0.051
     for durations in tried.values():
         assert durations and len(durations) == len(set(durations))
 
@@ -205,11 +211,8 @@ def test_what_few_intervals_leave_besides_is_learned_from_few_motions_on_many(co
 
     def exactly(duration):
         tried.append(duration)
-        return rest(duration), SimpleNamespace(
-            spec=attrs.evolve(spec, move=attrs.evolve(spec.move, duration=duration))
-        )
+        return rest(duration), duration
 
-    spec = preset_spec("paper")
-    found = planning._calm(spec, 2.7, lambda duration: rest(duration) + coarser, exactly)
-    assert 3.0 <= found.spec.move.duration < 3.0 + 2.0 * planning.UNNOTICED
+    found = least_corrected(lambda duration: rest(duration) + coarser, exactly, 2.7, 30.0, in_cycles)
+    assert 3.0 <= found < 3.0 + 2.0 * UNNOTICED
     assert len(tried) <= 3

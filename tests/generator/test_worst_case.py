@@ -174,9 +174,9 @@ def test_where_programs_for_more_machines_fail_the_motion_for_fewer_is_taken(mon
     problem = ranged()
     motion = choice.attempt(attrs.evolve(problem, worst_case=None, limits=LimitsSpec()))
     failed = choice.given_up(problem)
-    monkeypatch.setattr(worst_case, "_rounds", lambda *_, **__: iter([motion, failed]))
+    monkeypatch.setattr(worst_case, "_rounds", lambda *_: iter([motion, failed]))
     assert worst_case.solve(problem).optimum is motion.optimum
-    monkeypatch.setattr(worst_case, "_rounds", lambda *_, **__: iter([failed]))
+    monkeypatch.setattr(worst_case, "_rounds", lambda *_: iter([failed]))
     assert worst_case.solve(problem).optimum is None
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from contextlib import suppress
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 
 import attrs
 import numpy as np
@@ -22,7 +21,7 @@ from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct.relaxation import Relaxed
-from gen_profile.solvers.minimum_time import PRECISION, least_beyond
+from gen_profile.solvers.minimum_time import least_corrected
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
@@ -35,9 +34,6 @@ SEARCHING = 18.0  # s of work to find the shortest duration
 SPREADING = 0.6  # of the work that is left for it to find the shortest duration, all machines considered
 SPREADS = 3  # times that it is measured how much more than the nominal machine others sway on the way
 NEARLY = 2e-3  # relative, by which it may be another than was supposed
-CORRECTIONS = 3  # of how much calmer motions are on many intervals than on few
-ROUGHLY = 5e-3  # of the duration, to see on few intervals how much calmer longer motions are
-UNNOTICED = 5e-3  # logarithm of the share of the limits of residual sway that a calm motion may leave unused
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
@@ -174,64 +170,19 @@ def _shortest(spec: Spec, progress: Progress) -> Draft:
         lasting = _lasting(spec, duration)
         return _unrest(Draft(spec=lasting, solution=solution, motion=motion, solver_time=0.0))
 
-    if problem.worst_case is None:
-        return _calm(spec, shortest.duration, roughly, exactly)
-    return _calm(spec, shortest.duration, lambda duration: exactly(duration)[0], exactly)
-
-
-def _calm(
-    spec: Spec,
-    shortest: float,
-    roughly: Callable[[float], float],
-    exactly: Callable[[float], tuple[float, Draft]],
-) -> Draft:
-    """Find the shortest motion of a duration or more that leaves little enough sway.
-
-    Parameters
-    ----------
-    spec : Spec
-    shortest : float
-        s.
-    roughly, exactly : float → float, float → (float, Draft)
-        The excess of sway of a duration, on few intervals, and on as many as it takes, with the motion. What
-        they differ by hardly depends on the duration.
-    """
-    roughly, exactly = cache(roughly), cache(exactly)  # for many a duration ends on the same cycle
-    start = _in_cycles(spec, shortest)
-    best: Draft | None = None
-
-    def least(excess: Callable[[float], float], precision: float = PRECISION) -> float | None:
-        def in_cycles(duration: float) -> float:
-            return excess(_in_cycles(spec, duration))
-
-        if in_cycles(start) <= 0.0:
-            return start
-        found = least_beyond(in_cycles, start, LONGEST * start, in_cycles(start), precision)
-        return None if found is None else _in_cycles(spec, found)
-
-    duration = least(roughly, ROUGHLY)
-    for _ in range(CORRECTIONS):
-        if duration is None:
-            break
-        unrest, found = exactly(duration)
-        if unrest <= 0.0 and (best is None or duration < best.spec.move.duration):
-            best = found
-        if unrest <= 0.0 and (duration == start or unrest > -UNNOTICED):
-            break
-        beside = start if duration > start else _in_cycles(spec, (1.0 + ROUGHLY) * start)
-        falls = (roughly(duration) - roughly(beside)) / (beside - duration)
-        if not 0.0 < falls < math.inf:
-            break
-        duration = max(start, _in_cycles(spec, duration + (unrest + UNNOTICED / 2.0) / falls))
-    if best is None:
-        enough = least(lambda duration: exactly(duration)[0])
-        best = None if enough is None else exactly(enough)[1]
-    if best is None:
+    calm = least_corrected(
+        roughly if problem.worst_case is None else lambda duration: exactly(duration)[0],
+        exactly,
+        shortest.duration,
+        LONGEST * shortest.duration,
+        partial(_in_cycles, spec),
+    )
+    if calm is None:
         raise InfeasibleProblem(
             "check.residual_sway: no duration leaves so little sway on every machine of "
             "robustness.uncertain; allow more, or narrow the ranges."
         )
-    return best
+    return calm
 
 
 def _slow(spec: Spec) -> Problem:

@@ -82,7 +82,7 @@ def attempt(
     return solution
 
 
-def as_asked_next(spec: Spec, problem: Problem) -> Solution:
+def as_asked_next(spec: Spec, problem: Problem, /, *, coarse: bool = False) -> Solution:
     """Solve a problem as if a spec had its duration and limits, which may not be plausible."""
     move = attrs.evolve(spec.move, duration=problem.duration, shortest=False)
     try:
@@ -96,13 +96,22 @@ def as_asked_next(spec: Spec, problem: Problem) -> Solution:
             found = choice.keeps_limits(smooth) and _too_much(spec, smooth, ENOUGH) is None
             if found or smooth.status is Status.INFEASIBLE:
                 return smooth
-    solution = kept_by_all(spec, problem, "direct")
+    if coarse:  # whether there is a motion does not depend on what it costs
+        problem = attrs.evolve(problem, sway_weight=0.0)
+    solution = kept_by_all(spec, problem, "direct", coarse=coarse)
     if solution.optimum is None or _too_much(spec, solution, SWAY_TOLERANCE) is None:
         return solution
     return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
 
 
-def kept_by_all(spec: Spec, problem: Problem, method: SolverName, progress: Progress = untold) -> Solution:
+def kept_by_all(
+    spec: Spec,
+    problem: Problem,
+    method: SolverName,
+    progress: Progress = untold,
+    *,
+    coarse: bool = False,
+) -> Solution:
     """Solve a problem again with less sway of the nominal machine, until all of a spec's keep the limit.
 
     How much less is measured on motions on few intervals first.
@@ -114,16 +123,18 @@ def kept_by_all(spec: Spec, problem: Problem, method: SolverName, progress: Prog
         Of that spec, or with other limits, another duration, or whatever else it asks for.
     method : str
     progress : Progress
+    coarse : bool
+        On few intervals only.
     """
     if not limited(spec, problem):
+        return choice.attempt(problem, method, coarse=coarse)
+    if method == "indirect" and problem.worst_case is None:  # which knows no limits
         return choice.attempt(problem, method)
-    if problem.worst_case is None:
-        if method == "indirect":  # which knows no limits
-            return choice.attempt(problem, method)
-        coarse = _kept(spec, problem, partial(choice.attempt, method=method, coarse=True))
-        if coarse.optimum is not None and coarse.method == indirect.METHOD:
-            return coarse
-        problem = attrs.evolve(problem, sway_spread=coarse.problem.sway_spread)
+    if coarse or problem.worst_case is None:
+        found = _kept(spec, problem, partial(choice.attempt, method=method, coarse=True))
+        if coarse or found.optimum is None or found.method == indirect.METHOD:
+            return found
+        problem = attrs.evolve(problem, sway_spread=found.problem.sway_spread)
     return _kept(spec, problem, choice.directly, NEARLY_ENOUGH, progress)
 
 

@@ -20,7 +20,7 @@ from gen_profile.work import OutOfWork, budget, left, spend
 
 FACTORS = (1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
 NEAR = 1.05  # how many times a value that will not do the one that is named may be
-WORK = 20.0  # s to look for all cures
+WORK = 10.0  # s to look for all cures
 SHARE = 0.5  # of the work that is left, which one cure may take, and one duration tried
 MOST = 0.8  # likewise a longer move, which nearly always does
 WIDEST = 4.0  # times as wide as they are, all limits together are worth naming
@@ -41,11 +41,14 @@ class CandidateTest:
         Whether it is one that will do.
     welcome : Solution → bool
         Whether it is one that is better named than others near by.
+    roughly : Problem → Solution, optional
+        Quicker, to look for what will then be tried.
     """
 
     solve: Callable[[Problem], Solution]
     keeps: Callable[[Solution], bool]
     welcome: Callable[[Solution], bool]
+    roughly: Callable[[Problem], Solution] | None = None
 
     def pleases(self, problem: Problem) -> bool:
         """Whether a problem has a solution that will do and is welcome."""
@@ -61,6 +64,17 @@ class CandidateTest:
         share : float
             Of the work that is left, which one factor may take.
         """
+        if self.roughly is None:
+            return self._nearest(changed, share)
+        with budget(SHARE * left()):
+            nearest = attrs.evolve(self, solve=self.roughly)._nearest(changed, share)
+        for factor in () if nearest is None else (nearest, *(more for more in FACTORS if more > nearest)):
+            solution = _in_time(partial(self.solve, changed(factor)), share)
+            if solution is not None and self.keeps(solution):
+                return factor
+        return None
+
+    def _nearest(self, changed: Callable[[float], Problem], share: float) -> float | None:
         found: list[float] = []
         try:
             found.extend(self._ever_better(changed, share))

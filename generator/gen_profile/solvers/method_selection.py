@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from typing import Protocol
 
 import attrs
 
@@ -27,7 +28,6 @@ from gen_profile.spec.values import SolverName
 from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]
-Trial = Callable[[Problem], Solution]  # of a problem by the direct method, as the next run would solve it
 ANSWER = 24.0, 28.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 8.0  # s of work for a method
 LOOKING = 0.5  # likewise to see whether limits can be kept at all
@@ -41,6 +41,13 @@ IN_VAIN = (
 )
 PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
 RANGE = 2.0  # times the work for a whole range
+
+
+class Trial(Protocol):
+    """Solves a problem by the direct method, as the next run would, or on few intervals only."""
+
+    def __call__(self, problem: Problem, /, *, coarse: bool = False) -> Solution:
+        """Solve it."""
 
 
 def solve(problem: Problem, method: SolverName = "auto") -> Solution:
@@ -69,7 +76,7 @@ def attempt(
     problem : Problem
     method : str
     coarse : bool
-        Where limits bind, on few intervals only and from one motion; over a range, not to the last digit.
+        Where limits bind, on few intervals only; over a range, with whatever sway is left.
     near : Relaxed, optional
         A motion at which the direct method begins, in place of rest.
     """
@@ -85,9 +92,9 @@ def attempt(
     return solution if other.optimum is None and solution.optimum is None else other
 
 
-def directly(problem: Problem) -> Solution:
+def directly(problem: Problem, *, coarse: bool = False) -> Solution:
     """Solve by the direct method: where it finds a motion, so does "auto", and it is the quicker to fail."""
-    return attempt(problem, "direct")
+    return attempt(problem, "direct", coarse=coarse)
 
 
 def diagnosed(
@@ -114,7 +121,7 @@ def diagnosed(
 
 def remedy(problem: Problem, method: SolverName, welcome: Judge, tried: Trial) -> str:
     """Say which other values would let a method find a motion within the limits; nothing where none will."""
-    trial = CandidateTest(tried, keeps_limits, welcome)
+    trial = _candidate_test(tried, welcome)
     if method != "indirect" or problem.worst_case is not None:
         return cures(problem, trial)
     try:
@@ -124,6 +131,10 @@ def remedy(problem: Problem, method: SolverName, welcome: Judge, tried: Trial) -
         return ""
     found = cures(problem, trial)
     return found and f"{OTHERWISE}. {found}"
+
+
+def _candidate_test(tried: Trial, welcome: Judge = lambda _: True) -> CandidateTest:
+    return CandidateTest(tried, keeps_limits, welcome, partial(tried, coarse=True))
 
 
 def patience(problem: Problem) -> float:
@@ -156,14 +167,16 @@ def given_up(problem: Problem) -> Solution:
 
 def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution:
     """Begin near by, or at rest; where that misleads, at the motion most easily within the limits."""
-    solution = direct.solve(problem, None if near is None else near.iterate, coarse=coarse)
-    if coarse or keeps_limits(solution) or not problem.limits.stated():
-        return solution
-    other = _from_the_easiest(problem)
-    return solution if other.optimum is None else other
+    cost, _ = direct.resolve_sway_cost(problem)  # once for all motions
+    settled = attrs.evolve(problem, sway_weight=cost.beta, sway_scale=cost.gamma)
+    solution = direct.solve(settled, None if near is None else near.iterate, coarse=coarse)
+    if problem.limits.stated() and not keeps_limits(solution):
+        other = _from_the_easiest(settled, coarse=coarse)
+        solution = solution if other.optimum is None else other
+    return attrs.evolve(solution, problem=problem)
 
 
-def _from_the_easiest(problem: Problem) -> Solution:
+def _from_the_easiest(problem: Problem, *, coarse: bool) -> Solution:
     """Begin at the motion that is most easily within the limits, unless that breaks them."""
     easiest = _easiest(problem)
     if easiest is None:
@@ -172,7 +185,7 @@ def _from_the_easiest(problem: Problem) -> Solution:
         return attrs.evolve(
             easiest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, cure=WIDER
         )
-    return direct.solve(problem, easiest.iterate)
+    return direct.solve(problem, easiest.iterate, coarse=coarse)
 
 
 def _easiest(problem: Problem) -> Relaxed | None:
@@ -193,19 +206,21 @@ def _within_reach(problem: Problem) -> bool:
 def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:
     """Look for the least worst case only where the nominal machine's motion can keep the limits."""
     easiest = _easiest(problem)
-    if easiest is None or easiest.share <= NEARLY:
-        return worst_case.solve(problem, coarse=coarse)
+    if easiest is None or (easiest.share <= NEARLY and not coarse):
+        return worst_case.solve(problem)
+    if easiest.share <= NEARLY:
+        return attrs.evolve(easiest.solution, problem=problem)
     return attrs.evolve(easiest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, cure=WIDER)
 
 
 def requirements(problem: Problem, tried: Trial) -> str:
     """Say which limits would have to be wider for a motion in the duration of a problem that has none."""
-    return cures(problem, CandidateTest(tried, keeps_limits, welcome=lambda _: True), in_time=True)
+    return cures(problem, _candidate_test(tried), in_time=True)
 
 
 def sufficient_duration(problem: Problem, tried: Trial) -> str:
     """Name a duration in s, no shorter than a problem's, that will do; empty where none is found."""
-    return longer(problem, CandidateTest(tried, keeps_limits, welcome=lambda _: True)) or ""
+    return longer(problem, _candidate_test(tried)) or ""
 
 
 def minimum_time(

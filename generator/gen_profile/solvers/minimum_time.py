@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
+from typing import TypeVar
 
 from gen_profile.work import OutOfWork, budget, left
 
@@ -12,8 +14,14 @@ PRECISION = 1e-3  # relative, of the duration; what is returned is the feasible 
 STRIDE = 1.5
 BISECTING = 0.6  # share of the work that is left
 LONGER = 8.0  # from stride to stride away from a duration that is too short
+CORRECTIONS = 3
+ROUGHLY = 5e-3  # precision of rough looks, by which it is seen how fast the excess falls
+UNNOTICED = 5e-3  # excess below zero that is not worth another exact look
 BEYOND = 1.2  # times the distance to where a line through two tries crosses zero
 ASIDE = 0.4  # of the precision, by which a try lies beside where a line crosses zero, for a narrow bracket
+
+
+Found = TypeVar("Found")
 
 
 def least(
@@ -96,6 +104,63 @@ def least_beyond(
         if 0.0 < falls < math.inf:  # a little beyond where a line crosses zero
             farthest = min(farthest, stride + BEYOND * beyond / falls / short)
         found, stride = (enough, beyond), max(farthest, stride + precision)
+
+
+def least_corrected(
+    roughly: Callable[[float], float],
+    exactly: Callable[[float], tuple[float, Found]],
+    start: float,
+    most: float,
+    rounded: Callable[[float], float],
+) -> Found | None:
+    """Find what belongs to the least duration that will do, with few exact looks.
+
+    What the rough excess and the exact one differ by should hardly depend on the duration.
+
+    Parameters
+    ----------
+    roughly, exactly : float → float, float → (float, anything)
+        The excess of a duration, and what belongs to it.
+    start, most : float
+        Where to begin and to give up, in s.
+    rounded : float → float
+        Rounds up to durations that there are.
+
+    Returns
+    -------
+    anything or None
+        None where no duration up to `most` was found to do.
+    """
+    roughly, exactly = cache(roughly), cache(exactly)  # for many a duration is rounded to the same one
+    start, best = rounded(start), None
+
+    def least(excess: Callable[[float], float], precision: float = PRECISION) -> float | None:
+        def of_rounded(duration: float) -> float:
+            return excess(rounded(duration))
+
+        if of_rounded(start) <= 0.0:
+            return start
+        found = least_beyond(of_rounded, start, most, of_rounded(start), precision)
+        return None if found is None else rounded(found)
+
+    duration = least(roughly, ROUGHLY)
+    for _ in range(CORRECTIONS):
+        if duration is None:
+            break
+        excess, found = exactly(duration)
+        if excess <= 0.0 and (best is None or duration < best[0]):
+            best = duration, found
+        if excess <= 0.0 and (duration == start or excess > -UNNOTICED):
+            break
+        beside = start if duration > start else rounded((1.0 + ROUGHLY) * start)
+        falls = (roughly(duration) - roughly(beside)) / (beside - duration)
+        if not 0.0 < falls < math.inf:
+            break
+        duration = max(start, rounded(duration + (excess + UNNOTICED / 2.0) / falls))
+    if best is None:
+        duration = least(lambda duration: exactly(duration)[0])
+        return None if duration is None else exactly(duration)[1]
+    return best[1]
 
 
 def _between(

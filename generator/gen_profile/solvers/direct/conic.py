@@ -20,7 +20,7 @@ Matrix = Any  # scipy.sparse matrix or array
 TOLERANCE = 1e-10
 MAX_ITERATIONS = 60  # three times what most programs take; more only circle about what can be reached
 POSING = 1.5e-6  # s of work for each entry of the constraints
-ITERATION = 1.7e-7  # s of work for each entry, in each iteration
+ITERATION = 1e-7  # s of work for each entry, in each iteration
 
 
 class ConicStatus(Enum):

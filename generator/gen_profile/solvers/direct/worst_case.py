@@ -64,15 +64,13 @@ ACCURACY = 1e-6  # of a machine's integration, relative
 Parameters = Mapping[str, float]
 
 
-def solve(problem: Problem, *, coarse: bool = False) -> Solution:
+def solve(problem: Problem) -> Solution:
     """Minimise the worst residual sway, each load in shares of its limit, then the cost.
 
     Parameters
     ----------
     problem : Problem
         With a `worst_case`.
-    coarse : bool
-        Only about, which tells as well how much machines sway.
 
     Returns
     -------
@@ -81,7 +79,7 @@ def solve(problem: Problem, *, coarse: bool = False) -> Solution:
     """
     free = [axis for axis in range(len(problem.target)) if not _limits_effort(problem.limits.of(axis))]
     bounded = _held_back(problem, free) if free else problem
-    return attrs.evolve(_solve(bounded or problem, TRACES, coarse=coarse), problem=problem)
+    return attrs.evolve(_solve(bounded or problem, TRACES), problem=problem)
 
 
 def _limits_effort(own: AxisLimitsSpec) -> bool:
@@ -135,12 +133,12 @@ def shortest_motion(problem: Problem, guess: float | Relaxed, progress: Progress
     return None
 
 
-def _solve(problem: Problem, traces: Sequence[float], *, coarse: bool) -> Solution:
+def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
     """Go from round to round as long as work and programs allow; the last motion is the best."""
     solutions: list[Solution] = []
     try:
         with budget(EXCHANGING * left()):
-            solutions.extend(_rounds(problem, traces, coarse=coarse))
+            solutions.extend(_rounds(problem, traces))
     except OutOfWork:
         spend(0.0)
         if not solutions:
@@ -149,7 +147,7 @@ def _solve(problem: Problem, traces: Sequence[float], *, coarse: bool) -> Soluti
     return (motions or solutions)[-1]
 
 
-def _rounds(problem: Problem, traces: Sequence[float], *, coarse: bool) -> Iterator[Solution]:
+def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
     """Solve for a few machines, about, search for worse ones, and solve again with them.
 
     Where there are none, and none that sway too much between collocation points, solve exactly.
@@ -184,7 +182,7 @@ def _rounds(problem: Problem, traces: Sequence[float], *, coarse: bool) -> Itera
         worse = worse_machines(problem, worst_case, optimal_profile(solution), enough)
         asked, swaying = swaying, to_be_asked(problem, solution, swaying)
         if not worse and asked == swaying:
-            if coarse or precision < COARSE:
+            if precision < COARSE:
                 return
             precision = STEP_TOLERANCE
         tried = [*tried, *worse]
