@@ -216,3 +216,13 @@ def test_what_few_intervals_leave_besides_is_learned_from_few_motions_on_many(co
     found = least_corrected(lambda duration: rest(duration) + coarser, exactly, 2.7, 30.0, in_cycles)
     assert 3.0 <= found < 3.0 + 2.0 * UNNOTICED
     assert len(tried) <= 3
+
+
+def test_what_few_intervals_allow_and_many_do_not_is_found_beyond():
+    def exactly(duration):
+        return (-1.0 if duration > 3.2 else math.inf), duration
+
+    found = least_corrected(lambda duration: 3.0 - duration, exactly, 2.7, 30.0, in_cycles)
+    assert 3.2 < found < 3.21
+    never = least_corrected(lambda _: -1.0, lambda duration: (math.inf, duration), 2.7, 30.0, in_cycles)
+    assert never is None

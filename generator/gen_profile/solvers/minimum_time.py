@@ -150,7 +150,7 @@ def least_corrected(
         excess, found = exactly(duration)
         if excess <= 0.0 and (best is None or duration < best[0]):
             best = duration, found
-        if excess <= 0.0 and (duration == start or excess > -UNNOTICED):
+        if not math.isfinite(excess) or (excess <= 0.0 and (duration == start or excess > -UNNOTICED)):
             break
         beside = start if duration > start else rounded((1.0 + ROUGHLY) * start)
         falls = (roughly(duration) - roughly(beside)) / (beside - duration)
