@@ -25,13 +25,14 @@ from gen_profile.problem.parameter_box import Box
 from gen_profile.spec.model import Spec
 
 PHASE = 3.0  # rad of the fastest mode that a piece of time covers at most
-TURN = 2.0  # rad by which a mode's phase at the end varies over a box at first
+TURN = 2.5  # rad by which a mode's phase at the end varies over a box at first
 FEWEST_TERMS, LEAST_TERM = 4, 1e-7  # of series in parameters; what they leave out, relative
 LEAST_POWER, WIDEST = 1e-6, 0.5  # likewise, where motions change little; how wide a range counts as, relative
 PLACES = 33  # along a range, at which phases are looked at
 CLOSE = 1.03  # of the greatest sway seen: how tight a bound is wanted
 SLACK = 1e-3  # relative, by which a bound is stated higher than it was found, lest other rounding break it
 CLOSE_TO_LIMIT = 2e-3  # of the limit, likewise
+NEAR = 1e-5  # of what is allowed: a smooth motion that is as near to the axes' is near enough
 MOST_NODES = 5 * 10**8  # at which equations are evaluated in all: some twenty minutes
 FRUITLESS = 4  # rounds in a row that bring no bound nearer, after which no more are tried
 FRUITFUL = 0.8  # of what the worst bound was too high by: how far it is to come down in a round
@@ -226,7 +227,8 @@ def _prepared(spec: Spec, setpoints: SampledProfile) -> tuple[Theorem, list[floa
         spans.append(float(np.abs(np.diff(phases, axis=0)).sum(axis=0).max()))
         fastest = max(fastest, float(phases.max()))
     longest = PHASE * box.duration / fastest
-    axes = fitted(track, float(setpoints.resolution.max()), longest, watch)
+    near = NEAR * min(limit.allowed for limit in limits_of(spec))
+    axes = fitted(track, max(0.6 * float(setpoints.resolution.max()), near), longest, watch)
     middles, half = 0.5 * (ranges.upper + ranges.lower), 0.5 * (ranges.upper - ranges.lower)
     widths = np.minimum(half / np.maximum(np.abs(middles), half), WIDEST).tolist()
     parts = [2 ** _halvings(span) for span in spans]

@@ -97,14 +97,14 @@ def widened(coefficients: Ball, reach: Array | float, order: int) -> Ball:
     return Ball(coefficients[0].mid, (coefficients[0].rad + rest) * (1.0 + 1e-12))
 
 
-def fitted(track: Track, resolution: float, longest: float, watch: float) -> AxisMotion:
+def fitted(track: Track, near: float, longest: float, watch: float) -> AxisMotion:
     """Fit a motion to that of the axes: splines with as many knots as it takes.
 
     Parameters
     ----------
     track : Track
-    resolution : float
-        Spacing of the setpoints' values.
+    near : float
+        How near is near enough, in m (or rad).
     longest : float
         Of a piece in s.
     watch : float
@@ -126,7 +126,7 @@ def fitted(track: Track, resolution: float, longest: float, watch: float) -> Axi
         )
     knots = np.unique(np.concatenate([_spread(times, *part, longest) for part in pairwise(track.parts)]))
     leaps = track.parts[1:-1] * (DEGREE - 2)  # up to where only the velocity is continuous
-    allowed = np.maximum(SAGITTA * np.abs(np.diff(position, 2, axis=0)).max() / 8.0, 0.6 * resolution)
+    allowed = np.maximum(SAGITTA * np.abs(np.diff(position, 2, axis=0)).max() / 8.0, near)
     for _ in range(ROUNDS):
         inner = times[np.sort([*knots[1:-1], *leaps])]
         ends = [times[:1].repeat(DEGREE + 1), inner, times[-1:].repeat(DEGREE + 1)]
