@@ -3,13 +3,14 @@
 import json
 import multiprocessing
 from importlib.util import find_spec
+from types import SimpleNamespace
 
 import attrs
 import dask
 import pyarrow.parquet as pq
 import pytest
 from command_line import run_here
-from distributed import LocalCluster
+from distributed import KilledWorker, LocalCluster
 
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.reading import preset_text
@@ -158,43 +159,48 @@ def test_a_scheduler_without_workers_is_named(tmp_path, monkeypatch):
 
 DEADLY = """
 import multiprocessing, os
-import attrs
 from gen_profile.plants.registry import find_plant
-CRANE = find_plant("double-pendulum-crane")
-
-def equations(q_u, dq_u, q_a, dq_a, p):
-    if isinstance(p.m1, float) and p.m1 == 0.21 and multiprocessing.parent_process() is not None:
-        os._exit(1)
-    return CRANE.equations(q_u, dq_u, q_a, dq_a, p)
-
-PLANT = attrs.evolve(CRANE, equations=equations)
+PLANT = find_plant("double-pendulum-crane")
+if multiprocessing.parent_process() is not None:
+    os._exit(1)
 """
 
 
 @pytest.mark.slow
-def test_a_case_that_kills_its_process_is_a_row_and_those_beside_it_are_worked_at(tmp_path):
+def test_a_case_that_kills_its_process_is_a_row(tmp_path):
     (tmp_path / "deadly.py").write_text(DEADLY, "utf-8")
     text = preset_text("paper-beta0").replace('type = "double-pendulum-crane"', 'file = "deadly.py"')
     (tmp_path / "spec.toml").write_text(text, "utf-8")
     assert multiprocessing.parent_process() is None
-    masses = ("0.19", "0.2", "0.21", "0.22", "0.23", "0.24")  # two in a task of one worker
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
         outcome = run_here(
             "sweep",
             tmp_path / "spec.toml",
             "--vary",
-            f"plant.m1={','.join(masses)}",
+            "move.duration=3",
             "--workers",
             "1",
             "--out",
             tmp_path / "out",
         )
     assert outcome.code == 0
-    rows = pq.read_table(tmp_path / "out" / "sweep.parquet").to_pylist()
-    assert [row["status"] for row in rows] == ["crashed" if mass == "0.21" else "passed" for mass in masses]
-    assert (
-        rows[2]["reason"] == "Every process that worked at it ended: it lacks memory, or a library crashes."
-    )
+    (row,) = pq.read_table(tmp_path / "out" / "sweep.parquet").to_pylist()
+    assert row["status"] == "crashed"
+    assert row["reason"] == "Every process that worked at it ended: it lacks memory, or a library crashes."
+
+
+def test_a_case_that_kills_its_process_costs_none_of_those_worked_at_with_it(tmp_path, monkeypatch):
+    def deadly(recipe, cases):
+        if 4 in cases:
+            raise KilledWorker("run_cases", SimpleNamespace(address="a"), 3)
+        return [failed(case, values, "infeasible", "no") for case, values in cases.items()]
+
+    monkeypatch.setattr(workflow, "run_cases", deadly)
+    store = prepared(tmp_path, "move.duration=3:4:9")
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, **LOOPBACK) as cluster:
+        swept = workflow.sweep(store, scheduler=cluster.scheduler_address)
+    assert swept.statuses == {"passed": 0, "infeasible": 8, "crashed": 1}
+    assert swept.reasons["crashed"].startswith("case 4: Every process that worked at it ended")
 
 
 @pytest.mark.parametrize(
