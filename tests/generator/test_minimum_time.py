@@ -9,6 +9,8 @@ from generator.crane_problems import CRANE, crane_problem
 from generator.oracles.crane_linear_program import feasible, modes
 from scipy.linalg import eigvalsh
 
+from gen_profile.designs import plan as planning
+from gen_profile.errors import CosimulationError
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.minimum_time import (
@@ -226,3 +228,14 @@ def test_what_few_intervals_allow_and_many_do_not_is_found_beyond():
     assert 3.2 < found < 3.21
     never = least_corrected(lambda _: -1.0, lambda duration: (math.inf, duration), 2.7, 30.0, in_cycles)
     assert never is None
+
+
+def test_a_motion_that_no_machine_can_follow_is_passed_over(monkeypatch):
+    """A hoist without limits flings the load about in the shortest motion."""
+    found = planning.draft(preset_spec("paper"))
+
+    def flung(*_):
+        raise CosimulationError("The motion cannot be integrated beyond 2.565 s.")
+
+    monkeypatch.setattr(planning, "evaluate", flung)
+    assert planning._unrest(found) == math.inf

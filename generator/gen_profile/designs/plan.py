@@ -12,7 +12,7 @@ import numpy as np
 
 from gen_profile.designs import transient_sway
 from gen_profile.designs.shape import shaped_motion
-from gen_profile.errors import InfeasibleProblem, LimitViolation, SolverDiverged
+from gen_profile.errors import CosimulationError, InfeasibleProblem, LimitViolation, SolverDiverged
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, share_of_residual_sway
 from gen_profile.motion.profile import Profile, grid_length, grid_times
 from gen_profile.problem.limits import SWAY_TOLERANCE, breaches, rounded_up
@@ -209,7 +209,10 @@ def _unrest(found: Draft) -> float:
     """Tell how much more sway a draft leaves than it should, as a logarithm; infinite without a motion."""
     if found.motion is None or found.solution is None:
         return math.inf
-    evaluation, limit = found.evaluation, found.solution.problem.limits.sway
+    try:
+        evaluation, limit = found.evaluation, found.solution.problem.limits.sway
+    except CosimulationError:  # which no machine can follow
+        return math.inf
     if limit is not None and evaluation.figures["sway_transient_worst_m"] > SWAY_TOLERANCE * limit:
         return math.inf
     share = share_of_residual_sway(found.spec, evaluation)
