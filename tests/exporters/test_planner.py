@@ -306,6 +306,19 @@ def test_a_machine_of_one_mode_without_live_parameters():
     assert residual(out, np.sqrt([spec.plant.parameters["g"] / rope])) < 1e-8
 
 
+@pytest.mark.parametrize("rope", [1.0, 2.3, 13.0])
+def test_a_rope_may_be_live_from_short_to_long(rope):
+    text = planner_block(parse_spec(BAY, ["planner.live={L1=[1.0, 14.0], m2=[0.0, 2000.0]}"])).text
+    out = (
+        Driver(text, fL1=rope, fm2=700.0, fActPosition=0.0)
+        .hold(2.0)
+        .hold(30.0, bExecute=1, fTarget=5.0)
+        .outputs
+    )
+    assert out["fPosition"][-1] == 5.0
+    assert residual(out, frequencies(rope, 700.0)) < 1e-6
+
+
 CHAIN = ["plant.c1=0", "plant.c2=0", "plant.c3=0", "planner.live={m3=[0.8, 1.5]}", "limits.velocity=0.6"]
 CHAIN += ["limits.acceleration=1.5", "limits.jerk=20.0", "limits.travel=[-2.0, 2.0]", "check.uncertain={}"]
 

@@ -153,6 +153,8 @@ class PlannerConstants:
         full speed; 0 is no condition.
     degrees : int
         Chebyshev polynomials per live parameter.
+    bends : sequence of float
+        Of each live parameter t from -1 to 1: k of (t + k) / (1 + k t), of which they are.
     exponents : (parameters, terms) array of int
         Which of them are multiplied.
     modes : int
@@ -174,6 +176,7 @@ class PlannerConstants:
     doubt: float
     second_order: Array
     degrees: int
+    bends: Sequence[float]
     exponents: NDArray[np.int64]
     modes: int
     model: Array
@@ -443,6 +446,7 @@ def _arrays(c: PlannerConstants) -> dict[str, Sequence[float] | Array]:
         "cSecondOrder": c.second_order,
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
+        "cLiveBend": c.bends or (0.0,),
         "cLiveDrift": c.drift or (0.0,),
         "cLiveStep": [c.cycle * c.rates.get(name, 0.0) * (1.0 + ROUNDING) for name in lives],
         "cModel": c.model.ravel(),

@@ -1,4 +1,8 @@
-"""Chebyshev interpolation in any number of variables, each from −1 to 1."""
+"""Chebyshev interpolation in any number of variables, each from −1 to 1.
+
+A variable t may be bent to (t + k) / (1 + k t), which leaves the ends where they are; 1 / (1 + k t) is a
+straight line in it.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+STRAIGHT = 1e-6  # relative difference of two slopes that counts as none
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class Interpolant:
@@ -19,19 +25,22 @@ class Interpolant:
 
     Attributes
     ----------
+    bends : sequence of float
+        k of each variable.
     exponents : (variables, terms) array of int
         Degree of the polynomial of each variable in each term.
     coefficients : (functions, terms) array
     """
 
+    bends: Sequence[float]
     exponents: NDArray[np.int64]
     coefficients: Array
 
     def __call__(self, point: Sequence[float]) -> Array:
         """Evaluate all functions at a point, as the block does."""
         factors = [
-            chebyshev.chebvander(np.array([x]), int(degrees.max()))[0, degrees]
-            for x, degrees in zip(point, self.exponents, strict=True)
+            chebyshev.chebvander(np.array([(t + k) / (1.0 + k * t)]), int(degrees.max()))[0, degrees]
+            for t, k, degrees in zip(point, self.bends, self.exponents, strict=True)
         ]
         return np.asarray(self.coefficients @ np.prod([np.ones(self.exponents.shape[1]), *factors], axis=0))
 
@@ -40,25 +49,40 @@ class Interpolant:
         least = negligible * np.abs(self.coefficients).max(axis=1, keepdims=True)
         coefficients = np.where(np.abs(self.coefficients) > least, self.coefficients, 0.0)
         kept = coefficients.any(axis=0)
-        return Interpolant(exponents=self.exponents[:, kept], coefficients=coefficients[:, kept])
+        return attrs.evolve(self, exponents=self.exponents[:, kept], coefficients=coefficients[:, kept])
 
 
-def interpolate(function: Callable[[Sequence[float]], Array], variables: int, degree: int) -> Interpolant:
+def bend(values: Sequence[float]) -> float:
+    """Find k: 1 / (1 + k t), scaled and shifted, takes these values at t = −1, 0 and 1; 0 if none does."""
+    first, second = np.diff(values)
+    if not first * second > 0.0 or abs(first - second) <= STRAIGHT * abs(first + second):
+        return 0.0
+    return float((first - second) / (first + second))
+
+
+def interpolate(
+    function: Callable[[Sequence[float]], Array], bends: Sequence[float], degree: int
+) -> Interpolant:
     """Interpolate functions at the Chebyshev points of a degree.
 
     Parameters
     ----------
     function : point → (functions,) array
-    variables, degree : int
+    bends : sequence of float
+        k of each variable.
+    degree : int
     """
+    variables = len(bends)
     nodes = chebyshev.chebpts1(degree + 1)
-    values = np.array([function(point) for point in product(nodes, repeat=variables)])
+    straight = [(nodes - k) / (1.0 - k * nodes) for k in bends]
+    values = np.array([function(point) for point in product(*straight)])
     table = values.T.reshape(-1, *(degree + 1,) * variables)
     inverse = np.linalg.inv(chebyshev.chebvander(nodes, degree))
     for axis in range(1, variables + 1):
         table = np.moveaxis(np.tensordot(inverse, table, axes=(1, axis)), 0, axis)
     exponents = np.array(list(product(range(degree + 1), repeat=variables)), dtype=np.int64)
     return Interpolant(
+        bends=bends,
         exponents=exponents.T.reshape(variables, (degree + 1) ** variables),
         coefficients=table.reshape(len(table), -1),
     )

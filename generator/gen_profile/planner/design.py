@@ -82,6 +82,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         doubt=float(frequency_errors(spec).max(initial=0.0)),
         second_order=_second_order(spec, found),
         degrees=int(interpolant.exponents.max(initial=0)) + 1,
+        bends=interpolant.bends,
         exponents=interpolant.exponents,
         modes=found.modes,
         model=interpolant.coefficients,

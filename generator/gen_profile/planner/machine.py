@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.planner.chebyshev import Array, Interpolant, interpolate
+from gen_profile.planner.chebyshev import Array, Interpolant, bend, interpolate
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.problem.linearization import Linearization, linearize
 from gen_profile.spec.model import Spec
@@ -76,13 +76,16 @@ def live_modes(spec: Spec) -> LiveModes:
     modes = len(_linearized(spec, [0.0] * len(live)).distinct_frequencies)
     between = list(product(np.linspace(-1.0, 1.0, 6), repeat=len(live)))
     exact = [_linearized(spec, point).distinct_frequencies for point in between]
-    for degree in DEGREES if live else (0,):
-        interpolant = interpolate(invariants, len(live), degree).without(NEGLIGIBLE)
+    axes = np.eye(len(live))
+    bent = [bend([invariants((t * axis).tolist())[0] for t in (-1.0, 0.0, 1.0)]) for axis in axes]
+    straight = [0.0] * len(live)
+    for degree, bends in product(DEGREES if live else (0,), (bent, straight)):
+        interpolant = interpolate(invariants, bends, degree).without(NEGLIGIBLE)
         found = [frequencies(interpolant(point)[:modes]) for point in between]
         error = float(np.abs(np.array(found) / exact - 1.0).max())
-        if error <= ACCURACY or interpolant.exponents.shape[1] > MOST_TERMS:
+        if error <= ACCURACY and interpolant.exponents.shape[1] <= MOST_TERMS:
             break
-    if error > ACCURACY or interpolant.exponents.shape[1] > MOST_TERMS:
+    else:
         raise SpecError(
             f"planner.live: over these ranges the frequencies would be known to {error:.1g} only; "
             "narrow the ranges, or write a block for each part of them."
