@@ -1,12 +1,26 @@
 """The planner block, executed: against a strict interpreter, linear programming, and a nonlinear crane."""
 
 import csv
-from functools import cache
 
 import numpy as np
 import pytest
 from command_line import run_here
 from counted_block import CountedBlock, compile_counting, require_interpreted
+from driven_block import (
+    ACCELERATION,
+    BAY,
+    CYCLE,
+    HIGH,
+    JERK,
+    LOW,
+    VELOCITY,
+    Driver,
+    G,
+    compiled,
+    frequencies,
+    require_limits,
+    residual,
+)
 from farthest_motion import farthest
 from scipy.integrate import solve_ivp
 
@@ -18,68 +32,12 @@ from gen_profile.spec.reading import parse_spec, preset_spec
 
 pytestmark = pytest.mark.slow
 
-G = 9.81
-VELOCITY, ACCELERATION, JERK, LOW, HIGH = 1.0, 0.3, 1.0, 0.0, 40.0
-CYCLE = 0.004
-BAY = f"""
-name = "bay 3"
-plant = {{ type = "double-pendulum-crane", m1 = 350.0, m2 = 2000.0, L1 = 6.0, L2 = 1.5 }}
-move = {{ distance = 8.0, duration = 14.0 }}
-limits = {{ velocity = {VELOCITY}, acceleration = {ACCELERATION}, jerk = {JERK}, travel = [{LOW}, {HIGH}] }}
-planner = {{ live = {{ L1 = [3.0, 9.0], m2 = [0.0, 2000.0] }} }}
-export = {{ cycle_time = {CYCLE} }}
-"""
 FOLLOWING = ["planner.live_rate={L1=0.25}", "check.residual_sway=0.05"]  # the block that has most to do
 
 
 @pytest.fixture(scope="module")
 def text():
     return planner_block(parse_spec(BAY)).text
-
-
-compiled = cache(compile_counting)
-
-
-class Driver:
-    """An instance that is given inputs by name, and all that it issued."""
-
-    def __init__(self, text, **inputs):
-        self.block = CountedBlock(compiled(text), **inputs)
-        self.parts = []
-
-    def hold(self, seconds, **inputs):
-        """Hold inputs; bExecute is an edge."""
-        self.parts.append(self.block.hold(max(1, round(seconds / CYCLE)), **inputs))
-        return self
-
-    @property
-    def outputs(self):
-        return {name: np.concatenate([part[name] for part in self.parts]) for name in self.block.outputs}
-
-
-def frequencies(L1, m2, m1=350.0, L2=1.5):
-    mass = np.array([[(m1 + m2) * L1**2, m2 * L1 * L2], [m2 * L1 * L2, m2 * L2**2]])
-    stiffness = np.diag([(m1 + m2) * G * L1, m2 * G * L2])
-    return np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)
-
-
-def require_limits(out, rounding=1e-9, limits=(VELOCITY, ACCELERATION, JERK, HIGH)):
-    velocity, acceleration, position = out["fVelocity"], out["fAcceleration"], out["fPosition"]
-    assert np.abs(velocity).max() <= limits[0] + rounding
-    assert np.abs(acceleration).max() <= limits[1] + rounding
-    assert np.abs(np.diff(acceleration)).max() <= (limits[2] + rounding) * CYCLE
-    assert position.min() >= LOW - rounding
-    assert position.max() <= limits[3] + rounding
-    # the three agree: acceleration is linear within a slot
-    advance = CYCLE * (velocity[1:] + velocity[:-1]) / 2 - CYCLE**2 * np.diff(acceleration) / 12
-    assert np.abs(np.diff(position) - advance).max() < rounding
-
-
-def residual(out, rates):
-    """Amplitude that each mode is left with, relative to that of a step to the greatest velocity."""
-    turned = np.exp(1j * np.outer(rates, CYCLE * np.arange(len(out["fVelocity"]))))
-    left = np.trapezoid(out["fAcceleration"] * turned, dx=CYCLE)
-    return np.abs(left).max() / max(np.abs(out["fVelocity"]).max(), 1e-3)
 
 
 def random_history(text, seed):
@@ -306,19 +264,6 @@ def test_a_machine_of_one_mode_without_live_parameters():
     assert residual(out, np.sqrt([spec.plant.parameters["g"] / rope])) < 1e-8
 
 
-@pytest.mark.parametrize("rope", [1.0, 2.3, 13.0])
-def test_a_rope_may_be_live_from_short_to_long(rope):
-    text = planner_block(parse_spec(BAY, ["planner.live={L1=[1.0, 14.0], m2=[0.0, 2000.0]}"])).text
-    out = (
-        Driver(text, fL1=rope, fm2=700.0, fActPosition=0.0)
-        .hold(2.0)
-        .hold(30.0, bExecute=1, fTarget=5.0)
-        .outputs
-    )
-    assert out["fPosition"][-1] == 5.0
-    assert residual(out, frequencies(rope, 700.0)) < 1e-6
-
-
 CHAIN = ["plant.c1=0", "plant.c2=0", "plant.c3=0", "planner.live={m3=[0.8, 1.5]}", "limits.velocity=0.6"]
 CHAIN += ["limits.acceleration=1.5", "limits.jerk=20.0", "limits.travel=[-2.0, 2.0]", "check.uncertain={}"]
 
@@ -415,51 +360,6 @@ def test_the_command_line_writes_and_executes_a_block(tmp_path):
     )
     assert float(rows[-1]["position_m"]) > 4.5
     assert rows[-1]["velocity_m_per_s"] == "0.0"
-
-
-@pytest.mark.parametrize("stops", [False, True])
-def test_a_motion_far_longer_than_a_swing_is_as_insensitive_as_a_short_one(text, stops):
-    """Its frequencies differ by 2.5 %, and what sways in the beginning is not left until it brakes."""
-    driver = Driver(text, fL1=9.0, fm2=1776.0, fActPosition=1.0).hold(2.0)
-    driver.hold(40.0, bExecute=1, fTarget=39.0, fVelocityLimit=0.39)
-    begins = driver.outputs["fPosition"][-1]
-    out = driver.hold(75.0, bStop=float(stops)).outputs
-    require_limits(out)
-    assert not out["bBusy"][-1]
-    if stops:
-        assert abs(out["fPosition"][-1] - begins) < 2.0
-        assert not out["bBusy"][round(52.0 / CYCLE)]
-    else:
-        assert out["fPosition"][-1] == 39.0
-    time = CYCLE * np.arange(len(out["fAcceleration"]))
-    for error in (-0.025, 0.025):
-        rates = (1.0 + error) * frequencies(9.0, 1776.0)
-        left = np.trapezoid(out["fAcceleration"] * np.exp(1j * rates[:, None] * time), dx=CYCLE)
-        assert np.sum(np.abs(left) / rates) < 0.005
-
-
-@pytest.mark.parametrize("rope", [3.0, 9.0])
-@pytest.mark.parametrize("limits", [(2.0, 0.2, 1.0), (1.1, 0.05, 1.5), (1.1, 0.3, 0.1)])
-def test_full_speed_is_reached_and_kept_by_a_drive_that_is_slow_beside_the_swing(limits, rope):
-    """Not in jolts, as when each pulse takes what it finds and leaves nothing to the next."""
-    velocity, acceleration, jerk = limits
-    travel = [LOW, 150.0]
-    stated = f"limits={{velocity={velocity}, acceleration={acceleration}, jerk={jerk}, travel={travel}}}"
-    rates = frequencies(rope, 2000.0)
-    quickest = velocity / acceleration + acceleration / jerk + 2.0 * np.pi * np.sum(1.0 / rates)
-
-    driver = Driver(planner_block(parse_spec(BAY, [stated])).text, fL1=rope, fm2=2000.0).hold(3.0)
-    rising = driver.hold(1.5 * quickest, bVelocity=1, fVelocityCommand=velocity).outputs["fVelocity"]
-    assert np.diff(rising).min() >= -1e-12
-    assert rising[-1] == pytest.approx(velocity)
-    driver.hold(quickest, fVelocityCommand=-0.2 * velocity).hold(1.5 * quickest, bVelocity=0)
-    target = driver.outputs["fPosition"][-1] + 60.0
-    driver.hold(1.15 * (60.0 / velocity + quickest), bExecute=1, fTarget=target)
-    out = driver.outputs
-    assert (out["bDone"][-1], out["fPosition"][-1]) == (1.0, target)
-    require_limits(out, limits=(*limits, travel[1]))
-    assert residual(out, rates) < 1e-8
-    assert out["operations"].max() <= 3000
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,73 @@
+"""The planner block on long ways and long ropes, and with drives that are slow beside the swing."""
+
+import numpy as np
+import pytest
+from driven_block import BAY, CYCLE, LOW, Driver, frequencies, require_limits, residual
+
+from gen_profile.planner.design import planner_block
+from gen_profile.spec.reading import parse_spec
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def text():
+    return planner_block(parse_spec(BAY)).text
+
+
+@pytest.mark.parametrize("stops", [False, True])
+def test_a_motion_far_longer_than_a_swing_is_as_insensitive_as_a_short_one(text, stops):
+    """Its frequencies differ by 2.5 %, and what sways in the beginning is not left until it brakes."""
+    driver = Driver(text, fL1=9.0, fm2=1776.0, fActPosition=1.0).hold(2.0)
+    driver.hold(40.0, bExecute=1, fTarget=39.0, fVelocityLimit=0.39)
+    begins = driver.outputs["fPosition"][-1]
+    out = driver.hold(75.0, bStop=float(stops)).outputs
+    require_limits(out)
+    assert not out["bBusy"][-1]
+    if stops:
+        assert abs(out["fPosition"][-1] - begins) < 2.0
+        assert not out["bBusy"][round(52.0 / CYCLE)]
+    else:
+        assert out["fPosition"][-1] == 39.0
+    time = CYCLE * np.arange(len(out["fAcceleration"]))
+    for error in (-0.025, 0.025):
+        rates = (1.0 + error) * frequencies(9.0, 1776.0)
+        left = np.trapezoid(out["fAcceleration"] * np.exp(1j * rates[:, None] * time), dx=CYCLE)
+        assert np.sum(np.abs(left) / rates) < 0.005
+
+
+@pytest.mark.parametrize("rope", [3.0, 9.0])
+@pytest.mark.parametrize("limits", [(2.0, 0.2, 1.0), (1.1, 0.05, 1.5), (1.1, 0.3, 0.1)])
+def test_full_speed_is_reached_and_kept_by_a_drive_that_is_slow_beside_the_swing(limits, rope):
+    """Not in jolts, as when each pulse takes what it finds and leaves nothing to the next."""
+    velocity, acceleration, jerk = limits
+    travel = [LOW, 150.0]
+    stated = f"limits={{velocity={velocity}, acceleration={acceleration}, jerk={jerk}, travel={travel}}}"
+    rates = frequencies(rope, 2000.0)
+    quickest = velocity / acceleration + acceleration / jerk + 2.0 * np.pi * np.sum(1.0 / rates)
+
+    driver = Driver(planner_block(parse_spec(BAY, [stated])).text, fL1=rope, fm2=2000.0).hold(3.0)
+    rising = driver.hold(1.5 * quickest, bVelocity=1, fVelocityCommand=velocity).outputs["fVelocity"]
+    assert np.diff(rising).min() >= -1e-12
+    assert rising[-1] == pytest.approx(velocity)
+    driver.hold(quickest, fVelocityCommand=-0.2 * velocity).hold(1.5 * quickest, bVelocity=0)
+    target = driver.outputs["fPosition"][-1] + 60.0
+    driver.hold(1.15 * (60.0 / velocity + quickest), bExecute=1, fTarget=target)
+    out = driver.outputs
+    assert (out["bDone"][-1], out["fPosition"][-1]) == (1.0, target)
+    require_limits(out, limits=(*limits, travel[1]))
+    assert residual(out, rates) < 1e-8
+    assert out["operations"].max() <= 3000
+
+
+@pytest.mark.parametrize("rope", [1.0, 2.3, 13.0])
+def test_a_rope_may_be_live_from_short_to_long(rope):
+    text = planner_block(parse_spec(BAY, ["planner.live={L1=[1.0, 14.0], m2=[0.0, 2000.0]}"])).text
+    out = (
+        Driver(text, fL1=rope, fm2=700.0, fActPosition=0.0)
+        .hold(2.0)
+        .hold(30.0, bExecute=1, fTarget=5.0)
+        .outputs
+    )
+    assert out["fPosition"][-1] == 5.0
+    assert residual(out, frequencies(rope, 700.0)) < 1e-6
