@@ -156,19 +156,26 @@ def _shortest(spec: Spec, progress: Progress) -> Draft:
             f"move.duration: no duration keeps the limits and brings the load to rest. {cure}"
         )
 
+    def unrest(solution: Solution, duration: float) -> float:
+        motion = None if solution.optimum is None else optimal_profile(solution)
+        return _unrest(
+            Draft(spec=_lasting(spec, duration), solution=solution, motion=motion, solver_time=0.0)
+        )
+
+    # an axis without limits may fling a load about
+    near = shortest if unrest(shortest.solution, shortest.duration) < math.inf else None
+
     def exactly(duration: float) -> tuple[float, Draft]:
         progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
-        found = _solved(_lasting(spec, duration), spread=problem.sway_spread, near=shortest)
+        found = _solved(_lasting(spec, duration), spread=problem.sway_spread, near=near)
         return _unrest(found), found
 
     def roughly(duration: float) -> float:
         solution = shortest.solution
         if duration > _in_cycles(spec, shortest.duration):
             timed = attrs.evolve(problem, duration=duration)
-            solution = choice.attempt(timed, "direct", coarse=True, near=shortest)
-        motion = None if solution.optimum is None else optimal_profile(solution)
-        lasting = _lasting(spec, duration)
-        return _unrest(Draft(spec=lasting, solution=solution, motion=motion, solver_time=0.0))
+            solution = choice.attempt(timed, "direct", coarse=True, near=near)
+        return unrest(solution, duration)
 
     calm = least_corrected(
         roughly if problem.worst_case is None else lambda duration: exactly(duration)[0],
