@@ -143,6 +143,8 @@ class PlannerConstants:
         By how much each may change before it is taken over anew.
     rates : mapping of str to float
         How fast some may change on the way, per s.
+    lowers : mapping of str to float
+        Of live parameters that lower all loads by as much as they grow: the inverse of gravity, in s²/m.
     calm : float
         m, sway up to which nothing is done about it.
     doubt : float
@@ -172,6 +174,7 @@ class PlannerConstants:
     nominal: tuple[float, ...]
     drift: tuple[float, ...]
     rates: Mapping[str, float]
+    lowers: Mapping[str, float]
     calm: float
     doubt: float
     second_order: Array
@@ -394,7 +397,7 @@ def _conditions(c: PlannerConstants) -> int:
 
 def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
-    following = 30 + 4 * c.modes * (4 * c.modes + 15)
+    following = 60 + 4 * c.modes * (4 * c.modes + 17)
     return (120 + (following if c.rates else 0)) * len(c.axes) - 35
 
 
@@ -444,6 +447,7 @@ def _arrays(c: PlannerConstants) -> dict[str, Sequence[float] | Array]:
         "cTargetLow": [axis.targets[0] for axis in c.axes],
         "cTargetHigh": [axis.targets[1] for axis in c.axes],
         "cSecondOrder": c.second_order,
+        **({"cLowers": [c.lowers.get(name, 0.0) for name in lives]} if c.rates else {}),
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
         "cLiveBend": c.bends or (0.0,),

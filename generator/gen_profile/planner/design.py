@@ -15,6 +15,7 @@ from gen_profile.planner.machine import (
     frequencies,
     frequency_errors,
     live_modes,
+    lowered,
     planned_axes,
     second_order_sway,
 )
@@ -78,6 +79,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         nominal=tuple(_nominal(spec, name) for name in found.live),
         drift=tuple(STEADY * high for _, high in found.live.values()),
         rates=spec.planner.live_rate,
+        lowers=lowered(spec),
         calm=CALM * min(spec.check.residual_sway.values()),
         doubt=float(frequency_errors(spec).max(initial=0.0)),
         second_order=_second_order(spec, found),

@@ -229,8 +229,23 @@ def _refuse_rates(spec: Spec) -> None:
             raise SpecError(f"planner.live_rate.{name}: no rope's length; only these may change on the way.")
 
 
+def lowered(spec: Spec) -> dict[str, float]:
+    """Of live parameters with a rate that lower all loads by as much as they grow: the inverse of gravity."""
+    gravity = spec.plant.parameters.get("g")
+    if not gravity:
+        return {}
+    lowering = {name: _lowering(spec, name) for name in spec.planner.live_rate}
+    return {name: 1.0 / gravity for name, by in lowering.items() if np.allclose(by, 1.0, rtol=0.0, atol=SAME)}
+
+
 def _is_length(spec: Spec, name: str) -> bool:
     """Whether a load comes down by as much as a parameter grows, all hanging still."""
+    hangs = spec.planner.live[name][0] > 0.0 or name not in spec.plant.parameters
+    return hangs and abs(_lowering(spec, name)[-1] - 1.0) <= SAME
+
+
+def _lowering(spec: Spec, name: str) -> Array:
+    """By how much each load comes down as a live parameter grows, relative to that, all hanging still."""
     plant, (low, high) = spec.machine(), spec.planner.live[name]
     still = [0.0] * len(plant.unactuated)
     heights = []
@@ -240,9 +255,8 @@ def _is_length(spec: Spec, name: str) -> bool:
             for axis, start in zip(plant.actuated, spec.move.start, strict=True)
         ]
         parameters = SimpleNamespace(**{**spec.plant.parameters, name: value})
-        heights.append(float(plant.outputs(still, places, parameters).height[-1]))
-    hangs = low > 0.0 or name not in spec.plant.parameters
-    return hangs and abs(heights[0] - heights[1] - (high - low)) <= 1e-9 * high
+        heights.append(np.array(plant.outputs(still, places, parameters).height, dtype=np.float64))
+    return np.asarray((heights[0] - heights[1]) / (high - low))
 
 
 def _refuse_others(spec: Spec) -> None:
