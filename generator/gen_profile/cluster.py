@@ -12,6 +12,7 @@ from typing import Any
 
 import dask
 from distributed import Client, LocalCluster
+from tornado.ioloop import PeriodicCallback
 
 from gen_profile.artefacts.manifest import versions
 from gen_profile.errors import SpecError
@@ -24,6 +25,7 @@ UNWATCHED = {
     "distributed.admin.system-monitor.interval": "10s",
 }
 ANSWER_TIME = "30s"  # that a scheduler and its first worker have to answer
+RENEWAL = 5000  # ms between looks for processes that ended while they started, which Dask gives up
 
 
 @contextmanager
@@ -39,6 +41,7 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
         if scheduler is None:
             with _undisturbed():
                 cluster = stack.enter_context(_local_cluster(workers))
+            _keep_up(cluster, workers, stack)
         else:
             cluster = scheduler
         try:
@@ -70,6 +73,13 @@ def _local_cluster(workers: int) -> LocalCluster:
             scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # of its health page, which stays
             silence_logs=logging.CRITICAL,
         )
+
+
+def _keep_up(cluster: LocalCluster, workers: int, stack: ExitStack) -> None:
+    """Have processes that Dask gave up started anew, until the stack is closed."""
+    renewal = PeriodicCallback(lambda: cluster.scale(workers), RENEWAL)
+    cluster.loop.add_callback(renewal.start)
+    stack.callback(cluster.loop.add_callback, renewal.stop)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 import json
 import multiprocessing
+import os
 from importlib.util import find_spec
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ import pytest
 from command_line import run_here
 from distributed import KilledWorker, LocalCluster
 
+from gen_profile import cluster
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.reading import preset_text
 from gen_profile.sweep import case as sweep_case
@@ -30,6 +32,22 @@ QUICK = ("--preset", "paper-beta0", "--set", "export.cycle_time=0.01")
 def prepared(folder, *axes, overrides=(), formats=("csv",)):
     text = (preset_text("paper-beta0"), "paper-beta0", folder)
     return prepare(text, ("export.cycle_time=0.01", *overrides), parse_grid(axes), formats, folder)
+
+
+# Processes
+
+
+@pytest.mark.slow
+def test_a_process_that_is_given_up_is_started_anew(monkeypatch):
+    """As is one that ends while it starts: no case may wait for it for ever."""
+    monkeypatch.setattr(cluster, "RENEWAL", 200)
+    with (
+        dask.config.set({"distributed.deploy.lost-worker-timeout": "1s"}),
+        cluster.client_of(None, 1) as client,
+    ):
+        first = client.submit(os.getpid, pure=False).result()
+        client.sync(client.cluster.workers[0].close)
+        assert client.submit(os.getpid, pure=False).result() != first
 
 
 # Cases
