@@ -71,7 +71,7 @@ def test_any_commands_keep_the_limits_and_leave_no_sway(text, seed):
 
 
 ORDERS = [
-    (40, {}),
+    (80, {}),
     (160, {"bExecute": 1.0, "fTarget": 3.0}),
     (140, {"bExecute": 1.0, "fTarget": 9.0}),
     (120, {"bVelocity": 1.0, "fVelocityCommand": -0.4, "fL1": 5.95}),
@@ -436,3 +436,11 @@ def test_a_fault_in_the_spec_is_told_with_its_place(changes, words):
 def test_a_machine_that_it_does_not_take_is_refused(preset, changes, words):
     with pytest.raises(SpecError, match=words):
         planner_block(preset_spec(preset, changes))
+
+
+def test_a_live_parameter_named_as_what_the_block_has_is_refused(tmp_path, request):
+    machine = (request.config.rootpath / "examples/inclined_crane.py").read_text("utf-8")
+    (tmp_path / "crane.py").write_text(machine.replace("p.L", "p.half").replace('"L"', '"half"'), "utf-8")
+    changes = ['plant={file="crane.py"}', "planner.live={half=[2.0, 5.0]}", "check.residual_sway=0.1"]
+    with pytest.raises(SpecError, match=r"planner\.live\.half: the block has an fhalf of its own"):
+        planner_block(parse_spec(BAY, changes, folder=tmp_path))

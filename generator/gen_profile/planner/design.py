@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Sequence
 
 import attrs
@@ -20,8 +22,14 @@ from gen_profile.planner.machine import (
     second_order_sway,
 )
 from gen_profile.spec.model import Spec
-from gen_profile_exporters.planner.block import SLOTS_PER_PERIOD, AxisConstants, PlannerConstants, block_text
+from gen_profile_exporters.planner.block import (
+    SLOTS_PER_PERIOD,
+    AxisConstants,
+    PlannerConstants,
+    block_text,
+)
 
+DECLARED = re.compile(r"(?m)^ +(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot
 STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
 CALM = 0.1  # of the allowed sway, which the block leaves as it is
@@ -89,9 +97,13 @@ def planner_block(spec: Spec) -> PlannerBlock:
         modes=found.modes,
         model=interpolant.coefficients,
     )
+    text = block_text(constants)
+    declared = Counter(name.lower() for name in DECLARED.findall(text))  # the language has one case only
+    if taken := [name for name in found.live if declared[f"f{name}".lower()] > 1]:
+        raise SpecError(*(f"planner.live.{name}: the block has an f{name} of its own." for name in taken))
     return PlannerBlock(
         filename=f"{spec.name}.st",
-        text=block_text(constants),
+        text=text,
         modes=found.modes,
         frequency_error=found.error,
     )
