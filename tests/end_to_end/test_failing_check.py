@@ -161,7 +161,7 @@ def test_a_run_that_is_interrupted_while_it_compiles_can_be_repeated(tmp_path):
 
 
 def test_an_interruption_that_compiled_code_turns_into_its_own_error_is_one(tmp_path, monkeypatch):
-    def solve(*_):
+    def solve(*_, **__):
         try:
             signal.raise_signal(signal.SIGTERM)
         except KeyboardInterrupt as stop:

@@ -16,7 +16,7 @@ from gen_profile_fmu.model.plant_variables import InputKind
 
 FAST = ("--set", "plant.L1=0.5")
 LIMITS = ("--set", "limits={velocity=0.5, acceleration=1.0, jerk=20.0, travel=[-1.0, 1.0]}")
-LIMITS += ("--set", "planner.live={L1=[0.4, 0.5]}")
+LIMITS += ("--set", "planner.live={L1=[0.4, 0.5]}", "--set", "check.uncertain={L1=0.02}")
 
 
 @pytest.mark.slow

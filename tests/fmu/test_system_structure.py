@@ -143,7 +143,12 @@ LIMITS = "limits={velocity=0.5, acceleration=1.0, jerk=20.0, travel=[-1.0, 1.0]}
 @pytest.fixture(scope="module")
 def planned(version, tmp_path_factory):
     path = tmp_path_factory.mktemp("planned") / "planned.ssp"
-    changes = (LIMITS, "planner.live={L1=[0.4, 0.5]}", f"export.cycle_time={STEP}")
+    changes = (
+        LIMITS,
+        "planner.live={L1=[0.4, 0.5]}",
+        "check.uncertain={L1=0.02}",
+        f"export.cycle_time={STEP}",
+    )
     done = run_here(
         "fmu", "planned-ssp", "--fmi", version, *(f"--set={one}" for one in changes), "--out", path, "--json"
     )

@@ -37,9 +37,9 @@ def test_everything_stated_comes_back():
     [
         ("can.travel=3", "can.travel: must be a table such as { cart = [0.0, 0.5] }, found 3."),
         ("can.travel={kart=[0, 1]}", "can.travel.kart: unknown axis; did you mean 'cart'?"),
-        ("can.travel={cart=[1]}", "can.travel.cart: must be an array of 2 numbers, found an array."),
+        ("can.travel={cart=[1]}", "can.travel.cart: must be an array of 2 numbers, found [1]."),
         ("can.travel={cart=[0, 'a']}", "can.travel.cart: must be a finite number, found text 'a'."),
-        ("can.homed=[1, 2]", "can.homed: must be an array of 3 numbers, found an array."),
+        ("can.homed=[1, 2]", "can.homed: must be an array of 3 numbers, found [1, 2]."),
         ("can.gear=3", "can.gear: must be an array of 2 numbers, found 3."),
         ("can.feed_forward=torque", "can.torque_per_acceleration: required with feed_forward"),
         ("can.feed_forward=both", 'can.torque_per_acceleration: required with feed_forward = "both"'),

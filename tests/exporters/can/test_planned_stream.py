@@ -199,7 +199,7 @@ def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
     with keyboard.operated(), bench_of(source) as bench:
         os.write(ours, b"\x1b[D")  # before the motion begins
         bench.at_cycle(10, lambda: os.write(ours, 3 * b"\x1b[C"))
-        bench.then_at_cycle(250, lambda: os.write(ours, b"x"))
+        bench.then_at_cycle(300, lambda: os.write(ours, b"x"))
         record = bench.run()
         assert termios.tcgetattr(theirs) != before
     assert termios.tcgetattr(theirs) == before
