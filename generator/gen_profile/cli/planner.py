@@ -119,8 +119,10 @@ def write(
         before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
         kept = "The block was kept." if outcome.files else f"Nothing was written{before}."
         if outcome.cures:
-            tried = "; or with ".join(f"{cure} ({100.0 * cure.share:.0f} %)" for cure in outcome.cures)
-            kept = f"It would pass, with so much of the limit, with {tried}.\n{kept}"
+            tried = "; or with ".join(
+                f"{cure} ({100.0 * cure.share:.0f} % of the limit)" for cure in outcome.cures
+            )
+            kept = f"It would pass with {tried}.\n{kept}"
         fail(outcome.proof.reasons(), kept)
 
 
