@@ -208,7 +208,8 @@ def _with_while_loops(text: str) -> str:
     for line in text.split("\n"):
         if begins := FOR.fullmatch(line):
             margin, counter, first, last, more = begins.groups()
-            lines += [f"{margin}{counter} := {first};", f"{margin}WHILE {counter} <= {last} DO{more}"]
+            within = f"< {last[:-4]}" if last.endswith(" - 1") else f"<= {last}"
+            lines += [f"{margin}{counter} := {first};", f"{margin}WHILE {counter} {within} DO{more}"]
             counters.append(counter)
         elif ends := END_FOR.fullmatch(line):
             margin, more, counter = *ends.groups(), counters.pop()
