@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from command_line import run_here
 
-from gen_profile.designs.plan import plan, timed
+from gen_profile.designs.plan import plan
+from gen_profile.designs.shortest import timed
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.impulses import SHAPERS

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gen_profile.designs import transient_sway
-from gen_profile.designs.plan import plan, timed
+from gen_profile.designs.plan import plan
+from gen_profile.designs.shortest import timed
 from gen_profile.errors import InfeasibleProblem, LimitViolation
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
@@ -343,7 +344,7 @@ def test_redundant_sensitivities_are_left_out_here_too():
     easiest = relaxation.Relaxation(problem).least(("limits.sway",))
     alone = relaxation.Relaxation(attrs.evolve(problem, desensitized=("L1",))).least(("limits.sway",))
     assert easiest.share == pytest.approx(alone.share, rel=1e-6)
-    begun_there = direct.solve(problem, easiest.iterate)
+    begun_there = direct.solve(problem, easiest.start(problem))
     assert begun_there.redundant == ("L2",)
     assert begun_there.raise_for_status().cost == pytest.approx(
         direct.solve(problem).raise_for_status().cost, rel=1e-6

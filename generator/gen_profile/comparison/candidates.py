@@ -9,8 +9,8 @@ from typing import Any
 import attrs
 
 from gen_profile.designs import transient_sway
-from gen_profile.designs.plan import timed
 from gen_profile.designs.shape import shaped_motion
+from gen_profile.designs.shortest import timed
 from gen_profile.errors import GenProfileError, InfeasibleProblem, SpecError
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest

@@ -169,7 +169,7 @@ def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution
     """Begin near by, or at rest; where that misleads, at the motion most easily within the limits."""
     cost, _ = direct.resolve_sway_cost(problem)  # once for all motions
     settled = attrs.evolve(problem, sway_weight=cost.beta, sway_scale=cost.gamma)
-    solution = direct.solve(settled, None if near is None else near.iterate, coarse=coarse)
+    solution = direct.solve(settled, None if near is None else near.start(problem), coarse=coarse)
     if problem.limits.stated() and not keeps_limits(solution):
         other = _from_the_easiest(settled, coarse=coarse)
         solution = solution if other.optimum is None else other
@@ -185,7 +185,7 @@ def _from_the_easiest(problem: Problem, *, coarse: bool) -> Solution:
         return attrs.evolve(
             easiest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, cure=WIDER
         )
-    return direct.solve(problem, easiest.iterate, coarse=coarse)
+    return direct.solve(problem, easiest.start(problem), coarse=coarse)
 
 
 def _easiest(problem: Problem) -> Relaxed | None:

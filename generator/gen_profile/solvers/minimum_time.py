@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache
 from typing import TypeVar
+
+import attrs
 
 from gen_profile.work import OutOfWork, budget, left
 
@@ -14,12 +15,23 @@ PRECISION = 1e-3  # relative, of the duration; what is returned is the feasible 
 STRIDE = 1.5
 BISECTING = 0.6  # share of the work that is left
 LONGER = 8.0  # from stride to stride away from a duration that is too short
-CORRECTIONS = 3
-ROUGHLY = 5e-3  # precision of rough looks, by which it is seen how fast the excess falls
-UNNOTICED = 5e-3  # excess below zero that is not worth another exact look
-BEYOND = 1.2  # times the distance to where a line through two tries crosses zero
-ASIDE = 0.4  # of the precision, by which a try lies beside where a line crosses zero, for a narrow bracket
+STEEPNESS = 15.0  # with which an excess falls over the duration's logarithm, as far as nothing is known of it
+BEYOND = 1.1  # times the distance to where a line through two tries crosses zero
+UNKNOWN = 1e-9  # excess of the duration to begin with, where it may do
+ASIDE = 0.4  # of the precision, by which a try lies at least beside another one
 
+
+@attrs.frozen
+class Enough:
+    """What need not be known more exactly: a duration, relatively, or an excess between two bounds."""
+
+    precision: float
+    low: float
+    high: float
+
+
+ROUGHLY = Enough(5e-3, -3e-2, 3e-2)
+EXACTLY = Enough(PRECISION, -5e-3, 0.0)
 
 Found = TypeVar("Found")
 
@@ -59,51 +71,11 @@ def least(
             if enough > most:
                 return None
 
-    def excess(value: float) -> float:
-        return -math.inf if feasible(value) else math.inf
-
-    return _between(excess, (short, math.inf), (enough, -math.inf), precision)
-
-
-def least_beyond(
-    excess: Callable[[float], float],
-    short: float,
-    most: float,
-    short_excess: float = math.inf,
-    precision: float = PRECISION,
-) -> float | None:
-    """Find the least duration that will do beyond one that will not, which is often next to it.
-
-    Parameters
-    ----------
-    excess : float → float
-        Positive where a duration will not do, and continuous; infinite where that is all that is known.
-    short : float
-        Too short, in s.
-    most : float
-        Where to give up, in s.
-    short_excess : float
-        Of the one that is too short.
-    precision : float
-        Relative.
-
-    Returns
-    -------
-    float or None
-        s; None where none up to `most` was found to do.
-    """
-    stride, found = precision, (short, short_excess)
-    while True:
-        enough = (1.0 + stride) * short
-        beyond = excess(enough)
-        if beyond <= 0.0:
-            return _between(excess, found, (enough, beyond), precision)
-        if enough > most:
-            return None
-        farthest, falls = LONGER * stride, (found[1] - beyond) / (enough - found[0])
-        if 0.0 < falls < math.inf:  # a little beyond where a line crosses zero
-            farthest = min(farthest, stride + BEYOND * beyond / falls / short)
-        found, stride = (enough, beyond), max(farthest, stride + precision)
+    with suppress(OutOfWork), budget(BISECTING * left()):
+        while enough - short > precision * enough:
+            middle = (short + enough) / 2.0
+            short, enough = (short, middle) if feasible(middle) else (middle, enough)
+    return enough
 
 
 def least_corrected(
@@ -120,7 +92,7 @@ def least_corrected(
     Parameters
     ----------
     roughly, exactly : float → float, float → (float, anything)
-        The excess of a duration, and what belongs to it.
+        The excess of a duration, positive where it will not do, and what belongs to it.
     start, most : float
         Where to begin and to give up, in s.
     rounded : float → float
@@ -131,71 +103,63 @@ def least_corrected(
     anything or None
         None where no duration up to `most` was found to do.
     """
-    roughly, exactly = cache(roughly), cache(exactly)  # for many a duration is rounded to the same one
-    start, best = rounded(start), None
-
-    def least(excess: Callable[[float], float], precision: float = PRECISION) -> float | None:
-        def of_rounded(duration: float) -> float:
-            return excess(rounded(duration))
-
-        if of_rounded(start) <= 0.0:
-            return start
-        found = least_beyond(of_rounded, start, most, of_rounded(start), precision)
-        return None if found is None else rounded(found)
-
-    duration = least(roughly, ROUGHLY)
-    for _ in range(CORRECTIONS):
-        if duration is None:
-            break
-        excess, found = exactly(duration)
-        if excess <= 0.0 and (best is None or duration < best[0]):
-            best = duration, found
-        if not math.isfinite(excess) or (excess <= 0.0 and (duration == start or excess > -UNNOTICED)):
-            break
-        beside = start if duration > start else rounded((1.0 + ROUGHLY) * start)
-        falls = (roughly(duration) - roughly(beside)) / (beside - duration)
-        if not 0.0 < falls < math.inf:
-            break
-        duration = max(start, rounded(duration + (excess + UNNOTICED / 2.0) / falls))
-    if best is None:
-        duration = least(lambda duration: exactly(duration)[0])
-        return None if duration is None else exactly(duration)[1]
-    return best[1]
+    start = rounded(start)
+    rough, trial = dict[float, float](), start
+    while trial is not None:
+        rough[trial] = roughly(trial)
+        trial = _next(rough, ROUGHLY, most, rounded)
+    known, found = dict[float, float](), dict[float, Found]()
+    first = trial = min((each for each in rough if rough[each] <= ROUGHLY.high), default=start)
+    while trial is not None:
+        known[trial], found[trial] = exactly(trial)
+        beside = known[first] - rough[first]
+        below = {each: rough[each] + beside for each in rough if each < min(known)}
+        too_short = {each: excess for each, excess in below.items() if excess > 0.0}
+        if start in below:
+            too_short.setdefault(start, UNKNOWN)
+        trial = _next(too_short | known, EXACTLY, most, rounded)
+    best = min((each for each in found if known[each] <= 0.0), default=None)
+    return None if best is None else found[best]
 
 
-def _between(
-    excess: Callable[[float], float],
-    short: tuple[float, float],
-    enough: tuple[float, float],
-    precision: float,
-) -> float:
-    """Narrow a bracket as far as a share of the work that is left allows, and return the end that will do.
+def _next(
+    known: Mapping[float, float], sufficient: Enough, most: float, rounded: Callable[[float], float]
+) -> float | None:
+    """Choose the next duration to try by the excess of those that are known; None where that is enough."""
+    if any(sufficient.low <= excess <= sufficient.high for excess in known.values()):
+        return None
+    enough = min((each for each in known if known[each] <= 0.0), default=math.inf)
+    short = max((each for each in known if each < enough), default=-math.inf)
+    if enough == math.inf:
+        trial = _beyond(known, sufficient.precision)
+    elif enough - short <= sufficient.precision * enough or short == -math.inf:
+        return None
+    else:
+        trial = _between(known, sufficient, short, enough)
+    trial = rounded(trial)
+    return None if trial > most or trial in known else trial
 
-    Where the excess is known at both ends, by the rule of false position, an end's excess being halved when
-    the other one was replaced twice (the Illinois method: M. Dowell, P. Jarratt, BIT 11, 1971, 168-174); by
-    bisection elsewhere.
 
-    Parameters
-    ----------
-    excess : float → float
-    short, enough : (float, float)
-        The ends of the bracket and their excess.
-    precision : float
-        Relative.
-    """
-    side = 0.0  # on which the last try was: -1 too short
-    with suppress(OutOfWork), budget(BISECTING * left()):
-        while (width := enough[0] - short[0]) > precision * enough[0]:
-            middle = short[0] + width / 2.0
-            if math.isfinite(enough[1] - short[1]):
-                aside = ASIDE * precision * enough[0]
-                crossing = enough[0] - width * enough[1] / (enough[1] - short[1])
-                middle = min(max(crossing - (side or -1.0) * aside, short[0] + aside), enough[0] - aside)
-            found = middle, excess(middle)
-            if found[1] <= 0.0:
-                enough, short = found, (short[0], short[1] * (0.5 if side > 0.0 else 1.0))
-                side = 1.0
-            else:
-                short, enough = found, (enough[0], enough[1] * (0.5 if side < 0.0 else 1.0))
-                side = -1.0
-    return enough[0]
+def _beyond(known: Mapping[float, float], precision: float) -> float:
+    """Step on from durations none of which will do, with longer strides where nothing tells how far."""
+    tried = sorted(known)
+    finite = [each for each in tried if known[each] < math.inf][-2:]
+    last, stride = tried[-1], precision
+    if len(tried) > 1:
+        stride = max(stride, LONGER * (last / tried[-2] - 1.0))
+    if last in finite:
+        falls = (known[finite[0]] - known[last]) / (last - finite[0]) if len(finite) > 1 else STEEPNESS / last
+        if falls > 0.0:
+            stride = BEYOND * known[last] / falls / last
+    return last * (1.0 + max(stride, precision))
+
+
+def _between(known: Mapping[float, float], sufficient: Enough, short: float, enough: float) -> float:
+    """Interpolate between the two durations whose excess is nearest to zero, or bisect."""
+    nearest, near = sorted(known, key=lambda each: abs(known[each]))[:2]
+    falls, aside = (known[nearest] - known[near]) / (near - nearest), ASIDE * sufficient.precision * enough
+    if 0.0 < falls < math.inf:
+        trial = nearest + (known[nearest] - (sufficient.low + sufficient.high) / 2.0) / falls
+        if short < trial < enough:
+            return min(max(trial, short + aside), enough - aside)
+    return (short + enough) / 2.0

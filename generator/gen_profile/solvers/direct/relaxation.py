@@ -126,10 +126,10 @@ class Relaxed:
         """Of the motion, in s."""
         return self.found.setup.problem.duration
 
-    @property
-    def iterate(self) -> Iterate:
-        """The motion, on its mesh."""
-        return self.found.iterate
+    def start(self, problem: Problem) -> Iterate | None:
+        """Give the motion, on its mesh, to begin at; nothing for a problem that is not about as long."""
+        nearby = abs(math.log(problem.duration / self.duration)) < NEARBY
+        return self.found.iterate if nearby else None
 
     @property
     def solution(self) -> Solution:
@@ -169,7 +169,7 @@ class Relaxation:
         if not self._tried:
             setup = unbounded
         rest = setup.transcription.rest()
-        if self._near is not None and self._near.iterate.like(rest):
+        if self._near is not None and (start := self._near.start(problem)) and start.like(rest):
             return setup, self._near.found
         free = CostProgram(
             setup=attrs.evolve(unbounded, problem=attrs.evolve(setup.problem, limits=LimitsSpec())),
@@ -264,8 +264,7 @@ def shortest(
         nonlocal last
         lasting = attrs.evolve(problem, duration=math.exp(log_duration))
         progress("looking for the shortest duration", remark=f"trying {lasting.duration:.3g} s")
-        near = last if last and abs(math.log(lasting.duration / last.duration)) < NEARBY else None
-        last = Relaxation(lasting, tried, near).least(places)
+        last = Relaxation(lasting, tried, last).least(places)
         if last is None:
             return UNSETTLED
         if last.share <= 1.0 - KEPT:
@@ -330,7 +329,7 @@ def _close_to_zero(excess: Callable[[float], float], short: float, enough: float
     """Interpolate between two values, until the excess of the greater one falls little short of 0."""
     tried = [short, enough]
     for _ in range(CLOSER):
-        if excess(enough) > -close:
+        if excess(enough) > -close or enough - short < close / POWERS[1]:
             break
         nearest, near = sorted(tried, key=lambda place: abs(excess(place)))[:2]
         slope = (excess(nearest) - excess(near)) / (nearest - near)

@@ -1,0 +1,85 @@
+"""A motion for a spec, not yet held to its limits."""
+
+from __future__ import annotations
+
+import math
+import time
+from functools import cached_property
+
+import attrs
+
+from gen_profile.designs import transient_sway
+from gen_profile.designs.shape import shaped_motion
+from gen_profile.errors import CosimulationError
+from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, share_of_residual_sway
+from gen_profile.motion.profile import Profile
+from gen_profile.problem.limits import SWAY_TOLERANCE
+from gen_profile.progress import Progress, untold
+from gen_profile.solvers.direct.relaxation import Relaxed
+from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.solution import Solution
+from gen_profile.spec.model import Spec
+
+CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Draft:
+    """A motion that was tried on no machine, or none.
+
+    Attributes
+    ----------
+    spec : Spec
+        With a duration.
+    solution : Solution or None
+        What the solver found, or why it found nothing; None where a shaper made the motion.
+    motion : Profile or None
+        Of the axes.
+    solver_time : float
+        s.
+    """
+
+    spec: Spec
+    solution: Solution | None
+    motion: Profile | None
+    solver_time: float = 0.0
+
+    @cached_property
+    def evaluation(self) -> MotionEvaluation:
+        """Of the motion, which must be there, on all machines."""
+        assert self.motion is not None
+        return evaluate(self.spec, self.motion)
+
+    @cached_property
+    def unrest(self) -> float:
+        """How much more sway it leaves than it should, as a logarithm; infinite without a motion.
+
+        Also where the motion sways more on the way than it may, or no machine can follow it.
+        """
+        if self.motion is None or self.solution is None:
+            return math.inf
+        try:
+            evaluation, limit = self.evaluation, self.solution.problem.limits.sway
+        except CosimulationError:
+            return math.inf
+        if limit is not None and evaluation.figures["sway_transient_worst_m"] > SWAY_TOLERANCE * limit:
+            return math.inf
+        share = share_of_residual_sway(self.spec, evaluation)
+        return math.log(share / CALM) if share > 0.0 else -math.inf
+
+
+def drafted(spec: Spec, solution: Solution, solver_time: float = 0.0) -> Draft:
+    """Take the motion of a solution, if it has one."""
+    motion = None if solution.optimum is None else optimal_profile(solution)
+    return Draft(spec=spec, solution=solution, motion=motion, solver_time=solver_time)
+
+
+def solved(
+    spec: Spec, progress: Progress = untold, spread: float = 1.0, near: Relaxed | None = None
+) -> Draft:
+    """Solve a spec with a duration, or shape a move for it; `near` as in `transient_sway.attempt`."""
+    if spec.solver.shaper is not None:
+        return Draft(spec=spec, solution=None, motion=shaped_motion(spec, spec.solver.shaper))
+    began = time.perf_counter()
+    solution = transient_sway.attempt(spec, progress, spread, near)
+    return drafted(spec, solution, time.perf_counter() - began)
