@@ -9,6 +9,7 @@ from functools import partial
 from typing import Protocol
 
 import attrs
+import numpy as np
 
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
@@ -40,6 +41,8 @@ IN_VAIN = (
     "the spec are in its units."
 )
 PERIODS = 1.5  # of the slowest mode, about as long as the shortest motions take
+LEAST = {1: 1.0, 2: 4.0, 3: 32.0}  # derivative of a unit move from rest to rest in unit time, at least
+BLEND = 4.0  # order of the norm by which these times and the period count together
 RANGE = 2.0  # times the work for a whole range
 
 
@@ -238,11 +241,21 @@ def minimum_time(
     roughly : bool
         Whether a duration a few hundredths longer will do.
     """
-    slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
-    guess = near or PERIODS * 2.0 * math.pi / float(slowest)
+    guess = near or _usual_duration(problem)
     if problem.worst_case is None:
         return shortest(problem, guess, progress=progress, roughly=roughly)
     return worst_case.shortest_motion(problem, guess, progress)
+
+
+def _usual_duration(problem: Problem) -> float:
+    """About how long in s the shortest motion takes, which no axis does in less time than by itself."""
+    slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
+    times = [PERIODS * 2.0 * math.pi / float(slowest)]
+    for axis, way in enumerate(problem.distance):
+        limits = problem.limits.of(axis)
+        for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
+            times += [] if limit is None else [(LEAST[order] * abs(way) / limit) ** (1.0 / order)]
+    return float(np.linalg.norm(times, BLEND))
 
 
 def keeps_limits(solution: Solution) -> bool:

@@ -104,7 +104,8 @@ def least_corrected(
         None where no duration up to `most` was found to do.
     """
     start = rounded(start)
-    rough, trial = dict[float, float](), start
+    rough = dict[float, float]()
+    trial: float | None = start
     while trial is not None:
         rough[trial] = roughly(trial)
         trial = _next(rough, ROUGHLY, most, rounded)

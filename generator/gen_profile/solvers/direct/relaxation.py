@@ -38,6 +38,7 @@ from gen_profile.work import OutOfWork, budget, left
 
 PRICES = (1e-5, 1e-3, 1e-1)  # of the effort without limits: ever less sway would take ever more of it
 CHANGE = 1e-4  # of the share, relative, that is worth another program
+FAR = 1e-2  # likewise of how far the share is from 1
 ENOUGH = 5e-3  # by which the share's logarithm may exceed 0
 CLOSE = 0.05  # by which it may fall short of 0: the duration found is then tried
 KEPT, CLOSEST = 2e-4, 1e-3  # likewise of the shortest duration: by how much it must, and may besides
@@ -99,7 +100,8 @@ class LeastShare:
         share, before = float(solutions[-1].x[-1]), float("inf")
         if len(solutions) > 1:
             before = float(solutions[-2].x[-1])
-        return STEP_TOLERANCE * abs(share - before) / (CHANGE * max(abs(share), TINY))
+        noticed = max(CHANGE * abs(share), FAR * abs(share - 1.0), TINY)
+        return STEP_TOLERANCE * abs(share - before) / noticed
 
     def approach(self, before: Iterate, after: Iterate) -> Iterate:
         """Go all the way: what it minimises is no expansion."""
