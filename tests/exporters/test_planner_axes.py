@@ -15,6 +15,7 @@ from gen_profile.planner.commands import play
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis, block_axes
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile_exporters.planner.c_source import c_files
 
 pytestmark = pytest.mark.slow
 
@@ -206,6 +207,16 @@ def test_from_python_a_number_for_each_axis_takes_the_place_of_one():
     assert planner.hold(2.0, velocity=stick).velocity[-1, 1] < 0.0
     with pytest.raises(SpecError, match=r"target: must be a number for each axis \(x, y\), found 3.0"):
         planner.step(target=3.0)
+    with pytest.raises(
+        SpecError, match=r"\(x, y\), or such a row for each of 250 cycles, found an array \(9, 2"
+    ):
+        planner.hold(0.25, velocity=np.zeros((9, 2)))
+
+
+def test_the_c_header_names_the_setpoint_of_each_axis():
+    text = planner_block(parse_spec(GANTRY)).text
+    header = c_files(text, "gantry")[1].content.decode("ascii")
+    assert "then out.fPosition_x and out.fPosition_y are the setpoints. Names" in header
 
 
 def test_an_axis_that_turns_is_planned_in_rad():

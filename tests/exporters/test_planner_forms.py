@@ -15,10 +15,11 @@ from system_parts import program as program_of
 
 import gen_profile as gp
 from gen_profile.errors import ExportError, SpecError
-from gen_profile.planner.commands import play
+from gen_profile.planner.commands import play, read_commands
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block, require_forms
+from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.reading import parse_spec, preset_spec
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
@@ -138,6 +139,7 @@ def test_exported_c_issues_the_same_bits_without_a_warning(block, program, tmp_p
 
 def test_c_plus_plus_takes_the_header(block, tmp_path):
     (_, header) = block_files(block, SPEC, ["c"])
+    assert b"then out.fPosition is the setpoint. Names" in header.content
     (tmp_path / header.filename).write_bytes(header.content)
     (tmp_path / "user.cpp").write_text(
         f'#include "{header.filename}"\nvoid f(bay_3_state *s, bay_3_inputs *in) {{ bay_3_init(s, in); }}\n'
@@ -201,8 +203,9 @@ class TestInPython:
         ):
             with pytest.raises(gp.SpecError, match=re.escape(words)):
                 planner.hold(1.0, **given)
-        with pytest.raises(gp.SpecError, match=r"at least one cycle of 0\.004 s"):
-            planner.hold(0.0)
+        for seconds in (0.0, -1.0, math.nan, math.inf):
+            with pytest.raises(gp.SpecError, match=r"at least one cycle of 0\.004 s"):
+                planner.hold(seconds)
         with pytest.raises(gp.OutputError, match=r"Cannot read the block .*none.st: No such file"):
             gp.Planner(tmp_path / "none.st")
         assert planner.hold(0.1, target=math.nan).error_id[-1] == 3
@@ -213,6 +216,29 @@ def test_a_format_without_blocks_is_refused(block):
         block_files(block, SPEC, ["csv"])
     with pytest.raises(SpecError, match=r"a planner block has no form 'csv' \(known: codesys, .*, c\)"):
         require_forms(["c", "csv"])
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("time_s;command;value\n0;stop;\n", "must name time_s, command, value, with commas between"),
+        ("time_s,command,value,L1,L1\n0,stop,,5,6\n", "two columns are called 'L1'"),
+        ("time_s,command,value\n0,position,1,5\n", "line 2: holds more cells than the first line has names"),
+        ("time_s,command,value\n0,position\n", "line 2: value must be a number, found ''."),
+        ('time_s,command,value\n0,position,"1,5"\n', "found '1,5'; write a decimal point: 1.5"),
+        ("time_s,command,value\n2,stop,\n\n1,stop,\n", "line 4: time_s goes back from 2 to 1"),
+        ("time_s,command,value\n1e6,stop,\n", "comes at 1e+06 s, and at most 40000 s are played in one go"),
+    ],
+)
+def test_commands_that_cannot_be_meant_are_refused_with_their_line(block, table, words):
+    with pytest.raises(SpecError, match=re.escape(words)):
+        play(block.text, table)
+
+
+def test_the_example_of_a_command_has_a_value_for_each_axis():
+    axes = [BlockAxis(name=name) for name in "xy"]
+    with pytest.raises(SpecError, match=re.escape("such as 0.0,position,1.0,1.0.")):
+        read_commands("time_s,command,value_x,value_y\n", axes, ())
 
 
 def test_the_command_line_plays_any_of_them(tmp_path, monkeypatch):
@@ -229,6 +255,16 @@ def test_the_command_line_plays_any_of_them(tmp_path, monkeypatch):
         "planner", "write", "bay.toml", "--out", "deploy", *formats, "--histories", 4, "--json"
     ).document
     (tmp_path / "commands.csv").write_text("time_s,command,value\n0,position,0.5\n")
+    block, play = written["files"][0]["path"], ("--commands", "commands.csv", "--out")
+    kept = (tmp_path / block).read_bytes()
+    for path, words in (("commands.csv", "the file of --commands"), (block, "the file of BLOCK")):
+        refused = run_here("planner", "play", block, *play, path)
+        assert (refused.code, words in refused.err) == (2, True)
+    assert (tmp_path / block).read_bytes() == kept
+    (tmp_path / "bay.c").write_text("int main(void) { return 0; }\n")
+    for other, words in (("bay.c", "C is not read back"), ("bay.toml", "holds no planner block")):
+        refused = run_here("planner", "play", other, *play, "out.csv")
+        assert (refused.code, words in refused.err) == (5, True)
     tables = []
     for file in written["files"]:
         run_here("planner", "play", file["path"], "--commands", "commands.csv", "--out", "out.csv", "--json")

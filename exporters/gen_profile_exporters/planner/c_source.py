@@ -14,7 +14,7 @@ OWNERS = {"VAR_INPUT": "in->", "VAR_OUTPUT": "state->out.", "VAR": "state->"}
 
 HEADER = """\
 /*
- * {file}.h: what plans every motion of one axis, in C99, from gen-profile.
+ * {file}.h: a planner, which plans every motion of its axes, in C99, from gen-profile.
  *
  * Made of the function block {block} of {file}.st; setpoints are the same, bit for bit. It allocates
  * nothing and calls nothing but fabs, sqrt and nearbyint of libm; a state takes some {kilobytes:.0f} kB.
@@ -25,8 +25,8 @@ HEADER = """\
  *     {name}_init(&state, &in);
  *     {name}_step(&state, &in, &out);
  *
- * the last in every cycle, after setting what changed of `in`; then out.fPosition is the axis's. Names and
- * behaviour are the block's. Its own words:
+ * the last in every cycle, after setting what changed of `in`; then {positions}. Names
+ * and behaviour are the block's. Its own words:
  *
 {words}
  */
@@ -136,8 +136,10 @@ def c_files(text: str, file: str) -> tuple[File, File]:
         initials=indent("\n".join(initials), "    "),
         body=indent("\n".join(statements.body), "    "),
     )
+    positions = [f"out.{v.name}" for v in by_section["VAR_OUTPUT"] if v.name.startswith("fPosition")]
     header = HEADER.format(
         **names,
+        positions=" and ".join(positions) + (" are the setpoints" if positions[1:] else " is the setpoint"),
         kilobytes=sum(map(_bytes, by_section["VAR"])) / 1000.0,
         words="\n".join(f" * {line}".rstrip() for line in _words(source).splitlines()),
         inputs=_members(by_section["VAR_INPUT"], source),

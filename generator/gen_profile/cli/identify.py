@@ -68,7 +68,7 @@ from gen_profile.errors import SpecError
 )
 @click.option(
     "--out",
-    type=OutputFile(),
+    type=OutputFile(replaces="spec_path"),
     default=Path("identified.toml"),
     help="Spec to write; ./identified.toml by default.",
 )

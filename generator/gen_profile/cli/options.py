@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
 from click.shell_completion import CompletionItem
@@ -41,7 +41,17 @@ class InputFile(click.Path):
 
 
 class OutputFile(InputFile):
-    """A file to write, in a folder that exists; refused before there is any work to lose."""
+    """A file to write, in a folder that exists; refused before there is any work to lose.
+
+    Parameters
+    ----------
+    replaces : str
+        Name of the parameter whose file it may replace. None that the command reads, if not given.
+    """
+
+    def __init__(self, replaces: str = "") -> None:
+        super().__init__()
+        self.replaces = replaces
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Take the path.
@@ -228,10 +238,32 @@ block_plot_option = click.option(
 
 
 def output_options(command: Command) -> Command:
-    """Add how every command says what came of it."""
+    """Add how every command says what came of it; let none write over what it reads."""
+
+    @wraps(command)
+    def careful(**values: Any) -> Any:
+        _require_apart(click.get_current_context())
+        return command(**values)
+
+    guarded = cast("Command", careful)
     for decorate in (
         click.option("--debug", is_flag=True, expose_value=False, help="Log details, and show tracebacks."),
         click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout."),
     ):
-        command = decorate(command)
-    return command
+        guarded = decorate(guarded)
+    return guarded
+
+
+def _require_apart(context: click.Context) -> None:
+    """Refuse to write a file that is read, or two files of one name."""
+    files: dict[Path, click.Parameter] = {}
+    by_role = sorted(context.command.params, key=lambda parameter: isinstance(parameter.type, OutputFile))
+    for parameter in by_role:
+        path = context.params.get(parameter.name or "")
+        if not isinstance(path, Path):
+            continue
+        other, own = files.setdefault(path.resolve(), parameter), parameter.type
+        if other is not parameter and isinstance(own, OutputFile) and own.replaces != other.name:
+            argument = isinstance(other, click.Argument)
+            told = other.human_readable_name.strip("[]") if argument else other.opts[0]
+            raise SpecError(f"{parameter.opts[0]} {path}: is the file of {told}; name another one.")

@@ -6,7 +6,7 @@ import csv
 import io
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from itertools import pairwise
+from itertools import chain
 
 import attrs
 import numpy as np
@@ -15,12 +15,14 @@ from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import BlockAxis, live_inputs
+from gen_profile.suggestion import number_meant
 
 COMMANDS = ("position", "velocity", "stop", "quick-stop")
 FIRST = ("time_s", "command")
 WHOLE = ("bBusy", "bDone", "nErrorId", "bPromise")
 CHUNK = 10_000  # cycles between looks at whether the axis stands
 LONGEST = 3600.0  # s, of what follows the last command
+MOST_CYCLES = 10_000_000  # before the last command
 STILL = 0.5  # s of standing after which nothing more is expected
 
 
@@ -79,26 +81,32 @@ def read_commands(text: str, axes: Sequence[BlockAxis], live: Collection[str]) -
     required = (*FIRST, *(axis.of("value") for axis in axes))
     if missing := [name for name in required if name not in names]:
         raise SpecError(
-            f"commands: there is no column {missing[0]}; the first line must name {', '.join(required)}."
+            f"commands: there is no column {missing[0]}; the first line must name {', '.join(required)}, "
+            "with commas between."
         )
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        raise SpecError(f"commands: two columns are called {twice[0]!r}.")
     if unknown := [name for name in names if name not in (*required, *live)]:
         known = ", ".join(live) or "none"
         raise SpecError(f"commands: the block has no live parameter {unknown[0]!r}; it has {known}.")
     rows.fieldnames = names
-    commands = [_command(row, number, axes, live) for number, row in enumerate(rows, start=2)]
+    commands: list[Command] = []
+    for row in rows:
+        command = _command(row, rows.line_num, axes, live)
+        if commands and command.time < commands[-1].time:
+            back = f"time_s goes back from {commands[-1].time:g} to {command.time:g}"
+            raise SpecError(f"commands, line {rows.line_num}: {back}.")
+        commands.append(command)
     if not commands:
-        raise SpecError("commands: there is no row; write one such as 0.0,position,1.0.")
-    for number, (before, after) in enumerate(pairwise(commands), start=3):
-        if after.time < before.time:
-            raise SpecError(
-                f"commands, line {number}: time_s goes back from {before.time:g} to {after.time:g}."
-            )
+        raise SpecError(f"commands: there is no row; write one such as 0.0,position{',1.0' * len(axes)}.")
     return tuple(commands)
 
 
 def _command(
     row: Mapping[str, str | None], line: int, axes: Sequence[BlockAxis], live: Collection[str]
 ) -> Command:
+    if None in row:  # where DictReader puts them
+        raise SpecError(f"commands, line {line}: holds more cells than the first line has names.")
     command = (row["command"] or "").strip()
     if command not in COMMANDS:
         known = ", ".join(COMMANDS)
@@ -117,7 +125,8 @@ def _number(text: str | None, name: str, line: int) -> float:
     try:
         return float(text or "")
     except ValueError:
-        raise SpecError(f"commands, line {line}: {name} must be a number, found {text!r}.") from None
+        found = f"found {text or ''!r}{number_meant(text or '')}"
+        raise SpecError(f"commands, line {line}: {name} must be a number, {found}.") from None
 
 
 @attrs.frozen(kw_only=True)
@@ -155,19 +164,22 @@ def play(text: str, commands_text: str) -> IssuedSetpoints:
     block = BlockInstance(text)
     commands = read_commands(commands_text, block.axes, live_inputs(block.inputs, block.axes))
     cycle = block.inputs["fCycleTime"]
-    issued = np.vstack(list(_issued(block, commands, cycle)))
+    if commands[-1].begin(cycle) > MOST_CYCLES:
+        at, most = f"{commands[-1].time:g} s", f"{MOST_CYCLES * cycle:g} s"
+        raise SpecError(f"commands: the last one comes at {at}, and at most {most} are played in one go.")
     columns = _columns(block.axes)
     places = {name: block.outputs.index(output) for name, output in columns.items()}
     lines = ["time_s," + ",".join(columns)]
-    for number, row in enumerate(issued):
+    shown: dict[int, None] = {}  # as an ordered set
+    for number, row in enumerate(chain.from_iterable(_issued(block, commands, cycle))):
         cells = (
             str(int(row[places[name]])) if output in WHOLE else repr(float(row[places[name]]))
             for name, output in columns.items()
         )
         lines.append(f"{number * cycle:.9g}," + ",".join(cells))
-    shown = issued[:, places["error_id"]].astype(int).tolist()
-    errors = tuple(error for error in dict.fromkeys(shown) if error)
-    return IssuedSetpoints(table="\n".join(lines) + "\n", cycles=len(issued), errors=errors)
+        shown[int(row[places["error_id"]])] = None
+    errors = tuple(error for error in shown if error)
+    return IssuedSetpoints(table="\n".join(lines) + "\n", cycles=len(lines) - 1, errors=errors)
 
 
 def _columns(axes: Sequence[BlockAxis]) -> dict[str, str]:
@@ -234,7 +246,8 @@ def _issued(block: BlockInstance, commands: tuple[Command, ...], cycle: float) -
     """Give the outputs, row of inputs by row of inputs."""
     begins, rows = input_rows(commands, block.axes, block.inputs | {"bEnable": 1.0}, cycle)
     for row, begin, end in zip(rows, begins, begins[1:], strict=False):
-        yield block.call(np.tile(row, (end - begin, 1)))
+        for first in range(begin, end, CHUNK):
+            yield block.call(np.tile(row, (min(CHUNK, end - first), 1)))
     yield from _until_still(block, rows[-1], cycle)
 
 

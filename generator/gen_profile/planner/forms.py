@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from gen_profile_exporters.registry import container_of, containers, find_contai
 
 PORTABLE = "plc"
 C = "c"
+_PLANNER = re.compile(r"^\s*FUNCTION_BLOCK\s+\w+_planner\s*$", re.MULTILINE | re.IGNORECASE)
 
 
 def require_forms(formats: Iterable[str]) -> None:
@@ -72,8 +74,13 @@ def _files(block: PlannerBlock, spec: Spec, format_: str) -> tuple[File, ...]:
     return files
 
 
+def is_planner(text: str) -> bool:
+    """Whether a text is a planner block's, by the name that it has."""
+    return _PLANNER.search(text) is not None
+
+
 def read_block(path: Path) -> str:
-    """Read a function block's text out of a written file, whichever the format.
+    """Read a planner block's text out of a written file, whichever the format.
 
     Parameters
     ----------
@@ -85,12 +92,18 @@ def read_block(path: Path) -> str:
     OutputError
         The file cannot be read.
     ExportError
-        It holds no function block.
+        It holds no planner block, or one in C.
     """
     try:
-        return block_in(path, path.read_bytes())
+        content = path.read_bytes()
     except OSError as error:
         raise OutputError(f"Cannot read the block {path}: {error.strerror}.") from error
+    if is_c(path.name):
+        raise ExportError(f"{path}: C is not read back; name its block, in Structured Text or a form of it.")
+    text = block_in(path, content)
+    if not is_planner(text):
+        raise ExportError(f"{path} holds no planner block; name a file that gen-profile planner wrote.")
+    return text
 
 
 def block_in(path: Path, content: bytes) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -235,7 +236,8 @@ class Planner:
         SpecError
             As of `step`; or there is no whole cycle, or an array of another length.
         """
-        cycles = round(float(_column("seconds", seconds, 1)[0]) / self.cycle_time)
+        share = float(_column("seconds", seconds, 1)[0]) / self.cycle_time
+        cycles = round(share) if math.isfinite(share) else 0
         if cycles < 1:
             raise SpecError(f"seconds: at least one cycle of {self.cycle_time:g} s, found {seconds!r}.")
         orders = _Orders(
@@ -334,7 +336,9 @@ def _columns_of(
     shape = np.shape(np.asarray(value, dtype=object))
     if shape not in ((len(axes),), (cycles, len(axes))):
         named = ", ".join(axis.name for axis in axes)
-        raise SpecError(f"{what}: must be a number for each axis ({named}), found {value!r}.")
+        each = f", or such a row for each of {cycles} cycles" if cycles > 1 else ""
+        found = f"an array {shape}" if shape else repr(value)
+        raise SpecError(f"{what}: must be a number for each axis ({named}){each}, found {found}.")
     rows = np.asarray(value, dtype=object).reshape(-1, len(axes)).T.tolist()
     return {
         axis.of(name): _column(f"{what} of {axis.name}", row[0] if len(row) == 1 else row, cycles)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -13,7 +12,7 @@ import attrs
 from gen_profile.artefacts.manifest import FILENAME, Manifest
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import ExportError, OutputError, SpecError
-from gen_profile.planner.forms import block_in
+from gen_profile.planner.forms import block_in, is_planner
 from gen_profile.progress import Progress, untold
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
@@ -24,7 +23,6 @@ from gen_profile.verification.check import alterations, provenance, spec_of
 from gen_profile_exporters.registry import container_of
 
 FORMAT = "planner"
-_FUNCTION_BLOCK = re.compile(r"^\s*FUNCTION_BLOCK\s+\w+_planner\s*$", re.MULTILINE | re.IGNORECASE)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -75,7 +73,7 @@ def is_planner_block(path: Path) -> bool:
     content = read_artefact(path)
     try:
         container_of(path)
-        return _FUNCTION_BLOCK.search(block_in(path, content)) is not None
+        return is_planner(block_in(path, content))
     except (SpecError, ExportError, OutputError):  # none that carries blocks, or that holds none
         return False
 
