@@ -246,22 +246,20 @@ class Function:
 
     def _by_operations(self, shape: tuple[int, ...], arguments: Sequence[Array]) -> Array:
         """Carry out every operation for all points; along an axis that no input of it has, once."""
-        columns = [_first(np.asarray(argument)) for argument in arguments]
         rows, width = self._shape
-        result = np.zeros((width * rows, *shape))
+        result = np.zeros((*shape, width * rows))
         known: dict[int, Any] = {}
         with np.errstate(all="ignore"):
             for name, operation, places, place in self._operations:
                 if operation is not None:
                     known[place] = operation(*[known[one] for one in places])
                 elif name == "INPUT":
-                    known[place] = columns[places[0]][places[1]]
+                    known[place] = np.ascontiguousarray(arguments[places[0]][..., places[1]])
                 elif name == "OUTPUT":
-                    result[place] = known[places[0]]
+                    result[..., place] = known[places[0]]
                 else:
                     known[place] = places[0]
-        points = np.ascontiguousarray(np.moveaxis(result, 0, -1)).reshape(*shape, width, rows)
-        return points.swapaxes(-1, -2)
+        return result.reshape(*shape, width, rows).swapaxes(-1, -2)
 
     def _evaluator(self, points: int) -> Callable[[Sequence[Array]], Array]:
         """Bind a mapped function to fixed buffers: CasADi's own conversions cost more than its evaluation."""
@@ -282,11 +280,6 @@ class Function:
             return result.transpose(0, 2, 1).copy()
 
         return evaluate
-
-
-def _first(argument: Array) -> Array:
-    """Put the last axis first, each of its entries in one piece."""
-    return np.ascontiguousarray(np.moveaxis(argument, -1, 0))
 
 
 _Operation = tuple[str, "Callable[..., Array] | None", tuple[Any, ...], int]
