@@ -72,7 +72,7 @@ class ManyRuns:
         self,
         times: Array,
         inputs: Mapping[str, Array],
-        parameters: Mapping[str, Array],
+        parameters: Mapping[str, Array | float],
         outputs: Sequence[str],
         *,
         since: float = 0.0,
@@ -86,8 +86,8 @@ class ManyRuns:
             Communication points in s, rising; those of all runs, or of each.
         inputs : mapping of str to (samples - 1,) or (runs, samples - 1) array
             Held from each point to the next; a setpoint is reached at the step's end.
-        parameters : mapping of str to (runs,) array
-            Start values; what is not named keeps the value of the model description.
+        parameters : mapping of str to (runs,) array or float
+            Start values, of each run or of all; what is not named keeps the value of the model description.
         outputs : sequence of str
         since : float
             Time in s from which peaks count.
@@ -123,7 +123,7 @@ class ManyRuns:
 
     def _run(self, plan: _Plan, found: Array) -> Array:
         """Let the workers fill the rows of what is to be found."""
-        edges = np.linspace(0, len(found), len(self._workers) + 1, dtype=int).tolist()
+        edges = [len(found) * number // len(self._workers) for number in range(len(self._workers) + 1)]
         shares = list(zip(self._workers, edges, edges[1:], strict=False))
         if len(shares) == 1:
             reached = [self._workers[0].run(plan, 0, len(found), found)]
@@ -175,7 +175,7 @@ class _Given:
     runs: int
 
     @classmethod
-    def of(cls, times: Array, inputs: Mapping[str, Array], parameters: Mapping[str, Array]) -> Self:
+    def of(cls, times: Array, inputs: Mapping[str, Array], parameters: Mapping[str, Array | float]) -> Self:
         """Order and check what a caller gives by name."""
         points = np.ascontiguousarray(np.atleast_2d(times), dtype=np.float64)
         columns = {name: np.reshape(values, (-1, 1)) for name, values in parameters.items()}
@@ -192,11 +192,14 @@ class _Given:
 
 def _stacked(what: str, arrays: Mapping[str, Array], length: int) -> Array:
     """Join arrays, each (length,) or (runs, length), to one of (runs or 1, length, arrays)."""
-    rows = [np.atleast_2d(np.asarray(array, dtype=np.float64)) for array in arrays.values()]
-    shapes = {(len(array), array.shape[1]) for array in rows} | {(1, length)}
+    rows = [np.atleast_2d(array) for array in arrays.values()]
+    shapes = {row.shape for row in rows} | {(1, length)}
     if len({size for _, size in shapes}) > 1 or len({runs for runs, _ in shapes} - {1}) > 1:
         raise CosimulationError(f"The {what} of many runs differ in length: {sorted(shapes)}.")
-    return np.stack(np.broadcast_arrays(*rows), axis=-1) if rows else np.empty((1, length, 0))
+    joined = np.empty((max(runs for runs, _ in shapes), length, len(rows)))
+    for column, row in enumerate(rows):
+        joined[:, :, column] = row
+    return joined
 
 
 def _per_run(rows: Array) -> _PerRun:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 
 import attrs
@@ -133,6 +134,12 @@ def _energy(bodies: Mechanics, q: Symbol, dq: Symbol) -> Symbol:
     return sum(kinetic, bodies.potential)
 
 
-def parameter_column(plant: Plant, values: dict[str, float]) -> Array:
+def parameter_column(plant: Plant, values: Mapping[str, float]) -> Array:
     """Order parameter values as `Dynamics.p` does, as one point (1, parameters)."""
-    return np.array([[values[parameter.name] for parameter in plant.parameters]])
+    return parameter_rows(plant, [values])
+
+
+def parameter_rows(plant: Plant, machines: Sequence[Mapping[str, float]]) -> Array:
+    """Order the parameters of machines as `Plant.parameters`, shape (machines, parameters)."""
+    names = [parameter.name for parameter in plant.parameters]
+    return np.array([[values[name] for name in names] for values in machines]).reshape(-1, len(names))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
 import attrs
-import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
@@ -62,7 +61,7 @@ def residual_peaks(
     machines: Array,
     *,
     tau: Array,
-    max_step: Array,
+    max_step: Array | float,
     since: float,
     on_the_way: bool = False,
 ) -> Array:
@@ -79,7 +78,7 @@ def residual_peaks(
         In the order of `Plant.parameters`.
     tau : (runs,) array
         Lag of the drives in s.
-    max_step : (runs,) array
+    max_step : (runs,) array or float
         Longest integration step in s.
     since : float
         When the axes stand, in s.
@@ -97,13 +96,10 @@ def residual_peaks(
     """
     plant = spec.machine()
     names = [parameter.name for parameter in plant.parameters]
-    values = dict(zip(names, machines.T, strict=True)) | {TAU: tau, MAX_STEP: max_step}
-    values |= {name: np.full(len(machines), value) for name, value in spec.move.initial.items()}
-    first = feed.position[..., 0, :]
-    for axis, start in zip(plant.actuated, np.moveaxis(first, -1, 0), strict=True):
-        values |= {
-            f"{axis.name}.{suffix}": np.broadcast_to(start, len(machines)) for suffix in ("start", "setpoint")
-        }
+    values = {**dict(zip(names, machines.T, strict=True)), **spec.move.initial, TAU: tau, MAX_STEP: max_step}
+    for column, axis in enumerate(plant.actuated):
+        first = feed.position[..., 0, column]
+        values |= {f"{axis.name}.{suffix}": first for suffix in ("start", "setpoint")}
     inputs = {
         f"{axis.name}.setpoint": feed.position[..., 1:, column] for column, axis in enumerate(plant.actuated)
     }
@@ -116,8 +112,3 @@ def processors() -> int:
     """Count the processors that this process may use."""
     present = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(present, _most.get())
-
-
-def parameter_rows(plant: Plant, machines: Sequence[Mapping[str, float]]) -> Array:
-    """Order the parameters of machines as `Plant.parameters`, shape (machines, parameters)."""
-    return np.array([[values[parameter.name] for parameter in plant.parameters] for values in machines])

@@ -10,8 +10,9 @@ import numpy as np
 from gen_profile.evaluation.residual_sway import STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import Scenario, scenarios
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
+from gen_profile.problem.dynamics import parameter_rows
 from gen_profile.spec.model import Spec
-from gen_profile.verification.batch import Feed, many_machines, parameter_rows, residual_peaks
+from gen_profile.verification.batch import Feed, many_machines, residual_peaks
 from gen_profile.verification.cosimulation import STEP_PHASE, longest_step
 from gen_profile.verification.setpoint_path import delay, followed_up, follows_exactly, lag_of, transmitted
 from gen_profile.verification.verdict import Check, Finding

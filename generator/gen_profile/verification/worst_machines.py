@@ -151,7 +151,7 @@ def _searched(way: _Way, setpoints: SampledProfile, runs: ManyRuns) -> tuple[Arr
             feed,
             box.machines(places),
             tau=way.lags(places),
-            max_step=np.full(len(places), step),
+            max_step=step,
             since=since,
             on_the_way=sway is not None,
         )
