@@ -160,12 +160,12 @@ def _is_linear(law: Law, states: States, axis: int) -> bool:
     still = _changed(rest, axis, factor=0.0)
     others = law(*still)[0]
     whole = law(*rest)[0] - others
+    coupling = _coupling(law, still)
+    if not _same([_coupling(law, rest)], [coupling]):
+        return False
     if not all(
         _same([law(*_changed(rest, axis, factor=k))[0] - others], [k * whole]) for k in (0.5, 0.25, -1.0)
     ):
-        return False
-    coupling = _coupling(law, still)
-    if not _same([_coupling(law, rest)], [coupling]):
         return False
     return not bool((_reached(whole, coupling) & _reached(others, coupling)).any())
 

@@ -101,16 +101,16 @@ def latest_stop(limits: PathLimits, velocity: Array, acceleration: Array, cycle_
     path, step = begin.astype(np.float64), max(1.0, cycles / STEPS)  # in cycles
     rate, slope = np.ones(len(path)), np.zeros(len(path))
     worth = np.zeros(len(path), dtype=bool)
-    push, forward = np.abs(acceleration * limits.inverse_velocity), acceleration * velocity > 0.0
+    push = np.abs(acceleration * limits.inverse_velocity)
+    pushes = np.stack([np.where(acceleration * velocity > 0.0, 0.0, push), push])  # slowing down, speeding up
     for passed in count(step, step):
         going = ~worth & (passed + MARGIN * step < cycles - begin)
         if not going.any():
             break
         slope = _slope(limits, rate, slope, step * cycle_time)
         at = np.minimum(path.astype(int), cycles)
-        room = np.maximum(limits.room - push[at] * (rate * rate)[:, None], 0.0)
-        least = np.where(forward[at], limits.room, room).min(axis=1)
-        slope = np.minimum(np.maximum(slope, -least), room.min(axis=1))
+        slower, faster = np.maximum(limits.room - pushes[:, at] * (rate * rate)[:, None], 0.0).min(axis=2)
+        slope = np.minimum(np.maximum(slope, -slower), faster)
         before, rate = rate, np.maximum(rate + slope * step * cycle_time, 0.0)
         path = path + 0.5 * step * (before + rate)
         worth |= going & (rate <= 0.0)

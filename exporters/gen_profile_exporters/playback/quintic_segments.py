@@ -161,7 +161,7 @@ def _longest(samples: Array, allowed: Array, begin: int, guess: int, cycle_time:
             fits = length
         else:
             fails = length
-        guess = int(min(reach, 2.0) * length) if trial % 3 else min((fits + fails) // 2, 2 * fits)
+        guess = int(min(reach, 2.0) * length) if trial % 4 else min((fits + fails) // 2, 2 * fits)
     return fits
 
 
