@@ -46,6 +46,7 @@ _VELOCITY = np.asarray(
     legendre.legvander(_POINTS, NODES) @ _ONCE, dtype=np.float64
 )  # accelerations → velocities at the nodes
 _POSITION: Array = legendre.legvander(_POINTS, NODES + 1) @ _TWICE
+_ENDS: Array = np.stack([_TWICE.sum(axis=0), _ONCE.sum(axis=0)])  # accelerations → position, velocity at 1
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -176,22 +177,21 @@ class _Newton:
     @classmethod
     def of(cls, length: float, stiffness: Array, damping: Array) -> _Newton:
         """Work them out for a step's length in s, and (machines, n_u, n_u) terms."""
-        machines, n_u = stiffness.shape[:2]
-        size, unit = NODES * n_u, np.eye(n_u)
+        n_u = stiffness.shape[1]
+        unit = np.eye(n_u)[None]
 
         def spread(nodes: Array, terms: Array) -> Array:
-            joined = np.einsum("ij,muv->miujv", nodes, terms)
-            return np.asarray(joined.reshape(machines, len(nodes) * n_u, -1))
+            joined = nodes[:, None, :, None] * terms[:, None, :, None, :]
+            return joined.reshape(len(terms), len(nodes) * n_u, -1)
 
         matrix = spread(length**2 * _POSITION, stiffness) + spread(length * _VELOCITY, damping)
-        inverse = np.asarray(np.linalg.inv(np.eye(size) + matrix), dtype=np.float64)
+        inverse = np.asarray(np.linalg.inv(np.eye(NODES * n_u) + matrix), dtype=np.float64)
         ones, times = np.ones((NODES, 1)), length * TIMES[:, None]
         given = np.concatenate(
             [spread(ones, stiffness), spread(times, stiffness) + spread(ones, damping)], axis=2
         )
-        ends = np.stack([length**2 * _TWICE.sum(axis=0), length * _ONCE.sum(axis=0)])
-        end = np.einsum("ej,uv->eujv", ends, unit).reshape(2 * n_u, size) @ inverse
-        free = np.kron([[1.0, length], [0.0, 1.0]], unit)
+        end = spread(np.array([[length**2], [length]]) * _ENDS, unit) @ inverse
+        free = spread(np.array([[1.0, length], [0.0, 1.0]]), unit)
         return cls(inverse, given, end, free - end @ given)
 
 
@@ -262,7 +262,7 @@ def _along(matrix: Array, values: Array) -> Array:
 
 def _states(a: Array, h: Array, start: Array) -> tuple[Array, Array]:
     """Coordinates and rates at the begin of every step, each of shape (steps, machines n_u)."""
-    once, twice = (_along(ends[None], a)[0] for ends in (_ONCE.sum(axis=0), _TWICE.sum(axis=0)))
+    twice, once = _along(_ENDS, a)
     v = np.cumsum(np.concatenate([start[1:], h * once]), axis=0)[:-1]
     q = np.cumsum(np.concatenate([start[:1], h * v + h**2 * twice]), axis=0)[:-1]
     return q, v
@@ -284,8 +284,8 @@ def _solved(residual: Array, alike: list[_Alike]) -> Array:
         ends[numbers, :, :, 0] = (newton.end @ lacking[:, :, numbers]).transpose(2, 0, 1)
         onward[numbers] = newton.onward
     states = np.zeros_like(ends)
-    for step in range(1, steps):
-        states[step] = onward[step - 1] @ states[step - 1] + ends[step - 1]
+    for move, begin, added, end in zip(onward, states, ends, states[1:], strict=False):
+        np.add(move @ begin, added, out=end)
     begun = states[..., 0].transpose(1, 2, 0)
     for numbers, newton in alike:
         lacking[:, :, numbers] = newton.inverse @ (
