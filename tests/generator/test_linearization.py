@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.plants.registry import find_plant
-from gen_profile.problem.linearization import linearize
+from gen_profile.problem.linearization import linear_terms, linearize, resting_place
 
 CRANE = find_plant("double-pendulum-crane")
 OTHER = {"m1": 350.0, "m2": 12000.0, "L1": 20.0, "L2": 2.0, "g": 9.81, "c1": 900.0, "c2": 50.0}
@@ -82,6 +82,23 @@ def test_a_mode_may_depend_on_where_the_axes_stand():
         np.testing.assert_allclose(model.frequencies, np.sqrt(9.81 / rope), rtol=1e-12)
         np.testing.assert_allclose(model.sway_gain, rope)
         np.testing.assert_allclose(model.input, [[1.0 / rope, 0.0]])
+
+
+@pytest.mark.parametrize(
+    "type_", ["double-pendulum-crane", "gantry-crane", "tower-crane", "single-pendulum-crane"]
+)
+def test_places_of_axes_count_where_the_equations_feel_them(type_):
+    plant = find_plant(type_)
+    machine = np.array([list(plant.nominal().values())])
+    here = np.array(plant.standing())
+    for axis in np.eye(len(here)):
+        there = here + 0.3 * axis
+        alike = all(
+            map(np.array_equal, linear_terms(plant, machine, here), linear_terms(plant, machine, there))
+        )
+        assert (resting_place(plant, here) == resting_place(plant, there)) == alike
+        if not alike:
+            assert resting_place(plant, there) @ axis == there @ axis
 
 
 def test_a_machine_that_falls_over_has_no_frequencies():

@@ -15,6 +15,7 @@ from gen_profile.evaluation.simulation import TRANSIENT_SAMPLES, PlantSimulation
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest, length, mean_square_root, overshoot, peak, root_mean_square
 from gen_profile.motion.profile import Array, Profile
+from gen_profile.problem.dynamics import parameter_rows
 from gen_profile.problem.limits import rounded_down
 from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import problem_of
@@ -82,17 +83,16 @@ def evaluate(spec: Spec, motion: Profile) -> MotionEvaluation:
     InfeasibleProblem
         It goes on to where the machine cannot be.
     """
-    plant, machines, until = spec.machine(), scenarios(spec), _watched_until(spec, motion)
-    swing = PlantSimulation(plant, motion, [m.parameters for m in machines], until, spec.move.initial)
-    known = np.array([list(machine.parameters.values()) for machine in machines])
-    inside = [
-        values
-        for values in machines_inside(problem_of(spec), spec.checked_ranges())
-        if not np.isclose(known, [values[name] for name in machines[0].parameters], 1e-9).all(axis=1).any()
-    ]
+    plant, until = spec.machine(), _watched_until(spec, motion)
+    named = [machine.parameters for machine in scenarios(spec)]
+    swing = PlantSimulation(plant, motion, named, until, spec.move.initial)
+    inside = machines_inside(problem_of(spec), spec.checked_ranges())
+    known, found = (parameter_rows(plant, rows) for rows in (named, inside))
+    same = np.isclose(found[:, None], known, 1e-9)
+    others = [values for values, rows in zip(inside, same, strict=True) if not rows.all(axis=1).any()]
     everywhere = swing
-    if inside:
-        everywhere = PlantSimulation(plant, motion, inside, until, spec.move.initial, accuracy=ACCURACY)
+    if others:
+        everywhere = PlantSimulation(plant, motion, others, until, spec.move.initial, accuracy=ACCURACY)
     return _evaluation(spec, motion, swing, everywhere)
 
 
@@ -167,26 +167,24 @@ def share_of_residual_sway(spec: Spec, evaluation: MotionEvaluation) -> float:
     return float(max((peak(sway) / limits).max() for sway in _afterwards(evaluation)))
 
 
-def _afterwards(evaluation: MotionEvaluation) -> list[Array]:
+def _afterwards(evaluation: MotionEvaluation) -> tuple[Array, Array]:
     """Sway after the motion of the evaluation's machines, and of others all over the ranges."""
     begin, watch = evaluation.motion.duration, evaluation.watch
-    named = evaluation.swing.sway(np.linspace(begin, begin + watch, RESIDUAL_SAMPLES))
-    others = evaluation.everywhere.sway(np.linspace(begin, begin + watch, COARSE_SAMPLES))
-    return [*named, *others]
+    return (
+        evaluation.swing.sway(np.linspace(begin, begin + watch, RESIDUAL_SAMPLES)),
+        evaluation.everywhere.sway(np.linspace(begin, begin + watch, COARSE_SAMPLES)),
+    )
 
 
 def _figures(evaluation: MotionEvaluation) -> dict[str, float]:
     motion, command, duration = evaluation.motion, evaluation.command, evaluation.motion.duration
     end_load = evaluation.swing.plant.end_load
-    on_the_way = [
-        length(sway[:, end_load])
-        for sway in (
-            *evaluation.swing.sway(np.linspace(0.0, duration, TRANSIENT_SAMPLES)),
-            *evaluation.everywhere.sway(np.linspace(0.0, duration, COARSE_SAMPLES)),
-        )
-    ]
-    during = on_the_way[0]
-    residuals = [float(peak(length(sway[:, end_load]))[0]) for sway in _afterwards(evaluation)]
+    during = evaluation.swing.sway(np.linspace(0.0, duration, TRANSIENT_SAMPLES))
+    others = evaluation.everywhere.sway(np.linspace(0.0, duration, COARSE_SAMPLES))
+    transients, residuals = (
+        [float(machine) for sway in sways for machine in peak(length(sway[:, :, end_load]))[:, 0]]
+        for sways in ((during, others), _afterwards(evaluation))
+    )
     names = ("velocity", "acceleration", "jerk")
     units = ("m_per_s", "m_per_s2", "m_per_s3")
     table = {"duration_s": duration}
@@ -195,9 +193,9 @@ def _figures(evaluation: MotionEvaluation) -> dict[str, float]:
         if order > 1:
             table[f"{name}_rms_{unit}"] = root_mean_square(motion, order)
     table |= {
-        "sway_transient_peak_m": float(peak(during)[0]),
-        "sway_transient_worst_m": max(float(peak(sway)[0]) for sway in on_the_way),
-        "sway_transient_rms_m": float(mean_square_root(during)[0]),
+        "sway_transient_peak_m": transients[0],
+        "sway_transient_worst_m": max(transients),
+        "sway_transient_rms_m": float(mean_square_root(length(during[0, :, end_load]))[0]),
         "sway_residual_peak_m": residuals[0],
         "sway_residual_peak_perturbed_m": residuals[min(1, len(evaluation.machines) - 1)],
         "sway_residual_worst_m": max(residuals),

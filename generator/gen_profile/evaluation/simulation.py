@@ -15,7 +15,7 @@ from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
-from gen_profile.problem.dynamics import dynamics, parameter_column
+from gen_profile.problem.dynamics import dynamics, parameter_rows
 from gen_profile.problem.initial_state import initial_state
 from gen_profile.problem.linearization import eigenvalues, eigenvalues_at, linear_terms, linearize
 from gen_profile.problem.symbolic import Function
@@ -105,7 +105,7 @@ class PlantSimulation:
         accuracy: float = RELATIVE_TOLERANCE,
     ) -> None:
         self.plant, self.initial, self._profile = plant, initial, profile
-        self._p = p = np.concatenate([parameter_column(plant, dict(values)) for values in machines])
+        self._p = p = parameter_rows(plant, machines)
         start, motion = initial_state(plant, initial).reshape(2, -1), _motion(profile)
         ends = [profile.start, profile.target]
         rates = np.array(eigenvalues_at(plant, p, ends))
@@ -156,7 +156,9 @@ class PlantSimulation:
     def sway(self, times: Array) -> Array:
         """Sway of every load in m at rising times in s, shape (machines, times, loads)."""
         q_u = self._solution.positions(times).reshape(len(times), len(self._p), -1).swapaxes(0, 1)
-        return _sway(self.plant)(q_u, self._profile.derivative(times, 0), self._p[:, None])[..., 0]
+        sway, by_place = _sway(self.plant)
+        q_a = self._profile.derivative(times, 0) if by_place else self._profile.start[None]
+        return sway(q_u, q_a, self._p[:, None])[..., 0]
 
 
 def greatest_sway(
@@ -177,7 +179,7 @@ def greatest_sway(
         found = swing.sway(np.linspace(0.0, motion.duration, samples))
     except CosimulationError:
         return np.full(len(machines), np.inf)
-    return np.array([float(peak(length(sway[:, plant.end_load]))[0]) for sway in found])
+    return peak(length(found[:, :, plant.end_load]))[:, 0]
 
 
 def free_swing(
@@ -312,10 +314,10 @@ def equations_of(plant: Plant) -> tuple[Function, Function]:
 
 
 @cache
-def _sway(plant: Plant) -> Function:
-    """Compile the sway of (q_u, q_a, p), where nothing else is looked at."""
+def _sway(plant: Plant) -> tuple[Function, bool]:
+    """Compile the sway of (q_u, q_a, p), where nothing else is looked at; and whether q_a changes it."""
     d = dynamics(plant)
-    return Function("sway", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, d.sway)
+    return Function("sway", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, d.sway), sym.depends(d.sway, d.q_a)
 
 
 def _motion(profile: Profile) -> Callable[[Array], Array]:

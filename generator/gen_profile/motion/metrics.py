@@ -56,9 +56,9 @@ def _quadrature(points: int) -> tuple[Array, Array]:
 
 def length(components: Array) -> Array:
     """Length of the vector in each row, as one column; a single component keeps its sign."""
-    if components.shape[1] == 1:
+    if components.shape[-1] == 1:
         return components
-    return np.asarray(np.linalg.norm(components, axis=1, keepdims=True))
+    return np.asarray(np.linalg.norm(components, axis=-1, keepdims=True))
 
 
 def peak(values: Array) -> Array:
@@ -66,24 +66,25 @@ def peak(values: Array) -> Array:
 
     Parameters
     ----------
-    values : (samples, columns) array
+    values : (…, samples, columns) array
         At evenly spaced times.
 
     Returns
     -------
-    (columns,) array
+    (…, columns) array
     """
-    magnitude = np.abs(values)
-    top = np.clip(magnitude.argmax(axis=0), 1, max(len(values) - 2, 1))
-    columns = np.arange(values.shape[1])
-    if len(values) < 3:
-        return np.asarray(magnitude.max(axis=0))
-    left, middle, right = (values[top + step, columns] for step in (-1, 0, 1))
+    columns = np.ascontiguousarray(np.swapaxes(values, -1, -2))
+    magnitude, samples = np.abs(columns), columns.shape[-1]
+    highest = magnitude.max(axis=-1)
+    if samples < 3:
+        return np.asarray(highest)
+    top = magnitude.argmax(axis=-1, keepdims=True).clip(1, samples - 2)
+    left, middle, right = (np.take_along_axis(columns, top + step, axis=-1)[..., 0] for step in (-1, 0, 1))
     curvature = left - 2.0 * middle + right
     safe = np.where(curvature == 0.0, 1.0, curvature)
     shift = np.clip(np.where(curvature == 0.0, 0.0, (left - right) / (2.0 * safe)), -1.0, 1.0)
     vertex = middle + shift * (right - left) / 4.0
-    return np.asarray(np.maximum(np.abs(vertex), magnitude.max(axis=0)))
+    return np.asarray(np.maximum(np.abs(vertex), highest))
 
 
 def mean_square_root(values: Array) -> Array:

@@ -135,7 +135,7 @@ def _no_bodies(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     return Mechanics(mass=[], place=[])
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(kw_only=True, cache_hash=True)  # it is looked up by in all that is kept of a machine
 class Plant:
     """A machine: names, parameters, equations of motion and outputs. Nothing else.
 

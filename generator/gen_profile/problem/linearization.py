@@ -83,8 +83,8 @@ def linearize(
     InfeasibleProblem
         A mode has no restoring force, so the machine has no natural frequency to speak of.
     """
-    axes = [0.0] * len(plant.actuated) if q_a is None else map(float, q_a)
-    return _linearized(plant, tuple(parameters.items()), tuple(axes))
+    axes = [0.0] * len(plant.actuated) if q_a is None else q_a
+    return _linearized(plant, tuple(parameters.items()), resting_place(plant, axes))
 
 
 def eigenvalues(plant: Plant, machines: Array, q_a: Sequence[float] | Array) -> NDArray[np.complex128]:
@@ -105,28 +105,27 @@ def eigenvalues_at(
     plant: Plant, machines: Array, places: Sequence[Sequence[float] | Array]
 ) -> list[NDArray[np.complex128]]:
     """Find the eigenvalues of many machines at rest at some places of the axes, each as `eigenvalues`."""
-    n_u = len(plant.unactuated)
-    found: list[NDArray[np.complex128]] = []
-    before: Array | None = None
-    for q_a in places:
-        stiffness, damping = linear_terms(plant, machines, q_a)
-        terms = np.concatenate([-stiffness, -damping], axis=2)
-        if before is None or not np.array_equal(terms, before):  # most machines are the same everywhere
-            state = np.zeros((len(machines), 2 * n_u, 2 * n_u))
-            state[:, :n_u, n_u:] = np.eye(n_u)
-            state[:, n_u:] = terms
-            rates = _undamped(stiffness) if not damping.any() else np.linalg.eigvals(state)
-            found.append(np.asarray(rates, dtype=np.complex128))
-        else:
-            found.append(found[-1])
-        before = terms
-    return found
+    resting = [resting_place(plant, q_a) for q_a in places]
+    found = {place: _eigenvalues(*linear_terms(plant, machines, place)) for place in set(resting)}
+    return [found[place] for place in resting]
 
 
-def _undamped(stiffness: Array) -> NDArray[np.complex128]:
-    """Find the eigenvalues ±√−k of machines without damping, from those of their stiffness."""
-    roots = np.sqrt(np.asarray(np.linalg.eigvals(-stiffness), dtype=np.complex128))
-    return np.concatenate([roots, -roots], axis=1)
+def resting_place(plant: Plant, q_a: Sequence[float] | Array) -> tuple[float, ...]:
+    """Tell where axes stand as far as it changes a plant at rest; other axes are always at the same place."""
+    standing, matters = plant.standing(), _terms(plant)[2]
+    return tuple(float(at) if own else one for at, one, own in zip(q_a, standing, matters, strict=True))
+
+
+def _eigenvalues(stiffness: Array, damping: Array) -> NDArray[np.complex128]:
+    """Find the eigenvalues of machines from their linear terms; ±√−k of the stiffness without damping."""
+    machines, n_u, _ = stiffness.shape
+    if not damping.any():
+        roots = np.sqrt(np.asarray(np.linalg.eigvals(-stiffness), dtype=np.complex128))
+        return np.concatenate([roots, -roots], axis=1)
+    state = np.zeros((machines, 2 * n_u, 2 * n_u))
+    state[:, :n_u, n_u:] = np.eye(n_u)
+    state[:, n_u:, :n_u], state[:, n_u:, n_u:] = -stiffness, -damping
+    return np.asarray(np.linalg.eigvals(state), dtype=np.complex128)
 
 
 def linear_terms(plant: Plant, machines: Array, q_a: Sequence[float] | Array) -> tuple[Array, Array]:
@@ -153,7 +152,7 @@ def _linearized(
     n_u, m = len(plant.unactuated), len(plant.actuated)
     still_u, still_a = np.zeros((1, n_u)), np.zeros((1, m))
     rest = (still_u, still_u, np.array([q_a]), still_a, parameter_column(plant, dict(parameters)))
-    motion_terms, sway_terms = _terms(plant)
+    motion_terms, sway_terms, _ = _terms(plant)
     free_q, free_dq, driven = np.split(motion_terms(*rest)[0], [n_u, 2 * n_u], axis=1)
     frequencies, modes = _modes(plant, -free_q)
     modal_damping = np.linalg.solve(modes, -free_dq @ modes)
@@ -169,13 +168,20 @@ def _linearized(
 
 
 @cache
-def _terms(plant: Plant) -> tuple[Function, Function]:
-    """[∂free/∂q_u, ∂free/∂q̇_u, driven] and ∂sway/∂q_u as functions of state and parameters."""
+def _terms(plant: Plant) -> tuple[Function, Function, list[bool]]:
+    """[∂free/∂q_u, ∂free/∂q̇_u, driven] and ∂sway/∂q_u as functions of state and parameters.
+
+    Third, of every axis, whether they depend on where it stands while the plant is at rest.
+    """
     d = dynamics(plant)
     inputs = {"q_u": d.q_u, "dq_u": d.dq_u, "q_a": d.q_a, "dq_a": d.dq_a, "p": d.p}
     motion = sym.matrix([[sym.jacobian(d.free, d.q_u), sym.jacobian(d.free, d.dq_u), d.driven]])
     sway = sym.jacobian(d.sway, d.q_u)
-    return Function("motion_terms", inputs, motion), Function("sway_terms", inputs, sway)
+    moving = sym.column([d.q_u, d.dq_u, d.dq_a])
+    still = sym.column([0.0] * moving.shape[0])
+    at_rest = [sym.substitute(terms, moving, still) for terms in (motion, sway)]
+    places = [any(sym.depends(terms, q) for terms in at_rest) for q in sym.split(d.q_a)]
+    return Function("motion_terms", inputs, motion), Function("sway_terms", inputs, sway), places
 
 
 def _modes(plant: Plant, stiffness: Array) -> tuple[Array, Array]:
