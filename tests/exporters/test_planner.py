@@ -406,7 +406,7 @@ def test_an_error_of_the_block_is_told(text):
         (["limits.jerk=0"], "limits.jerk"),
         (["planner.live={L3=[1.0, 2.0]}"], "planner.live.L3: unknown parameter"),
         (["planner.live={L1=[2.0, 1.0]}"], "planner.live.L1: must be two rising numbers"),
-        (["planner.quick_stop=0.1"], "planner.quick_stop: at least limits.acceleration"),
+        (["planner.quick_stop=0.1"], "planner.quick_stop: must be at least limits.acceleration, "),
         (["export.cycle_time=0.2"], "export.cycle_time: at most"),
     ],
 )

@@ -3,6 +3,7 @@
 import json
 import pickle
 import re
+from html import unescape
 from time import sleep
 
 import attrs
@@ -395,8 +396,14 @@ def test_a_page_tells_of_the_proof(deployed, tmp_path):
         "report", folder / "bay 3.st", "--out", page, "--field", "Customer=ACME", "--json"
     ).document
     assert told["proof"] == proof
-    text = page.read_text("utf-8")
+    text = unescape(page.read_text("utf-8"))
     worst = proof["worst"]
+    assert f"gen-profile check 'bay 3.st' --history {worst['number']} runs" in text
+    assert "L1 (m)" in text
+    ranked = [float(swayed) for swayed in re.findall(r"<td[^>]*>(?:hook|payload) ([0-9.]+) mm</td>", text)]
+    shares = [proof["share"], *(one["share"] for one in proof["next_worst"])]
+    limit = 1e3 * proof["limits_m"]["payload"]
+    assert ranked == pytest.approx([limit * share for share in shares], rel=1e-2)
     assert f"history {worst['number']} of {proof['histories']}, drawn with the seed {proof['seed']}" in text
     assert "ACME" in text
     assert told["report"]["bytes"] == page.stat().st_size

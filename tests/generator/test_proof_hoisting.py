@@ -156,6 +156,10 @@ def test_hoisting_too_fast_for_the_allowed_sway_is_refused_with_its_number():
     ("changes", "words"),
     [
         (["planner.live_rate={L2=0.1}"], "planner.live_rate.L2: not among planner.live"),
+        (
+            ["planner.live={L1=[9, 3]}", "planner.live_rate={L1=0.1}"],
+            r"^planner.live.L1: .*, found \[9, 3\].$",
+        ),
         (["planner.live_rate={L1=0}"], "planner.live_rate.L1: must be greater than 0"),
         (["planner.live_rate=0.1"], "planner.live_rate: must be a table such as"),
         (["planner.live_rate={m2=1.0}"], "planner.live_rate.m2: no rope's length"),

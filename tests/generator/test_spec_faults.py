@@ -174,7 +174,7 @@ FAULTS = [
     (
         "robustness.uncertain",
         ["L1"],
-        r"robustness\.uncertain: must be a table such as \{ L1 = 0\.2 \}, found an array\.",
+        r"robustness\.uncertain: must be a table such as \{ NAME = 0\.2 \}, found an array\.",
     ),
     ("name", 7, r"name: must be text, found 7\."),
     ("robustness.nominal_zero", 1, r"robustness\.nominal_zero: must be true or false, found 1\."),
@@ -206,6 +206,15 @@ FAULTS = [
 def test_one_fault_is_one_sentence(place, value, sentence):
     (fault,) = faults_of(with_value(place, value))
     assert re.fullmatch(sentence, fault)
+
+
+def test_faults_name_what_the_machine_has():
+    gantry = preset_spec("gantry-crane").to_dict()
+    gantry |= {"axis": {"unit": "mm"}, "robustness": {"method": "range"}}
+    assert set(faults_of(gantry)) == {
+        "axis.unit: state it of each axis: axis.x.unit, axis.y.unit.",
+        'robustness.uncertain: required with method = "range", such as { L = 0.2 }.',
+    }
 
 
 NAMES = [

@@ -145,10 +145,7 @@ def map_figure(spec: Spec, proof: Proof) -> Figure:
 
 def _labelled(spec: Spec, name: str) -> str:
     """Name a live parameter, which may be another axis's position, with its unit."""
-    machine = spec.machine()
-    units = {axis.name: axis.unit for axis in machine.actuated}
-    units |= {known.name: known.unit for known in machine.parameters}
-    return f"{name} ({units[name]})"
+    return f"{name} ({spec.machine().units[name]})"
 
 
 def _unpromised(found: Trace) -> Iterator[Band]:

@@ -83,7 +83,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         axes=axes,
         cycle=spec.export.cycle_time,
         live=found.live,
-        units=tuple(_unit(spec, name) for name in found.live),
+        units=tuple(spec.machine().units[name] for name in found.live),
         nominal=tuple(_nominal(spec, name) for name in found.live),
         drift=tuple(STEADY * high for _, high in found.live.values()),
         rates=spec.planner.live_rate,
@@ -137,11 +137,11 @@ def _faults(spec: Spec, number: int, suffix: str) -> list[str]:
         if getattr(own, name) is None
     ]
     if quick and own.acceleration and quick < own.acceleration:
-        faults.append(
-            f"planner.quick_stop: at least limits.acceleration ({own.acceleration:g}), found {quick:g}."
-        )
+        least = f"at least limits.acceleration{of}, {own.acceleration:g}"
+        faults.append(f"planner.quick_stop: must be {least}, found {quick:g}.")
     if quick_jerk and own.jerk and quick_jerk < own.jerk:
-        faults.append(f"planner.quick_stop_jerk: at least limits.jerk ({own.jerk:g}), found {quick_jerk:g}.")
+        least = f"at least limits.jerk{of}, {own.jerk:g}"
+        faults.append(f"planner.quick_stop_jerk: must be {least}, found {quick_jerk:g}.")
     return faults
 
 
@@ -174,12 +174,6 @@ def _axis(spec: Spec, number: int, suffix: str) -> AxisConstants:
         travel=travel,
         targets=target_range(spec, number),
     )
-
-
-def _unit(spec: Spec, name: str) -> str:
-    plant = spec.machine()
-    units = {axis.name: axis.unit for axis in plant.actuated} | {p.name: p.unit for p in plant.parameters}
-    return units[name]
 
 
 def _nominal(spec: Spec, name: str) -> float:

@@ -189,6 +189,12 @@ class Plant:
         """What to call the end load as a whole: its directions have a name each."""
         return self.loads[-1] if self.directions == 1 else "load"
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every axis and parameter, by name."""
+        known: tuple[Parameter | Coordinate, ...] = (*self.actuated, *self.parameters)
+        return {one.name: one.unit for one in known}
+
     def nominal(self) -> dict[str, float]:
         """Nominal value of every parameter, by name."""
         return {parameter.name: parameter.nominal for parameter in self.parameters}

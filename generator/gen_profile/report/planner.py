@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import attrs
@@ -72,7 +73,10 @@ def planner_report(
 
 def _page(judgement: BlockJudgement, followed: Trace) -> Page:
     spec, proof = judgement.spec, judgement.check
-    live = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in spec.planner.live.items())
+    units = spec.machine().units
+    live = ", ".join(
+        f"{name} {low:g} to {high:g} {units[name]}" for name, (low, high) in spec.planner.live.items()
+    )
     libraries = ", ".join(f"{library} {number}" for library, number in versions())
     return Page(
         title=spec.name,
@@ -86,10 +90,12 @@ def _page(judgement: BlockJudgement, followed: Trace) -> Page:
 
 def _verdict(proof: Proof, path: Path) -> Verdict:
     """Say first whether the block may be deployed, and how to see the worst history again."""
-    again = f"gen-profile check {path.name} --history {proof.worst.number} runs the worst history again."
+    again = (
+        f"gen-profile check {quote(path.name)} --history {proof.worst.number} runs the worst history again."
+    )
     if not proof.passed:
         return Verdict(word="Failed.", passed=False, sentences=[*proof.reasons(), again])
-    load = _worst_load(proof)
+    load = _worst_load(proof, proof.worst)
     return Verdict(
         word="Passed.",
         passed=True,
@@ -105,7 +111,8 @@ def _verdict(proof: Proof, path: Path) -> Verdict:
 
 
 def _facts(proof: Proof) -> list[tuple[str, str]]:
-    load, worst = _worst_load(proof), proof.worst
+    worst = proof.worst
+    load = _worst_load(proof, worst)
     swaying = max(one.on_the_way[load] for one in proof.judged)
     resting = max(one.rests_after or 0.0 for one in proof.judged)
     return [
@@ -121,7 +128,8 @@ def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
     """Put the page in the order in which an engineer asks."""
     spec, proof = judgement.spec, judgement.check
     worst = proof.worst
-    told = ", ".join(f"{name} = {number(value)}" for name, value in worst.history.live.items())
+    units = spec.machine().units
+    told = ", ".join(f"{name} = {number(value)} {units[name]}" for name, value in worst.history.live.items())
     commands = len(worst.history.commands)
     yield Section(
         title="The worst history",
@@ -135,7 +143,7 @@ def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
         ],
     )
     if len(proof.judged) > 1:
-        yield Section(title="Where it sways most", blocks=[map_figure(spec, proof), _ranking(proof)])
+        yield Section(title="Where it sways most", blocks=[map_figure(spec, proof), _ranking(spec, proof)])
     yield Section(title="Limits and margins", blocks=[_limits(spec, proof)])
     yield Section(title="How it was proved", blocks=[_groups(proof), Terms(rows=[*_proved(proof)])])
     digest = sha256(read_artefact(judgement.path))
@@ -154,9 +162,9 @@ def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
     )
 
 
-def _worst_load(proof: Proof) -> str:
-    """Name the load that takes up the greatest share of its limit in the worst history."""
-    return max(proof.limit, key=lambda load: proof.worst.residual[load] / proof.limit[load])
+def _worst_load(proof: Proof, judged: JudgedHistory) -> str:
+    """Name the load that takes up the greatest share of its limit in a history."""
+    return max(proof.limit, key=lambda load: judged.residual[load] / proof.limit[load])
 
 
 def _commands(history: History) -> str:
@@ -174,18 +182,19 @@ def _cells(command: Command, axes: Sequence[BlockAxis]) -> list[str]:
     return [f"{value:.6g}" for value in command.values] or [""] * len(axes)
 
 
-def _ranking(proof: Proof) -> Table:
+def _ranking(spec: Spec, proof: Proof) -> Table:
     ranked = sorted(proof.judged, key=proof.share, reverse=True)[:LISTED]
-    load = _worst_load(proof)
-    live = list(ranked[0].history.live)
+    live, units = list(ranked[0].history.live), spec.machine().units
 
     def row(one: JudgedHistory) -> TableRow:
         values = [number(one.history.live[name]) for name in live]
-        residual = mm(one.residual[load])
+        load = _worst_load(proof, one)
+        residual = f"{load} {mm(one.residual[load])}"
         cells: list[str | Share] = [f"{one.number}", one.group, *values, residual, Share(proof.share(one))]
         return TableRow(cells=cells, mark="failed" if proof.share(one) > 1.0 else "")
 
-    head = ("history", "group", *live, f"residual sway of the {load}", "share of its limit")
+    told = (f"{name} ({units[name]})" for name in live)
+    head = ("history", "group", *told, "residual sway", "share of its limit")
     return Table(head=head, rows=[row(one) for one in ranked], words=2)
 
 

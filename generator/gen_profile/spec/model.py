@@ -51,7 +51,7 @@ LiveParameter = Annotated[str, Named("parameter", of="live", reorder=False)]
 LiveRate = Annotated[str, Named("parameter", of="rate", reorder=False)]
 Span = Annotated[tuple[float, float], Rising()]
 SwingState = Annotated[str, Named("coordinate")]
-Shares = Annotated[Mapping[ParameterName, RelativeRange], example("L1 = 0.2")]
+Shares = Annotated[Mapping[ParameterName, RelativeRange], example("NAME = 0.2")]
 Sway = Annotated[float, Bounds(above=0.0), Words("must be a finite number greater than 0, found FOUND")]
 
 
@@ -369,7 +369,7 @@ class PlannerSpec(Checked, table="planner"):
     """
 
     live: Annotated[Mapping[LiveParameter, Span], example("L1 = [3.0, 9.0]")] = NONE
-    live_rate: Annotated[Mapping[LiveRate, Positive], example("L1 = 0.1")] = NONE
+    live_rate: Annotated[Mapping[LiveRate, Positive], example("NAME = 0.1")] = NONE
     quick_stop: Positive | None = None
     quick_stop_jerk: Positive | None = None
 

@@ -148,6 +148,12 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
             per = f"{unit}/s" if kind == "velocity" else f"{unit}/s²"
             cure = _thousandth(value, f"limits are in {per}")
             yield from _fast(value, unit, kind, f"{place}: allows {value:g} {per}", cure)
+        if unit == "m" and kind == "travel" and (far := max(map(abs, value))) > LONG_WAY:
+            cure = _thousandth(far, "lengths are in m")
+            yield Doubt(sentence=f"{place}: reaches {far:g} m, farther than any crane's runway; {cure}")
+    for name, rate in spec.planner.live_rate.items():
+        found = f"planner.live_rate.{name}: hoists at {rate:g} m/s"
+        yield from _fast(rate, "m", "velocity", found, _thousandth(rate, "rates are in m/s"))
     sway, depth = spec.limits.sway, scale.depth[-1]
     if sway is not None and sway > (depth or FAR * max(scale.way[-1], *scale.depth)) > 0.0:
         what = f"the ropes' {depth:.4g} m" if depth else f"{FAR:g} times the move"

@@ -53,7 +53,9 @@ def _drive(spec: Spec) -> Iterator[Fault]:
 def _robustness(spec: Spec) -> Iterator[Fault]:
     own = spec.robustness
     if own.method != "none" and not own.uncertain:
-        yield "robustness.uncertain", f'required with method = "{own.method}", such as {{ L1 = 0.2 }}'
+        names = [*spec.plant.parameters]
+        one = next((name for name in names if name.startswith("L")), [*names, "L1"][0])  # ropes are
+        yield "robustness.uncertain", f'required with method = "{own.method}", such as {{ {one} = 0.2 }}'
     if own.nominal_zero and own.method != "range":
         yield "robustness.nominal_zero", 'only with method = "range"; elsewhere it is so anyway'
     if own.order == 2 and own.method == "range":
@@ -217,7 +219,8 @@ def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:
     live = spec.planner.live
     for name in spec.planner.live_rate:
         if name not in live:
-            yield place("planner.live_rate", name), f"not among planner.live{suggestion(name, live)}"
+            problem = f"not among planner.live{suggestion(name, live)}"
+            yield place("planner.live_rate", name), problem, place("planner.live", name)
 
 
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)

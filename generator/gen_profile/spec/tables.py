@@ -18,7 +18,7 @@ from gen_profile.plants.plant import Coordinate, Parameter, Plant
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.spec.external_fmu import KEYS as FMU_KEYS
 from gen_profile.spec.external_fmu import external_fmu
-from gen_profile.spec.model import RESIDUAL_SHARE, CheckSpec, MoveSpec, PlantSpec, Spec, Sway
+from gen_profile.spec.model import RESIDUAL_SHARE, AxisSpec, CheckSpec, MoveSpec, PlantSpec, Spec, Sway
 from gen_profile.spec.rules import broken_rules
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of, place
 from gen_profile.spec.values import NONE, Bounds, Distance, Duration, Positive, Rising, Words, found
@@ -304,6 +304,8 @@ def _axis(table: Table, plant: Plant | None, structurer: Structurer) -> Table:
         return {}
     if len(plant.actuated) == 1:
         table = _named(plant.actuated[0].name, table, structurer.faults)
+    else:
+        table = _of_several([axis.name for axis in plant.actuated], table, structurer.faults)
     table = {**{axis.name: {} for axis in plant.actuated}, **table}
     for axis in plant.actuated:
         given = table[axis.name]
@@ -321,6 +323,15 @@ def _named(axis: str, table: Table, faults: Faults) -> Table:
     for key in sorted(bare.keys() & own.keys()):
         faults.add(place("axis", key), f"stands in axis.{axis}, too; state one of them")
     return {**{key: value for key, value in table.items() if key not in bare}, axis: {**bare, **own}}
+
+
+def _of_several(axes: Sequence[str], table: Table, faults: Faults) -> Table:
+    """Refuse what stands there without a name, as it would be of which axis."""
+    bare = table.keys() & {*kinds_of(AxisSpec)} - {*axes}
+    for key in sorted(bare):
+        places = ", ".join(place(place("axis", axis), key) for axis in axes)
+        faults.add(place("axis", key), f"state it of each axis: {places}")
+    return {key: value for key, value in table.items() if key not in bare}
 
 
 def _feed_constant(table: Mapping[str, Any], where: str, structurer: Structurer) -> Table:

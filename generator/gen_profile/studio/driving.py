@@ -263,9 +263,7 @@ class Drive:
 
     def _ranges(self, name: str, value: float) -> Part:
         low, high = self._spec.planner.live[name]
-        units = {one.name: one.unit for one in self._plant.parameters}
-        units |= {axis.name: axis.unit for axis in self._plant.actuated}
-        return {"name": name, "value": value, "least": low, "most": high, "unit": units[name]}
+        return {"name": name, "value": value, "least": low, "most": high, "unit": self._plant.units[name]}
 
 
 def _load(drawing: Drawing) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import attrs
@@ -202,7 +203,7 @@ def spec_of(manifest: Manifest | None, path: Path) -> Spec:
     if manifest is None:
         raise OutputError(
             f"There is no {FILENAME} beside {path}, so its spec is unknown; name the spec: "
-            f"gen-profile check {path} SPEC.toml"
+            f"gen-profile check {quote(str(path))} SPEC.toml"
         )
     try:
         return spec_from_dict(manifest.spec, path.parent)
