@@ -14,7 +14,7 @@ import logging
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from gen_profile.private_folder import is_private, make_private, others_may_writ
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CACHE"
 _CHECKSUMS = "checksums.json"
 _logger = logging.getLogger(__name__)
-_known_intact: dict[Path, list[tuple[int, ...]]] = {}  # entries that were read whole, and their files then
+_known_intact: dict[Path, dict[str, tuple[int, ...]]] = {}  # entries read whole, and their files then
 
 
 def cache_folders() -> Iterator[Path]:
@@ -123,26 +123,29 @@ def is_intact(entry: Path) -> bool:
     Files that have not been touched since this process read them are not read again.
     """
     try:
+        if (known := _known_intact.get(entry)) and known == _stamps(entry, known):
+            return True
         checksums = json.loads((entry / _CHECKSUMS).read_text(encoding="utf-8"))
         if any(others_may_write(entry / name, entry.parent) for name in (_CHECKSUMS, *checksums)):
             return False
-        stamp = [_stamp(entry / name) for name in (_CHECKSUMS, *checksums)]
-        if _known_intact.get(entry) == stamp:
-            return True
+        stamps = _stamps(entry, (_CHECKSUMS, *checksums))
         intact = bool(checksums) and all(
             _sha256((entry / name).read_bytes()) == checksum for name, checksum in checksums.items()
         )
     except (OSError, ValueError, AttributeError, TypeError):
         return False
     if intact:
-        _known_intact[entry] = stamp
+        _known_intact[entry] = stamps
     return intact
 
 
-def _stamp(file: Path) -> tuple[int, ...]:
-    """Tell a file from what it may be replaced by or changed to."""
-    status = file.stat()
-    return status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
+def _stamps(entry: Path, names: Iterable[str]) -> dict[str, tuple[int, ...]]:
+    """Tell files from what they may be replaced by or changed to; whom they let write shows in them, too."""
+    found = {name: (entry / name).stat() for name in names}
+    return {
+        name: (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+        for name, status in found.items()
+    }
 
 
 def write_entry(entry: Path, files: Mapping[str, bytes]) -> None:

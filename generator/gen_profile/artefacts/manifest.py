@@ -103,7 +103,8 @@ class Manifest:
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
         return {
-            **attrs.asdict(self),
+            **attrs.asdict(self, recurse=False),
+            "artefacts": [attrs.asdict(artefact) for artefact in self.artefacts],
             "check": self.check or UNVERIFIED,
             "earlier": [one.to_dict() for one in self.earlier],
         }

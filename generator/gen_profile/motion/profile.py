@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from decimal import ROUND_CEILING, Decimal
 from functools import lru_cache
 from typing import Any, Protocol
@@ -134,22 +135,27 @@ class Profile:
 
     def derivative(self, times: Array, order: int) -> Array:
         """Evaluate a derivative by its order (0 = position), right-continuous, shape (times, axes)."""
+        return self._evaluated(times, (order,))[0]
+
+    def _evaluated(self, times: Array, orders: Sequence[int]) -> list[Array]:
         times = np.asarray(times, dtype=np.float64)
         beyond = (times - self.duration)[:, None]
         ahead = (self.target + beyond * self.final_velocity, self.final_velocity)
-        values = np.zeros((len(times), self.axes))
-        values[:] = ahead[order] if order < len(ahead) else 0.0
-        values[times < 0.0] = self.start if order == 0 else 0.0
         moving = (times >= 0.0) & (beyond[:, 0] < 0.0)
-        if moving.any():
-            segment = np.searchsorted(self.knots, times[moving], side="right") - 1
-            local = (times[moving] - self.knots[segment])[:, None]
+        segment = np.searchsorted(self.knots, times[moving], side="right") - 1
+        local = (times[moving] - self.knots[segment])[:, None]
+        found = []
+        for order in orders:
+            values = np.zeros((len(times), self.axes))
+            values[:] = ahead[order] if order < len(ahead) else 0.0
+            values[times < 0.0] = self.start if order == 0 else 0.0
             values[moving] = polynomial.polyval(local, self._derived(order)[:, segment], tensor=False)
-        return values
+            found.append(values)
+        return found
 
     def __call__(self, times: Array) -> Motion:
         """Evaluate position, velocity, acceleration and jerk at times in s."""
-        position, velocity, acceleration, jerk = (self.derivative(times, order) for order in range(4))
+        position, velocity, acceleration, jerk = self._evaluated(times, range(4))
         return Motion(position=position, velocity=velocity, acceleration=acceleration, jerk=jerk)
 
     def within_segments(self, points: int, order: int) -> tuple[Array, Array]:

@@ -78,11 +78,12 @@ class Box:
 
     def machines(self, places: Array) -> Array:
         """Parameters at some places, shape (places, parameters), in the plant's order."""
-        columns = {name: np.full(len(places), self.nominal[name]) for name in self._names()}
+        names = self._names()
+        found = np.tile([float(self.nominal[name]) for name in names], (len(places), 1))
         for (name, (low, high)), share in zip(self.ranges.items(), places.T, strict=True):
-            if name in columns:
-                columns[name] = low + share * (high - low)
-        return np.stack(list(columns.values()), axis=1)
+            if name in names:
+                found[:, names.index(name)] = low + share * (high - low)
+        return found
 
     def parameters(self, places: Array) -> list[dict[str, float]]:
         """Parameters at some places by name."""
@@ -217,8 +218,7 @@ def worst_places(shares: Shares, begun: Start, keep: int = 1) -> tuple[Array, in
     index, figure = (np.array(column) for column in zip(*chosen, strict=True))
     places, best = begun.places[index], values[index, figure]
     random, reach, tried = np.random.default_rng(0), np.ones(len(places)), len(values)
-    for _ in range(rounds):
-        basis = np.linalg.qr(random.standard_normal((ranges, ranges)))[0]
+    for basis in np.linalg.qr(random.standard_normal((rounds, ranges, ranges)))[0]:
         ways = np.concatenate([basis, -basis]) * begun.steps
         polls = np.clip(places[:, None] + reach[:, None, None] * ways, 0.0, 1.0)
         found = shares(polls.reshape(-1, ranges)).reshape(*polls.shape[:2], -1)

@@ -23,7 +23,7 @@ from gen_profile.sweep.case import CRASHED, PASSED, CaseOutcome, failed, run_cas
 from gen_profile.sweep.reading import swept_table
 from gen_profile.sweep.store import Keeper, Store, opened
 
-CASES_PER_TASK = 4  # at most; Dask's work for a task is a tenth of that for a case
+CASES_PER_TASK = 8  # at most; Dask's work for a task is a fifth of that for a case
 TASKS_AHEAD = 3  # per process: one at work, and what keeps it busy while this process takes results in
 
 
