@@ -1,5 +1,7 @@
 """The planner block on long ways and long ropes, and with drives that are slow beside the swing."""
 
+import re
+
 import numpy as np
 import pytest
 from driven_block import (
@@ -15,6 +17,7 @@ from driven_block import (
 )
 
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.full_speed import slow_axes
 from gen_profile.spec.reading import parse_spec
 
 pytestmark = pytest.mark.slow
@@ -68,6 +71,32 @@ def test_full_speed_is_reached_and_kept_by_a_drive_that_is_slow_beside_the_swing
     require_limits(out, limits=(*limits, travel[1]))
     assert residual(out, rates) < 1e-8
     assert out["operations"].max() <= 3000
+
+
+def stick(spec, rope):
+    """Hold it at full speed on an empty hook, and give the velocity of every cycle."""
+    driver = Driver(planner_block(spec).text, fL1=rope, fm2=0.0).hold(3.0)
+    command = spec.limits.velocity
+    return driver.hold(80.0, bVelocity=1, fVelocityCommand=command).outputs["fVelocity"]
+
+
+def test_a_slow_drive_reaches_its_share_of_full_speed_where_the_rope_may_change_on_the_way():
+    """A tenth is kept for calming; where rounding cut its pulses it went at a quarter."""
+    changes = ["planner.live_rate={L1=0.1}", "limits.acceleration=0.05", "limits.travel=[0.0, 1000.0]"]
+    assert stick(parse_spec(BAY, changes), 6.0)[-1] == pytest.approx(0.9 * VELOCITY)
+
+
+def test_an_axis_that_never_reaches_the_velocity_of_its_limits_is_told_of():
+    changes = ["limits.velocity=2.0", "limits.travel=[0.0, 1000.0]"]
+    slow, quick = (parse_spec(BAY, [*changes, f"limits.acceleration={a}"]) for a in (0.05, 1.0))
+    (sentence,) = slow_axes(slow, planner_block(slow))
+    told = re.match(
+        r"limits\.velocity: of 2 m/s the block reaches ([\d.]+) m/s with L1 = 3, m2 = 0: ", sentence
+    )
+    assert told
+    assert sentence.endswith("raise limits.acceleration.")
+    assert stick(slow, 3.0).max() == pytest.approx(float(told[1]), rel=0.05)
+    assert slow_axes(quick, planner_block(quick)) == ()
 
 
 @pytest.mark.parametrize("rope", [1.0, 2.3, 13.0])

@@ -421,7 +421,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cRate": min(axis.acceleration / axis.velocity for axis in c.axes),
         "cCurve": min(axis.jerk / axis.velocity for axis in c.axes),
-        "cInside": RESERVE if c.rates else INSIDE,
+        "cInside": INSIDE + (RESERVE if c.rates else 0.0),
         "cReserve": RESERVE if c.rates else 0.0,
         "cCalm": c.calm,
         "cAtOnce": AT_ONCE,

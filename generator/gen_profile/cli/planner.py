@@ -24,7 +24,7 @@ from gen_profile.cli.options import (
     scheduler_option,
     spec_options,
 )
-from gen_profile.cli.outcome import fail, print_outcome, warn
+from gen_profile.cli.outcome import beware, fail, print_outcome, warn
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
@@ -115,6 +115,7 @@ def write(
             draw(spec, outcome.block.text, outcome.proof, picture, tell)
     print_outcome(outcome.to_dict(), words.deployment(outcome), as_json)
     warn(outcome.proof)
+    beware(outcome.warnings)
     if outcome.proof is not None and not outcome.proof.passed:
         before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
         kept = "The block was kept." if outcome.files else f"Nothing was written{before}."

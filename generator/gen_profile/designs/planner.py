@@ -16,6 +16,7 @@ from gen_profile.designs.design import deliver_judged
 from gen_profile.designs.planner_cures import Cure, cures
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
+from gen_profile.planner.full_speed import slow_axes
 from gen_profile.progress import Progress, untold
 from gen_profile.proof.check import FORMAT
 from gen_profile.proof.prove import HISTORIES, prove
@@ -38,6 +39,8 @@ class Deployment:
         What was delivered; empty when the proof failed.
     cures : tuple of Cure
         Changes of a refused spec with which its block passes.
+    warnings : tuple of str
+        Sentences on axes that never reach the velocity of their limits; none where nothing was proved.
     """
 
     spec: Spec
@@ -46,6 +49,7 @@ class Deployment:
     folder: Path
     files: tuple[Artefact, ...]
     cures: tuple[Cure, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
@@ -64,6 +68,7 @@ class Deployment:
             "frequency_error": self.block.frequency_error,
             "proof": None if self.proof is None else self.proof.to_dict(),
             "cures": [{"values": dict(cure.values), "share": cure.share} for cure in self.cures],
+            "warnings": list(self.warnings),
         }
 
 
@@ -110,10 +115,10 @@ def deploy_planner(
     with staged(folder) as staging:
         written = {file.filename: staging.write(file.filename, file.content) for file in files}
         text = _executed(block, written)
-        proof = None
+        proof, warnings = None, tuple[str, ...]()
         prove_on = partial(prove, histories=histories, scheduler=scheduler, progress=progress)
         if check:
-            proof = prove_on(spec, text)
+            proof, warnings = prove_on(spec, text), slow_axes(spec, block)
         artefacts = tuple(
             Artefact(format=FORMAT, path=name, sha256=sha256(content), bytes=len(content))
             for name, content in written.items()
@@ -123,7 +128,15 @@ def deploy_planner(
     if proof is not None and not proof.passed and not keep_failed:
         progress("looking for what would pass")
         found = cures(spec, proof, lambda changed: prove_on(changed, planner_block(changed).text))
-    return Deployment(spec=spec, block=block, proof=proof, folder=folder, files=kept, cures=found)
+    return Deployment(
+        spec=spec,
+        block=block,
+        proof=proof,
+        folder=folder,
+        files=kept,
+        cures=found,
+        warnings=warnings,
+    )
 
 
 def _executed(block: PlannerBlock, written: Mapping[str, bytes]) -> str:

@@ -51,12 +51,15 @@ class PlannerBlock:
     modes : int
     frequency_error : float
         Relative, over the live ranges.
+    period : float
+        Of the slowest mode in s, the shortest over the live ranges.
     """
 
     filename: str
     text: str
     modes: int
     frequency_error: float
+    period: float
 
 
 def planner_block(spec: Spec) -> PlannerBlock:
@@ -72,9 +75,9 @@ def planner_block(spec: Spec) -> PlannerBlock:
     if faults := [fault for number, axis in planned.items() for fault in _faults(spec, number, axis.suffix)]:
         raise SpecError(*faults)
     axes = tuple(_axis(spec, number, axis.suffix) for number, axis in planned.items())
-    fastest = max(_rates(found, point)[0][0] for point in corners(found.live))
-    if 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * spec.export.cycle_time) < FEWEST_CYCLES:
-        most = 2.0 * np.pi / (SLOTS_PER_PERIOD * fastest * FEWEST_CYCLES)
+    period = 2.0 * np.pi / max(_rates(found, point)[0][0] for point in corners(found.live))
+    if period / (SLOTS_PER_PERIOD * spec.export.cycle_time) < FEWEST_CYCLES:
+        most = period / (SLOTS_PER_PERIOD * FEWEST_CYCLES)
         raise SpecError(f"export.cycle_time: at most {most:.2g} s for a machine that swings this fast.")
     interpolant = found.interpolant
     constants = PlannerConstants(
@@ -106,6 +109,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         text=text,
         modes=found.modes,
         frequency_error=found.error,
+        period=period,
     )
 
 

@@ -1,0 +1,84 @@
+"""Whether the axes of a planner block reach the velocity that their limits allow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+
+import attrs
+import numpy as np
+
+from gen_profile.planner.chebyshev import Array
+from gen_profile.planner.design import PlannerBlock
+from gen_profile.planner.machine import planned_axes
+from gen_profile.planner.planner import Planner
+from gen_profile.spec.model import AxisLimitsSpec, Spec
+from gen_profile_exporters.planner.block import FUTURE, RESERVE, SLOTS_PER_PERIOD
+
+QUICK = (
+    1.5  # periods of the slowest mode in which an axis at its limits is at a speed that it can be left from
+)
+ROOM = 1e5  # m: travel that no axis comes to the end of
+SETTLED = 10.0  # periods after which a held stick's velocity no longer changes
+NEARLY = 0.99
+AHEAD = FUTURE / SLOTS_PER_PERIOD
+
+
+def slow_axes(spec: Spec, block: PlannerBlock) -> tuple[str, ...]:
+    """Say which axes stay below the velocity of their limits, however far they go.
+
+    A block goes no faster than it can stop within the future that it holds. That is tried, where an axis is
+    slow beside the swing: a stick is held at full speed, at every corner of the live ranges.
+
+    Parameters
+    ----------
+    spec : Spec
+    block : PlannerBlock
+        Of that spec.
+
+    Raises
+    ------
+    CosimulationError
+        There is no C compiler.
+    """
+    period = block.period
+    limits = {number: spec.limits.of(number) for number in planned_axes(spec)}
+    quick = [
+        (own.velocity or 0.0)
+        <= QUICK * period * min(own.acceleration or 0.0, 0.5 * period * (own.jerk or 0.0))
+        for own in limits.values()
+    ]
+    return () if all(quick) else tuple(_sentences(spec, period))
+
+
+def _sentences(spec: Spec, period: float) -> Iterator[str]:
+    axes, limits, live = planned_axes(spec), spec.limits, spec.planner.live
+    travel = {limits.place(number, "travel"): (-ROOM, ROOM) for number in axes}
+    planner = Planner(attrs.evolve(spec, limits=limits.changed(travel)))
+    corners = [dict(zip(live, ends, strict=True)) for ends in product(*live.values())]
+    reached = [
+        _reached(planner, [limits.of(number) for number in axes], corner, period) for corner in corners
+    ]
+    for (number, axis), speeds in zip(axes.items(), np.transpose(reached), strict=True):
+        own, at = limits.of(number), int(np.argmin(speeds))
+        assert own.velocity and own.acceleration and own.jerk
+        if speeds[at] < NEARLY * (1.0 - (RESERVE if spec.planner.live_rate else 0.0)) * own.velocity:
+            scarce = "acceleration" if 3.0 * own.acceleration < period * own.jerk else "jerk"
+            where = ", ".join(f"{name} = {value:g}" for name, value in corners[at].items())
+            yield (
+                f"{limits.place(number, 'velocity')}: of {own.velocity:g} {axis.unit}/s the block reaches "
+                f"{speeds[at]:.2g} {axis.unit}/s{' with ' if where else ''}{where}: a stop from more would "
+                f"take longer than {AHEAD:g} periods of the slowest swing, for which it plans ahead; raise "
+                f"{limits.place(number, scarce)}."
+            )
+
+
+def _reached(
+    planner: Planner, limits: Sequence[AxisLimitsSpec], live: Mapping[str, float], period: float
+) -> Array:
+    """Hold a stick at full speed, and find the greatest velocity of each axis, shape (axes,)."""
+    full = [own.velocity or 0.0 for own in limits]
+    rise = max((own.velocity or 0.0) / (own.acceleration or 1.0) for own in limits)
+    planner.restart(np.zeros(len(full)) if len(full) > 1 else 0.0)
+    issued = planner.hold(rise + SETTLED * period, velocity=full if len(full) > 1 else full[0], live=live)
+    return np.asarray(np.abs(issued.velocity).reshape(-1, len(full)).max(axis=0))
