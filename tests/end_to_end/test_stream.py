@@ -273,6 +273,7 @@ class TestArtefact:
         assert outcome.code == 2
         assert outcome.err.splitlines()[-1].startswith("Error: --interface")
         assert cure in outcome.err
+        assert "?." not in outcome.err
         assert "solving" not in outcome.err
 
 

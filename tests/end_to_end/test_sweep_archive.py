@@ -103,7 +103,7 @@ def test_holds_one_sweep_and_lets_one_write(store):
         raise AssertionError
     other = prepared(store.folder, "plant.L1=0.4,0.6")
     with (
-        pytest.raises(OutputError, match=r"a sweep with another vary; choose another file"),
+        pytest.raises(OutputError, match=r"a sweep with other values; choose another file"),
         opened(other),
     ):
         raise AssertionError

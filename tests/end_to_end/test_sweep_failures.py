@@ -133,7 +133,7 @@ def test_a_folder_holds_one_sweep(tmp_path):
     with opened(store):
         pass
     other = prepared(tmp_path, "move.duration=3,5", overrides=["plant.m1=0.3"])
-    difference = r"a sweep with another vary and spec_sha256 and overrides;"
+    difference = r"a sweep with other values and spec and overrides;"
     with pytest.raises(OutputError, match=difference), opened(other):
         raise AssertionError
 

@@ -288,6 +288,20 @@ def test_a_log_that_begins_before_the_stop(tmp_path):
         assert abs(row["value"] - true["L0"]) <= row["half_range"]
 
 
+def test_comments_stay_in_their_column(tmp_path, monkeypatch):
+    """And a spec may be replaced by what was found of it."""
+    monkeypatch.chdir(tmp_path)
+    run_here("presets", "double-pendulum-crane", "--out", "bay.toml")
+    before = (tmp_path / "bay.toml").read_text("utf-8").splitlines()
+    words = ("--measured", "L1=6.123456±0.01", "--measured", "L2=1.4321±0.01", "--out", "bay.toml")
+    assert run_here("identify", "bay.toml", *words).code == 0
+    after = (tmp_path / "bay.toml").read_text("utf-8").splitlines()
+    changed = [pair for pair in zip(before, after, strict=True) if pair[0] != pair[1]]
+    assert [new.partition(" = ")[0] for _, new in changed] == ["L1", "L2", "uncertain"]
+    for old, new in changed[:2]:
+        assert new.index("#") == old.index("#")
+
+
 def test_a_contradiction_is_told(tmp_path):
     found = run_here(
         "identify", "--measured", "L1=0.5±0.001", "--measured", "L1=0.6±0.001", "--out", tmp_path / "x.toml"
@@ -300,7 +314,7 @@ def test_a_contradiction_is_told(tmp_path):
     ("arguments", "code", "why"),
     [
         ([], 2, "Name what to identify"),
-        (["--free", "L9"], 2, "L9: unknown parameter"),
+        (["--free", "L9"], 2, "--free L9: unknown parameter"),
         (["--free", "L1", "--period", "3:1±0.1"], 2, "the machine has 2 modes, found mode 3"),
         (["--free", "L1", "--period", "1±0.1", "--at", "1,2"], 2, "one position per axis (1), found 2"),
         (["--free", "L1", "--period", "1±0.1", "--at", "x"], 2, "write one number per axis"),

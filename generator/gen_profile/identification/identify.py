@@ -282,7 +282,11 @@ def _doubts(row: Mapping[str, Any]) -> Iterator[str]:
 
 def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], asked: set[str]) -> None:
     known = {q.name: q for q in plant.parameters}
-    faults = [f"{name}: unknown parameter{suggestion(name, known)}" for name in sorted(asked - known.keys())]
+    read = {reading.parameter for reading in readings if isinstance(reading, DirectReading)}
+    faults = [
+        f"{'measured' if name in read else 'free'} {name}: unknown parameter{suggestion(name, known)}"
+        for name in sorted(asked - known.keys())
+    ]
     for reading in (reading for reading in readings if isinstance(reading, DirectReading)):
         parameter = known.get(reading.parameter)
         if parameter and not parameter.lower <= reading.value <= parameter.upper:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import tomli_w
 import tomlkit
-from tomlkit.items import Table
+from tomlkit.items import Item, Table
 
 from gen_profile.errors import GenProfileError
 from gen_profile.spec.model import Spec
@@ -53,6 +53,19 @@ def changed_text(text: str, overrides: tuple[str, ...], given: Spec, spec: Spec,
 def _change(table: tomlkit.TOMLDocument | Table, key: str, before: object, after: object) -> None:
     if before == after:
         return
+    width = _width(table.get(key))
+    _set(table, key, before, after)
+    changed = table[key]
+    if width and (trivia := changed.trivia).comment:  # which stays in its column
+        trivia.comment_ws = " " * max(1, len(trivia.comment_ws) + width - _width(changed))
+
+
+def _width(item: object) -> int:
+    """Count the characters of a value in its line; none of a table of several lines."""
+    return len(item.as_string()) if isinstance(item, Item) and not isinstance(item, Table) else 0
+
+
+def _set(table: tomlkit.TOMLDocument | Table, key: str, before: object, after: object) -> None:
     if isinstance(after, dict) and isinstance(before, dict):
         if key not in table:
             table[key] = tomlkit.table()

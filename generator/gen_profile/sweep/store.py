@@ -30,6 +30,7 @@ from gen_profile.sweep.rows import case_path
 from gen_profile.sweep.table import write_table
 
 FORMAT, FORMAT_VERSION = "gen-profile sweep", 1
+WORDS = {"vary": "values", "spec_sha256": "spec"}  # for keys of a description
 DESCRIPTION, RECORD = "sweep.json", "case.json"
 RECORD_TYPES = {
     "status": str,
@@ -197,9 +198,9 @@ def opened(store: Store) -> Iterator[Keeper]:
 def _require_same(path: Path, asked: dict[str, Any], description: bytes | str) -> None:
     found = _parsed(path, description)
     if found != asked:
-        other = " and ".join(key for key in asked if found.get(key) != asked[key])
+        other = " and ".join(WORDS.get(key, key) for key in asked if found.get(key) != asked[key])
         what = "file" if is_archive(path) else "folder"
-        raise OutputError(f"{path} holds a sweep with another {other}; choose another {what}.")
+        raise OutputError(f"{path} holds a sweep with other {other}; choose another {what}.")
 
 
 @contextmanager

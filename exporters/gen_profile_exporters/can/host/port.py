@@ -42,18 +42,16 @@ class Port:
         except (can.CanError, OSError, ValueError, ImportError, NotImplementedError, NameError) as error:
             raise SpecError(
                 f"interface {self.interface}, channel {self.channel}: cannot be opened "
-                f"({str(error).rstrip('.')}); {self._cure()}."
+                f"({str(error).rstrip('.')}){self._cure()}"
             ) from error
 
     def _cure(self) -> str:
-        """Say what to install or set up, and which channels are there."""
+        """End a sentence by what to install or set up, and which channels are there."""
         if self.interface not in can.VALID_INTERFACES:
-            return f"unknown to python-can{suggestion(self.interface, sorted(can.VALID_INTERFACES))}".rstrip(
-                "."
-            )
+            return suggestion(self.interface, sorted(can.VALID_INTERFACES))
         channels = [channel.name for channel in detection.channels(self.interface)]
         there = f"channels found: {', '.join(channels)}" if channels else "no channel was found"
-        return f"{detection.needs(self.interface, self.channel)}; {there}"
+        return f"; {detection.needs(self.interface, self.channel)}; {there}."
 
     def remarks(self, launched: bool, channels: Sequence[str] = ()) -> tuple[str, ...]:
         """Say what there is to say about who sends each cycle at its instant."""
