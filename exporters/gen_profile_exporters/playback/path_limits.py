@@ -101,15 +101,15 @@ def latest_stop(limits: PathLimits, velocity: Array, acceleration: Array, cycle_
     path, step = begin.astype(np.float64), max(1.0, cycles / STEPS)  # in cycles
     rate, slope = np.ones(len(path)), np.zeros(len(path))
     worth = np.zeros(len(path), dtype=bool)
-    push = np.abs(acceleration * limits.inverse_velocity)
-    pushes = np.stack([np.where(acceleration * velocity > 0.0, 0.0, push), push])  # slowing down, speeding up
+    push = np.abs(acceleration * limits.inverse_velocity).T
+    pushes = np.stack([np.where((acceleration * velocity).T > 0.0, 0.0, push), push])  # slower, faster
     for passed in count(step, step):
         going = ~worth & (passed + MARGIN * step < cycles - begin)
         if not going.any():
             break
         slope = _slope(limits, rate, slope, step * cycle_time)
-        at = np.minimum(path.astype(int), cycles)
-        slower, faster = np.maximum(limits.room - pushes[:, at] * (rate * rate)[:, None], 0.0).min(axis=2)
+        used = pushes.take(path.astype(int), axis=2, mode="clip") * (rate * rate)
+        slower, faster = np.maximum(limits.room[:, None] - used, 0.0).min(axis=1)
         slope = np.minimum(np.maximum(slope, -slower), faster)
         before, rate = rate, np.maximum(rate + slope * step * cycle_time, 0.0)
         path = path + 0.5 * step * (before + rate)

@@ -112,8 +112,8 @@ def eigenvalues_at(
 
 def resting_place(plant: Plant, q_a: Sequence[float] | Array) -> tuple[float, ...]:
     """Tell where axes stand as far as it changes a plant at rest; other axes are always at the same place."""
-    standing, matters = plant.standing(), _terms(plant)[2]
-    return tuple(float(at) if own else one for at, one, own in zip(q_a, standing, matters, strict=True))
+    places = _terms(plant)[2]
+    return tuple(float(at) if place is None else place for at, place in zip(q_a, places, strict=True))
 
 
 def _eigenvalues(stiffness: Array, damping: Array) -> NDArray[np.complex128]:
@@ -168,10 +168,10 @@ def _linearized(
 
 
 @cache
-def _terms(plant: Plant) -> tuple[Function, Function, list[bool]]:
+def _terms(plant: Plant) -> tuple[Function, Function, list[float | None]]:
     """[∂free/∂q_u, ∂free/∂q̇_u, driven] and ∂sway/∂q_u as functions of state and parameters.
 
-    Third, of every axis, whether they depend on where it stands while the plant is at rest.
+    Third, for every axis on whose place neither depends while the plant is at rest, one to let it stand at.
     """
     d = dynamics(plant)
     inputs = {"q_u": d.q_u, "dq_u": d.dq_u, "q_a": d.q_a, "dq_a": d.dq_a, "p": d.p}
@@ -180,7 +180,8 @@ def _terms(plant: Plant) -> tuple[Function, Function, list[bool]]:
     moving = sym.column([d.q_u, d.dq_u, d.dq_a])
     still = sym.column([0.0] * moving.shape[0])
     at_rest = [sym.substitute(terms, moving, still) for terms in (motion, sway)]
-    places = [any(sym.depends(terms, q) for terms in at_rest) for q in sym.split(d.q_a)]
+    depends = [any(sym.depends(terms, q) for terms in at_rest) for q in sym.split(d.q_a)]
+    places = [None if matters else place for matters, place in zip(depends, plant.standing(), strict=True)]
     return Function("motion_terms", inputs, motion), Function("sway_terms", inputs, sway), places
 
 

@@ -6,6 +6,7 @@ import copy
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
@@ -190,8 +191,9 @@ def spec_from_dict(document: Mapping[str, Any], folder: Path = HERE) -> Spec:
     return spec
 
 
+@lru_cache(maxsize=1)  # all cases of a sweep begin at the same
 def _document(text: str, source: str) -> Table:
-    """Parse TOML; its parser tells where it stumbled, except at the end of the text."""
+    """Parse TOML, for others to copy; its parser tells where it stumbled, except at the end of the text."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
