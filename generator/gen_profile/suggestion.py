@@ -58,7 +58,7 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     """End a sentence: ``; did you mean 'x'?`` where something similar is known, else the list of what is."""
     known = list(known)
     near = meant(word, known)
-    return f"; did you mean {listed(near)}?" if near else f" (known: {', '.join(known)})."
+    return f"; did you mean {listed(near)}?" if near else f" (known: {', '.join(known) or 'none'})."
 
 
 def listed(names: Iterable[str]) -> str:

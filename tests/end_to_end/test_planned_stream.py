@@ -86,7 +86,7 @@ def test_unproved_blocks_are_refused(tmp_path, check, text, words):
         ),
         (
             ("--planner", "paper.st", "--commands", "commands.csv", "--live-parameter", "L3=1"),
-            "no parameter 'L3'",
+            "--live-parameter: the block has no live parameter 'L3'",
         ),
     ],
 )

@@ -152,6 +152,7 @@ def play(block: Path, commands_path: Path, path: Path, as_json: bool) -> None:
     from gen_profile.cli.progress import progress
     from gen_profile.planner.commands import play as run
     from gen_profile.planner.forms import read_block
+    from gen_profile.planner.interface import LOST
 
     content, commands = read_block(block), _read(commands_path)
     with progress() as tell:
@@ -162,7 +163,14 @@ def play(block: Path, commands_path: Path, path: Path, as_json: bool) -> None:
     if setpoints.errors:
         ids = ", ".join(map(str, setpoints.errors))
         text += f"; the block showed error {ids}, which its header explains"
-    document = {"path": str(path), "cycles": setpoints.cycles, "error_ids": list(setpoints.errors)}
+    if why := LOST.get(setpoints.unpromised):
+        text += f"; the load may sway, because {why}"
+    document = {
+        "path": str(path),
+        "cycles": setpoints.cycles,
+        "error_ids": list(setpoints.errors),
+        "promise": not setpoints.unpromised,
+    }
     print_outcome(document, text, as_json)
 
 

@@ -140,11 +140,14 @@ class IssuedSetpoints:
     cycles : int
     errors : tuple of int
         Error ids that it showed, in their order.
+    unpromised : int
+        Its nPromise at the end: 0 where no sway remains.
     """
 
     table: str
     cycles: int
     errors: tuple[int, ...]
+    unpromised: int
 
 
 def play(text: str, commands_text: str) -> IssuedSetpoints:
@@ -169,7 +172,7 @@ def play(text: str, commands_text: str) -> IssuedSetpoints:
         raise SpecError(f"commands: the last one comes at {at}, and at most {most} are played in one go.")
     columns = _columns(block.axes)
     places = {name: block.outputs.index(output) for name, output in columns.items()}
-    lines = ["time_s," + ",".join(columns)]
+    lines, promise = ["time_s," + ",".join(columns)], block.outputs.index("nPromise")
     shown: dict[int, None] = {}  # as an ordered set
     for number, row in enumerate(chain.from_iterable(_issued(block, commands, cycle))):
         cells = (
@@ -179,7 +182,12 @@ def play(text: str, commands_text: str) -> IssuedSetpoints:
         lines.append(f"{number * cycle:.9g}," + ",".join(cells))
         shown[int(row[places["error_id"]])] = None
     errors = tuple(error for error in shown if error)
-    return IssuedSetpoints(table="\n".join(lines) + "\n", cycles=len(lines) - 1, errors=errors)
+    return IssuedSetpoints(
+        table="\n".join(lines) + "\n",
+        cycles=len(lines) - 1,
+        errors=errors,
+        unpromised=int(row[promise]),
+    )
 
 
 def _columns(axes: Sequence[BlockAxis]) -> dict[str, str]:

@@ -13,6 +13,7 @@ COMMON = ("bEnable", "bExecute", "bVelocity", "bStop", "bQuickStop", "rOverride"
 OWN = ("fTarget", "fVelocityCommand", "fVelocityLimit", "fActPosition")  # of each axis
 ISSUED = ("fPosition", "fVelocity", "fAcceleration")  # likewise
 STATES = ("bBusy", "bPromise", "nErrorId")
+LOST = {1: "a live parameter changed on the way", 2: "there was a quick stop"}  # promises, by nPromise
 UNITS = ("m", "rad")
 
 _TARGET = re.compile(r"^\s*fTarget(\w*)\s*:\s*LREAL\s*;(?:\s*\(\*\s*(\w+))?", re.MULTILINE)

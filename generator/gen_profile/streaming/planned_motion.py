@@ -14,7 +14,7 @@ from gen_profile.motion.profile import SampledProfile
 from gen_profile.planner.commands import STILL, Command, inputs_of
 from gen_profile.planner.design import quick_limits
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.planner.interface import ISSUED, live_inputs
+from gen_profile.planner.interface import ISSUED, LOST, live_inputs
 from gen_profile.planner.machine import planned_axes
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import Spec
@@ -38,7 +38,6 @@ from gen_profile_exporters.setpoints import INT32, TOO_FAR, require_within
 LONGEST = 900_000  # cycles after which the axis is stopped without sway: an hour at 4 ms
 MARGIN = 100_000  # cycles for that stop
 ROUNDING = 1e-9  # relative, of a period counted in the block's cycles
-LOST = {1: "a live parameter changed on the way", 2: "there was a quick stop"}  # promises, by nPromise
 
 
 class Operator(Protocol):
@@ -312,5 +311,7 @@ def _live_values(block: BlockInstance, live: Mapping[str, float]) -> dict[str, f
     known = live_inputs(block.inputs, block.axes)
     for name in live:
         if name not in known:
-            raise SpecError(f"planner.live: the block has no parameter {name!r}{suggestion(name, known)}")
+            raise SpecError(
+                f"live_parameter: the block has no live parameter {name!r}{suggestion(name, known)}"
+            )
     return {known[name]: value for name, value in live.items()}
