@@ -159,7 +159,7 @@ def test_a_block_that_does_not_fit_the_bus_is_refused():
         source_of(spec_of(sync_period=0.015))
     with pytest.raises(SpecError, match=r"can\.travel\.cart: it must hold"):
         source_of(spec_of(travel={"cart": (-0.5, 1.0)}))
-    with pytest.raises(SpecError, match=r"no parameter 'L2'"):
+    with pytest.raises(SpecError, match=r"no live parameter 'L2'"):
         source_of(spec_of(), L2=0.3)
 
 
