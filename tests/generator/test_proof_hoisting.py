@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from generator.planned_machines import BAY, CYCLE, GANTRY, HOIST, swing
 
+from gen_profile.charts.proof import history_figure
 from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command
 from gen_profile.planner.design import planner_block
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.prove import prove
+from gen_profile.proof.trace import trace
 from gen_profile.spec.reading import parse_spec
 
 HOISTED = ((0.0, 6.0), (2.0, 6.0), (27.0, 8.5), (32.0, 8.0))  # s and m: at 0.1 m/s
@@ -129,7 +131,8 @@ def test_a_rope_that_changes_faster_than_stated_ends_the_promise(hoisting):
 def test_a_block_is_proved_for_ropes_that_change_on_the_way(written, changes):
     """At the stated speed throughout, in corners, up and down, and with starts and stops in the others."""
     spec = parse_spec(written, changes)
-    proof = prove(spec, planner_block(spec).text, histories=40)
+    text = planner_block(spec).text
+    proof = prove(spec, text, histories=40)
     assert proof.reasons() == ()
     assert proof.share(proof.worst) < 0.2
     ((name, rate),) = spec.planner.live_rate.items()
@@ -142,6 +145,12 @@ def test_a_block_is_proved_for_ropes_that_change_on_the_way(written, changes):
     assert max(map(max, speeds)) == pytest.approx(rate)
     assert min(speeds[0]) == pytest.approx(rate)
     assert min(map(min, speeds)) < 0.5 * rate
+    worst = proof.worst.history
+    *_, rope, _ = history_figure(spec, proof, trace(spec, text, Histories.of(spec), worst)).panels
+    assert rope.y_label == f"{name} (m)"
+    assert rope.lines[0].y[0] == worst.live[name]
+    assert rope.lines[0].y[-1] == pytest.approx(worst.hoisting[name][-1][1])
+    assert f"{name} {worst.live[name]:.4g} m at first" in worst.told(spec.machine().units)
 
 
 @pytest.mark.slow

@@ -53,12 +53,23 @@ def draw(spec: Spec, text: str, proof: Proof, path: Path, progress: Progress = u
 
 
 def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
-    """Draw place, velocity, acceleration and sway over time, and shade what is not promised."""
+    """Draw each axis, ropes that change, and the sway over time; shade what is not promised."""
     few = slice(None, None, -(-len(found.times) // SAMPLES))
     times, limit = found.times[few], 1e3 * list(proof.limit.values())[-1]
     signs = (1.0, -1.0) if spec.machine().directions == 1 else (1.0,)
     bands = [*_unpromised(found)]
     panels = [panel for place in range(len(found.history.axes)) for panel in _axis_panels(spec, found, place)]
+    panels += [
+        Panel(
+            title=f"What the block is told of {name}",
+            x_label=TIME,
+            y_label=_labelled(spec, name),
+            lines=[Line(name="command", x=times, y=np.interp(times, *np.transpose(corners)), style=COMMAND)],
+            levels=[Level(value=value) for value in spec.planner.live[name]],
+            bands=bands,
+        )
+        for name, corners in found.history.hoisting.items()
+    ]
     styles = [Style(colour=INK, width=2.0), *(Style(colour=colour, width=1.2) for colour in PALETTE[2:])]
     panels.append(
         Panel(

@@ -147,7 +147,7 @@ def block_judgement(found: BlockJudgement) -> str:
     )
     rows += [
         ("history", f"{worst.number}, {worst.group}, from {worst.history.start_words}"),
-        ("told", ", ".join(f"{name} {value:.4g}" for name, value in worst.history.live.items())),
+        ("told", worst.history.told(found.spec.machine().units)),
         ("commands", "; ".join(commands)),
         ("residual sway", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.residual.items())),
         ("sway on the way", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.on_the_way.items())),

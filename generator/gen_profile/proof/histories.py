@@ -16,6 +16,7 @@ import attrs
 import numpy as np
 from scipy.stats import qmc
 
+from gen_profile.evaluation import phrases
 from gen_profile.motion.profile import Array
 from gen_profile.planner.commands import Command
 from gen_profile.planner.design import target_range
@@ -80,6 +81,13 @@ class History:
         return ", ".join(
             f"{axis.name} {self.places[number]:.4g} {axis.unit}".lstrip()
             for number, axis in self.axes.items()
+        )
+
+    def told(self, units: Mapping[str, str]) -> str:
+        """Say what the block is told of live parameters, whose units are given by name."""
+        return ", ".join(
+            f"{name} {phrases.number(value)} {units[name]}" + " at first" * (name in self.hoisting)
+            for name, value in self.live.items()
         )
 
     def described(self, command: Command) -> dict[str, Any]:

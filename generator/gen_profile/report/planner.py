@@ -128,8 +128,7 @@ def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
     """Put the page in the order in which an engineer asks."""
     spec, proof = judgement.spec, judgement.check
     worst = proof.worst
-    units = spec.machine().units
-    told = ", ".join(f"{name} = {number(value)} {units[name]}" for name, value in worst.history.live.items())
+    told = worst.history.told(spec.machine().units)
     commands = len(worst.history.commands)
     yield Section(
         title="The worst history",
