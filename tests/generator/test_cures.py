@@ -87,7 +87,8 @@ def test_every_change_that_is_named_works_and_half_of_it_does_not(preset, overri
 def test_a_hoist_is_no_way_out_where_its_travel_is_limited():
     overrides = ["limits.sway=0.08", HOIST]
     changes = refused("single-pendulum-crane", *overrides)
-    assert [change[0].partition("=")[0] for change in changes[:2]] == ["move.duration", "limits.sway"]
+    assert changes[0][0].startswith("move.duration=")
+    assert not any("travel" in change for (change, *others) in changes if not others)
     assert all(works("single-pendulum-crane", *overrides, *change) for change in changes)
 
 

@@ -4,6 +4,8 @@ import casadi
 import numpy as np
 import pytest
 
+from gen_profile.evaluation.simulation import equations_of
+from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.problem.symbolic import Function
 
 MANY = 500
@@ -18,8 +20,8 @@ EXPRESSIONS = {
         casadi.tan(c),
         casadi.atan(a),
         casadi.atan2(a, b),
-        casadi.tanh(c),
     ],
+    "hyperbolic": [casadi.sinh(a), casadi.cosh(b), casadi.tanh(c)],
     "choices": [casadi.fabs(c), casadi.fmin(a, b), casadi.fmax(a, c), casadi.sin(a * b)],
     "what NumPy is not asked for": [casadi.if_else(a < b, a, c), casadi.floor(5.0 * a), casadi.erf(b)],
 }
@@ -53,6 +55,17 @@ def test_numpy_is_asked_from_some_points_on(monkeypatch):
     function(np.ones((MANY, 2)))
     function(np.ones((3, 2)))
     assert asked == [(MANY,)]
+
+
+@pytest.mark.parametrize("machine", plant_types())
+def test_every_machine_is_evaluated_operation_by_operation(monkeypatch, machine):
+    """Point by point, a tank's motion takes twice as long."""
+    for function in equations_of(find_plant(machine)):
+        asked = []
+        monkeypatch.setattr(function, "_by_operations", lambda points, _, asked=asked: asked.append(points))
+        sizes = [function._function.size1_in(i) for i in range(function._function.n_in())]
+        function(*(np.ones((MANY, size)) for size in sizes))
+        assert asked == [(MANY,)]
 
 
 @pytest.mark.parametrize("count", [3, MANY])

@@ -7,7 +7,6 @@ from contextlib import suppress
 from functools import cache, partial
 
 import attrs
-import numpy as np
 
 from gen_profile.designs import transient_sway
 from gen_profile.designs.draft import Draft, drafted, solved
@@ -15,7 +14,6 @@ from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import InfeasibleProblem, SolverDiverged
 from gen_profile.motion.profile import grid_length, grid_times
 from gen_profile.problem.limits import rounded_up
-from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
@@ -24,8 +22,8 @@ from gen_profile.solvers.minimum_time import least_corrected
 from gen_profile.spec.model import Spec
 from gen_profile.work import OutOfWork, budget, left, spend
 
-SLOW = 5.0  # periods of the slowest mode, which are time enough where no duration keeps the limits
-SEARCHING = 9.0  # s of work to find the shortest duration
+SLOW = 2.0  # times the usual duration, which is time enough where no duration keeps the limits
+SEARCHING = 4.0  # s of work to find the shortest duration
 SPREADING = 0.6  # of the work that is left for it to find the shortest duration, all machines considered
 SPREADS = 3  # times that it is measured how much more than the nominal machine others sway on the way
 NEARLY = 2e-3  # relative, by which it may be another than was supposed
@@ -143,8 +141,7 @@ def _calm(
 def _slow(spec: Spec) -> Problem:
     """Give a problem so much time that it is not the time that it lacks, and the machines' usual spread."""
     problem = problem_of(spec)
-    slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
-    slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * 2.0 * np.pi / slowest)))
+    slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * choice.usual_duration(problem))))
     return transient_sway.with_usual_spread(spec, slow)
 
 

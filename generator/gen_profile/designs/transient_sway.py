@@ -37,7 +37,7 @@ ENOUGH = 1.005  # times the limit that the worst machine may sway
 NEARLY_ENOUGH = 1.008  # likewise where solving again takes long
 MARGIN = 1.002  # for what lies between the machines and the times looked at
 STEEPNESS = 0.1  # least share of its own sway, by which the worst machine's falls with the nominal one's
-AT_ONCE = 3.0  # s of work, in which a motion without limits is found, or is not worth the while
+AT_ONCE = 1.0  # s of work, in which a motion without limits is found, or is not worth the while
 ACCURACY = 1e-6  # of the machines' integration, relative
 SAMPLES = 1001
 

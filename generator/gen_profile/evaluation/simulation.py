@@ -28,7 +28,7 @@ TRANSIENT_SAMPLES = 4001
 SHORTEST_STRETCH = 1e-9  # of a motion's duration: closer times are one
 GROWTH = 1e-6  # of the fastest rate, beyond which a machine does not return to rest
 LONGEST = 1e6  # greatest rate of a machine times its time: some hundred thousand steps, and minutes
-RATE, POINT = 4e-5, 4e-7  # s of work to evaluate the equations in a step, and more for each point
+RATE, POINT = 2e-5, 2e-7  # s of work to evaluate the equations in a step, and more for each point
 AT_REST: Mapping[str, float] = MappingProxyType({})
 
 

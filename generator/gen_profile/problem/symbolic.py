@@ -137,6 +137,8 @@ _OPERATIONS: Mapping[str, Callable[..., Array]] = {
     "SIN": np.sin,
     "COS": np.cos,
     "TAN": np.tan,
+    "SINH": np.sinh,
+    "COSH": np.cosh,
     "TANH": np.tanh,
     "ATAN": np.arctan,
     "ATAN2": np.arctan2,

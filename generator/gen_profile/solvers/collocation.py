@@ -25,7 +25,7 @@ from gen_profile.one_thread import one_thread
 from gen_profile.work import spend
 
 STAGES = 4  # of the schemes for fine meshes
-WORK = 1e-9  # s of work for each interval and the cube of its unknowns
+WORK = 3e-10  # s of work for each interval and the cube of its unknowns
 
 IntArray = NDArray[np.intp]
 

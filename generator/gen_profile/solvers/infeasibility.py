@@ -20,7 +20,6 @@ from gen_profile.work import OutOfWork, budget, left, spend
 
 FACTORS = (1.03, 1.1, 1.3, 1.7, 2.5, 4.0)  # times the least value, for which there is but one motion
 NEAR = 1.05  # how many times a value that will not do the one that is named may be
-WORK = 10.0  # s to look for all cures
 SHARE = 0.5  # of the work that is left, which one cure may take, and one duration tried
 MOST = 0.8  # likewise a longer move, which nearly always does
 WIDEST = 4.0  # times as wide as they are, all limits together are worth naming
@@ -138,14 +137,13 @@ def cures(problem: Problem, trial: CandidateTest, *, in_time: bool = False) -> s
     alone = (partial(_widened, relaxation, trial, {place: value}) for place, value in stated.items())
     together = [partial(_widened, relaxation, trial, stated, WIDEST)] if len(stated) > 1 else []
     try:
-        with budget(WORK):
-            if not in_time:
-                needed = _in_time(partial(least_duration, relaxation))
-                duration = needed and _in_time(partial(_longer, relaxation, trial, needed), MOST)
-            instead.extend(filter(None, map(_in_time, alone)))
-            for last_resort in (*together, partial(_less_robust, problem, trial)):
-                if not instead:
-                    instead.extend(filter(None, [_in_time(last_resort)]))
+        if not in_time:
+            needed = _in_time(partial(least_duration, relaxation))
+            duration = needed and _in_time(partial(_longer, relaxation, trial, needed), MOST)
+        instead.extend(filter(None, map(_in_time, alone)))
+        for last_resort in (*together, partial(_less_robust, problem, trial)):
+            if not instead:
+                instead.extend(filter(None, [_in_time(last_resort)]))
     except OutOfWork:  # of the budget for the whole answer: what was found so far is told
         pass
     if duration:

@@ -29,10 +29,10 @@ from gen_profile.spec.values import SolverName
 from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]
-ANSWER = 24.0, 28.0  # s of work for all that a spec asks for or would do instead, and of the processor
-SOLVING = 8.0  # s of work for a method
+ANSWER = 5.0, 8.0  # s of work for all that a spec asks for or would do instead, and of the processor
+SOLVING = 2.0  # s of work for a method
 LOOKING = 0.5  # likewise to see whether limits can be kept at all
-DIRECTLY = 12.0  # likewise for the direct one
+DIRECTLY = 3.0  # likewise for the direct one
 NEARLY = 1.1  # times the limits that the motion most easily within them may take, for it costs a little, too
 OTHERWISE = 'Set solver.method = "auto"'
 IN_VAIN = (
@@ -241,16 +241,18 @@ def minimum_time(
     roughly : bool
         Whether a duration a few hundredths longer will do.
     """
-    guess = near or _usual_duration(problem)
+    guess = near or usual_duration(problem)
     if problem.worst_case is None:
         return shortest(problem, guess, progress=progress, roughly=roughly)
     return worst_case.shortest_motion(problem, guess, progress)
 
 
-def _usual_duration(problem: Problem) -> float:
+def usual_duration(problem: Problem) -> float:
     """About how long in s the shortest motion takes, which no axis does in less time than by itself."""
-    slowest = linearize(problem.plant, problem.parameters, problem.target).frequencies[0]
-    times = [PERIODS * 2.0 * math.pi / float(slowest)]
+    slowest = float(linearize(problem.plant, problem.parameters, problem.target).frequencies[0])
+    times = [PERIODS * 2.0 * math.pi / slowest]
+    if problem.limits.sway is not None:  # a pendulum's, under a constant acceleration
+        times.append(math.sqrt(LEAST[2] * max(map(abs, problem.distance)) / problem.limits.sway) / slowest)
     for axis, way in enumerate(problem.distance):
         limits = problem.limits.of(axis)
         for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):

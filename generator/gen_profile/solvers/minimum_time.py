@@ -18,6 +18,7 @@ LONGER = 8.0  # from stride to stride away from a duration that is too short
 STEEPNESS = 15.0  # with which an excess falls over the duration's logarithm, as far as nothing is known of it
 BEYOND = 1.1  # times the distance to where a line through two tries crosses zero
 UNKNOWN = 1e-9  # excess of the duration to begin with, where it may do
+BENT = 0.35  # share of what a shorter duration leaves that counts: an excess falls ever more slowly
 ASIDE = 0.4  # of the precision, by which a try lies at least beside another one
 
 
@@ -114,7 +115,8 @@ def least_corrected(
     while trial is not None:
         known[trial], found[trial] = exactly(trial)
         beside = known[first] - rough[first]
-        below = {each: rough[each] + beside for each in rough if each < min(known)}
+        bent = BENT if min(known.values()) <= 0.0 else 1.0
+        below = {each: bent * (rough[each] + beside) for each in rough if each < min(known)}
         too_short = {each: excess for each, excess in below.items() if excess > 0.0}
         if start in below:
             too_short.setdefault(start, UNKNOWN)

@@ -217,17 +217,25 @@ def least_duration(relaxation: Relaxation) -> float | None:
         settle, so that nothing is known.
     """
     problem = relaxation.problem
-    places, asked = tuple(problem.limits.stated()), math.log(problem.duration)
+    places, asked, kept = tuple(problem.limits.stated()), math.log(problem.duration), list[float]()
 
     @cache
     def excess(log_duration: float) -> float:
         lasting = attrs.evolve(problem, duration=math.exp(log_duration))
         found = (relaxation if log_duration == asked else Relaxation(lasting)).least(places)
+        if found is not None and math.log(max(found.share, TINY)) <= ENOUGH:
+            kept.append(log_duration)
         return UNSETTLED if found is None else math.log(max(found.share, TINY)) - ENOUGH
 
     if not places or excess(asked) <= 0.0:
         return problem.duration
-    found = _least_above(excess, asked, CLOSE)
+    try:
+        with budget(SEARCHING * left()):
+            found = _least_above(excess, asked, CLOSE)
+    except OutOfWork:
+        if not kept:
+            raise
+        found = min(kept)
     return None if found is None else math.exp(found)
 
 
@@ -290,7 +298,7 @@ def shortest(
 
 
 def _least_above(
-    excess: Callable[[float], float], asked: float, close: float, steps: tuple[float, float] = STEPS
+    excess: Callable[[float], float], asked: float, close: float, steps: tuple[float, ...] = STEPS
 ) -> float | None:
     """Find where an excess that falls comes close to 0 from a place on where it is positive.
 
@@ -300,7 +308,7 @@ def _least_above(
     asked : float
     close : float
         How little it may fall short of 0.
-    steps : (float, float)
+    steps : tuple of float
         Least and greatest first step.
 
     Returns
@@ -311,18 +319,19 @@ def _least_above(
     short = lowest = asked
     power = POWER
     for _ in range(ROUNDS):
-        enough = short + float(np.clip((excess(short) + close / 2.0) / power, *steps))
+        enough = short + float(np.clip((excess(short) + close / 2.0) / power, steps[0], steps[-1]))
         if excess(enough) <= 0.0:
             return _close_to_zero(excess, short, enough, close)
-        if excess(enough) >= UNSETTLED > excess(lowest):
-            return enough  # by all that is known
+        unsettled = excess(enough) >= UNSETTLED > excess(lowest)
+        if unsettled and excess(short) >= UNSETTLED:
+            return short  # by all that is known
         if excess(enough) < excess(lowest) - LITTLE:
             lowest = enough
         elif excess(enough) < UNSETTLED and enough - lowest > STEPS[1]:
             return None
         known = (excess(short) - excess(enough)) / (enough - short)
         settled = excess(short) < UNSETTLED and POWERS[0] < known < POWERS[1]
-        power, steps = (known, KNOWN_STEPS) if settled else (POWER, STEPS)
+        power, steps = (known, KNOWN_STEPS) if settled else (POWER, STEPS[: 2 - unsettled])
         short = enough
     return asked
 
@@ -331,7 +340,7 @@ def _close_to_zero(excess: Callable[[float], float], short: float, enough: float
     """Interpolate between two values, until the excess of the greater one falls little short of 0."""
     tried = [short, enough]
     for _ in range(CLOSER):
-        if excess(enough) > -close or enough - short < close / POWERS[1]:
+        if excess(enough) > -close or enough - short < close / POWER:
             break
         nearest, near = sorted(tried, key=lambda place: abs(excess(place)))[:2]
         slope = (excess(nearest) - excess(near)) / (nearest - near)
