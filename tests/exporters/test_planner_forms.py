@@ -271,6 +271,8 @@ def test_the_command_line_plays_any_of_them(tmp_path, monkeypatch):
         tables.append((tmp_path / "out.csv").read_text())
     assert len(tables) == 3
     assert tables[0].splitlines()[-1].split(",")[1] == "0.5"
+    assert "C is not read back" in run_here("check", "bay.c").err
+    assert "C is not read back" in run_here("report", "bay.c").err
     (tmp_path / "hoisting.csv").write_text("time_s,command,value,L1\n0,position,9,5\n5,position,9,6\n")
     hoisting = ("planner", "play", block, "--commands", "hoisting.csv", "--out", "out.csv")
     assert "the load may sway, because a live parameter changed on the way" in run_here(*hoisting).out

@@ -39,6 +39,17 @@ def is_c(filename: str) -> bool:
     return Path(filename).suffix in (".c", ".h")
 
 
+def refuse_c(path: Path) -> None:
+    """Refuse a file that is C.
+
+    Raises
+    ------
+    ExportError
+    """
+    if is_c(path.name):
+        raise ExportError(f"{path}: C is not read back; name its block, in Structured Text or a form of it.")
+
+
 def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tuple[File, ...]:
     """Write a planner block in every form that is asked for, and read each back.
 
@@ -98,8 +109,7 @@ def read_block(path: Path) -> str:
         content = path.read_bytes()
     except OSError as error:
         raise OutputError(f"Cannot read the block {path}: {error.strerror}.") from error
-    if is_c(path.name):
-        raise ExportError(f"{path}: C is not read back; name its block, in Structured Text or a form of it.")
+    refuse_c(path)
     text = block_in(path, content)
     if not is_planner(text):
         raise ExportError(f"{path} holds no planner block; name a file that gen-profile planner wrote.")
