@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import signal
 import sys
@@ -15,6 +17,7 @@ from gen_profile.cli.outcome import print_error
 
 def main() -> None:
     """Run the command line; the entry point."""
+    atexit.register(gc.freeze)  # else Python looks for garbage among all that it loaded, just before it ends
     _open_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
