@@ -138,6 +138,16 @@ STANDING = gp.SampledProfile(cycle_time=0.01, position=np.zeros((10, 1)))
             lambda spec: gp.residual_sways(spec, STANDING, {"L1": [0.4, 0.5], "L2": [1, 2, 3]}),
             "as many of all",
         ),
+        (
+            lambda spec: gp.residual_sways(spec, STANDING, {"L1": [0.4, np.nan]}),
+            "L1 must be from 0.01 to 200 m",
+        ),
+        (lambda spec: gp.residual_sways(spec, STANDING, {"L1": []}), "for one machine or more"),
+        (lambda spec: gp.cosimulate(spec, STANDING, {"L1": "long"}), "one number of each"),
+        (lambda spec: gp.cosimulate(spec, STANDING, {"L1": -1.0}), "must be from 0.01 to 200 m, found -1"),
+        (lambda spec: gp.cosimulate(spec, STANDING, {"L1": [0.4, 0.5]}), "residual_sways takes many"),
+        (lambda spec: gp.linearize(spec.machine(), {"m1": 0.1}), "m2 must be a finite number"),
+        (lambda spec: gp.design(spec, [], "unused"), "name at least one format"),
         (lambda spec: gp.design(spec, "plcc", "unused"), "unknown format 'plcc'; did you mean 'plc'"),
     ],
 )
@@ -145,6 +155,17 @@ def test_slips_are_told_in_a_sentence(call, sentence):
     with pytest.raises(gp.SpecError, match=sentence):
         call(gp.preset_spec("paper"))
     assert not Path("unused").exists()
+
+
+@pytest.mark.parametrize("cycle_time", [0.0, -1.0, np.nan, np.inf, 1e-12])
+def test_a_cycle_that_cannot_be_is_told_in_a_sentence(cycle_time):
+    with pytest.raises(gp.GenProfileError, match="cycle"):
+        gp.sample(straight(1, "mine"), cycle_time)
+
+
+def test_samples_without_axes_are_told_in_a_sentence():
+    with pytest.raises(gp.GenProfileError, match="two samples of at least one axis"):
+        gp.SampledProfile(cycle_time=0.01, position=np.zeros(10))
 
 
 def test_what_is_said_of_all_axes_replaces_what_was_said_of_one():

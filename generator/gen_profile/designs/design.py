@@ -13,7 +13,7 @@ import attrs
 from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256, versions
 from gen_profile.artefacts.writing import Kept, Staging, staged
 from gen_profile.designs.plan import Plan, plan
-from gen_profile.errors import OutputError
+from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
@@ -180,6 +180,8 @@ def _designed(
     progress: Progress = untold,
 ) -> Design:
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
+    if not exporters:
+        raise SpecError("export: name at least one format.")
     require_end(exporters, stops=spec.move.stops)
     planned = plan(spec, progress)
     spec = planned.spec

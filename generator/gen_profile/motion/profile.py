@@ -17,6 +17,8 @@ from gen_profile.errors import GenProfileError
 
 Array = NDArray[np.float64]
 
+MOST_SAMPLES = 1e8  # of a profile
+
 
 def read_only(values: object) -> Array:
     """Copy to a read-only array of doubles."""
@@ -243,7 +245,7 @@ class SampledProfile:
 
     @resolution.default
     def _exact(self) -> Array:
-        return np.zeros(self.position.shape[1])
+        return np.zeros(self.position.shape[1:])
 
     def __attrs_post_init__(self) -> None:
         if self.position.ndim != 2 or len(self.position) < 2:
@@ -251,8 +253,7 @@ class SampledProfile:
         for values in (self.velocity, self.acceleration, self.jerk):
             if values is not None and values.shape != self.position.shape:
                 raise GenProfileError("A sampled profile's columns differ in length.")
-        if not (np.isfinite(self.cycle_time) and self.cycle_time > 0.0):
-            raise GenProfileError("A sampled profile's cycle time must be positive.")
+        _require_cycle(self.cycle_time)
 
     @property
     def times(self) -> Array:
@@ -265,7 +266,16 @@ class SampledProfile:
 
 
 def sample(profile: Profile, cycle_time: float) -> SampledProfile:
-    """Sample a profile on the cycle grid; the last sample is the first one at or after its end."""
+    """Sample a profile on the cycle grid; the last sample is the first one at or after its end.
+
+    Raises
+    ------
+    GenProfileError
+        The cycle time in s is not positive, or too short for a motion so long.
+    """
+    _require_cycle(cycle_time)
+    if profile.duration / cycle_time > MOST_SAMPLES:
+        raise GenProfileError(f"A motion of {profile.duration:g} s has too many cycles of {cycle_time:g} s.")
     times = grid_times(grid_length(profile.duration, cycle_time), cycle_time)
     motion = profile(times)
     return SampledProfile(
@@ -275,6 +285,11 @@ def sample(profile: Profile, cycle_time: float) -> SampledProfile:
         acceleration=motion.acceleration,
         jerk=motion.jerk,
     )
+
+
+def _require_cycle(cycle_time: float) -> None:
+    if not (np.isfinite(cycle_time) and cycle_time > 0.0):
+        raise GenProfileError("A sampled profile's cycle time must be positive.")
 
 
 def _sha256(*arrays: object) -> str:

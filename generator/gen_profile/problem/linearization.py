@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cache, lru_cache
 
@@ -9,7 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_profile.errors import InfeasibleProblem
+from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.problem import symbolic as sym
 from gen_profile.problem.dynamics import dynamics, parameter_column
@@ -80,9 +81,14 @@ def linearize(
 
     Raises
     ------
+    SpecError
+        A parameter is missing, or no finite number.
     InfeasibleProblem
         A mode has no restoring force, so the machine has no natural frequency to speak of.
     """
+    for name in plant.nominal():
+        if not math.isfinite(parameters.get(name, math.nan)):
+            raise SpecError(f"parameters: {name} must be a finite number; state every one of the machine.")
     axes = [0.0] * len(plant.actuated) if q_a is None else q_a
     return _linearized(plant, tuple(parameters.items()), resting_place(plant, axes))
 

@@ -34,12 +34,15 @@ def cosimulate(spec: Spec, setpoints: SampledProfile, parameters: Mapping[str, f
     Raises
     ------
     SpecError
-        The machine has no such parameter.
+        The machine has no such parameter, or does not take this value.
     CosimulationError
         The FMU cannot be built or run.
     """
-    _require_known(spec, parameters)
-    machine = Scenario(name="asked for", parameters={**spec.plant.parameters, **parameters})
+    values, *others = _machines(spec, parameters).tolist()
+    if others:
+        raise SpecError("parameters: one value of each; residual_sways takes many machines.")
+    names = (parameter.name for parameter in spec.machine().parameters)
+    machine = Scenario(name="asked for", parameters=dict(zip(names, values, strict=True)))
     (found,) = cosimulation.cosimulate(spec, setpoints, [machine], output_step=setpoints.cycle_time)
     return found
 
@@ -62,17 +65,12 @@ def residual_sways(spec: Spec, setpoints: SampledProfile, parameters: Mapping[st
     Raises
     ------
     SpecError
-        The machine has no such parameter, or there are not as many values of each.
+        The machine has no such parameter, does not take a value, or there are not as many values of each.
     CosimulationError
         The FMU cannot be built or run.
     """
-    _require_known(spec, parameters)
     plant, tau = spec.machine(), spec.actuator.tau or 0.0
-    values = {q.name: parameters.get(q.name, spec.plant.parameters[q.name]) for q in plant.parameters}
-    try:
-        machines = np.stack(np.broadcast_arrays(*map(np.atleast_1d, values.values())), axis=-1).astype(float)
-    except ValueError as error:
-        raise SpecError("parameters: one value of each for every machine, as many of all.") from error
+    machines = _machines(spec, parameters)
     ends = (spec.move.start, spec.move.target)
     fastest = np.max([abs(eigenvalues(plant, machines, q_a)).max(axis=-1) for q_a in ends], axis=0)
     feed = Feed(times=setpoints.times, position=setpoints.position)
@@ -88,8 +86,23 @@ def residual_sways(spec: Spec, setpoints: SampledProfile, parameters: Mapping[st
         )
 
 
-def _require_known(spec: Spec, parameters: Mapping[str, object]) -> None:
-    known = spec.plant.parameters
+def _machines(spec: Spec, parameters: Mapping[str, npt.ArrayLike]) -> Array:
+    """Put parameters of machines side by side, those that are not given as the spec has them."""
+    known, plant = spec.plant.parameters, spec.machine()
     for name in parameters:
         if name not in known:
             raise SpecError(f"parameters: the machine has no {name!r}{suggestion(name, known)}")
+    values = [parameters.get(q.name, known[q.name]) for q in plant.parameters]
+    try:
+        machines = np.stack(np.broadcast_arrays(*map(np.atleast_1d, values)), axis=-1).astype(float)
+    except (TypeError, ValueError) as error:
+        raise SpecError("parameters: one number of each for every machine, as many of all.") from error
+    if machines.ndim != 2 or not len(machines):
+        raise SpecError("parameters: a row of numbers of each, for one machine or more.")
+    for parameter, column in zip(plant.parameters, machines.T, strict=True):
+        taken = (parameter.lower <= column) & (column <= parameter.upper)  # never by what is no number
+        if not taken.all():
+            bounds = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
+            worst = column[~taken][0]
+            raise SpecError(f"parameters: {parameter.name} must be from {bounds}, found {worst:g}.")
+    return machines
