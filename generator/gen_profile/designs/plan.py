@@ -109,21 +109,19 @@ def judged(found: Draft, progress: Progress = untold) -> Plan:
         Nothing is left of a budget.
     """
     spec = found.spec
+    asked_next = spec.solver.solver, partial(_is_calm, spec), partial(transient_sway.as_asked_next, spec)
     if found.motion is None:
-        found = attrs.evolve(found, motion=_motion(found, progress))
-    evaluation = found.evaluation
-    figures = evaluation.figures
+        assert found.solution is not None  # a shaper has a motion, or raises
+        progress(EXPLAINING)
+        solution = choice.diagnosed(found.solution, *asked_next)
+        found = attrs.evolve(found, motion=optimal_profile(solution))
+    evaluation, figures = found.evaluation, found.evaluation.figures
     swing = max(figures["sway_transient_peak_m"], figures["sway_transient_worst_m"] / SWAY_TOLERANCE)
     broken = breaches(spec.limits, evaluation.command, swing)
     if broken:
         sentences = [breach.sentence() for breach in broken]
         progress(EXPLAINING)
-        cure = choice.remedy(
-            problem_of(spec),
-            spec.solver.solver,
-            partial(_is_calm, spec),
-            partial(transient_sway.as_asked_next, spec),
-        )
+        cure = choice.remedy(problem_of(spec), *asked_next)
         raise LimitViolation("\n".join([*sentences, cure]).strip())
     return Plan(
         spec=spec,
@@ -131,21 +129,4 @@ def judged(found: Draft, progress: Progress = untold) -> Plan:
         solver_time=found.solver_time,
         evaluation=evaluation,
         figures=figures,
-    )
-
-
-def _motion(found: Draft, progress: Progress) -> Profile:
-    """Take a draft's motion, or find out what would help."""
-    if found.motion is not None:
-        return found.motion
-    assert found.solution is not None  # a shaper has a motion, or raises
-    progress(EXPLAINING)
-    spec = found.spec
-    return optimal_profile(
-        choice.diagnosed(
-            found.solution,
-            spec.solver.solver,
-            partial(_is_calm, spec),
-            partial(transient_sway.as_asked_next, spec),
-        )
     )

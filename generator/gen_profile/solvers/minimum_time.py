@@ -38,27 +38,17 @@ Found = TypeVar("Found")
 
 
 def least(
-    feasible: Callable[[float], bool],
-    guess: float,
-    most: float,
-    precision: float = PRECISION,
+    feasible: Callable[[float], bool], guess: float, most: float, precision: float = PRECISION
 ) -> float | None:
-    """Bisect for the least value that will do, where every greater one does.
+    """Bisect for the least value up to `most` that will do, where every greater one does; None without any.
 
     Parameters
     ----------
     feasible : float → bool
-    guess : float
-        Roughly.
-    most : float
-        Where to give up.
+    guess, most : float
+        Where to begin and to give up.
     precision : float
         Relative.
-
-    Returns
-    -------
-    float or None
-        None where none up to `most` was found to do.
     """
     if feasible(guess):
         enough, short = guess, guess / STRIDE

@@ -223,9 +223,9 @@ def least_duration(relaxation: Relaxation) -> float | None:
     def excess(log_duration: float) -> float:
         lasting = attrs.evolve(problem, duration=math.exp(log_duration))
         found = (relaxation if log_duration == asked else Relaxation(lasting)).least(places)
-        if found is not None and math.log(max(found.share, TINY)) <= ENOUGH:
-            kept.append(log_duration)
-        return UNSETTLED if found is None else math.log(max(found.share, TINY)) - ENOUGH
+        exceeds = UNSETTLED if found is None else math.log(max(found.share, TINY)) - ENOUGH
+        kept.extend([log_duration] if exceeds <= 0.0 else [])
+        return exceeds
 
     if not places or excess(asked) <= 0.0:
         return problem.duration
