@@ -408,6 +408,10 @@ def test_an_error_of_the_block_is_told(text):
         (["planner.live={L1=[2.0, 1.0]}"], "planner.live.L1: must be two rising numbers"),
         (["planner.quick_stop=0.1"], "planner.quick_stop: must be at least limits.acceleration, "),
         (["export.cycle_time=0.2"], "export.cycle_time: at most"),
+        (
+            ["planner.live={L1=[3.0, 12.0]}", "plant.m1=450.0", "plant.m2=20000.0", "plant.L2=1.8"],
+            "planner.live: at L1 = 12 m the fastest mode has 20 times the frequency .* takes 9 at most",
+        ),
     ],
 )
 def test_a_fault_in_the_spec_is_told_with_its_place(changes, words):

@@ -90,11 +90,19 @@ def live_modes(spec: Spec) -> LiveModes:
             f"planner.live: over these ranges the frequencies would be known to {error:.1g} only; "
             "narrow the ranges, or write a block for each part of them."
         )
-    slowest, fastest = np.array(exact)[:, 0], np.array(exact)[:, -1]
-    if (fastest / slowest).max() > MOST_RATIO:
+    ratios = [rates[-1] / rates[0] for rates in exact]
+    if max(ratios) > MOST_RATIO:
+        farthest = zip(live.items(), between[np.argmax(ratios)], strict=True)
+        units = spec.machine().units
+        told = (
+            f"{name} = {0.5 * (low + high + t * (high - low)):g} {units[name]}"
+            for (name, (low, high)), t in farthest
+        )
         raise SpecError(
-            f"plant: the fastest mode has more than {MOST_RATIO:g} times the frequency of the slowest, "
-            "and the planner block does not take that; leave the fast mode out of the machine."
+            f"{'planner.live: at ' + ' and '.join(told) if live else 'plant:'} the fastest mode has "
+            f"{max(ratios):.3g} times the frequency of the slowest, and the planner block takes "
+            f"{MOST_RATIO:g} at most; {'narrow the ranges, or ' if live else ''}"
+            "state a machine without the fast mode, such as a single pendulum."
         )
     return LiveModes(modes=modes, live=live, interpolant=interpolant, error=error)
 
