@@ -57,18 +57,18 @@ def test_a_rope_that_changes_on_the_way_against_other_equations(hoisting):
     sway = swing(time, out["fAcceleration"], m1=350.0, m2=2000.0, L1=rope, L2=1.5)
     found = np.abs([out["hook"], out["payload"]])[:, : 2 * sway.shape[1] : 2]
     assert np.abs(found - sway).max() < 1e-3
-    assert sway.max() > 0.3
+    assert sway.max() > 0.25
 
 
 @pytest.mark.slow
 def test_what_a_changing_rope_leaves_is_calmed(hoisting):
-    """Without, a tenth of the sway on the way and more would remain."""
+    """Without, a twentieth of the sway on the way and more would remain."""
     run, _ = followed(*hoisting)
     assert run.promise
     assert run.stands > 0
     assert run.residual.max() < 0.01 * run.on_the_way.max()
     careless, out = followed(hoisting[0], planner_block(parse_spec(BAY)).text)
-    assert careless.residual.max() > 0.1 * careless.on_the_way.max()
+    assert careless.residual.max() > 0.05 * careless.on_the_way.max()
     assert out["bDone"].any()
 
 
@@ -109,6 +109,26 @@ def test_what_errors_of_the_rope_leave_does_not_add_up_from_motion_to_motion(hoi
         run = loop.run(history)
     assert run.stands > 0
     assert run.residual.max() < 0.003
+
+
+@pytest.mark.slow
+def test_much_sway_is_calmed_before_the_axis_goes_elsewhere():
+    """New targets while the rope goes from 9 to 3 m: 28 mm would remain if each were followed at once."""
+    spec = parse_spec(BAY, ["planner.live_rate={L1=0.3}", "robustness.uncertain={L1=0.01}"])
+    targets = ((0.2, 10.6), (2.7, 14.8), (3.3, 25.7), (6.5, 39.9), (11.8, 17.8))
+    history = History(
+        live={"L1": 9.0, "m2": 0.0},
+        parameters=dict(spec.plant.parameters) | {"L1": 0.99 * 9.0, "m2": 1e-4},
+        places=(36.8,),
+        commands=tuple(
+            Command(time=time, command="position", values=(place,), live={}) for time, place in targets
+        ),
+        hoisting={"L1": ((0.0, 9.0), (20.0, 3.0), (40.0, 9.0))},
+    )
+    with ClosedLoop(spec, planner_block(spec).text, Histories.of(spec)) as loop:
+        run = loop.run(history)
+    assert run.stands > 0
+    assert run.residual.max() < 0.01
 
 
 @pytest.mark.slow
