@@ -388,7 +388,9 @@ def test_what_the_author_of_a_spec_wrote_stays(tmp_path):
     text = (tmp_path / "new.toml").read_text("utf-8")
     length = read_spec(tmp_path / "new.toml").plant.parameters["L0"]
     assert length == pytest.approx(3.0, abs=1e-3)
-    changed = SPEC.replace("L0 = 2.6", f"L0 = {length}").replace("14.0", "15.0")
+    changed = SPEC.replace("L0 = 2.6   #", f"L0 = {length} #").replace(
+        "14.0", "15.0"
+    )  # as far as there is room
     assert text == changed
     assert re.search(r"kept +the spec's range of L0, ±10", found.out)
     assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
