@@ -10,6 +10,7 @@ from gen_profile.charts.proof import history_figure
 from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command
 from gen_profile.planner.design import planner_block
+from gen_profile.planner.planner import Planner
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.prove import prove
@@ -70,6 +71,19 @@ def test_what_a_changing_rope_leaves_is_calmed(hoisting):
     careless, out = followed(hoisting[0], planner_block(parse_spec(BAY)).text)
     assert careless.residual.max() > 0.05 * careless.on_the_way.max()
     assert out["bDone"].any()
+
+
+@pytest.mark.slow
+def test_an_axis_that_has_come_to_rest_stays_there(hoisting):
+    """An error of the rope makes the phase of what still swings ever less certain, but no swing greater."""
+    planner = Planner(hoisting[0], position=1.0)
+    cycles = round(20.0 / CYCLE)
+    for target, ropes in ((9.0, (6.0, 8.0)), (14.0, (8.0, 6.5))):
+        planner.hold(20.0, target=target, live={"L1": np.linspace(*ropes, cycles)})
+        planner.hold(40.0)
+    rests = planner.hold(120.0)
+    assert rests.done.all()
+    assert np.ptp(rests.position) == 0.0
 
 
 @pytest.mark.slow
