@@ -395,6 +395,14 @@ def test_what_is_no_block_is_refused(text, words):
         play(text, "")
 
 
+def test_targets_of_cycles_one_after_the_other_are_all_taken(text):
+    """The last one holds, though a rising edge needs a cycle without one before it."""
+    rows = [f"{0.1 + CYCLE * number},position,{number + 1}" for number in range(4)]
+    table = play(text, "\n".join(["time_s,command,value", *rows])).table
+    name, last = (line.split(",") for line in (table.splitlines()[0], table.splitlines()[-1]))
+    assert float(dict(zip(name, last, strict=True))["position_m"]) == pytest.approx(4.0, abs=1e-9)
+
+
 def test_an_error_of_the_block_is_told(text):
     """The target lies beyond the travel."""
     assert play(text, "time_s,command,value\n0,position,1e6\n").errors == (3,)

@@ -203,6 +203,17 @@ def _columns(axes: Sequence[BlockAxis]) -> dict[str, str]:
     return columns | {f"{axis.prefix}stop_distance_{axis.unit}": axis.of("fStopDistance") for axis in axes}
 
 
+def begins_of(commands: Sequence[Command], cycle: float) -> list[int]:
+    """Tell in which cycles commands begin: a position waits for a cycle without bExecute, to be an edge."""
+    begins, edge = list[int](), -2
+    for command in commands:
+        begin = max(command.begin(cycle), *begins[-1:], 0)
+        if command.command == "position":
+            edge = begin = begin + (begin == edge + 1)
+        begins.append(begin)
+    return begins
+
+
 def input_rows(
     commands: Sequence[Command], axes: Sequence[BlockAxis], values: Mapping[str, float], cycle: float
 ) -> tuple[list[int], Array]:
@@ -225,9 +236,8 @@ def input_rows(
     """
     values = dict(values)
     rows = {0: list(values.values())}
-    for command in commands:
+    for command, begin in zip(commands, begins_of(commands, cycle), strict=True):
         values |= inputs_of(command, axes)
-        begin = command.begin(cycle)
         rows[begin] = list(values.values())
         values["bExecute"] = 0.0  # an edge, so that the next command makes another
         rows[begin + 1] = list(values.values())

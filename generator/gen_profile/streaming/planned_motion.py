@@ -11,7 +11,7 @@ import numpy as np
 
 from gen_profile.errors import GenProfileError, SpecError, StreamAborted
 from gen_profile.motion.profile import SampledProfile
-from gen_profile.planner.commands import STILL, Command, inputs_of
+from gen_profile.planner.commands import STILL, Command, begins_of, inputs_of
 from gen_profile.planner.design import quick_limits
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import ISSUED, LOST, live_inputs
@@ -68,7 +68,7 @@ class CommandList:
     """
 
     def __init__(self, commands: Sequence[Command], cycle: float) -> None:
-        self._cycle, self._left = cycle, list(commands)
+        self._left = list(zip(begins_of(commands, cycle), commands, strict=True))
 
     @property
     def over(self) -> bool:
@@ -81,8 +81,8 @@ class CommandList:
 
     def due(self, cycle: int) -> Iterable[Command]:
         """Give the commands that begin in a cycle of the block."""
-        while self._left and self._left[0].begin(self._cycle) <= cycle:
-            yield self._left.pop(0)
+        while self._left and self._left[0][0] <= cycle:
+            yield self._left.pop(0)[1]
 
     def words(self, cycle: int, issued: Mapping[str, float]) -> str:
         """Say nothing: who wrote the commands knows them."""

@@ -51,6 +51,14 @@ def played(commands=COMMANDS, calls=1):
     return {name: np.array([float(row[name]) for row in rows])[::calls] for name in rows[0]}
 
 
+def test_targets_of_cycles_one_after_the_other_are_all_taken():
+    commands = f"time_s,command,value\n0.1,position,0.1\n{0.1 + CYCLE},position,0.2\n"
+    with bench_of(source_of(spec_of(), commands)) as bench:
+        record = bench.run()
+    last = struct.unpack_from("<i", bench.of(0x301)[-1].data)[0]
+    assert (record.phase, last) == (Phase.DONE, round(0.2 * COUNTS))
+
+
 @pytest.mark.parametrize(
     ("calls", "can"),
     [
