@@ -23,7 +23,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.work import OutOfWork, budget, left, spend
 
 SLOW = 2.0  # times the usual duration, which is time enough where no duration keeps the limits
-SEARCHING = 4.0  # s of work to find the shortest duration
+SEARCHING = 8.0  # s of work to find the shortest duration
 SPREADING = 0.6  # of the work that is left for it to find the shortest duration, all machines considered
 SPREADS = 3  # times that it is measured how much more than the nominal machine others sway on the way
 NEARLY = 2e-3  # relative, by which it may be another than was supposed

@@ -29,7 +29,7 @@ from gen_profile.spec.values import SolverName
 from gen_profile.work import OutOfWork, budget, spend
 
 Judge = Callable[[Solution], bool]
-ANSWER = 5.6, 8.0  # s of work for all that a spec asks for or would do instead, and of the processor
+ANSWER = 8.4, 12.0  # s of work for all that a spec asks for or would do instead, and of the processor
 SOLVING = 2.0  # s of work for a method
 LOOKING = 0.5  # likewise to see whether limits can be kept at all
 DIRECTLY = 3.0  # likewise for the direct one
