@@ -15,9 +15,7 @@ from gen_profile.planner.planner import Planner
 from gen_profile.spec.model import AxisLimitsSpec, Spec
 from gen_profile_exporters.planner.block import FUTURE, RESERVE, SLOTS_PER_PERIOD
 
-QUICK = (
-    1.5  # periods of the slowest mode in which an axis at its limits is at a speed that it can be left from
-)
+QUICK = 1.5  # slow periods in which an axis at its limits is at a speed that it can be left from
 ROOM = 1e5  # m: travel that no axis comes to the end of
 SETTLED = 10.0  # periods after which a held stick's velocity no longer changes
 NEARLY = 0.99
