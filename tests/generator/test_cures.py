@@ -92,6 +92,16 @@ def test_a_hoist_is_no_way_out_where_its_travel_is_limited():
     assert all(works("single-pendulum-crane", *overrides, *change) for change in changes)
 
 
+@pytest.mark.slow
+def test_a_travel_that_begins_where_the_move_does_is_not_to_blame_for_a_short_duration():
+    overrides = ["move.duration=9", "limits.travel=[0, 8]"]
+    (longer,), *others = refused("bay-crane", *overrides)
+    assert float(longer.partition("=")[2]) < 14.0  # 15.8 was named; the shortest takes 12.75 s
+    assert others
+    assert not any("travel" in place for change in others for place in change)
+    assert works("bay-crane", *overrides, longer)
+
+
 def test_limits_that_no_single_one_is_to_blame_for_are_widened_together():
     overrides = ["limits.velocity=0.09", "limits.acceleration=0.1"]
     changes = refused("paper", *overrides)

@@ -54,6 +54,15 @@ def test_of_the_papers_crane(limits, desensitized):
     assert 0.998 * best < found < 1.02 * best
 
 
+def test_a_travel_that_ends_where_the_move_does_takes_no_longer():
+    limits = LimitsSpec(velocity=0.15, acceleration=0.5, jerk=10.0)
+    free, bounded = (
+        choice.minimum_time(crane_problem(desensitized=("L1",), limits=own)).duration
+        for own in (limits, attrs.evolve(limits, travel=(0.0, 0.3)))
+    )
+    assert bounded == pytest.approx(free, rel=2e-3)
+
+
 @pytest.mark.slow
 def test_with_a_limit_of_the_sway_on_the_way():
     limits = LimitsSpec(acceleration=0.5, sway=0.02)

@@ -14,7 +14,7 @@ import attrs
 
 from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem
-from gen_profile.solvers.direct.relaxation import Relaxation, least_duration
+from gen_profile.solvers.direct.relaxation import Relaxation, eased_by_time, least_duration
 from gen_profile.solvers.solution import Solution, Status
 from gen_profile.work import OutOfWork, budget, left, spend
 
@@ -135,7 +135,9 @@ def cures(problem: Problem, trial: CandidateTest, *, in_time: bool = False) -> s
     needed, duration, instead, sentences = None, None, list[str](), list[str]()
     stated, relaxation = problem.limits.stated(), Relaxation(problem)
     alone = (partial(_widened, relaxation, trial, {place: value}) for place, value in stated.items())
-    together = [partial(_widened, relaxation, trial, stated, WIDEST)] if len(stated) > 1 else []
+    eased = {place: stated[place] for place in eased_by_time(problem)}
+    families = [limits for limits in ([eased] if eased == stated else [eased, stated]) if len(limits) > 1]
+    together = [partial(_widened, relaxation, trial, limits, WIDEST) for limits in families]
     try:
         if not in_time:
             needed = _in_time(partial(least_duration, relaxation))

@@ -207,6 +207,15 @@ class Relaxation:
         return None
 
 
+def eased_by_time(problem: Problem) -> tuple[str, ...]:
+    """Name the limits of which a longer move asks for less: all but travel, where others are stated.
+
+    A move that begins at an end of its travel asks for all of it, however long it takes.
+    """
+    places = tuple(problem.limits.stated())
+    return tuple(place for place in places if not place.endswith(".travel")) or places
+
+
 def least_duration(relaxation: Relaxation) -> float | None:
     """Find the duration in s, no shorter than the problem's, in which all limits can just be kept.
 
@@ -217,7 +226,7 @@ def least_duration(relaxation: Relaxation) -> float | None:
         settle, so that nothing is known.
     """
     problem = relaxation.problem
-    places, asked, kept = tuple(problem.limits.stated()), math.log(problem.duration), list[float]()
+    places, asked, kept = eased_by_time(problem), math.log(problem.duration), list[float]()
 
     @cache
     def excess(log_duration: float) -> float:
@@ -266,7 +275,7 @@ def shortest(
     Relaxed or None
         None where no duration was found to do.
     """
-    places, kept = tuple(problem.limits.stated()), list[Relaxed]()
+    places, kept = eased_by_time(problem), list[Relaxed]()
     last, begun = (guess, guess.duration) if isinstance(guess, Relaxed) else (None, guess)
 
     @cache
