@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,6 +13,7 @@ from gen_profile.cli.options import (
     Count,
     InputFile,
     OutputFile,
+    PathType,
     SpecChoice,
     block_plot_option,
     complete_presets,
@@ -29,6 +29,8 @@ from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gen_profile.certificate.document import Certificate
     from gen_profile.proof.check import BlockJudgement
     from gen_profile.spec.model import Spec
@@ -130,7 +132,7 @@ def compare(
 
 
 @cli.command(epilog="Example: gen-profile check deploy/paper.st")
-@click.argument("artefact", type=click.Path(path_type=Path))
+@click.argument("artefact", type=PathType())
 @spec_options
 @click.option("--samples", type=Count(0, 1_000_000), help="Draw N machines, in place of check.samples.")
 @click.option("--scenario", metavar="N", type=int, help="Try only the scenario of this number (row).")

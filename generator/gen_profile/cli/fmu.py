@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +10,9 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.options import OutputFile, SpecChoice, output_options, spec_options
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 # spelled out here because --help must not wait for CasADi; a test holds them against those of designs/fmu.py
 KINDS = ("plant", "profile", "system", "planner", "planned-system", "ssp", "planned-ssp")

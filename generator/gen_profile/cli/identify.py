@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import OutputFile, SpecChoice, output_options, plot_option, spec_options
+from gen_profile.cli.options import (
+    OutputFile,
+    PathType,
+    SpecChoice,
+    output_options,
+    plot_option,
+    spec_options,
+)
 from gen_profile.cli.outcome import print_outcome
 from gen_profile.errors import SpecError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @cli.command(epilog="Example: gen-profile identify crane.toml --measured L1=6.2±0.1 --period 51.3±0.3/10")
@@ -32,7 +42,7 @@ from gen_profile.errors import SpecError
     "--swing",
     "log",
     metavar="CSV",
-    type=click.Path(path_type=Path),
+    type=PathType(),
     help="A swing logged while the axes stood still.",
 )
 @click.option("--columns", metavar="TIME,VALUE", default="1,2", help="Columns of the log: names, or numbers.")
@@ -69,7 +79,7 @@ from gen_profile.errors import SpecError
 @click.option(
     "--out",
     type=OutputFile(replaces="spec_path"),
-    default=Path("identified.toml"),
+    default="identified.toml",
     help="Spec to write; ./identified.toml by default.",
 )
 @plot_option

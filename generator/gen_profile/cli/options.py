@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
@@ -14,6 +13,9 @@ from gen_profile.cli.outcome import beware
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
+    from os import PathLike
+    from pathlib import Path
+
     from gen_profile.spec.model import Spec
 
 DEFAULT_PRESET = "paper"
@@ -29,11 +31,18 @@ class Count(click.IntRange):
         return "N"
 
 
-class InputFile(click.Path):
-    """A file to read."""
+class PathType(click.Path):
+    """A path as Python's own type, which takes a while to load and is not needed to tell what there is."""
 
-    def __init__(self) -> None:
-        super().__init__(path_type=Path)
+    def coerce_path_result(self, value: str | PathLike[str]) -> Path:
+        """Make a path of a word."""
+        from pathlib import Path
+
+        return Path(value)
+
+
+class InputFile(PathType):
+    """A file to read."""
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Call it FILE in the help."""
@@ -63,7 +72,7 @@ class OutputFile(InputFile):
         """
         from gen_profile.artefacts.writing import require_place
 
-        path = Path(str(super().convert(value, param, ctx)))
+        path = cast("Path", super().convert(value, param, ctx))
         if ctx is not None and ctx.resilient_parsing:  # of a line that is still being typed
             return path
         if not path.parent.exists():
@@ -161,7 +170,7 @@ def complete_presets(_: click.Context, __: click.Parameter, incomplete: str) -> 
 def spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add what every command that takes a spec takes; the command gets it as `chosen`."""
 
-    @click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=click.Path(path_type=Path))
+    @click.argument("spec_path", metavar="[SPEC.toml]", required=False, type=PathType())
     @click.option(
         "--preset",
         metavar="NAME",
@@ -224,8 +233,8 @@ folder_option = click.option(
     "--out",
     "folder",
     metavar="DIR",
-    type=click.Path(path_type=Path),
-    default=Path("gen-profile-out"),
+    type=PathType(),
+    default="gen-profile-out",
     help="Folder to write to; ./gen-profile-out by default.",
 )
 plot_option = click.option("--plot", "picture", type=PictureFile(), help="Draw it (png, svg or pdf).")
@@ -256,6 +265,8 @@ def output_options(command: Command) -> Command:
 
 def _require_apart(context: click.Context) -> None:
     """Refuse to write a file that is read, or two files of one name."""
+    from pathlib import Path
+
     files: dict[Path, click.Parameter] = {}
     by_role = sorted(context.command.params, key=lambda parameter: isinstance(parameter.type, OutputFile))
     for parameter in by_role:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,6 +16,7 @@ from gen_profile.cli.options import (
     Count,
     InputFile,
     OutputFile,
+    PathType,
     SpecChoice,
     block_plot_option,
     folder_option,
@@ -28,6 +28,8 @@ from gen_profile.cli.outcome import beware, fail, print_outcome, warn
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gen_profile.streaming.outcome import Source
 
 CLEARED = "\r\x1b[K"  # the line, of a terminal
@@ -130,7 +132,7 @@ def write(
 @planner.command(
     epilog="Example: gen-profile planner play deploy/bay-3.st --commands commands.csv --out setpoints.csv"
 )
-@click.argument("block", type=click.Path(path_type=Path))
+@click.argument("block", type=PathType())
 @click.option(
     "--commands",
     "commands_path",
@@ -203,7 +205,7 @@ def planner_options(command: Callable[..., Any]) -> Callable[..., Any]:
             "--planner",
             "block",
             metavar="BLOCK",
-            type=click.Path(path_type=Path),
+            type=PathType(),
             help="Stream what this written planner block issues.",
         ),
     ):

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from gen_profile.cli.commands import cli
-from gen_profile.cli.options import OutputFile, SpecChoice, export_option, output_options, spec_options
+from gen_profile.cli.options import (
+    OutputFile,
+    PathType,
+    SpecChoice,
+    export_option,
+    output_options,
+    spec_options,
+)
 from gen_profile.cli.outcome import fail, print_outcome
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gen_profile.spec.model import Spec
 
 
@@ -38,7 +46,7 @@ if TYPE_CHECKING:
     "--measured",
     "log",
     metavar="LOG.csv",
-    type=click.Path(path_type=Path),
+    type=PathType(),
     help="What the machine really did: columns time_s, <axis>_position_mm, <load>_sway_mm, <load>_angle_deg.",
 )
 @click.option(
@@ -84,6 +92,8 @@ def report(
             compared=not no_compare,
         )
     )
+    from pathlib import Path
+
     out = path or Path(f"{made_of.name}.html")
     on_paper = out.suffix.lower() == ".pdf"
     if not on_paper and out.suffix.lower() not in {".html", ".htm"}:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from gen_profile.cli.commands import cli
 from gen_profile.cli.options import Count, OutputFile, SpecChoice, output_options, plot_option, spec_options
 from gen_profile.cli.outcome import print_outcome
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @cli.command(epilog="Example: gen-profile robustness crane.toml --parameter L1 --plot robustness.png")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +10,7 @@ from gen_profile.cli.commands import cli
 from gen_profile.cli.options import (
     Count,
     OutputFile,
+    PathType,
     SpecChoice,
     export_option,
     output_options,
@@ -17,6 +18,9 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import print_outcome
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @cli.command(
@@ -38,8 +42,8 @@ from gen_profile.cli.outcome import print_outcome
     "--out",
     "folder",
     metavar="DIR|FILE.sqlite",
-    type=click.Path(path_type=Path),
-    default=Path("gen-profile-sweep"),
+    type=PathType(),
+    default="gen-profile-sweep",
     help="Folder to write to, or one file for everything; ./gen-profile-sweep by default. A sweep begun "
     "there goes on.",
 )
@@ -96,7 +100,7 @@ def sweep(
 @click.option(
     "--out",
     metavar="DIR",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=PathType(file_okay=False),
     help="Folder to write the profile to, with its manifest; it stays where it is by default.",
 )
 @output_options
@@ -120,12 +124,12 @@ def lookup(words: tuple[str, ...], out: Path | None, as_json: bool) -> None:
 
 
 @cli.command(epilog="Example: gen-profile library swept --out crane.st")
-@click.argument("folder", metavar="DIR|FILE", type=click.Path(path_type=Path))
+@click.argument("folder", metavar="DIR|FILE", type=PathType())
 @click.option(
     "--out",
     "path",
     type=OutputFile(),
-    default=Path("library.st"),
+    default="library.st",
     help="File to write: its name is the block's, its suffix tells the format; ./library.st by default.",
 )
 @output_options
@@ -166,4 +170,6 @@ def _folder_and_values(words: tuple[str, ...]) -> tuple[Path, dict[str, str]]:
             "name one folder or file that was swept to, and a value for every key varied there, "
             "such as --plant.L1 5.2."
         )
+    from pathlib import Path
+
     return Path(folders[0]), asked

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -19,6 +18,8 @@ from gen_profile.cli.streaming.words import at_start, outcome_words, plan_words,
 from gen_profile.errors import OutputError, StreamAborted
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gen_profile.streaming.outcome import StreamOutcome
 
 _MISSES = ("extrapolate", "hold", "stop")
