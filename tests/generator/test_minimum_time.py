@@ -244,7 +244,7 @@ def test_a_motion_that_no_machine_can_follow_is_passed_over(monkeypatch):
         raise CosimulationError("The motion cannot be integrated beyond 2.565 s.")
 
     monkeypatch.setattr("gen_profile.designs.draft.evaluate", flung)
-    assert found.unrest == math.inf
+    assert found.excess_sway == math.inf
 
 
 def test_where_the_work_does_not_reach_for_many_intervals_the_motion_on_few_is_taken(monkeypatch):
@@ -254,6 +254,6 @@ def test_where_the_work_does_not_reach_for_many_intervals_the_motion_on_few_is_t
     monkeypatch.setattr(searching, "solved", solved)
     limits = ["limits.acceleration=0.7", "move.duration=minimum"]
     found = draft(preset_spec("paper", [*limits, "check.residual_sway=0.0031"]))
-    assert found.unrest <= 0.0
+    assert found.excess_sway <= 0.0
     assert found.spec.move.duration == pytest.approx(2.6, rel=0.01)
     assert found.solution.problem.duration == found.spec.move.duration

@@ -51,7 +51,7 @@ class Draft:
         return evaluate(self.spec, self.motion)
 
     @cached_property
-    def unrest(self) -> float:
+    def excess_sway(self) -> float:
         """How much more sway it leaves than it should, as a logarithm; infinite without a motion.
 
         Also where the motion sways more on the way than it may, or no machine can follow it.

@@ -60,7 +60,7 @@ class Plan:
 
 def _is_calm(spec: Spec, solution: Solution) -> bool:
     """Whether a solution leaves every machine of a spec little enough sway, and no more on the way."""
-    return drafted(spec, solution).unrest <= 0.0
+    return drafted(spec, solution).excess_sway <= 0.0
 
 
 def plan(spec: Spec, progress: Progress = untold) -> Plan:

@@ -112,12 +112,12 @@ def _calm(
     """
     first = drafted(_lasting(spec, easiest.duration), easiest.solution)
     # an axis without limits may fling a load about
-    near = easiest if first.unrest < math.inf else None
+    near = easiest if first.excess_sway < math.inf else None
 
     def tried(how: str, found: Draft) -> float:
-        if found.unrest <= 0.0:
+        if found.excess_sway <= 0.0:
             calm[how] = found
-        return found.unrest
+        return found.excess_sway
 
     @cache
     def exactly(duration: float) -> tuple[float, Draft]:
@@ -129,7 +129,7 @@ def _calm(
         if problem.worst_case is not None:
             return exactly(duration)[0]
         if duration == first.spec.move.duration:
-            return first.unrest
+            return first.excess_sway
         lasting = attrs.evolve(problem, duration=duration)
         solution = choice.attempt(lasting, "direct", coarse=True, near=near)
         return tried("roughly", drafted(_lasting(spec, duration), solution))
