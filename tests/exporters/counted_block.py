@@ -60,10 +60,19 @@ class CountedBlock:
         self.library.begin(self.memory)
 
     def hold(self, cycles, **inputs):
-        """Hold inputs, bExecute being an edge, and give the outputs of every cycle by name."""
+        """Hold inputs and give the outputs of every cycle by name; where bExecute is given, it is an edge."""
+        was_high = self.inputs["bExecute"] and inputs.get("bExecute") and cycles > 1
         self.inputs |= {"bExecute": 0.0} | inputs
         rows = np.tile(list(self.inputs.values()), (cycles, 1))
-        rows[1:, list(self.inputs).index("bExecute")] = 0.0
+        rows[: int(bool(was_high)), list(self.inputs).index("bExecute")] = 0.0
+        return self._played(rows)
+
+    def play_on(self, cycles):
+        """Hold all inputs as they are, bExecute too."""
+        return self._played(np.tile(list(self.inputs.values()), (cycles, 1)))
+
+    def _played(self, rows):
+        cycles = len(rows)
         issued = np.empty((cycles, len(self.outputs)))
         self.library.play(
             self.memory, rows.ctypes.data_as(DOUBLES), ctypes.c_long(cycles), issued.ctypes.data_as(DOUBLES)

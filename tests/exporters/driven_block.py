@@ -13,7 +13,7 @@ name = "bay 3"
 plant = {{ type = "double-pendulum-crane", m1 = 350.0, m2 = 2000.0, L1 = 6.0, L2 = 1.5 }}
 move = {{ distance = 8.0, duration = 14.0 }}
 limits = {{ velocity = {VELOCITY}, acceleration = {ACCELERATION}, jerk = {JERK}, travel = [{LOW}, {HIGH}] }}
-planner = {{ live = {{ L1 = [3.0, 9.0], m2 = [0.0, 2000.0] }} }}
+planner = {{ live = {{ L1 = [3.0, 9.0], m2 = [0.0, 2000.0] }}, operations = 3000 }}
 export = {{ cycle_time = {CYCLE} }}
 """
 

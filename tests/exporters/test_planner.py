@@ -150,6 +150,7 @@ def test_planning_takes_24_cycles_of_3000_operations_at_most(counted):
         block = CountedBlock(counted, fL1=rope, fm2=load)
         worst = block.hold(600)["operations"].max()
         for target in (1.0, 3.0, 8.0, 39.0):
+            block.hold(1)
             out = block.hold(60_000, bExecute=1.0, fTarget=target)
             assert np.argmax(out["fVelocity"] != 0.0) <= 24
             assert out["bDone"][-1]
@@ -185,7 +186,12 @@ MACHINES = {
 @pytest.mark.parametrize("preset", MACHINES)
 def test_no_machine_takes_more_operations(preset):
     limits = ["velocity=0.5", "acceleration=0.3", "jerk=2.0", "travel=[-20.0, 20.0]"]
-    changes = [*(f"limits.{limit}" for limit in limits), "export.cycle_time=0.002", *MACHINES[preset]]
+    changes = [
+        *(f"limits.{limit}" for limit in limits),
+        "export.cycle_time=0.002",
+        "planner.operations=3000",
+        *MACHINES[preset],
+    ]
     text = planner_block(preset_spec(preset, changes)).text
     assert len(text) < 100_000
     library, *_ = compiled = compile_counting(text)
@@ -300,7 +306,7 @@ def test_three_modes_are_left_at_rest_in_little_more_than_the_shortest_time():
         ({"bVelocity": 1.0, "fVelocityCommand": np.nan}, 3),
         ({"fL1": np.nan}, 2),
         ({"fm2": 2001.0}, 2),
-        ({"rOverride": 0.0}, 5),
+        ({"rOverride": -0.1}, 5),
         ({"rOverride": np.nan}, 5),
         ({"fVelocityLimit": -1.0}, 5),
         ({"fCycleTime": 0.002}, 1),
@@ -328,7 +334,8 @@ def test_a_quick_stop_brakes_at_once_and_gives_no_promise(text):
     assert np.abs(late["fAcceleration"]).max() <= 2 * ACCELERATION + 1e-12
     assert not late["bPromise"][-1]
     again = driver.hold(0.1, bQuickStop=0, bEnable=0).hold(0.5, bEnable=1).outputs
-    assert again["bPromise"][-1]
+    assert again["nPromise"][-1] == 2
+    assert driver.hold(0.1, bLoadAtRest=1).outputs["bPromise"][-1]
 
 
 def test_a_rope_that_changes_on_the_way_ends_the_promise(text):

@@ -145,7 +145,7 @@ def test_a_senseless_input_of_one_axis_stops_all(block, given, number):
 def test_it_computes_what_the_text_says(text, counted):
     orders = [
         (60, {}),
-        (60, {"bVelocity": 1.0, "fVelocityCommand_x": 0.5, "fVelocityCommand_y": -0.2}),
+        (400, {"bVelocity": 1.0, "fVelocityCommand_x": 0.5, "fVelocityCommand_y": -0.2}),
         (60, {"bVelocity": 0.0, "bExecute": 1.0, "fTarget_x": 0.3, "fTarget_y": 0.1}),
         (5, {"bQuickStop": 1.0}),
     ]
@@ -228,7 +228,7 @@ def test_an_axis_that_turns_is_planned_in_rad():
 
 def test_short_slots_leave_no_cycle_more_work():
     """Slots of 43 cycles, where a new target comes on the way."""
-    text = planner_block(parse_spec(GANTRY, ["export.cycle_time=0.004"])).text
+    text = planner_block(parse_spec(GANTRY, ["export.cycle_time=0.004", "planner.operations=3000"])).text
     block = CountedBlock(compile_counting(text), fL=3.0, fActPosition_x=30.0, fActPosition_y=9.95)
     block.hold(930)
     ways = [(70, 40.0, 8.7), (215, 33.8, 9.7), (6000, 0.0, 0.14)]

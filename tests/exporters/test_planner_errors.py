@@ -19,19 +19,19 @@ planner = {{ live = {{ L1 = [0.3, 0.6] }} }}
 check = {{ residual_sway = 0.01 }}
 export = {{ cycle_time = {CYCLE} }}
 """
-ORDERS = (  # s until the next, target in m, override: the worst that a search found of the block without
-    (2.35, 1.763, 0.911),
-    (0.13, 0.809, 0.437),
-    (0.078, 0.798, 1.0),
-    (5.85, 1.788, 1.0),
-    (0.04, 1.578, 0.892),
-    (0.9, 1.004, 1.0),
-    (1.56, 2.0, 1.0),
-    (0.29, 0.614, 0.525),
-    (0.04, 1.935, 1.0),
-    (2.15, 0.976, 1.0),
-    (0.24, 2.0, 1.0),
-    (20.0, 1.208, 1.0),
+ORDERS = (  # s until the next, target in m: much of the worst that a search found of the block without
+    (2.35, 1.763),
+    (0.13, 0.809),
+    (0.078, 0.798),
+    (5.85, 1.788),
+    (0.04, 1.578),
+    (0.9, 1.004),
+    (1.56, 2.0),
+    (0.29, 0.614),
+    (0.04, 1.935),
+    (2.15, 0.976),
+    (0.24, 2.0),
+    (20.0, 1.208),
 )
 
 
@@ -40,9 +40,9 @@ def played(uncertain, orders, start):
     text = planner_block(parse_spec(PAPER, [f"check.uncertain={uncertain}"])).text
     block = CountedBlock(compile_counting(text), fL1=0.366, fActPosition=start)
     parts = [block.hold(500)]
-    for seconds, target, override in orders:
+    for seconds, target in orders:
         cycles = round(seconds / CYCLE)
-        parts.append(block.hold(cycles, bExecute=1.0, fTarget=target, rOverride=override))
+        parts.append(block.hold(cycles, bExecute=1.0, fTarget=target))
     assert parts[-1]["bDone"][-1]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
@@ -60,19 +60,18 @@ def left(out, L1, m1=0.192, m2=0.183, L2=0.391, g=9.81):
 
 
 def test_stated_errors_leave_less_of_new_targets_in_time_with_the_fast_mode():
-    """Rope and load are some per cent off: 12 mm in the fast mode where the block knows of no errors."""
+    """Rope and load are some per cent off: 7 mm in the fast mode where the block knows of no errors."""
     unaware = left(played("{}", ORDERS, 2.0), 0.382)
     aware = left(played("{L1=0.05, m2=0.1}", ORDERS, 2.0), 0.382)
-    assert unaware[1] > 8e-3
-    assert aware[1] < 3e-3
-    assert aware.max() < 5e-3
+    assert unaware[1] > 6e-3
+    assert aware.max() < 2e-3
 
 
 @pytest.mark.parametrize("distance", [0.15, 0.6, 1.2])
 def test_less_sensitive_motions_take_little_longer(distance):
     """And as told, nothing is left."""
-    orders = [(15.0, distance, 1.0)]
+    orders = [(15.0, distance)]
     unaware, aware = (played(errors, orders, 0.0) for errors in ("{}", "{L1=0.05, m2=0.1}"))
     assert np.argmax(aware["bDone"]) - 500 <= 1.08 * (np.argmax(unaware["bDone"]) - 500)
-    assert aware["operations"].max() <= 3000
+    assert aware["operations"].max() <= 12_000
     assert left(aware, 0.366, m2=0.203).max() < 1e-9

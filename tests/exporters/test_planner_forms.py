@@ -151,9 +151,13 @@ def test_c_plus_plus_takes_the_header(block, tmp_path):
 
 class TestInPython:
     def test_a_history_is_that_of_the_played_block(self, block):
-        """Steps, stretches and columns are the same inputs."""
+        """Steps, stretches and columns are the same inputs; both enable the block in a cycle of its own.
+
+        It is the first that is played, and none of Python's; there bExecute falls when the next target comes.
+        """
         commands = (
-            "time_s,command,value,L1\n0.4,position,3.0,5.5\n2,position,2.5,\n4,velocity,0.3,\n8,stop,,\n"
+            "time_s,command,value,L1\n0.404,position,3.0,5.5\n2.008,position,2.5,\n4.004,velocity,0.3,\n"
+            "8.004,stop,,\n"
         )
         played = np.genfromtxt(io.StringIO(play(block.text, commands).table), delimiter=",", names=True)
         planner = gp.Planner(SPEC)
@@ -171,7 +175,7 @@ class TestInPython:
             ("busy", "busy"),
         ):
             issued = [*np.concatenate([getattr(p, name) for p in parts]), *(getattr(s, name) for s in steps)]
-            np.testing.assert_array_equal(issued, played[column][: len(issued)])
+            np.testing.assert_array_equal(issued, played[column][1 : 1 + len(issued)])
         assert planner.live == {"L1": 5.5}
 
     def test_a_target_of_every_cycle_is_one_command_and_a_new_one_another(self):

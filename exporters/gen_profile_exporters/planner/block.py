@@ -54,8 +54,10 @@ LONG_KERNEL = 40  # slots, from which on no longer one is sought
 WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
 REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
 CHUNK = 45  # slots that a phase takes at once
-WORK = 2960  # floating-point operations that a cycle may spend, by a cautious count
+COUNTED = 40  # operations of a cycle that its cautious count leaves out
 ITERATIONS = 6
+HOLD = 0.2  # s, in which an input that is out of range is held
+STILL = 1e-3  # of full speed: a velocity that counts as standing, and a way as none
 ROUNDING = 1e-3  # of a live parameter's greatest rate
 SPARE = 0.3  # slots more than expected, by slots between two measured motions
 MORE_ITERATIONS = 5  # where these do not lead to a plan
@@ -80,6 +82,8 @@ TAKEN = {  # inputs of each axis, by the arrays that hold them
     "aCommand": "fVelocityCommand",
     "aLimit": "fVelocityLimit",
     "aActual": PLACE,
+    "aActualVelocity": "fActVelocity",
+    "aFollowing": "fFollowingLimit",
 }
 GIVEN = {  # and outputs
     "aPosition": "fPosition",
@@ -87,6 +91,8 @@ GIVEN = {  # and outputs
     "aAcceleration": "fAcceleration",
     "aDistanceToGo": "fDistanceToGo",
     "aStopDistance": "fStopDistance",
+    "aStopLow": "fStopLow",
+    "aStopHigh": "fStopHigh",
 }
 
 
@@ -147,6 +153,10 @@ class PlannerConstants:
         Of live parameters that lower all loads by as much as they grow: the inverse of gravity, in s²/m.
     calm : float
         m, sway up to which nothing is done about it.
+    operations : int
+        That a cycle may spend.
+    periods : sequence of float
+        s, of the slowest mode at the corners of the live ranges.
     doubt : float
         Relative error that the frequencies may have.
     second_order : (modes,) array
@@ -176,6 +186,8 @@ class PlannerConstants:
     rates: Mapping[str, float]
     lowers: Mapping[str, float]
     calm: float
+    operations: int
+    periods: Sequence[float]
     doubt: float
     second_order: Array
     degrees: int
@@ -220,8 +232,8 @@ def _with_while_loops(text: str) -> str:
 
 
 def _narrow(text: str) -> str:
-    """Indent by two columns, as a block shall be no longer than 100 kB."""
-    return re.sub("(?m)^ +", lambda margin: margin[0][: len(margin[0]) // 2], text)
+    """Indent by tabs, as a block shall be no longer than 100 kB."""
+    return re.sub("(?m)^ +", lambda margin: "\t" * (len(margin[0]) // 4), text)
 
 
 def _values(c: PlannerConstants) -> dict[str, str]:
@@ -243,9 +255,11 @@ def _values(c: PlannerConstants) -> dict[str, str]:
         "cycle_time": literal(c.cycle),
         "cycle": f"{c.cycle:g}",
         "live_rates": " faster than stated" if c.rates else "",
+        "hold": f"{HOLD:g}",
+        "reaction": f"{_reaction(c):.3g}",
         "live_lines": "\n    ".join(ranges) or "No live parameters.",
         "live_inputs": "\n".join(inputs),
-        "take_live": "\n".join(f"aLiveNow[{k}] := f{name};" for k, name in enumerate(lives)),
+        "take_live": "\n".join(f"aLiveGiven[{k}] := f{name};" for k, name in enumerate(lives)),
         "constants": _constants(c),
         **_words(c.axes),
         **_interface(c.axes),
@@ -305,14 +319,19 @@ def _interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
         "target_inputs": declared("fTarget", ""),
         "command_inputs": declared("fVelocityCommand", "/s"),
         "limit_inputs": declared("fVelocityLimit", "/s; 0.0: none but the machine's"),
-        "place_inputs": declared(PLACE, ", where the axis stands"),
+        "place_inputs": declared(PLACE, ", where the axis is")
+        + "\n"
+        + declared("fActVelocity", "/s, of the axis"),
+        "following_inputs": declared("fFollowingLimit", ", from the setpoint; 0.0: none"),
         "setpoint_outputs": "\n".join(
             [declared("fPosition", ""), declared("fVelocity", "/s"), declared("fAcceleration", "/s2")]
         ),
         "distance_outputs": "\n".join(
             [
                 declared("fDistanceToGo", ", to the target"),
-                declared("fStopDistance", ", which a stop without sway takes at most"),
+                declared("fStopLow", ", the least place that a stop without sway passes"),
+                declared("fStopHigh", ", the greatest"),
+                declared("fStopDistance", ", the farther of them from here"),
             ]
         ),
         "take_axes": "\n".join(taken),
@@ -358,14 +377,14 @@ def _constants(c: PlannerConstants) -> str:
 
 
 def _whole_constants(c: PlannerConstants) -> dict[str, int]:
-    modes, (rows, terms), conditions = c.modes, c.model.shape, _conditions(c)
+    modes, (rows, terms) = c.modes, c.model.shape
     return {
         "cAxes": len(c.axes),
         "cModes": modes,
         "cRows": rows,
         "cFresh": FRESH,
         "cCycleWork": _cycle_work(c),
-        "cConditions": conditions,
+        "cConditions": _conditions(c),
         "cSeconds": np.count_nonzero(c.second_order),
         "cLives": len(c.live),
         "cTerms": terms,
@@ -382,11 +401,12 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cWide": WIDE,
         "cChunk": CHUNK,
         "cFuture": FUTURE,
-        "cWork": WORK,
+        "cWork": _work(c),
+        "cHoldCycles": round(HOLD / c.cycle),
         "cIterations": ITERATIONS,
         "cMoreIterations": MORE_ITERATIONS,
         "cWayIterations": WAY_ITERATIONS,
-        "cColumnWork": 220 + 12 * conditions + conditions * conditions,
+        "cColumnWork": _column_work(c),
         "cReaches": len(REACH_SLOTS),
     }
 
@@ -394,6 +414,31 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
 def _conditions(c: PlannerConstants) -> int:
     """Conditions of a plan: its sum; four of each mode, and two of second order where these are needed."""
     return 1 + 4 * c.modes + 2 * int(np.count_nonzero(c.second_order))
+
+
+def _work(c: PlannerConstants) -> int:
+    return c.operations - COUNTED
+
+
+def _column_work(c: PlannerConstants) -> int:
+    """Operations of one iteration for each unknown of a plan."""
+    conditions = _conditions(c)
+    return 220 + 12 * conditions + conditions * conditions
+
+
+def _reaction(c: PlannerConstants) -> float:
+    """Bound the time in s until a new command changes the motion.
+
+    It begins with a slot, and takes over two slots after it was planned; the plan in work may be finished
+    before, or come too late.
+    """
+
+    def bound(period: float) -> float:
+        cycles = max(1, round(period / (SLOTS_PER_PERIOD * c.cycle)))
+        ahead = 2 + 2 * len(c.axes) * WAY_ITERATIONS * _column_work(c) * MOST // (_work(c) * cycles)
+        return 2 * (ahead + 2) * cycles * c.cycle
+
+    return max(bound(period) for period in c.periods)
 
 
 def _cycle_work(c: PlannerConstants) -> int:
@@ -405,24 +450,26 @@ def _cycle_work(c: PlannerConstants) -> int:
 def _longest_kernel(c: PlannerConstants) -> int:
     """Slots of the longest kernel whose last step fits into one cycle at rest: the block's own count."""
     conditions = 1 + 4 * c.modes
-    left = WORK - _cycle_work(c) - 20 - conditions * conditions - 100
+    left = _work(c) - _cycle_work(c) - 20 - conditions * conditions - 100
     return min(KERNEL_SLOTS, left // (2 * conditions + 8))
 
 
 def _pulse_chunk(c: PlannerConstants) -> int:
     """Slots of a long pulse that can be weighed in one cycle, in which pulses may be added, too."""
     axes = len(c.axes)
-    return (WORK - _cycle_work(c) - 80 - FUTURE - 3 * axes * FUTURE) // 55
+    return (_work(c) - _cycle_work(c) - 80 - FUTURE - 3 * axes * FUTURE) // 55
 
 
 def _real_constants(c: PlannerConstants) -> dict[str, float]:
     return {
         "cCycle": c.cycle,
+        "cReaction": _reaction(c),
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cRate": min(axis.acceleration / axis.velocity for axis in c.axes),
         "cCurve": min(axis.jerk / axis.velocity for axis in c.axes),
         "cInside": INSIDE + (RESERVE if c.rates else 0.0),
         "cReserve": RESERVE if c.rates else 0.0,
+        "cMargin": c.axes[0].targets[0] - c.axes[0].travel[0],
         "cCalm": c.calm,
         "cAtOnce": AT_ONCE,
         "cDoubt": c.doubt,
@@ -443,6 +490,7 @@ def _arrays(c: PlannerConstants) -> dict[str, Sequence[float] | Array]:
         "cJerk": [axis.jerk for axis in c.axes],
         "cQuickDeceleration": [axis.quick_deceleration for axis in c.axes],
         "cQuickJerk": [axis.quick_jerk for axis in c.axes],
+        "cStill": [STILL * axis.velocity for axis in c.axes],
         "cTravelLow": [axis.travel[0] for axis in c.axes],
         "cTravelHigh": [axis.travel[1] for axis in c.axes],
         "cTargetLow": [axis.targets[0] for axis in c.axes],

@@ -23,9 +23,10 @@ UNITS = ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "s")
 TYPES = {"LREAL": Type.REAL, "BOOL": Type.BOOLEAN, "DINT": Type.INTEGER}
 CYCLE = "fCycleTime"  # of the task: fixed, where others are inputs
 STANDS = "fActPosition"
+MOVES = "fActVelocity"
 OWN = (  # inputs and outputs of each axis
-    *("fTarget", "fVelocityCommand", "fVelocityLimit", STANDS),
-    *("fPosition", "fVelocity", "fAcceleration", "fDistanceToGo", "fStopDistance"),
+    *("fTarget", "fVelocityCommand", "fVelocityLimit", "fFollowingLimit", STANDS, MOVES),
+    *("fPosition", "fVelocity", "fAcceleration", "fDistanceToGo", "fStopDistance", "fStopLow", "fStopHigh"),
 )
 SETPOINTS = {
     "fPosition": "setpoint",
@@ -143,7 +144,11 @@ def planned_system_model(
         code=translate(text),
         axes=axes,
         live=live,
-        inside=(CYCLE, *stands),  # the axes stand where they were led to
+        inside=(
+            CYCLE,
+            *stands,
+            *(f"{MOVES}{suffix}" for suffix in axes),
+        ),  # the axes stand where they were led to
     )
     names = [axis.name for axis in plant.actuated]
     planned = [names.index(axis) for axis in axes.values()]
@@ -270,11 +275,10 @@ def _rank(name: str, block: _PlacedBlock) -> int:
     return list(SETPOINTS).index(stem) if stem in SETPOINTS else len(SETPOINTS)
 
 
-def _taken_over(block: Translation) -> dict[str, str]:
-    """Tell which outputs show an input until the block is called: where the axis stands."""
-    inputs = {v.name for v in block.inputs}
+def _taken_over(block: Translation, at: Mapping[str, int]) -> dict[str, str]:
+    """Tell which outputs show an input until the block is called: where the axis is, and its velocity."""
     actual = {v.name: f"{v.name[0]}Act{v.name[1:]}" for v in block.outputs}
-    return {output: given for output, given in actual.items() if given in inputs}
+    return {output: given for output, given in actual.items() if given in at}
 
 
 def _references(block: _PlacedBlock, table: VariableTable) -> dict[str, int]:
@@ -288,7 +292,7 @@ def _structure(block: _PlacedBlock, table: VariableTable, at: Mapping[str, int])
     outputs = table.references("COMMAND", "TOLD")
     running = table.references("ORDERS", "TIME")
     starting: dict[int, list[int]] = {output: [] for output in outputs}
-    starting |= {at[output]: [at[given]] for output, given in _taken_over(block.code).items()}
+    starting |= {at[output]: [at[given]] for output, given in _taken_over(block.code, at).items()}
     return Structure(running=dict.fromkeys(outputs, running), starting=starting)
 
 
@@ -308,11 +312,11 @@ typedef {block.name} PlannerBlock;
 
 
 def _block_source(block: _PlacedBlock, at: Mapping[str, int]) -> str:
-    code, taken = block.code, _taken_over(block.code)
+    code, taken = block.code, _taken_over(block.code, at)
     given = [
         f"block->{v.name} = values[{at[v.name]}]{' != 0.0' if v.type == 'BOOL' else ''};"
         for v in code.inputs
-        if v.name != CYCLE
+        if v.name in at
     ]
     shown = [f"values[{at[v.name]}] = block->{v.name};" for v in code.outputs]
     stands = [f"block->{output} = values[{at[given]}];" for output, given in taken.items()]

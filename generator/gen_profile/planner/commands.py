@@ -204,10 +204,14 @@ def _columns(axes: Sequence[BlockAxis]) -> dict[str, str]:
 
 
 def begins_of(commands: Sequence[Command], cycle: float) -> list[int]:
-    """Tell in which cycles commands begin: a position waits for a cycle without bExecute, to be an edge."""
+    """Tell in which cycles commands begin.
+
+    A stick waits for a cycle in which the block is enabled without it, as one that is deflected then does not
+    count. A position waits for a cycle without bExecute, to be an edge.
+    """
     begins, edge = list[int](), -2
     for command in commands:
-        begin = max(command.begin(cycle), *begins[-1:], 0)
+        begin = max(command.begin(cycle), *begins[-1:], int(command.command == "velocity"))
         if command.command == "position":
             edge = begin = begin + (begin == edge + 1)
         begins.append(begin)
@@ -237,15 +241,16 @@ def input_rows(
     values = dict(values)
     rows = {0: list(values.values())}
     for command, begin in zip(commands, begins_of(commands, cycle), strict=True):
+        if command.command == "position" and values["bExecute"]:
+            values["bExecute"] = 0.0  # for a cycle, so that there is an edge
+            rows[begin - 1] = list(values.values())
         values |= inputs_of(command, axes)
         rows[begin] = list(values.values())
-        values["bExecute"] = 0.0  # an edge, so that the next command makes another
-        rows[begin + 1] = list(values.values())
     return list(rows), np.array(list(rows.values()), dtype=np.float64)
 
 
 def inputs_of(command: Command, axes: Sequence[BlockAxis]) -> dict[str, float]:
-    """Turn a command into the inputs that it changes, by name; bExecute is an edge, for one cycle only."""
+    """Turn a command into the inputs that it changes, by name. bExecute stays until the next one."""
     told = "fTarget" if command.command == "position" else "fVelocityCommand"
     limits = command.velocity_limits or (0.0,) * len(axes)
     return {

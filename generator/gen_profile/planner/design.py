@@ -29,9 +29,10 @@ from gen_profile_exporters.planner.block import (
     block_text,
 )
 
-DECLARED = re.compile(r"(?m)^ +(\w+) : ")  # in Structured Text
+DECLARED = re.compile(r"(?m)^\s+(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot
 STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
+OPERATIONS = 3000  # that a cycle of a millisecond may spend, if the spec states none
 CALM = 0.1  # of the allowed sway, which the block leaves as it is
 MARGIN = 2.0  # between targets and the travel's ends, relative to the allowed sway, for calming
 HALF_A_SLOT = 0.05  # of the allowed sway: where stated errors leave so much, it is worth that time
@@ -88,9 +89,15 @@ def planner_block(spec: Spec) -> PlannerBlock:
         live=found.live,
         units=tuple(spec.machine().units[name] for name in found.live),
         nominal=tuple(_nominal(spec, name) for name in found.live),
-        drift=tuple(STEADY * high for _, high in found.live.values()),
+        drift=tuple(
+            STEADY * high + 2.0 * spec.planner.live_noise.get(name, 0.0)
+            for name, (_, high) in found.live.items()
+        ),
         rates=spec.planner.live_rate,
         lowers=lowered(spec),
+        operations=spec.planner.operations
+        or max(OPERATIONS, round(OPERATIONS * spec.export.cycle_time / 1e-3)),
+        periods=tuple(2.0 * np.pi / _rates(found, point)[0][0] for point in corners(found.live)),
         calm=CALM * min(spec.check.residual_sway.values()),
         doubt=float(frequency_errors(spec).max(initial=0.0)),
         second_order=_second_order(spec, found),

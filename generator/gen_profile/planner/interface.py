@@ -13,7 +13,11 @@ COMMON = ("bEnable", "bExecute", "bVelocity", "bStop", "bQuickStop", "rOverride"
 OWN = ("fTarget", "fVelocityCommand", "fVelocityLimit", "fActPosition")  # of each axis
 ISSUED = ("fPosition", "fVelocity", "fAcceleration")  # likewise
 STATES = ("bBusy", "bPromise", "nErrorId")
-LOST = {1: "a live parameter changed on the way", 2: "there was a quick stop"}  # promises, by nPromise
+LATER = ("bReset", "bLoadAtRest", "fActVelocity", "fFollowingLimit")  # inputs that the first blocks had not
+LOST = {  # promises, by nPromise
+    1: "a live parameter changed on the way",
+    2: "there was a quick stop, or the axis was moved while the block was disabled",
+}
 UNITS = ("m", "rad")
 
 _TARGET = re.compile(r"^\s*fTarget(\w*)\s*:\s*LREAL\s*;(?:\s*\(\*\s*(\w+))?", re.MULTILINE)
@@ -78,4 +82,5 @@ def live_inputs(inputs: Iterable[str], axes: Iterable[BlockAxis]) -> dict[str, s
     known = list(inputs)
     if missing := [name for name in standard if name not in known]:
         raise SpecError(f"The function block has no input {missing[0]}, so it is no planner block.")
+    standard += [name for later in LATER for name in (later, *(axis.of(later) for axis in axes))]
     return {name[1:]: name for name in known if name not in standard}

@@ -82,6 +82,8 @@ class _Orders:
     velocity: ArrayLike | None
     stop: bool
     quick_stop: bool
+    reset: bool
+    load_at_rest: bool
     live: Mapping[str, ArrayLike] | None
     override: float | None
     velocity_limit: ArrayLike | None
@@ -152,6 +154,9 @@ class Planner:
         }
         self._target: list[float] | None = None  # of the command that holds
         self._is_due = self._was_given = False  # the rising edge of bExecute; whether it is high
+        self._block.call(
+            np.array([list((self._inputs | {"bExecute": 0.0}).values())])
+        )  # enabled, no command yet
 
     def step(
         self,
@@ -160,6 +165,8 @@ class Planner:
         velocity: ArrayLike | None = None,
         stop: bool = False,
         quick_stop: bool = False,
+        reset: bool = False,
+        load_at_rest: bool = False,
         live: Mapping[str, float] | None = None,
         override: float | None = None,
         velocity_limit: ArrayLike | None = None,
@@ -177,6 +184,10 @@ class Planner:
         quick_stop : bool
             Whether to brake at once: the load swings. At most one of these four; the command before goes on
             where there is none.
+        reset : bool
+            Whether to acknowledge an error that stopped a command.
+        load_at_rest : bool
+            Whether the load was seen to hang still, as some time after a quick stop: the promise holds again.
         live : mapping of str to float, optional
             Live parameters that change, by name, in their SI units.
         override : float, optional
@@ -195,6 +206,8 @@ class Planner:
             velocity=velocity,
             stop=stop,
             quick_stop=quick_stop,
+            reset=reset,
+            load_at_rest=load_at_rest,
             live=live,
             override=override,
             velocity_limit=velocity_limit,
@@ -214,6 +227,8 @@ class Planner:
         velocity: ArrayLike | None = None,
         stop: bool = False,
         quick_stop: bool = False,
+        reset: bool = False,
+        load_at_rest: bool = False,
         live: Mapping[str, ArrayLike] | None = None,
         override: float | None = None,
         velocity_limit: ArrayLike | None = None,
@@ -224,7 +239,7 @@ class Planner:
         ----------
         seconds : float
             For how long, in whole cycles.
-        target, stop, quick_stop, override, velocity_limit
+        target, stop, quick_stop, reset, load_at_rest, override, velocity_limit
             As of `step`.
         velocity : float, (cycles,) array, or (axes,) or (cycles, axes) array, optional
             m/s; over the cycles it is the history of a stick.
@@ -245,6 +260,8 @@ class Planner:
             velocity=velocity,
             stop=stop,
             quick_stop=quick_stop,
+            reset=reset,
+            load_at_rest=load_at_rest,
             live=live,
             override=override,
             velocity_limit=velocity_limit,
@@ -301,7 +318,13 @@ class Planner:
         return columns
 
     def _command(self, orders: _Orders, columns: dict[str, Array]) -> None:
-        """Let another command take the place of the one that holds."""
+        """Let another command take the place of the one that holds; one that was stopped is given anew."""
+        columns |= {
+            "bReset": np.full(1, float(orders.reset)),
+            "bLoadAtRest": np.full(1, float(orders.load_at_rest)),
+        }
+        if orders.reset:
+            self._target = None
         if orders.target is not None:
             target = [float(columns[axis.of("fTarget")][0]) for axis in self._axes]
             self._is_due = self._is_due or target != self._target
@@ -318,11 +341,12 @@ class Planner:
         columns |= {name: np.full(1, float(value)) for name, value in moves.items()}
 
     def _edge(self, cycles: int) -> Array:
-        """Give bExecute: high for the one cycle that begins a motion, and low for one before it."""
-        execute = np.zeros(cycles)
-        at = int(self._was_given)
-        if self._is_due and at < cycles:
-            execute[at], self._is_due = 1.0, False
+        """Give bExecute: high while a position is commanded, but for a cycle before another one is."""
+        execute = np.full(cycles, float(self._target is not None))
+        if self._is_due:
+            waits = self._was_given
+            execute[: int(waits)] = 0.0
+            self._is_due = waits and cycles == 1
         self._was_given = bool(execute[-1])
         return execute
 

@@ -217,10 +217,11 @@ def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:
             problem = f"begins below the least that the machine takes, {least:g}"
             yield place("planner.live", name), problem
     live = spec.planner.live
-    for name in spec.planner.live_rate:
-        if name not in live:
-            problem = f"not among planner.live{suggestion(name, live)}"
-            yield place("planner.live_rate", name), problem, place("planner.live", name)
+    for key in ("live_rate", "live_noise"):
+        for name in getattr(spec.planner, key):
+            if name not in live:
+                problem = f"not among planner.live{suggestion(name, live)}"
+                yield place(f"planner.{key}", name), problem, place("planner.live", name)
 
 
 OF_SPEC = (_drive, _robustness, _move, _setpoint_path, _csv_columns, _can)

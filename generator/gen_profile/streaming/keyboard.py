@@ -14,7 +14,7 @@ from gen_profile.planner.interface import BlockAxis
 
 SHARE = 0.1  # of the greatest velocity, by which an arrow changes that of the stick
 PAUSE = 0.25  # s between two reports
-PROMISES = {0: "no sway", 1: "may sway", 2: "may sway", 3: "not ready"}  # by nPromise
+PROMISES = {0: "no sway", 1: "may sway", 2: "may sway", 3: "not ready", 4: "not ready"}  # by nPromise
 ARROWS = "← →", "↓ ↑"  # of the first axis and the second
 CURSOR = {b"C": (0, 1), b"D": (0, -1), b"A": (1, 1), b"B": (1, -1)}  # keys' last bytes: axis, tenths more
 CURSOR_KEY = 3  # bytes of an escape sequence, also in application mode

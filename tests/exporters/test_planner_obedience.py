@@ -1,0 +1,271 @@
+"""A planner block does what it is told: soon, no more than that, and says so truly."""
+
+import numpy as np
+import pytest
+from driven_block import CYCLE, Driver, require_limits
+
+from gen_profile.planner.design import planner_block
+from gen_profile.spec.reading import preset_spec
+
+pytestmark = pytest.mark.slow
+
+SPEC = preset_spec("bay-crane")
+LIMITS = (1.1, 0.3, 1.5, 40.0)
+NAN = float("nan")
+
+
+@pytest.fixture(scope="module")
+def text():
+    return planner_block(SPEC).text
+
+
+@pytest.fixture(scope="module")
+def hoisting():
+    return planner_block(preset_spec("bay-crane", ["planner.live_rate={L1=0.1}"])).text
+
+
+def standing(text, place, **inputs):
+    return Driver(text, fActPosition=place, **inputs).hold(2.0)
+
+
+def last(driver, name):
+    return driver.parts[-1][name][-1]
+
+
+def require_within(driver, start):
+    """Hold everything that a driver issued from a cycle on to the ends that were stated before it."""
+    out = driver.outputs
+    stated = {name: out[name][start - 1] for name in ("fPosition", "fStopLow", "fStopHigh", "fStopDistance")}
+    way = out["fPosition"][start:]
+    assert stated["fStopLow"] - 1e-9 <= way.min() <= way.max() <= stated["fStopHigh"] + 1e-9
+    assert np.abs(way - stated["fPosition"]).max() <= stated["fStopDistance"] + 1e-9
+    return stated
+
+
+def test_a_stop_while_turning_round_passes_no_end_that_was_stated(text):
+    """From 0.6 m/s forwards it runs 0.8 m on, to rest a few millimetres away."""
+    driver = (
+        standing(text, 10.0).hold(10.0, bVelocity=1, fVelocityCommand=1.1).hold(3.1, fVelocityCommand=-1.1)
+    )
+    assert last(driver, "fVelocity") > 0.5
+    start = len(driver.outputs["fPosition"])
+    stated = require_within(driver.hold(20.0, bStop=1), start)
+    assert 0.7 < stated["fStopDistance"] < 0.85
+    assert not last(driver, "bBusy")
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", ["text", "hoisting"])
+def test_no_stop_passes_the_ends_that_were_stated(request, kind, seed):
+    """Not even where the load is calmed afterwards, while the rope goes on changing."""
+    random = np.random.default_rng(seed)
+    driver = standing(request.getfixturevalue(kind), random.uniform(0.2, 39.8))
+    rope = 6.0
+
+    def hold(seconds, **inputs):
+        nonlocal rope
+        for _ in range(round(seconds / 0.4)):
+            if kind == "hoisting":
+                rope = float(np.clip(rope + random.uniform(-0.04, 0.04), 3.0, 9.0))
+                ropes = {"fL1": np.linspace(driver.block.inputs["fL1"], rope, 101)[1:]}
+                for value in ropes["fL1"]:
+                    driver.hold(CYCLE, fL1=value, **inputs)
+                    inputs.pop("bExecute", None)
+            else:
+                driver.hold(0.4, **inputs)
+                inputs.pop("bExecute", None)
+
+    for _ in range(5):
+        if random.random() < 0.6:
+            hold(
+                random.uniform(0.4, 12.0), bStop=0, bVelocity=0, bExecute=1, fTarget=random.uniform(0.2, 39.8)
+            )
+        else:
+            hold(random.uniform(0.4, 8.0), bStop=0, bVelocity=1, fVelocityCommand=random.uniform(-1.1, 1.1))
+        start = len(driver.outputs["fPosition"])
+        hold(random.uniform(1.0, 12.0), bStop=1)
+        require_within(driver, start)
+    require_limits(driver.outputs, limits=LIMITS)
+
+
+def test_without_enable_it_guides_nothing_and_then_takes_the_axis_over_where_that_is(text):
+    """The drive tripped on the way to 20 m, and stands at 4.5 m."""
+    driver = standing(text, 0.0).hold(8.0, bExecute=1, fTarget=20.0)
+    assert last(driver, "fVelocity") > 1.0
+    tripped = driver.hold(CYCLE, bEnable=0, fActPosition=4.5).parts[-1]
+    assert (tripped["bEnabled"][-1], tripped["fPosition"][-1], tripped["bCommandAborted"][-1]) == (0, 4.5, 1)
+    driver.hold(1.0).hold(8.0, bEnable=1)
+    assert set(driver.parts[-1]["fPosition"]) == {4.5}
+    assert last(driver, "nPromise") == 2  # nobody knows how the load swings
+    assert last(driver.hold(CYCLE, bLoadAtRest=1), "bPromise")
+
+
+def test_an_axis_that_moves_is_taken_over_with_its_velocity(text):
+    driver = Driver(text, bEnable=0.0, fActPosition=5.0, fActVelocity=0.8).hold(1.0)
+    taken = driver.hold(6.0, bEnable=1).parts[-1]
+    assert taken["fPosition"][0] == pytest.approx(5.0 + 0.8 * CYCLE, abs=1e-5)
+    assert taken["fVelocity"][0] == pytest.approx(0.8, abs=1e-4)
+    joined = {name: np.concatenate([[before], taken[name]]) for name, before in
+              (("fPosition", 5.0), ("fVelocity", 0.8), ("fAcceleration", 0.0))}  # fmt: skip
+    require_limits(joined, limits=LIMITS)
+    assert (taken["fVelocity"][-1], taken["nPromise"][-1]) == (0.0, 2)
+    assert taken["fPosition"][-1] == pytest.approx(taken["fStopHigh"][0])
+
+
+def test_a_promise_outlives_a_pause_in_which_nothing_moved(text):
+    driver = standing(text, 5.0).hold(1.0, bEnable=0)
+    assert (last(driver, "bPromise"), last(driver, "nPromise")) == (0, 4)
+    assert last(driver.hold(1.0, bEnable=1), "bPromise")
+    assert last(driver.hold(1.0, bEnable=0, fActPosition=5.2).hold(1.0, bEnable=1), "nPromise") == 2
+
+
+def test_the_same_target_again_and_again_changes_nothing(text):
+    driver = standing(text, 2.0).hold(4.0, bExecute=1, fTarget=20.0)
+    for _ in range(50):
+        driver.hold(0.5, bExecute=1, fTarget=8.0)
+        assert not driver.parts[-1]["bCommandAborted"][2:].any()
+    assert last(driver, "fPosition") == 8.0
+    assert driver.outputs["fPosition"].max() <= 8.0 + 1e-9
+
+
+@pytest.mark.parametrize("every", [0.008, 0.02, 0.06])
+def test_targets_that_change_every_few_cycles_are_followed(text, every):
+    random = np.random.default_rng(0)
+    driver = standing(text, 2.0)
+    for _ in range(round(25.0 / every)):
+        driver.hold(every, bExecute=1, fTarget=8.0 + random.uniform(-0.5, 0.5))
+    assert abs(last(driver, "fPosition") - 8.0) < 0.6
+    require_limits(driver.outputs, limits=LIMITS)
+
+
+@pytest.mark.parametrize(("begin", "step"), [(2.0, 4e-4), (30.0, -4e-4)])
+def test_a_target_that_creeps_is_followed(text, begin, step):
+    """Half of all cycles bring a new one; the axis is some seconds behind."""
+    driver = standing(text, 2.0)
+    for number in range(4000):
+        driver.hold(2 * CYCLE, bExecute=1, fTarget=begin + step * number)
+    assert abs(last(driver, "fPosition") - driver.block.inputs["fTarget"]) < 0.6
+    assert last(driver.hold(20.0), "fPosition") == driver.block.inputs["fTarget"]
+
+
+WRONG = [({"fL1": 9.001}, 2), ({"fm2": NAN}, 2), ({"rOverride": -1.0}, 5), ({"fVelocityLimit": NAN}, 5)]
+
+
+@pytest.mark.parametrize(("given", "number"), WRONG)
+def test_an_input_out_of_range_is_held_for_a_while_and_then_stops_the_command_visibly(text, given, number):
+    driver = standing(text, 2.0).hold(6.0, bExecute=1, fTarget=20.0)
+    good = {name: driver.block.inputs[name] for name in given}
+
+    def goes_on(seconds, **inputs):  # with bExecute high
+        driver.block.inputs |= inputs
+        driver.parts.append(driver.block.play_on(round(seconds / CYCLE)))
+        return driver.parts[-1]
+
+    goes_on(0.15, **given)
+    goes_on(3.0, **good)
+    assert not driver.outputs["nErrorId"].any()
+    assert driver.outputs["bPromise"][-1]
+    goes_on(0.3, **given)
+    wrong = goes_on(12.0, **good)
+    assert set(wrong["nErrorId"]) == {number}
+    assert wrong["bCommandAborted"].all()
+    assert (wrong["bBusy"][-1], wrong["fVelocity"][-1]) == (0, 0.0)
+    assert last(
+        driver.hold(1.0, bExecute=1, fTarget=20.0), "bCommandAborted"
+    )  # not before it is acknowledged
+    assert last(driver.hold(1.0, bReset=1), "nErrorId") == 0
+    assert last(driver.hold(30.0, bReset=0, bExecute=1, fTarget=20.0), "bDone")
+    require_limits(driver.outputs, limits=LIMITS)
+
+
+def test_an_override_of_zero_holds_and_goes_on(text):
+    driver = standing(text, 2.0).hold(6.0, bExecute=1, fTarget=20.0)
+    driver.block.inputs["rOverride"] = 0.0
+    held = driver.block.play_on(5000)
+    assert (held["fVelocity"][-1], held["bBusy"][-1], held["nErrorId"].max()) == (0.0, 1, 0)
+    driver.block.inputs["rOverride"] = 1.0
+    gone = driver.block.play_on(8000)
+    assert (gone["fPosition"][-1], gone["bDone"][-1]) == (20.0, 1)
+
+
+def test_override_and_velocity_limit_act_on_the_motion_of_now_both_ways(text):
+    """It takes what the change of velocity takes: a slow period and a half, planning included."""
+    driver = standing(text, 2.0).hold(12.0, bExecute=1, fTarget=38.0)
+    for name, slow, usual in (("rOverride", 0.3, 1.0), ("fVelocityLimit", 0.33, 0.0)):
+        driver.block.inputs[name] = slow
+        slowed = driver.block.play_on(2400)["fVelocity"]
+        assert np.argmax(slowed <= 0.331) * CYCLE < 9.0
+        driver.block.inputs[name] = usual
+        if name == "rOverride":
+            raised = driver.block.play_on(2400)["fVelocity"]
+            assert np.argmax(raised >= 1.09) * CYCLE < 9.0
+    end = driver.block.play_on(12_000)
+    assert (end["fPosition"][-1], end["bDone"][-1]) == (38.0, 1)
+
+
+def test_a_command_during_a_stop_is_answered(text):
+    driver = standing(text, 2.0).hold(6.0, bExecute=1, fTarget=20.0).hold(1.0, bStop=1)
+    assert driver.hold(1.0, bExecute=1, fTarget=5.0).parts[-1]["bCommandAborted"].all()
+    assert not last(driver.hold(20.0), "bCommandAborted")
+
+
+@pytest.mark.parametrize(("velocity", "seconds"), [(1.1, CYCLE), (-1.1, 0.1), (0.05, CYCLE)])
+def test_a_tap_of_the_stick_moves_as_far_as_the_stick_says(text, velocity, seconds):
+    driver = standing(text, 10.0).hold(0.5, bVelocity=1)
+    driver.hold(seconds, fVelocityCommand=velocity).hold(12.0, fVelocityCommand=0.0)
+    assert last(driver, "fPosition") == pytest.approx(10.0 + velocity * seconds, abs=1e-9)
+
+
+def test_a_short_reversal_counts_by_its_length_not_by_its_phase(text):
+    ends = []
+    for phase in np.arange(0.0, 0.3, 0.05):
+        driver = standing(text, 10.0).hold(6.0 + phase, bVelocity=1, fVelocityCommand=0.5)
+        driver.hold(0.06, fVelocityCommand=-0.5).hold(1.0 - phase, fVelocityCommand=0.5)
+        ends.append(last(driver.hold(12.0, fVelocityCommand=0.0), "fPosition"))
+    assert np.ptp(ends) < 3e-3  # a cycle, by rounding
+
+
+def test_a_stick_that_is_deflected_at_power_up_counts_once_it_was_at_zero(text):
+    driver = Driver(text, fActPosition=10.0, bVelocity=1.0, fVelocityCommand=1.0).hold(5.0)
+    assert set(driver.outputs["fPosition"]) == {10.0}
+    assert last(driver.hold(0.1, fVelocityCommand=0.0).hold(9.0, fVelocityCommand=1.0), "bInVelocity")
+
+
+def test_an_axis_that_does_not_follow_is_braked_at_once(text):
+    driver = standing(text, 10.0, fFollowingLimit=0.05).hold(4.0, bExecute=1, fTarget=20.0)
+    at = np.argmax(driver.outputs["nErrorId"] == 7)
+    assert driver.outputs["fPosition"][at] < 10.06
+    assert last(driver, "fPosition") < 10.11
+    assert (last(driver, "bBusy"), last(driver, "bCommandAborted"), last(driver, "nPromise")) == (0, 1, 2)
+
+
+def test_from_beyond_its_travel_an_axis_only_comes_back(text):
+    driver = standing(text, 45.0).hold(CYCLE, bVelocity=1).hold(10.0, fVelocityCommand=1.0)
+    assert driver.outputs["fPosition"].max() <= 45.0 + 1e-9
+    assert last(driver.hold(20.0, fVelocityCommand=-0.5), "fPosition") < 40.0
+    assert driver.hold(40.0, fVelocityCommand=1.0).parts[-1]["fPosition"].max() <= 40.0 + 1e-9
+    straight = standing(text, -2.0).hold(40.0, bExecute=1, fTarget=5.0)
+    assert (last(straight, "fPosition"), last(straight, "nErrorId")) == (5.0, 0)
+
+
+@pytest.mark.parametrize("spike", [3.0, 9.0])
+def test_a_spike_of_a_live_parameter_costs_nothing(text, spike):
+    plain, spiked = standing(text, 2.0), standing(text, 2.0)
+    for driver, rope in ((plain, 6.0), (spiked, spike)):
+        driver.hold(4.0, bExecute=1, fTarget=20.0).hold(CYCLE, fL1=rope).hold(30.0, fL1=6.0)
+    np.testing.assert_array_equal(plain.outputs["fPosition"], spiked.outputs["fPosition"])
+    assert spiked.outputs["bPromise"][500:].all()
+
+
+def test_stated_noise_of_a_live_parameter_keeps_the_promise():
+    noisy = planner_block(preset_spec("bay-crane", ["planner.live_noise={L1=0.02}"])).text
+    random = np.random.default_rng(0)
+    driver = standing(noisy, 2.0)
+    for number in range(5000):
+        driver.hold(
+            CYCLE,
+            fL1=6.0 + random.uniform(-0.02, 0.02),
+            **({"bExecute": 1, "fTarget": 12.0} if number == 99 else {}),
+        )
+    assert last(driver, "fPosition") == 12.0
+    assert driver.outputs["bPromise"][500:].all()
