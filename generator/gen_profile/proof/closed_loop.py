@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from queue import SimpleQueue
 from typing import Self
 
+import attrs
 import numpy as np
 
 from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
@@ -16,10 +17,11 @@ from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.proof.histories import SLOWEST, Histories, History
+from gen_profile.proof.watching import Watch
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
-from gen_profile_fmu.running.block_run import BlockFollower, BlockRun, Hoist, Script
+from gen_profile_fmu.running.block_run import BlockFollower, BlockRun, CalledBlock, Hoist, Script
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 STEP_PHASE = 0.05  # rad of the fastest mode that an integration step may cover
@@ -65,6 +67,7 @@ class ClosedLoop:
         self._block = BlockInstance(text)
         self.cycle = self._block.inputs["fCycleTime"]
         self.max_step = STEP_PHASE / histories.fastest
+        self._watch = Watch.of(text, self._block, histories)
         self._workers = workers
         self._open = ExitStack()
         self._followers: SimpleQueue[BlockFollower] = SimpleQueue()
@@ -85,13 +88,32 @@ class ClosedLoop:
         return self._block.outputs
 
     @contextmanager
-    def runs(self, histories: Iterable[History]) -> Iterator[Iterator[BlockRun]]:
+    def runs(self, histories: Iterable[History]) -> Iterator[Iterator[tuple[BlockRun, tuple[str, ...]]]]:
         """Run histories on all workers, in their order; those not begun when it closes are left out."""
         pool = ThreadPoolExecutor(self._workers)
         try:
-            yield pool.map(self.run, histories)
+            yield pool.map(self.watched, histories)
         finally:
             pool.shutdown(cancel_futures=True)
+
+    def watched(self, history: History) -> tuple[BlockRun, tuple[str, ...]]:
+        """Let the machine of a history follow the block, and see whether the block obeys.
+
+        Returns
+        -------
+        run : BlockRun
+        faults : tuple of str
+            What it did other than it was told, each in words that end a sentence.
+
+        Raises
+        ------
+        ExportError, CosimulationError
+        """
+        script, block = self._script(history), self._block.called()
+        marks, rows = self._watch.marks(script), script.begins[-1] + script.longest + script.settle + script.watch
+        run = self._followed(history, block, script, rows=rows, marks=marks)
+        faults = () if run.fault else self._watch.faults(history, script, marks, block, run)
+        return attrs.evolve(run, trace=None, copies=None), faults
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
         """Let the machine of a history follow the block.
@@ -108,15 +130,29 @@ class ClosedLoop:
         ------
         ExportError, CosimulationError
         """
+        script = self._script(history)
+        return self._followed(history, self._block.called(), script, rows=rows, max_step=max_step)
+
+    def _followed(
+        self,
+        history: History,
+        block: CalledBlock,
+        script: Script,
+        *,
+        rows: int,
+        max_step: float | None = None,
+        marks: Sequence[int] = (),
+    ) -> BlockRun:
         follower = self._followers.get()
         try:
             return follower.run(
-                self._block.called(),
-                self._script(history),
+                block,
+                script,
                 self._values(history, max_step or self.max_step),
                 led=tuple(self._histories.axes),
                 hoists=self._hoists(history),
                 rows=rows,
+                marks=marks,
             )
         finally:
             self._followers.put(follower)

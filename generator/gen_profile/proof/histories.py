@@ -165,6 +165,18 @@ class Histories:
             slowed=slowed,
         )
 
+    def slowest(self, history: History) -> float:
+        """Find the longest period in s of the machine that a block is told of in a history."""
+        live = history.live
+        ropes = {name: [value for _, value in corners] for name, corners in history.hoisting.items()}
+        ends = [dict(live)] + [
+            live | {name: end(values) for name, values in ropes.items()} for end in (min, max) if ropes
+        ]
+        plant = self.spec.machine()
+        return float(
+            max(2.0 * np.pi / linearize(plant, *_machine(self.spec, told, {})).frequencies.min() for told in ends)
+        )
+
     @property
     def driven(self) -> tuple[str, ...]:
         """Live parameters that change on the way and are no axes of the machine."""

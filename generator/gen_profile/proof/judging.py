@@ -20,7 +20,14 @@ Judge = Callable[[Numbering, Sequence[int]], list[JudgedHistory]]
 
 
 def judge_run(
-    spec: Spec, run: BlockRun, history: History, *, cycle: float, number: int, group: str
+    spec: Spec,
+    run: BlockRun,
+    history: History,
+    disobeyed: Sequence[str] = (),
+    *,
+    cycle: float,
+    number: int,
+    group: str,
 ) -> JudgedHistory:
     """Judge what became of a history.
 
@@ -30,6 +37,8 @@ def judge_run(
     run : BlockRun
     history : History
         Of that run.
+    disobeyed : sequence of str
+        What the block did other than it was told, in words that end a sentence.
     cycle : float
         s.
     number : int
@@ -48,7 +57,7 @@ def judge_run(
         residual=dict(zip(loads, run.residual.tolist(), strict=True)),
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,
-        faults=tuple(_faults(history, run, limits)),
+        faults=(*_faults(history, run, limits), *disobeyed),
     )
 
 

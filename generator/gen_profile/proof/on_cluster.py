@@ -125,6 +125,7 @@ def judge_part(recipe: ProofRecipe, rows: Sequence[tuple[int, str, list[float]]]
     with ClosedLoop(spec, recipe.text, histories) as loop:
         made = [(number, group, histories.history(np.array(choices))) for number, group, choices in rows]
         return [
-            judge_run(spec, loop.run(history), history, cycle=loop.cycle, number=number, group=group)
+            judge_run(spec, run, history, disobeyed, cycle=loop.cycle, number=number, group=group)
             for number, group, history in made
+            for run, disobeyed in [loop.watched(history)]
         ]

@@ -116,9 +116,11 @@ def _judge(
     histories = [numbering.history(number) for number in numbers]
     judged = []
     with loop.runs(histories) as runs:
-        for number, history, run in zip(numbers, histories, runs, strict=True):
+        for number, history, watched in zip(numbers, histories, runs, strict=True):
             group = numbering.group(number)
-            judged.append(judge_run(spec, run, history, cycle=loop.cycle, number=number, group=group))
+            judged.append(
+                judge_run(spec, watched[0], history, watched[1], cycle=loop.cycle, number=number, group=group)
+            )
             if number % TOLD == 0:
                 progress("proving", number, numbering.count)
     return judged

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -146,9 +147,9 @@ class Proof(Examination):
         by_kind: dict[str, list[JudgedHistory]] = {}
         for judged in self.judged:
             for fault in judged.faults:
-                by_kind.setdefault(fault.split(" by ")[0], []).append(judged)
+                by_kind.setdefault(_kind(fault), []).append(judged)
         for kind, those in by_kind.items():
-            first = next(fault for fault in those[0].faults if fault.split(" by ")[0] == kind)
+            first = next(fault for fault in those[0].faults if _kind(fault) == kind)
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
             sentences.append(f"In history {those[0].number} {first}{others}.")
         if not self.apart <= AGREEMENT:
@@ -208,3 +209,8 @@ class Proof(Examination):
             "worst_share": max(shares),
             "quantiles": {f"{part:g}": float(q) for part, q in zip(QUANTILES, quantiles, strict=True)},
         }
+
+
+def _kind(fault: str) -> str:
+    """Leave out the numbers of a fault."""
+    return re.split(" by |, at ", fault, maxsplit=1)[0]
