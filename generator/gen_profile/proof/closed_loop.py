@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
@@ -110,9 +111,9 @@ class ClosedLoop:
         ExportError, CosimulationError
         """
         script, block = self._script(history), self._block.called()
-        marks, rows = self._watch.marks(script), script.begins[-1] + script.longest + script.settle + script.watch
-        run = self._followed(history, block, script, rows=rows, marks=marks)
-        faults = () if run.fault else self._watch.faults(history, script, marks, block, run)
+        told = self._watch.orders(script)
+        run = self._followed(history, block, script, rows=told[-1].end, marks=self._watch.marks(told))
+        faults = () if run.fault else self._watch.faults(history, script, told, block, run)
         return attrs.evolve(run, trace=None, copies=None), faults
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
@@ -193,6 +194,7 @@ class ClosedLoop:
         begins, inputs = self._hoisted(
             history, *input_rows(history.commands, [*axes.values()], values, self.cycle)
         )
+        begins, inputs = self._changed(history, begins, inputs)
         period = self._histories.period
         patience = PATIENCE * period + max(map(self._crossing, axes))
         watch = max(SHORTEST_WATCH, WATCHED * period)
@@ -236,6 +238,23 @@ class ClosedLoop:
             rounded = np.convolve(line, np.full(starting, 1.0 / starting), mode="valid")
             inputs[:, list(self._block.inputs).index(f"f{name}")] = np.clip(rounded, low, high)
         return range(len(cycles)), inputs
+
+    def _changed(self, history: History, begins: Sequence[int], inputs: Array) -> tuple[Sequence[int], Array]:
+        """Let inputs differ for some time."""
+        if not history.changes:
+            return begins, inputs
+        spans = [
+            (first, first + max(1, round(change.lasts / self.cycle)), change)
+            for change in history.changes
+            for first in [round(change.time / self.cycle)]
+        ]
+        cycles = sorted({*begins, *(edge for begin, end, _ in spans for edge in (begin, end))})
+        inputs = inputs[np.searchsorted(begins, cycles, side="right") - 1]
+        for begin, end, change in spans:
+            within = slice(bisect_left(cycles, begin), bisect_left(cycles, end))
+            for name, value in change.inputs.items():
+                inputs[within, list(self._block.inputs).index(name)] = value
+        return cycles, inputs
 
     def _hoists(self, history: History) -> list[Hoist]:
         """Tell how axes follow what the block is told."""

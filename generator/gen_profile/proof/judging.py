@@ -87,7 +87,7 @@ def _faults(history: History, run: BlockRun, limits: dict[str, float]) -> Iterat
         yield from _axis_faults(history, named, axis, limits)
     if run.stands < 0:
         yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
-    if run.error:
+    if run.error and run.error not in history.errors:
         yield f"the block shows error {run.error}"
     if not run.promise and not history.brakes:
         yield "the block takes its promise back"

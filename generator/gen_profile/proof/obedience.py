@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
 
 import attrs
 import numpy as np
@@ -116,6 +115,8 @@ WORDS = {
     "aborted": "bCommandAborted is set though no command was replaced, {at}",
     "not aborted": "bCommandAborted is not set though a command was replaced, {at}",
     "error": "bError and nErrorId contradict each other, {at}",
+    "refused": "nErrorId does not tell why a command is refused, {at}",
+    "untold": "nErrorId tells an error without a cause by {needed:.0f}, {at}",
     "disabled": "bEnabled is not set, {at}",
     "distance": "fDistanceToGo is wrong by {needed:.3g} m, {at}",
     "time": "fTimeToGo is wrong by {needed:.3g} s, {at}",
@@ -318,12 +319,13 @@ def _velocity_limits(followed: Followed, motion: Motion) -> Iterator[Measured]:
 def _stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
     """Stops within the ends that were stated when they came."""
     stated = f"fStopLow{followed.axes[0].suffix}" in followed.issued
-    for before, order in pairwise(followed.orders):
+    targets = list[tuple[float, ...]]()
+    for order in followed.orders:
+        if order.kind == POSITION:
+            targets.append(order.values)
         if order.kind != STOP:
             continue
-        known = np.zeros(len(followed.axes))
-        if before.kind == POSITION:
-            known = np.abs(np.array(before.values) - motion.position[:, order.begin])
+        known = np.abs(np.array([*targets, motion.position[:, order.begin]]) - motion.position[:, order.begin]).max(axis=0)
         begin, own = order.begin, slice(order.begin, order.end)
         takes = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
         for k, axis in enumerate(followed.axes):
@@ -334,7 +336,7 @@ def _stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
                 distance = float(followed.issued[axis.of("fStopDistance")][begin])
                 low, high = place[0] - distance, place[0] + distance
             yield Measured("ends", begin, max(low - place.min(), place.max() - high), EXACT)
-            leads = followed.limits[k].velocity * takes + known[k]  # a stop that is not planned yet may end there
+            leads = known[k] + followed.limits[k].velocity * takes  # a stop that is not planned yet may end there
             yield Measured("loose", begin, max(place[0] - low, high - place[0]), leads)
 
 
@@ -350,10 +352,14 @@ def _states(followed: Followed, motion: Motion) -> Iterator[Measured]:
     yield from _never("done", done & busy)
     yield from _velocities(followed, motion)
     told = done | busy | aborted | error
+    wrong = np.zeros(followed.cycles, dtype=bool)
     may_be_aborted = np.zeros(followed.cycles, dtype=bool)
     alone, before = np.zeros(followed.cycles, dtype=bool), None
     for order in followed.orders:
         own = slice(order.begin, order.end)
+        if order.refused:
+            wrong[own] = True
+            yield Measured("refused", order.begin, float(followed.issued["nErrorId"][order.begin] != order.refused), 0.0)
         if before and before.kind == POSITION and order.edge == order.begin and not done[order.begin - 1]:
             if not (done | error)[before.begin : before.end].any():
                 yield Measured("not aborted", order.begin, float(not aborted[order.begin]), 0.0)
@@ -371,10 +377,10 @@ def _states(followed: Followed, motion: Motion) -> Iterator[Measured]:
         elif order.kind == STOP and not followed.reserve:
             latest = order.begin + followed.after(slowing(followed, motion.velocity[:, order.begin], TO_STOP))
             yield from _never("not busy", busy[latest : order.end] & motion.stands[latest : order.end], latest)
-            yield from _never("done", done[order.begin + 1 : order.end], order.begin + 1)
-        else:
-            yield from _never("done", done[own], order.begin)
+        if order.kind != POSITION and order.begin:  # it may last, but not begin
+            yield from _never("done", done[own] & ~done[order.begin - 1 : order.end - 1], order.begin)
         before = order
+    yield from _never("untold", error & ~wrong)
     yield from _never("aborted", aborted & ~may_be_aborted & ~error)
 
 
@@ -415,12 +421,19 @@ def _numbers(followed: Followed, motion: Motion) -> Iterator[Measured]:
         if rests.any() and not rests[0] and not followed.reserve:
             moving = np.flatnonzero(~rests)
             at = int(moving[-1]) + 1  # rests for good in this order
-            if at < len(rests):
+            if at < len(rests) and _is_end(motion, order, order.begin + at):
                 first = max(0, at - followed.after(0.5 * followed.period))
                 left = (at - np.arange(first, at)) * followed.cycle
                 error = np.abs(time[order.begin + first : order.begin + at] - left)
                 yield Measured("time", order.begin + first + int(np.argmax(error)), float(error.max()), 0.1 * followed.period + 2 * followed.cycle)
                 yield Measured("time", order.begin + at + 1, float(np.abs(time[order.begin + at + 1 : order.end]).max(initial=0.0)), EXACT)
+
+
+def _is_end(motion: Motion, order: Order, at: int) -> bool:
+    """Whether an axis that stands has nowhere else to go."""
+    if order.kind == POSITION:
+        return bool(np.abs(motion.position[:, at] - order.values).max() <= EXACT)
+    return not any(order.values)
 
 
 def _promises(followed: Followed, motion: Motion) -> Iterator[Measured]:
@@ -429,7 +442,7 @@ def _promises(followed: Followed, motion: Motion) -> Iterator[Measured]:
     yield from _never("promise", promise != (why == 0.0))
     ready = followed.after(ENABLED + followed.reaction)
     yield from _never("lost", why[ready:] > 2.0, ready)
-    yield from _never("lost", why[:ready] > 4.0)
+    yield from _never("lost", why == 1.0)  # live parameters keep their stated rates, but for spikes
     braked = next((order.begin for order in followed.orders if order.kind == QUICK_STOP), followed.cycles)
     yield from _never("lost", why[: braked] == 2.0)
     if braked < followed.cycles and not motion.stands[max(0, braked - 1)]:

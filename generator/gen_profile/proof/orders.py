@@ -28,6 +28,8 @@ class Order:
         Of each axis the target or the velocity; none of a stop.
     tops : tuple of float
         Of each axis the greatest velocity, by limit, override and velocity limit; 0 holds.
+    refused : int
+        Error for which it is a stop.
     edge : int
         Cycle in which the command came; before `begin` where but the velocity limits have changed since.
     """
@@ -38,6 +40,7 @@ class Order:
     values: tuple[float, ...]
     tops: tuple[float, ...]
     edge: int
+    refused: int = 0
 
 
 @attrs.frozen(kw_only=True)
@@ -82,7 +85,7 @@ def orders(
 
 def _same(order: Order, before: Order) -> bool:
     """Whether nothing new is told; stops know no velocity limit."""
-    again = (order.kind, order.values) == (before.kind, before.values)
+    again = (order.kind, order.values) == (before.kind, before.values) and not order.refused
     return again and (order.kind in (STOP, QUICK_STOP) or order.tops == before.tops)
 
 
@@ -102,6 +105,7 @@ def _changes(
         override, given = row[place["rOverride"]], [row[number] for number in slow]
         if 0.0 <= override <= 1.0 and min(given) >= 0.0:  # others are the block's to refuse
             tops = tuple(min(override * most, limit or most) for most, limit in zip(full, given, strict=True))
+        refused = 0
         was, rises = (kind, values), bool(row[place["bExecute"]]) and not execute
         execute = bool(row[place["bExecute"]])
         if row[place["bQuickStop"]]:
@@ -113,12 +117,12 @@ def _changes(
         elif rises:
             kind, values = POSITION, tuple(row[number] for number in targets)
             if not all(low <= value <= high for value, (low, high) in zip(values, (own.targets for own in limits), strict=True)):
-                kind, values = STOP, ()  # refused
+                kind, values, refused = STOP, (), 3
         elif kind in (VELOCITY, QUICK_STOP):
             kind, values = STOP, ()
         if rises or was != (kind, values):
             edge = begin
-        yield Order(begin=begin, end=begin, kind=kind, values=values, tops=tops, edge=edge)
+        yield Order(begin=begin, end=begin, kind=kind, values=values, tops=tops, edge=edge, refused=refused)
 
 
 def told_rows(begins: Sequence[int], rows: Array, ignored: Sequence[int]) -> tuple[list[int], Array]:

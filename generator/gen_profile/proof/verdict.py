@@ -73,6 +73,7 @@ class JudgedHistory:
             "live": dict(self.history.live),
             "parameters": dict(self.history.parameters),
             "commands": [self.history.described(command) for command in self.history.commands],
+            "changes": self.history.other_inputs,
             "hoisting": {
                 name: [{"time_s": time, "value": value} for time, value in corners]
                 for name, corners in self.history.hoisting.items()
@@ -100,6 +101,8 @@ class Proof(Examination):
         With which the histories were drawn, and how many.
     slowed : bool
         Whether override and velocity limit varied, too.
+    habits : bool
+        Whether commands also came as operators and controllers give them.
     parents : sequence of sequences of int
         From which histories each round of the search began.
     judged : tuple of JudgedHistory
@@ -118,6 +121,7 @@ class Proof(Examination):
     seed: int
     count: int
     slowed: bool
+    habits: bool
     parents: Sequence[Sequence[int]]
     judged: tuple[JudgedHistory, ...]
     by_fmpy: tuple[int, ...]
@@ -181,6 +185,7 @@ class Proof(Examination):
             "histories": self.count,
             "seed": self.seed,
             "slowed": self.slowed,
+            "habits": self.habits,
             "search_parents": [list(numbers) for numbers in self.parents],
             "share": self.share(self.worst),
             "worst": self.described(self.worst),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from ctypes import CFUNCTYPE, POINTER, c_double, c_int, c_long, c_void_p
+from typing import Any
 
 import attrs
 import numpy as np
@@ -39,26 +40,31 @@ class Watch:
         Likewise.
     cycle : float
         s.
-    stated : float or None
-        s, in which the block says that it obeys.
+    limits : tuple of Ends
+        Of the block's axes.
+    reaction : float
+        s, within which a new command must be obeyed.
     """
 
     histories: Histories
     inputs: Sequence[str]
     outputs: Sequence[str]
     cycle: float
-    stated: float | None
+    limits: tuple[Ends, ...]
+    reaction: float
 
     @classmethod
     def of(cls, text: str, block: BlockInstance, histories: Histories) -> Watch:
         """Look at a block's text."""
         stated = _STATED.search(text)
+        usual = LEAST_REACTION + REACTION * histories.period
         return cls(
             histories=histories,
             inputs=list(block.inputs),
             outputs=block.outputs,
             cycle=block.inputs["fCycleTime"],
-            stated=float(stated[1]) if stated else None,
+            limits=tuple(_ends(histories.spec, number) for number in histories.axes),
+            reaction=float(stated[1]) if stated else usual,
         )
 
     @property
@@ -66,64 +72,55 @@ class Watch:
         """Of the machine."""
         return self.histories.spec
 
-    @property
-    def limits(self) -> tuple[Ends, ...]:
-        """Of the block's axes."""
-        found = []
-        for number in self.histories.axes:
-            own = self.spec.limits.of(number)
-            assert own.velocity and own.acceleration and own.jerk
-            found.append(
-                Ends(
-                    velocity=own.velocity,
-                    acceleration=own.acceleration,
-                    jerk=own.jerk,
-                    targets=target_range(self.spec, number),
-                )
-            )
-        return tuple(found)
-
-    def orders(self, script: Script, last: int) -> tuple[Order, ...]:
-        """Read what a script tells the block, up to a cycle."""
+    def orders(self, script: Script) -> tuple[Order, ...]:
+        """Read what a script tells the block."""
         live = [self.inputs.index(f"f{name}") for name in self.spec.planner.live]
         begins, rows = told_rows(script.begins, script.inputs, live)
+        last = script.begins[-1] + script.longest + script.settle + script.watch
         return orders(begins, rows, self.inputs, [*self.histories.axes.values()], self.limits, last)
 
-    def marks(self, script: Script) -> list[int]:
+    def marks(self, told: Sequence[Order]) -> list[int]:
         """Tell before which cycles the block is to be copied: those of orders that hold long enough."""
-        period = self.histories.period
-        least = self.reaction(period) / self.cycle
-        found = self.orders(script, script.begins[-1] + script.longest)
+        least = self.reaction / self.cycle
         return [
             one.begin
-            for one in found
+            for one in told
             if 0 < one.begin == one.edge and one.end - one.begin > least and one.kind != QUICK_STOP
         ]
 
-    def reaction(self, period: float) -> float:
-        """Time in s within which a new command must be obeyed."""
-        usual = LEAST_REACTION + REACTION * period
-        return usual if self.stated is None else self.stated
+    def faults(
+        self, history: History, script: Script, told: Sequence[Order], block: CalledBlock, run: BlockRun
+    ) -> tuple[str, ...]:
+        """Say what is wrong, each in words that end a sentence.
 
-    def faults(self, history: History, script: Script, marks: Sequence[int], block: CalledBlock, run: BlockRun) -> tuple[str, ...]:
-        """Say what is wrong, each in words that end a sentence."""
-        return tuple(faults(*self.followed(history, script, marks, block, run)))
+        Parameters
+        ----------
+        history : History
+        script : Script
+            Of that history.
+        told : sequence of Order
+            Of that script.
+        block : CalledBlock
+        run : BlockRun
+            With its trace, and copies of the block before `marks`.
+        """
+        return tuple(faults(*self.followed(history, script, told, block, run)))
 
     def followed(
-        self, history: History, script: Script, marks: Sequence[int], block: CalledBlock, run: BlockRun
+        self, history: History, script: Script, told: Sequence[Order], block: CalledBlock, run: BlockRun
     ) -> tuple[Followed, dict[int, int | None]]:
         """Give what is to be judged."""
         assert run.trace is not None
-        period = self.histories.slowest(history)
-        reaction = self.reaction(self.histories.period)
         reserve = RESERVE if self.spec.planner.live_rate else 0.0
         followed = Followed(
             cycle=self.cycle,
-            period=period,
-            reaction=reaction,
+            period=self.histories.slowest(history),
+            reaction=self.reaction,
             axes=[*self.histories.axes.values()],
             limits=self.limits,
-            orders=self.orders(script, run.cycles),
+            orders=[
+                attrs.evolve(order, end=min(order.end, run.cycles)) for order in told if order.begin < run.cycles
+            ],
             issued=dict(zip(self.outputs, run.trace.T, strict=False)),
             reserve=reserve,
             wander=WANDER * max(self.spec.check.residual_sway.values()) if reserve else 0.0,
@@ -133,31 +130,45 @@ class Watch:
         ends = {order.begin: order.end for order in followed.orders}
         places = [self.outputs.index(name) for axis in block.axes for name in axis]
         reactions = {
-            mark: _first_difference(block, memory, self._without(script, mark, ends[mark]), run.trace[mark:], places)
-            for mark, memory in zip(marks, run.copies, strict=True)
+            mark: self._first_difference(script, mark, ends[mark], block, memory, run.trace[:, places])
+            for mark, memory in zip(self.marks(told), run.copies, strict=True)
             if mark in ends
         }
         return followed, reactions
 
-    def _without(self, script: Script, begin: int, end: int) -> Array:
-        """Inputs as if nothing but live parameters changed any more, (cycles, inputs)."""
-        cycle = np.arange(begin - 1, end)
-        rows = script.inputs[np.searchsorted(script.begins, cycle, side="right") - 1]
-        given = rows[1:].copy()
-        others = [k for k, name in enumerate(self.inputs) if name[1:] not in self.spec.planner.live]
-        given[:, others] = rows[0, others]
-        return given
+    def _first_difference(
+        self, script: Script, begin: int, end: int, block: CalledBlock, memory: Array, issued: Array
+    ) -> int | None:
+        """Call a copy of a block as if an order had not come, until it issues other setpoints than it did."""
+        play, places = _PLAY(block.play), [self.outputs.index(name) for axis in block.axes for name in axis]
+        live = [self.inputs.index(f"f{name}") for name in self.spec.planner.live]
+        row = np.searchsorted(script.begins, begin - 1, side="right") - 1
+        first, many = begin, AT_ONCE
+        while first < end:
+            cycles = np.arange(first, min(first + many, end))
+            given = np.tile(script.inputs[row], (len(cycles), 1))
+            now = np.searchsorted(script.begins, cycles, side="right") - 1
+            given[:, live] = script.inputs[now[:, None], live]
+            outputs = np.empty((len(cycles), len(self.outputs)))
+            if play(memory.ctypes.data, _doubles(given), len(cycles), _doubles(outputs)):
+                return None
+            differs = (outputs[:, places] != issued[cycles]).any(axis=1)
+            if differs.any():
+                return first - begin + int(np.argmax(differs))
+            first, many = first + many, 2 * many
+        return None
 
 
-def _first_difference(block: CalledBlock, memory: Array, rows: Array, issued: Array, places: Sequence[int]) -> int | None:
-    """Call a copy of a block, and find the first cycle in which it issues other setpoints than it did."""
-    play, outputs = _PLAY(block.play), np.empty((AT_ONCE, len(block.outputs)))
-    for first in range(0, len(rows), AT_ONCE):
-        part = rows[first : first + AT_ONCE]
-        fault = play(memory.ctypes.data, part.ctypes.data_as(POINTER(c_double)), len(part), outputs.ctypes.data_as(POINTER(c_double)))
-        if fault:
-            return None
-        differs = (outputs[: len(part), places] != issued[first : first + len(part), places]).any(axis=1)
-        if differs.any():
-            return first + int(np.argmax(differs))
-    return None
+def _ends(spec: Spec, axis: int) -> Ends:
+    own = spec.limits.of(axis)
+    assert own.velocity and own.acceleration and own.jerk
+    return Ends(
+        velocity=own.velocity,
+        acceleration=own.acceleration,
+        jerk=own.jerk,
+        targets=target_range(spec, axis),
+    )
+
+
+def _doubles(array: Array) -> Any:
+    return array.ctypes.data_as(POINTER(c_double))
