@@ -57,6 +57,7 @@ class Script:
     begins : (rows,) array of int
         Cycle from which each row of inputs holds; the first is 0.
     inputs : (rows, inputs) array
+        Of the block, and behind them what else axes follow.
     longest : int
         Cycles after the last row within which the axes must stand.
     settle, watch : int
@@ -73,16 +74,16 @@ class Script:
 
 @attrs.frozen(kw_only=True)
 class Hoist:
-    """An axis that follows what the block is told, not what it issues.
+    """An axis that follows not what the block issues, but a column of the script.
 
     Attributes
     ----------
     axis : int
         Of the plant.
     told : int
-        Place among the block's inputs.
+        Place of the column.
     ratio : float
-        Of the axis's position to the input.
+        Of the axis's position to its values.
     """
 
     axis: int

@@ -225,7 +225,7 @@ class ClosedLoop:
         return sum(alone)
 
     def _hoisted(self, history: History, begins: list[int], inputs: Array) -> tuple[Sequence[int], Array]:
-        """Give a row to every cycle in which live parameters change."""
+        """Give a row to every cycle in which live parameters change, and what they truly are at its end."""
         if not history.hoisting:
             return begins, inputs
         starting = math.ceil(HOIST_STARTS * self._histories.period / self.cycle)
@@ -237,7 +237,8 @@ class ClosedLoop:
             line = np.interp(np.arange(1 - starting, len(cycles)) * self.cycle, *np.transpose(corners))
             rounded = np.convolve(line, np.full(starting, 1.0 / starting), mode="valid")
             inputs[:, list(self._block.inputs).index(f"f{name}")] = np.clip(rounded, low, high)
-        return range(len(cycles)), inputs
+        true = [inputs[:, list(self._block.inputs).index(f"f{name}")] for name in history.hoisting]
+        return range(len(cycles)), np.column_stack([inputs, *true])
 
     def _changed(self, history: History, begins: Sequence[int], inputs: Array) -> tuple[Sequence[int], Array]:
         """Let inputs differ for some time."""
@@ -258,14 +259,14 @@ class ClosedLoop:
 
     def _hoists(self, history: History) -> list[Hoist]:
         """Tell how axes follow what the block is told."""
-        axes, inputs = [axis.name for axis in self._machine.actuated], list(self._block.inputs)
+        axes, inputs = [axis.name for axis in self._machine.actuated], len(self._block.inputs)
         return [
             Hoist(
                 axis=axes.index(name),
-                told=inputs.index(f"f{name}"),
+                told=inputs + place,
                 ratio=history.parameters[name] / history.live[name] if name in history.parameters else 1.0,
             )
-            for name in history.hoisting
+            for place, name in enumerate(history.hoisting)
         ]
 
     def _places(self, history: History) -> list[float]:

@@ -151,9 +151,9 @@ class Proof(Examination):
         by_kind: dict[str, list[JudgedHistory]] = {}
         for judged in self.judged:
             for fault in judged.faults:
-                by_kind.setdefault(_kind(fault), []).append(judged)
+                by_kind.setdefault(kind_of(fault), []).append(judged)
         for kind, those in by_kind.items():
-            first = next(fault for fault in those[0].faults if _kind(fault) == kind)
+            first = next(fault for fault in those[0].faults if kind_of(fault) == kind)
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
             sentences.append(f"In history {those[0].number} {first}{others}.")
         if not self.apart <= AGREEMENT:
@@ -216,6 +216,6 @@ class Proof(Examination):
         }
 
 
-def _kind(fault: str) -> str:
+def kind_of(fault: str) -> str:
     """Leave out the numbers of a fault."""
     return re.split(" by |, at ", fault, maxsplit=1)[0]

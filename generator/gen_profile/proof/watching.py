@@ -75,7 +75,7 @@ class Watch:
     def orders(self, script: Script) -> tuple[Order, ...]:
         """Read what a script tells the block."""
         live = [self.inputs.index(f"f{name}") for name in self.spec.planner.live]
-        begins, rows = told_rows(script.begins, script.inputs, live)
+        begins, rows = told_rows(script.begins, script.inputs, [*live, *range(len(self.inputs), script.inputs.shape[1])])
         last = script.begins[-1] + script.longest + script.settle + script.watch
         return orders(begins, rows, self.inputs, [*self.histories.axes.values()], self.limits, last)
 
@@ -142,11 +142,11 @@ class Watch:
         """Call a copy of a block as if an order had not come, until it issues other setpoints than it did."""
         play, places = _PLAY(block.play), [self.outputs.index(name) for axis in block.axes for name in axis]
         live = [self.inputs.index(f"f{name}") for name in self.spec.planner.live]
-        row = np.searchsorted(script.begins, begin - 1, side="right") - 1
+        row, inputs = np.searchsorted(script.begins, begin - 1, side="right") - 1, len(self.inputs)
         first, many = begin, AT_ONCE
         while first < end:
             cycles = np.arange(first, min(first + many, end))
-            given = np.tile(script.inputs[row], (len(cycles), 1))
+            given = np.tile(script.inputs[row, :inputs], (len(cycles), 1))
             now = np.searchsorted(script.begins, cycles, side="right") - 1
             given[:, live] = script.inputs[now[:, None], live]
             outputs = np.empty((len(cycles), len(self.outputs)))
