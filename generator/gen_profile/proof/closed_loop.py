@@ -254,7 +254,8 @@ class ClosedLoop:
         for begin, end, change in spans:
             within = slice(bisect_left(cycles, begin), bisect_left(cycles, end))
             for name, value in change.inputs.items():
-                inputs[within, list(self._block.inputs).index(name)] = value
+                if name in self._block.inputs:  # those of earlier versions have no bReset
+                    inputs[within, list(self._block.inputs).index(name)] = value
         return cycles, inputs
 
     def _hoists(self, history: History) -> list[Hoist]:

@@ -15,6 +15,7 @@ CREEPING = 40
 LONGEST_WAIT = 0.6  # s, from one of them to the next
 SOON = 100  # cycles, in which a mind is changed
 STOPS = 4
+WRONG = 0.5  # s, at least, in which values count that cannot be
 OUTSIDE = 10.0  # m (or rad) beyond the targets
 
 _MORE = 0.6180339887  # turns one choice into others
@@ -87,7 +88,10 @@ class Surroundings:
 
     def speed(self, share: float) -> tuple[float, ...]:
         """Choose a velocity of at least a third of the greatest."""
-        return tuple((high if _share(share, k) > 0.5 else low) * (0.3 + 0.7 * _share(share, k + 1)) for k, (low, high) in enumerate(self.speeds))
+        return tuple(
+            (high if _share(share, k) > 0.5 else low) * (0.3 + 0.7 * _share(share, k + 1))
+            for k, (low, high) in enumerate(self.speeds)
+        )
 
 
 def manner(command: Command, which: float, how: float, around: Surroundings) -> Manner:
@@ -101,7 +105,11 @@ def manner(command: Command, which: float, how: float, around: Surroundings) -> 
     around : Surroundings
     """
     number = int(2.0 * len(HABITS) * (which - 0.5)) if which >= 0.5 else -1
-    return Manner(commands=(command,)) if number < 0 else HABITS[min(number, len(HABITS) - 1)](command, how, around)
+    return (
+        Manner(commands=(command,))
+        if number < 0
+        else HABITS[min(number, len(HABITS) - 1)](command, how, around)
+    )
 
 
 def _share(share: float, number: int) -> float:
@@ -113,7 +121,7 @@ def _log(low: float, high: float, share: float) -> float:
 
 
 def _towards(command: Command, share: float, around: Surroundings) -> Command:
-    """The command, or one to a position where it is another."""
+    """Give the command, or one to a position where it is another."""
     if command.command == "position":
         return command
     return attrs.evolve(command, command="position", values=around.target(share))
@@ -124,14 +132,14 @@ def _followed(first: Command, after: float, **changes: Any) -> Command:
 
 
 def _again(command: Command, how: float, around: Surroundings) -> Manner:
-    """The same target cyclically, as from a panel."""
+    """Give the same target cyclically, as a panel does."""
     wait = _log(2.0 * around.cycle, LONGEST_WAIT, how)
     first = _towards(command, how, around)
     return Manner(commands=tuple(_followed(first, k * wait) for k in range(REPEATED)))
 
 
 def _creeping(command: Command, how: float, around: Surroundings) -> Manner:
-    """A target that creeps towards the middle, every few cycles."""
+    """Let a target creep towards the middle, every few cycles."""
     wait, first = _log(2.0 * around.cycle, 20.0 * around.cycle, how), _towards(command, how, around)
     step = _log(5e-6, 1e-3, _share(how, 5))
     commands = []
@@ -140,19 +148,27 @@ def _creeping(command: Command, how: float, around: Surroundings) -> Manner:
             value + k * step * (high - low) * (1.0 if value < 0.5 * (low + high) else -1.0)
             for value, (low, high) in zip(first.values, around.targets, strict=True)
         )
-        commands.append(_followed(first, k * wait, values=tuple(min(max(v, low), high) for v, (low, high) in zip(values, around.targets, strict=True))))
+        commands.append(
+            _followed(
+                first,
+                k * wait,
+                values=tuple(
+                    min(max(v, low), high) for v, (low, high) in zip(values, around.targets, strict=True)
+                ),
+            )
+        )
     return Manner(commands=tuple(commands))
 
 
 def _tap(command: Command, how: float, around: Surroundings) -> Manner:
-    """A short tap of the stick."""
+    """Tap the stick."""
     lasts = _log(around.cycle, 0.5 * around.period, how)
     stick = attrs.evolve(command, command="velocity", values=around.speed(how))
     return Manner(commands=(stick, _followed(stick, lasts, values=(0.0,) * len(around.speeds))))
 
 
 def _reversal(command: Command, how: float, around: Surroundings) -> Manner:
-    """A stick that is thrown over for a short time."""
+    """Throw the stick over for a short time."""
     lasts = _log(around.cycle, 0.5 * around.period, how)
     stick = attrs.evolve(command, command="velocity", values=around.speed(how))
     back, again = around.period * (0.3 + _share(how, 4)), tuple(-value for value in stick.values)
@@ -160,19 +176,27 @@ def _reversal(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _changed_mind(command: Command, how: float, around: Surroundings) -> Manner:
-    """Something else before the first was planned."""
+    """Command something else before the first was planned."""
     wait, first = _log(around.cycle, SOON * around.cycle, how), _towards(command, how, around)
-    others = ("position", around.target(_share(how, 6))), ("stop", ()), ("velocity", around.speed(how)), ("position", first.values)
+    others = (
+        ("position", around.target(_share(how, 6))),
+        ("stop", ()),
+        ("velocity", around.speed(how)),
+        ("position", first.values),
+    )
     return Manner(
         commands=(
             first,
-            *(_followed(first, (k + 1) * wait, command=kind, values=values) for k, (kind, values) in enumerate(others)),
+            *(
+                _followed(first, (k + 1) * wait, command=kind, values=values)
+                for k, (kind, values) in enumerate(others)
+            ),
         )[: 2 + int(3.0 * _share(how, 7))]
     )
 
 
 def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
-    """Stops on the way to one target."""
+    """Stop on the way to one target, and go on."""
     wait, first = _log(2.0 * around.cycle, around.period, how), _towards(command, how, around)
     commands = [first]
     for k in range(STOPS):
@@ -182,26 +206,36 @@ def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _slowed_on_the_way(command: Command, how: float, around: Surroundings) -> Manner:
-    """Another override or velocity limit while the axis moves, without a new command."""
+    """Change override or velocity limit while the axis moves, without a new command."""
     later, lasts = around.period * _share(how, 3), around.period * (1.0 + 5.0 * _share(how, 4))
     share = 0.3 + 0.5 * how
     inputs = {"rOverride": share}
     if _share(how, 5) < 0.5:
-        inputs = {f"fVelocityLimit{end}": share * most for end, (_, most) in zip(around.suffixes, around.speeds, strict=True)}
-    return Manner(commands=(command,), changes=(Change(time=command.time + later, lasts=lasts, inputs=inputs),))
+        inputs = {
+            f"fVelocityLimit{end}": share * most
+            for end, (_, most) in zip(around.suffixes, around.speeds, strict=True)
+        }
+    return Manner(
+        commands=(command,), changes=(Change(time=command.time + later, lasts=lasts, inputs=inputs),)
+    )
 
 
 def _held(command: Command, how: float, around: Surroundings) -> Manner:
-    """An override of 0, and back."""
+    """Hold by an override of 0, and go on."""
     later, lasts = around.period * _share(how, 3), _log(around.cycle, 3.0 * around.period, how)
     return Manner(
-        commands=(command,), changes=(Change(time=command.time + later, lasts=lasts, inputs={"rOverride": 0.0}),)
+        commands=(command,),
+        changes=(Change(time=command.time + later, lasts=lasts, inputs={"rOverride": 0.0}),),
     )
 
 
 def _wild(command: Command, how: float, around: Surroundings) -> Manner:
-    """One cycle of a live parameter, override or velocity limit that cannot be, or a spike."""
-    values: list[dict[str, float]] = [{"rOverride": nan}, {"rOverride": 1.5}, {f"fVelocityLimit{around.suffixes[0]}": -1.0}]
+    """Give one cycle of a live parameter, override or velocity limit that cannot be, or a spike."""
+    values: list[dict[str, float]] = [
+        {"rOverride": nan},
+        {"rOverride": 1.5},
+        {f"fVelocityLimit{around.suffixes[0]}": -1.0},
+    ]
     for name, (low, high) in around.live.items():
         spike = low + _share(how, 8) * (high - low)
         values += [{f"f{name}": wild} for wild in (nan, inf, 0.9 * low - 1.0, 1.001 * high, spike, spike)]
@@ -210,13 +244,53 @@ def _wild(command: Command, how: float, around: Surroundings) -> Manner:
     return Manner(commands=(command,), changes=(Change(time=command.time + later, lasts=0.0, inputs=inputs),))
 
 
+def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
+    """Give a live parameter, override or velocity limit that cannot be for long; acknowledge the error."""
+    later, lasts = around.period * _share(how, 3), WRONG * (1.0 + _share(how, 4))
+    values = [
+        (5, {"rOverride": -0.1}),
+        (5, {"rOverride": 1.01}),
+        (5, {f"fVelocityLimit{around.suffixes[-1]}": nan}),
+    ]
+    for name, (low, high) in around.live.items():
+        values += [
+            (2, {f"f{name}": 0.99 * low - 1e-3}),
+            (2, {f"f{name}": 1.01 * high}),
+            (2, {f"f{name}": nan}),
+        ]
+    error, inputs = values[int(how * len(values)) % len(values)]
+    begin = command.time + later
+    reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
+    again = _followed(command, later + lasts + 10.0 * around.cycle)
+    return Manner(
+        commands=(command, again),
+        changes=(Change(time=begin, lasts=lasts, inputs=inputs), reset),
+        errors=(error,),
+    )
+
+
+def _correction(command: Command, how: float, around: Surroundings) -> Manner:
+    """Give the last axis alone another target, not far away, on the way or after the arrival."""
+    first, (low, high) = _towards(command, how, around), around.targets[-1]
+    step = (
+        _log(1e-4, 0.1, _share(how, 3))
+        * (high - low)
+        * (1.0 if first.values[-1] < 0.5 * (low + high) else -1.0)
+    )
+    other = (*first.values[:-1], first.values[-1] + step)
+    return Manner(
+        commands=(first, _followed(first, around.period * (1.0 + 8.0 * _share(how, 4)), values=other))
+    )
+
+
 def _refused(command: Command, how: float, around: Surroundings) -> Manner:
-    """A target that is none, on the way to another."""
+    """Give a target that is none, on the way to another."""
     first, wait = _towards(command, how, around), around.period * _share(how, 3)
     low, high = around.targets[-1]
     wrong = (*first.values[:-1], (nan, inf, low - OUTSIDE, high + OUTSIDE)[int(4.0 * how) % 4])
     return Manner(
-        commands=(first, _followed(first, wait, values=wrong), _followed(first, wait + 0.5 * around.period)), errors=(3,)
+        commands=(first, _followed(first, wait, values=wrong), _followed(first, wait + 0.5 * around.period)),
+        errors=(3,),
     )
 
 
@@ -230,5 +304,7 @@ HABITS: tuple[Callable[[Command, float, Surroundings], Manner], ...] = (
     _slowed_on_the_way,
     _held,
     _wild,
+    _wrong,
+    _correction,
     _refused,
 )

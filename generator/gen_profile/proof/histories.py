@@ -24,10 +24,10 @@ from gen_profile.planner.design import target_range
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.planner.machine import planned_axes
 from gen_profile.plants.plant import Plant
-from gen_profile.proof.habits import Change, Manner, Surroundings
-from gen_profile.proof.habits import manner as habit
 from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
+from gen_profile.proof.habits import Change, Manner, Surroundings
+from gen_profile.proof.habits import manner as habit
 from gen_profile.spec.model import Spec
 
 COMMANDED = 40.0  # s in which commands come; slow machines take longer, see PERIODS
@@ -193,14 +193,17 @@ class Histories:
 
     def slowest(self, history: History) -> float:
         """Find the longest period in s of the machine that a block is told of in a history."""
-        live = history.live
+        live = dict(history.live)
         ropes = {name: [value for _, value in corners] for name, corners in history.hoisting.items()}
-        ends = [dict(live)] + [
+        ends = [live] + [
             live | {name: end(values) for name, values in ropes.items()} for end in (min, max) if ropes
         ]
         plant = self.spec.machine()
         return float(
-            max(2.0 * np.pi / linearize(plant, *_machine(self.spec, told, {})).frequencies.min() for told in ends)
+            max(
+                2.0 * np.pi / linearize(plant, *_machine(self.spec, told, {})).frequencies.min()
+                for told in ends
+            )
         )
 
     @property
@@ -334,7 +337,9 @@ class Histories:
             command = self._command(time, int(np.searchsorted(np.cumsum(likely), row[0])), row[1:last])
             more = iter(row[last + 1 :])
             command = self._slowed(command, *islice(more, self.slowed))
-            found = habit(command, *more, around) if self.habits else Manner(commands=(command,))
+            found = Manner(commands=(command,))
+            if self.habits:
+                found = habit(command, next(more), next(more), around)
             yield found
             time = found.commands[-1].time + self.period * SHORTEST * (LONGEST / SHORTEST) ** row[last]
         time = min(time, max(within, found.commands[-1].time if found else 0.0))

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from math import inf
 
 import attrs
-import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
@@ -45,17 +44,39 @@ class Order:
 
 @attrs.frozen(kw_only=True)
 class Ends:
-    """Between which a block may move an axis, in its unit and s."""
+    """Between which a block may move an axis, in its unit and s; `quick`: deceleration and jerk."""
 
     velocity: float
     acceleration: float
     jerk: float
     targets: tuple[float, float]
+    quick: tuple[float, float] = (inf, inf)
 
 
-def orders(
-    begins: Sequence[int], rows: Array, names: Sequence[str], axes: Sequence[BlockAxis], limits: Sequence[Ends], last: int
-) -> tuple[Order, ...]:
+@attrs.frozen(kw_only=True)
+class Inputs:
+    """What is known of a block's inputs.
+
+    Attributes
+    ----------
+    names : sequence of str
+    axes : sequence of BlockAxis
+    limits : sequence of Ends
+        Of the same axes.
+    live : mapping of str to (float, float)
+        Ranges of the live parameters.
+    held : int
+        Cycles in which wrong values of them, of override and of velocity limit do not count.
+    """
+
+    names: Sequence[str]
+    axes: Sequence[BlockAxis]
+    limits: Sequence[Ends]
+    live: Mapping[str, tuple[float, float]] = attrs.field(factory=dict)
+    held: int = 0
+
+
+def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tuple[Order, ...]:
     """Read rows of inputs as the block's header tells.
 
     Parameters
@@ -63,72 +84,78 @@ def orders(
     begins : (rows,) sequence of int
         From which cycle each row holds.
     rows : (rows, inputs) array
-    names : sequence of str
-        Of the inputs.
-    axes : sequence of BlockAxis
-    limits : sequence of Ends
-        Of the same axes.
+    inputs : Inputs
     last : int
         Cycle after the last one.
     """
     found = list[Order]()
-    for order in _changes(begins, rows, names, axes, limits):
-        before = found[-1] if found else None
-        if before and _same(order, before):
-            continue
-        if before and order.begin == before.begin:
+    for order in sorted(_changes(begins, rows, inputs), key=lambda order: order.begin):
+        if found and found[-1].begin == order.begin:
             found.pop()
-        found.append(order)
+        if not found or not _same(order, found[-1]):
+            found.append(order)
     ends = [*(order.begin for order in found[1:]), last]
-    return tuple(attrs.evolve(order, end=min(end, last)) for order, end in zip(found, ends, strict=True) if order.begin < last)
+    return tuple(attrs.evolve(order, end=end) for order, end in zip(found, ends, strict=True))
 
 
 def _same(order: Order, before: Order) -> bool:
     """Whether nothing new is told; stops know no velocity limit."""
-    again = (order.kind, order.values) == (before.kind, before.values) and not order.refused
+    again = (order.kind, order.values, order.refused) == (before.kind, before.values, before.refused)
     return again and (order.kind in (STOP, QUICK_STOP) or order.tops == before.tops)
 
 
-def _changes(
-    begins: Sequence[int], rows: Array, names: Sequence[str], axes: Sequence[BlockAxis], limits: Sequence[Ends]
-) -> Iterator[Order]:
-    """Give an order for every row."""
-    place = {name: number for number, name in enumerate(names)}
+def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Order]:
+    """Give an order for every row, and one where wrong values have lasted too long."""
+    place = {name: number for number, name in enumerate(inputs.names)}
 
     def of(name: str) -> list[int]:
-        return [place[axis.of(name)] for axis in axes]
+        return [place[axis.of(name)] for axis in inputs.axes]
 
     targets, sticks, slow = of("fTarget"), of("fVelocityCommand"), of("fVelocityLimit")
-    kind, values, execute, edge = STOP, tuple[float, ...](), False, 0
-    full = tops = tuple(own.velocity for own in limits)
-    for begin, row in zip(begins, rows.tolist(), strict=True):
-        override, given = row[place["rOverride"]], [row[number] for number in slow]
-        if 0.0 <= override <= 1.0 and min(given) >= 0.0:  # others are the block's to refuse
-            tops = tuple(min(override * most, limit or most) for most, limit in zip(full, given, strict=True))
-        refused = 0
-        was, rises = (kind, values), bool(row[place["bExecute"]]) and not execute
+    reset = place.get("bReset")
+    kind, values, execute, edge, since, latched = STOP, tuple[float, ...](), False, 0, -1, 0
+    full = tops = tuple(own.velocity for own in inputs.limits)
+    for begin, end, row in zip(begins, [*begins[1:], begins[-1]], rows.tolist(), strict=True):
+        given, wrong = [row[number] for number in slow], _wrong(row, place, slow, inputs.live)
+        since = -1 if not wrong else begin if since < 0 else since
+        if reset is None or row[reset]:
+            latched = 0
+        if not wrong:
+            tops = tuple(
+                min(row[place["rOverride"]] * most, limit or most)
+                for most, limit in zip(full, given, strict=True)
+            )
+        was, rises, refused = (kind, values), bool(row[place["bExecute"]]) and not execute, latched
         execute = bool(row[place["bExecute"]])
         if row[place["bQuickStop"]]:
             kind, values = QUICK_STOP, ()
-        elif row[place["bStop"]] or not row[place["bEnable"]]:
+        elif latched or row[place["bStop"]] or not row[place["bEnable"]]:
             kind, values = STOP, ()
         elif row[place["bVelocity"]]:
             kind, values = VELOCITY, tuple(row[number] for number in sticks)
         elif rises:
             kind, values = POSITION, tuple(row[number] for number in targets)
-            if not all(low <= value <= high for value, (low, high) in zip(values, (own.targets for own in limits), strict=True)):
+            within = zip(values, (own.targets for own in inputs.limits), strict=True)
+            if not all(low <= value <= high for value, (low, high) in within):
                 kind, values, refused = STOP, (), 3
         elif kind in (VELOCITY, QUICK_STOP):
             kind, values = STOP, ()
         if rises or was != (kind, values):
             edge = begin
         yield Order(begin=begin, end=begin, kind=kind, values=values, tops=tops, edge=edge, refused=refused)
+        if wrong and not latched and end > since + inputs.held:
+            kind, values, latched, edge = STOP, (), wrong, since + inputs.held
+            yield Order(begin=edge, end=edge, kind=kind, values=values, tops=tops, edge=edge, refused=wrong)
 
 
-def told_rows(begins: Sequence[int], rows: Array, ignored: Sequence[int]) -> tuple[list[int], Array]:
-    """Leave out rows in which but some inputs (those of live parameters) change."""
-    if len(rows) < 2:
-        return list(begins), rows
-    kept = np.delete(rows, ignored, axis=1)
-    changed = np.flatnonzero(np.concatenate([[True], (kept[1:] != kept[:-1]).any(axis=1)]))
-    return [begins[number] for number in changed], rows[changed]
+def _wrong(
+    row: Sequence[float],
+    place: Mapping[str, int],
+    slow: Sequence[int],
+    live: Mapping[str, tuple[float, float]],
+) -> int:
+    """Give the error of values that cannot be, if they last; 0 for none."""
+    if not all(low <= row[place[f"f{name}"]] <= high for name, (low, high) in live.items()):
+        return 2
+    good = 0.0 <= row[place["rOverride"]] <= 1.0 and all(row[number] >= 0.0 for number in slow)
+    return 0 if good else 5

@@ -11,11 +11,12 @@ import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array
-from gen_profile.planner.design import target_range
+from gen_profile.planner.design import quick_limits, target_range
 from gen_profile.planner.execution import BlockInstance
+from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed
 from gen_profile.proof.histories import Histories, History
-from gen_profile.proof.obedience import LEAST_REACTION, REACTION, Followed, faults
-from gen_profile.proof.orders import QUICK_STOP, Ends, Order, orders, told_rows
+from gen_profile.proof.obedience import faults
+from gen_profile.proof.orders import QUICK_STOP, Ends, Inputs, Order, orders
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.block import RESERVE
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
@@ -24,6 +25,7 @@ AT_ONCE = 64  # cycles between looks at whether a setpoint differs
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
 
 _STATED = re.compile(r"\bcReaction\s*:\s*LREAL\s*:=\s*([0-9.Ee+-]+)\s*;")
+_HELD = re.compile(r"\bcHoldCycles\s*:\s*DINT\s*:=\s*(\d+)\s*;")
 _PLAY = CFUNCTYPE(c_int, c_void_p, POINTER(c_double), c_long, POINTER(c_double))
 
 
@@ -40,8 +42,7 @@ class Watch:
         Likewise.
     cycle : float
         s.
-    limits : tuple of Ends
-        Of the block's axes.
+    told : Inputs
     reaction : float
         s, within which a new command must be obeyed.
     """
@@ -50,20 +51,26 @@ class Watch:
     inputs: Sequence[str]
     outputs: Sequence[str]
     cycle: float
-    limits: tuple[Ends, ...]
+    told: Inputs
     reaction: float
 
     @classmethod
     def of(cls, text: str, block: BlockInstance, histories: Histories) -> Watch:
         """Look at a block's text."""
-        stated = _STATED.search(text)
+        stated, held = _STATED.search(text), _HELD.search(text)
         usual = LEAST_REACTION + REACTION * histories.period
         return cls(
             histories=histories,
             inputs=list(block.inputs),
             outputs=block.outputs,
             cycle=block.inputs["fCycleTime"],
-            limits=tuple(_ends(histories.spec, number) for number in histories.axes),
+            told=Inputs(
+                names=list(block.inputs),
+                axes=[*histories.axes.values()],
+                limits=tuple(_ends(histories.spec, number) for number in histories.axes),
+                live=histories.spec.planner.live,
+                held=int(held[1]) if held else 0,
+            ),
             reaction=float(stated[1]) if stated else usual,
         )
 
@@ -74,10 +81,19 @@ class Watch:
 
     def orders(self, script: Script) -> tuple[Order, ...]:
         """Read what a script tells the block."""
-        live = [self.inputs.index(f"f{name}") for name in self.spec.planner.live]
-        begins, rows = told_rows(script.begins, script.inputs, [*live, *range(len(self.inputs), script.inputs.shape[1])])
+        begins, rows = self._changes(script)
         last = script.begins[-1] + script.longest + script.settle + script.watch
-        return orders(begins, rows, self.inputs, [*self.histories.axes.values()], self.limits, last)
+        return orders(begins, rows, self.told, last)
+
+    def _changes(self, script: Script) -> tuple[list[int], Array]:
+        """Leave out rows in which but live parameters change, within their ranges."""
+        begins, rows = np.asarray(script.begins), script.inputs[:, : len(self.inputs)]
+        kept = rows.copy()
+        for name, (low, high) in self.told.live.items():
+            live = kept[:, self.inputs.index(f"f{name}")]
+            live[(live >= low) & (live <= high)] = low
+        changed = np.flatnonzero(np.concatenate([[True], (kept[1:] != kept[:-1]).any(axis=1)]))
+        return begins[changed].tolist(), kept[changed]
 
     def marks(self, told: Sequence[Order]) -> list[int]:
         """Tell before which cycles the block is to be copied: those of orders that hold long enough."""
@@ -117,9 +133,11 @@ class Watch:
             period=self.histories.slowest(history),
             reaction=self.reaction,
             axes=[*self.histories.axes.values()],
-            limits=self.limits,
+            limits=self.told.limits,
             orders=[
-                attrs.evolve(order, end=min(order.end, run.cycles)) for order in told if order.begin < run.cycles
+                order if order.end <= run.cycles else attrs.evolve(order, end=run.cycles)
+                for order in told
+                if order.begin < run.cycles
             ],
             issued=dict(zip(self.outputs, run.trace.T, strict=False)),
             reserve=reserve,
@@ -130,29 +148,30 @@ class Watch:
         ends = {order.begin: order.end for order in followed.orders}
         places = [self.outputs.index(name) for axis in block.axes for name in axis]
         reactions = {
-            mark: self._first_difference(script, mark, ends[mark], block, memory, run.trace[:, places])
+            mark: self._first_difference(script, (mark, ends[mark]), block, memory, run.trace[:, places])
             for mark, memory in zip(self.marks(told), run.copies, strict=True)
             if mark in ends
         }
         return followed, reactions
 
     def _first_difference(
-        self, script: Script, begin: int, end: int, block: CalledBlock, memory: Array, issued: Array
+        self, script: Script, cycles: tuple[int, int], block: CalledBlock, memory: Any, issued: Array
     ) -> int | None:
         """Call a copy of a block as if an order had not come, until it issues other setpoints than it did."""
+        begin, end = cycles
         play, places = _PLAY(block.play), [self.outputs.index(name) for axis in block.axes for name in axis]
         live = [self.inputs.index(f"f{name}") for name in self.spec.planner.live]
-        row, inputs = np.searchsorted(script.begins, begin - 1, side="right") - 1, len(self.inputs)
+        row, inputs = int(np.searchsorted(script.begins, begin - 1, side="right")) - 1, len(self.inputs)
         first, many = begin, AT_ONCE
         while first < end:
-            cycles = np.arange(first, min(first + many, end))
-            given = np.tile(script.inputs[row, :inputs], (len(cycles), 1))
-            now = np.searchsorted(script.begins, cycles, side="right") - 1
+            part = np.arange(first, min(first + many, end))
+            given = np.tile(script.inputs[row, :inputs], (len(part), 1))
+            now = np.searchsorted(script.begins, part, side="right") - 1
             given[:, live] = script.inputs[now[:, None], live]
-            outputs = np.empty((len(cycles), len(self.outputs)))
-            if play(memory.ctypes.data, _doubles(given), len(cycles), _doubles(outputs)):
+            outputs = np.empty((len(part), len(self.outputs)))
+            if play(memory.ctypes.data, _doubles(given), len(part), _doubles(outputs)):
                 return None
-            differs = (outputs[:, places] != issued[cycles]).any(axis=1)
+            differs = (outputs[:, places] != issued[part]).any(axis=1)
             if differs.any():
                 return first - begin + int(np.argmax(differs))
             first, many = first + many, 2 * many
@@ -167,6 +186,7 @@ def _ends(spec: Spec, axis: int) -> Ends:
         acceleration=own.acceleration,
         jerk=own.jerk,
         targets=target_range(spec, axis),
+        quick=quick_limits(spec, axis),
     )
 
 
