@@ -46,3 +46,7 @@ battery *arguments:
 # Random sequences of knobs in the studio: how they end, and what they leave behind.
 knobs *arguments:
     python tests/end_to_end/knob_sequences.py {{ arguments }}
+
+# Changed texts of the planner block: which of them its proof lets pass.
+mutants *arguments:
+    python tests/generator/mutants.py {{ arguments }}

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.errors import CosimulationError
 from gen_profile.motion.profile import Array
@@ -56,6 +57,7 @@ class Script:
     begins : (rows,) array of int
         Cycle from which each row of inputs holds; the first is 0.
     inputs : (rows, inputs) array
+        Of the block, and behind them what else axes follow.
     longest : int
         Cycles after the last row within which the axes must stand.
     settle, watch : int
@@ -72,16 +74,16 @@ class Script:
 
 @attrs.frozen(kw_only=True)
 class Hoist:
-    """An axis that follows what the block is told, not what it issues.
+    """An axis that follows not what the block issues, but a column of the script.
 
     Attributes
     ----------
     axis : int
         Of the plant.
     told : int
-        Place among the block's inputs.
+        Place of the column.
     ratio : float
-        Of the axis's position to the input.
+        Of the axis's position to its values.
     """
 
     axis: int
@@ -134,6 +136,8 @@ class BlockRun:
     fault : int
         What the block did that no block may do; 0 for nothing.
     trace : (cycles, outputs + loads) array or None
+    copies : (marks, bytes) array or None
+        Of the block's instance, as they were before marked cycles.
     """
 
     axes: tuple[AxisExtremes, ...]
@@ -145,6 +149,7 @@ class BlockRun:
     error: int
     fault: int
     trace: Array | None = None
+    copies: NDArray[np.uint8] | None = None
 
 
 class _Block(Structure):
@@ -152,7 +157,7 @@ class _Block(Structure):
         *((name, c_void_p) for name in ("play", "instance")),
         *((name, c_size_t) for name in ("n_inputs", "n_outputs", "n_axes")),
         ("axes", POINTER(c_size_t)),
-        *((name, c_size_t) for name in ("busy", "promise", "error")),
+        *((name, c_size_t) for name in ("busy", "promise", "error", "size")),
     ]
 
 
@@ -171,13 +176,16 @@ class _History(Structure):
         ("n_hoists", c_size_t),
         *((name, POINTER(c_size_t)) for name in ("hoists", "told")),
         ("ratios", POINTER(c_double)),
+        ("n_marks", c_size_t),
+        ("marks", POINTER(c_long)),
     ]
 
 
 class _Found(Structure):
     _fields_ = [
         *((name, POINTER(c_double)) for name in ("axes", "on_the_way", "residual", "trace")),
-        *((name, c_long) for name in ("stands", "cycles")),
+        ("copies", c_void_p),
+        *((name, c_long) for name in ("n_rows", "stands", "cycles")),
         *((name, c_int) for name in ("status", "fault", "error")),
         ("promise", c_bool),
     ]
@@ -221,6 +229,7 @@ class BlockFollower:
         *,
         hoists: Sequence[Hoist] = (),
         rows: int = 0,
+        marks: Sequence[int] = (),
     ) -> BlockRun:
         """Let the plant follow a block.
 
@@ -235,7 +244,9 @@ class BlockFollower:
             Which axis of the plant each axis of the block is.
         hoists : sequence of Hoist
         rows : int
-            Cycles of which everything is to be kept: as many as an earlier run took, or none.
+            Cycles of which everything is to be kept, at most.
+        marks : sequence of int
+            Rising cycles, before which the block's instance is to be copied.
 
         Raises
         ------
@@ -248,14 +259,20 @@ class BlockFollower:
             "axes": np.zeros((len(block.axes), 7)),
             "on_the_way": np.zeros(loads),
             "residual": np.zeros(loads),
-            "trace": np.zeros((rows, outputs + loads)),
+            "trace": np.empty((outputs + loads, rows)),
         }
-        found = _Found(**{name: _doubles(array) for name, array in kept.items() if array.size})
+        size = ctypes.sizeof(block.memory)
+        copies = np.empty((len(marks), size), dtype=np.uint8)
+        found = _Found(
+            **{name: _doubles(array) for name, array in kept.items() if array.size},
+            copies=copies.ctypes.data,
+            n_rows=rows,
+        )
         room = np.empty(2 * outputs + loads + len(block.axes))
         self._loop(
             byref(self._fmu),
             byref(_called(block, script)),
-            byref(self._history(script, values, led, hoists)),
+            byref(self._history(script, values, led, hoists, marks)),
             _doubles(room),
             byref(found),
         )
@@ -268,12 +285,18 @@ class BlockFollower:
             ),
             on_the_way=kept["on_the_way"],
             residual=kept["residual"],
-            trace=kept["trace"] if rows else None,
+            trace=kept["trace"][:, : found.cycles].T if rows else None,
+            copies=copies if marks else None,
             **{name: getattr(found, name) for name in _SIMPLE},
         )
 
     def _history(
-        self, script: Script, values: Mapping[str, float], led: Sequence[int], hoists: Sequence[Hoist]
+        self,
+        script: Script,
+        values: Mapping[str, float],
+        led: Sequence[int],
+        hoists: Sequence[Hoist],
+        marks: Sequence[int],
     ) -> _History:
         begins = (c_long * len(script.begins))(*script.begins)
         setpoints = [values[name] for name in self._setpoints]
@@ -298,6 +321,8 @@ class BlockFollower:
             hoists=(c_size_t * len(hoists))(*(hoist.axis for hoist in hoists)),
             told=(c_size_t * len(hoists))(*(hoist.told for hoist in hoists)),
             ratios=(c_double * len(hoists))(*(hoist.ratio for hoist in hoists)),
+            n_marks=len(marks),
+            marks=(c_long * len(marks))(*marks),
         )
 
     def _numbers(self, names: Mapping[str, float] | Sequence[str]) -> Any:
@@ -324,6 +349,7 @@ def _called(block: CalledBlock, script: Script) -> _Block:
         busy=busy,
         promise=promise,
         error=error,
+        size=ctypes.sizeof(block.memory),
     )
 
 

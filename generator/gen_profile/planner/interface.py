@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 
 import attrs
 
@@ -53,6 +54,7 @@ class BlockAxis:
         return name + self.suffix
 
 
+@lru_cache(maxsize=4)
 def block_axes(text: str) -> tuple[BlockAxis, ...]:
     """Find the axes that a block plans in its declarations.
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from queue import SimpleQueue
 from typing import Self
 
+import attrs
 import numpy as np
 
 from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
@@ -16,10 +18,11 @@ from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.proof.histories import SLOWEST, Histories, History
+from gen_profile.proof.watching import Watch
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
-from gen_profile_fmu.running.block_run import BlockFollower, BlockRun, Hoist, Script
+from gen_profile_fmu.running.block_run import BlockFollower, BlockRun, CalledBlock, Hoist, Script
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
 
 STEP_PHASE = 0.05  # rad of the fastest mode that an integration step may cover
@@ -65,6 +68,7 @@ class ClosedLoop:
         self._block = BlockInstance(text)
         self.cycle = self._block.inputs["fCycleTime"]
         self.max_step = STEP_PHASE / histories.fastest
+        self._watch = Watch.of(text, self._block, histories)
         self._workers = workers
         self._open = ExitStack()
         self._followers: SimpleQueue[BlockFollower] = SimpleQueue()
@@ -85,13 +89,32 @@ class ClosedLoop:
         return self._block.outputs
 
     @contextmanager
-    def runs(self, histories: Iterable[History]) -> Iterator[Iterator[BlockRun]]:
+    def runs(self, histories: Iterable[History]) -> Iterator[Iterator[tuple[BlockRun, tuple[str, ...]]]]:
         """Run histories on all workers, in their order; those not begun when it closes are left out."""
         pool = ThreadPoolExecutor(self._workers)
         try:
-            yield pool.map(self.run, histories)
+            yield pool.map(self.watched, histories)
         finally:
             pool.shutdown(cancel_futures=True)
+
+    def watched(self, history: History) -> tuple[BlockRun, tuple[str, ...]]:
+        """Let the machine of a history follow the block, and see whether the block obeys.
+
+        Returns
+        -------
+        run : BlockRun
+        faults : tuple of str
+            What it did other than it was told, each in words that end a sentence.
+
+        Raises
+        ------
+        ExportError, CosimulationError
+        """
+        script, block = self._script(history), self._block.called()
+        told = self._watch.orders(script)
+        run = self._followed(history, block, script, rows=told[-1].end, marks=self._watch.marks(told))
+        faults = () if run.fault else self._watch.faults(history, script, told, block, run)
+        return attrs.evolve(run, trace=None, copies=None), faults
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
         """Let the machine of a history follow the block.
@@ -108,15 +131,29 @@ class ClosedLoop:
         ------
         ExportError, CosimulationError
         """
+        script = self._script(history)
+        return self._followed(history, self._block.called(), script, rows=rows, max_step=max_step)
+
+    def _followed(
+        self,
+        history: History,
+        block: CalledBlock,
+        script: Script,
+        *,
+        rows: int,
+        max_step: float | None = None,
+        marks: Sequence[int] = (),
+    ) -> BlockRun:
         follower = self._followers.get()
         try:
             return follower.run(
-                self._block.called(),
-                self._script(history),
+                block,
+                script,
                 self._values(history, max_step or self.max_step),
                 led=tuple(self._histories.axes),
                 hoists=self._hoists(history),
                 rows=rows,
+                marks=marks,
             )
         finally:
             self._followers.put(follower)
@@ -157,6 +194,7 @@ class ClosedLoop:
         begins, inputs = self._hoisted(
             history, *input_rows(history.commands, [*axes.values()], values, self.cycle)
         )
+        begins, inputs = self._changed(history, begins, inputs)
         period = self._histories.period
         patience = PATIENCE * period + max(map(self._crossing, axes))
         watch = max(SHORTEST_WATCH, WATCHED * period)
@@ -187,7 +225,7 @@ class ClosedLoop:
         return sum(alone)
 
     def _hoisted(self, history: History, begins: list[int], inputs: Array) -> tuple[Sequence[int], Array]:
-        """Give a row to every cycle in which live parameters change."""
+        """Give a row to every cycle in which live parameters change, and what they truly are at its end."""
         if not history.hoisting:
             return begins, inputs
         starting = math.ceil(HOIST_STARTS * self._histories.period / self.cycle)
@@ -199,18 +237,37 @@ class ClosedLoop:
             line = np.interp(np.arange(1 - starting, len(cycles)) * self.cycle, *np.transpose(corners))
             rounded = np.convolve(line, np.full(starting, 1.0 / starting), mode="valid")
             inputs[:, list(self._block.inputs).index(f"f{name}")] = np.clip(rounded, low, high)
-        return range(len(cycles)), inputs
+        true = [inputs[:, list(self._block.inputs).index(f"f{name}")] for name in history.hoisting]
+        return range(len(cycles)), np.column_stack([inputs, *true])
+
+    def _changed(self, history: History, begins: Sequence[int], inputs: Array) -> tuple[Sequence[int], Array]:
+        """Let inputs differ for some time."""
+        if not history.changes:
+            return begins, inputs
+        spans = [
+            (first, first + max(1, round(change.lasts / self.cycle)), change)
+            for change in history.changes
+            for first in [round(change.time / self.cycle)]
+        ]
+        cycles = sorted({*begins, *(edge for begin, end, _ in spans for edge in (begin, end))})
+        inputs = inputs[np.searchsorted(begins, cycles, side="right") - 1]
+        for begin, end, change in spans:
+            within = slice(bisect_left(cycles, begin), bisect_left(cycles, end))
+            for name, value in change.inputs.items():
+                if name in self._block.inputs:  # those of earlier versions have no bReset
+                    inputs[within, list(self._block.inputs).index(name)] = value
+        return cycles, inputs
 
     def _hoists(self, history: History) -> list[Hoist]:
         """Tell how axes follow what the block is told."""
-        axes, inputs = [axis.name for axis in self._machine.actuated], list(self._block.inputs)
+        axes, inputs = [axis.name for axis in self._machine.actuated], len(self._block.inputs)
         return [
             Hoist(
                 axis=axes.index(name),
-                told=inputs.index(f"f{name}"),
+                told=inputs + place,
                 ratio=history.parameters[name] / history.live[name] if name in history.parameters else 1.0,
             )
-            for name in history.hoisting
+            for place, name in enumerate(history.hoisting)
         ]
 
     def _places(self, history: History) -> list[float]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate, islice, pairwise, product
+from math import isfinite
 from typing import Any, Self
 
 import attrs
@@ -25,6 +26,8 @@ from gen_profile.planner.machine import planned_axes
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
+from gen_profile.proof.habits import Change, Manner, Surroundings
+from gen_profile.proof.habits import manner as habit
 from gen_profile.spec.model import Spec
 
 COMMANDED = 40.0  # s in which commands come; slow machines take longer, see PERIODS
@@ -40,6 +43,7 @@ LEGS = 8  # of one speed each, in which a live parameter changes on the way
 HOISTED_ON = 2.0  # periods after the last command in which it still may
 
 _PER_COMMAND = 2  # choices: which, how long; its values; and how slowly, where that is varied
+_PER_HABIT = 2  # choices: which, and how
 _PER_LEG = 2  # choices: speed, how long
 
 
@@ -61,6 +65,10 @@ class History:
     hoisting : mapping of str to tuple of (float, float)
         What the block is told of live parameters that change on the way: corners (time in s, value) of a
         line, which begins with the value in `live` and ends constant.
+    changes : tuple of Change
+        Of inputs, beside the commands.
+    errors : tuple of int
+        That the block must show, as commands are wrong.
     """
 
     live: Mapping[str, float]
@@ -69,6 +77,8 @@ class History:
     commands: tuple[Command, ...]
     axes: Mapping[int, BlockAxis] = {0: BlockAxis(name="")}
     hoisting: Mapping[str, tuple[tuple[float, float], ...]] = attrs.field(factory=dict)
+    changes: tuple[Change, ...] = ()
+    errors: tuple[int, ...] = ()
 
     @property
     def starts(self) -> dict[str, float]:
@@ -98,13 +108,25 @@ class History:
         return {
             "time_s": command.time,
             "command": command.command,
-            **{axis.of("value"): value for axis, value in zip(axes, values, strict=True)},
+            **{axis.of("value"): written(value) for axis, value in zip(axes, values, strict=True)},
             "override": command.override,
             **{
                 f"{axis.prefix}velocity_limit_{axis.unit}_per_s": limit
                 for axis, limit in zip(axes, limits, strict=True)
             },
         }
+
+    @property
+    def other_inputs(self) -> list[dict[str, Any]]:
+        """Plain values of what differs for some time from the commands, for JSON."""
+        return [
+            {
+                "time_s": change.time,
+                "lasts_s": change.lasts,
+                "inputs": {name: written(value) for name, value in change.inputs.items()},
+            }
+            for change in self.changes
+        ]
 
     @property
     def brakes(self) -> bool:
@@ -129,6 +151,8 @@ class Histories:
         Frequency of the fastest mode there, in rad/s.
     slowed : bool
         Whether override and velocity limit vary, too; those of earlier manifests do not.
+    habits : bool
+        Whether commands also come as `proof.habits` tells; those of earlier manifests do not.
     """
 
     spec: Spec
@@ -137,9 +161,10 @@ class Histories:
     period: float
     fastest: float
     slowed: bool = True
+    habits: bool = True
 
     @classmethod
-    def of(cls, spec: Spec, *, slowed: bool = True) -> Self:
+    def of(cls, spec: Spec, *, slowed: bool = True, habits: bool = True) -> Self:
         """Look at the ranges of a spec, whose limits are stated."""
         live, nominal = spec.planner.live, spec.plant.parameters
         ranges = {
@@ -163,6 +188,22 @@ class Histories:
             period=period,
             fastest=fastest,
             slowed=slowed,
+            habits=habits,
+        )
+
+    def slowest(self, history: History) -> float:
+        """Find the longest period in s of the machine that a block is told of in a history."""
+        live = dict(history.live)
+        ropes = {name: [value for _, value in corners] for name, corners in history.hoisting.items()}
+        ends = [live] + [
+            live | {name: end(values) for name, values in ropes.items()} for end in (min, max) if ropes
+        ]
+        plant = self.spec.machine()
+        return float(
+            max(
+                2.0 * np.pi / linearize(plant, *_machine(self.spec, told, {})).frequencies.min()
+                for told in ends
+            )
         )
 
     @property
@@ -187,7 +228,7 @@ class Histories:
 
     @property
     def _per_command(self) -> int:
-        return _PER_COMMAND + len(self.axes) + self.slowed
+        return _PER_COMMAND + len(self.axes) + self.slowed + _PER_HABIT * self.habits
 
     @property
     def _first_command(self) -> int:
@@ -250,7 +291,8 @@ class Histories:
             assert travel is not None
             places[number] = _between(travel, _widened(start))
         rows = choices[self._first_command : self._first_leg].reshape(MOST_COMMANDS, self._per_command)
-        commands = tuple(self._commands(rows[: int(amount * MOST_COMMANDS)], first, manner, ending))
+        manners = [*self._manners(rows[: int(amount * MOST_COMMANDS)], first, manner, ending, told)]
+        commands = tuple(command for one in manners for command in one.commands)
         return History(
             live=told,
             parameters=parameters,
@@ -258,6 +300,8 @@ class Histories:
             commands=commands,
             axes=self.axes,
             hoisting=self._hoisting(choices[self._first_leg :], told, commands[-1].time),
+            changes=tuple(change for one in manners for change in one.changes),
+            errors=tuple(error for one in manners for error in one.errors),
         )
 
     def _hoisting(
@@ -279,25 +323,44 @@ class Histories:
         """Parameters of a machine that differs by some errors from what the block is told in a history."""
         return _machine(self.spec, history.live, errors)[0]
 
-    def _commands(
-        self, rows: Array, first: float, manner: float, ending: Sequence[float]
-    ) -> Iterator[Command]:
+    def _manners(
+        self, rows: Array, first: float, manner: float, ending: Sequence[float], told: Mapping[str, float]
+    ) -> Iterator[Manner]:
         """Follow the rows until their time is over, then come to rest."""
         within = max(COMMANDED, PERIODS * self.period)
         likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
         time, last = first * SOONEST, 1 + len(self.axes)
+        around, found = self._surroundings(told), None
         for row in rows.tolist():
             if time > within:
                 break
             command = self._command(time, int(np.searchsorted(np.cumsum(likely), row[0])), row[1:last])
-            yield self._slowed(command, *row[last + 1 :])
-            time += self.period * SHORTEST * (LONGEST / SHORTEST) ** row[last]
-        time = min(time, within)
+            more = iter(row[last + 1 :])
+            command = self._slowed(command, *islice(more, self.slowed))
+            found = Manner(commands=(command,))
+            if self.habits:
+                found = habit(command, next(more), next(more), around)
+            yield found
+            time = found.commands[-1].time + self.period * SHORTEST * (LONGEST / SHORTEST) ** row[last]
+        time = min(time, max(within, found.commands[-1].time if found else 0.0))
         how, *others = ending
         if how < 0.05:
-            yield Command(time=time, command="quick-stop")
+            last_one = Command(time=time, command="quick-stop")
         else:
-            yield self._command(time, 0 if how < 0.5 else 2, [(how - 0.05) / 0.45, *others])
+            last_one = self._command(time, 0 if how < 0.5 else 2, [(how - 0.05) / 0.45, *others])
+        yield Manner(commands=(last_one,))
+
+    def _surroundings(self, told: Mapping[str, float]) -> Surroundings:
+        speeds = tuple(self._velocity(number) for number in self.axes)
+        return Surroundings(
+            cycle=self.spec.export.cycle_time,
+            period=self.period,
+            targets=tuple(target_range(self.spec, number) for number in self.axes),
+            speeds=tuple((-speed, speed) for speed in speeds),
+            suffixes=tuple(axis.suffix for axis in self.axes.values()),
+            live=self.spec.planner.live,
+            told=told,
+        )
 
     def _slowed(self, command: Command, choice: float = 0.0) -> Command:
         """Limit one command in four by the override, and one in four by the velocity limit."""
@@ -329,6 +392,11 @@ class Histories:
         """Choose a share from end to end; of several axes, each is left alone now and then."""
         alone = len(self.axes) > 1 and abs(choice - 0.5) < ALONE
         return 0.5 if alone else _widened(choice, 0.25)
+
+
+def written(value: float) -> float | str:
+    """Write a number as JSON can: what is none, in words."""
+    return value if isfinite(value) else str(value)
 
 
 def _between(ends: tuple[float, float], share: float) -> float:

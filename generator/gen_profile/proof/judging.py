@@ -20,7 +20,14 @@ Judge = Callable[[Numbering, Sequence[int]], list[JudgedHistory]]
 
 
 def judge_run(
-    spec: Spec, run: BlockRun, history: History, *, cycle: float, number: int, group: str
+    spec: Spec,
+    run: BlockRun,
+    history: History,
+    disobeyed: Sequence[str] = (),
+    *,
+    cycle: float,
+    number: int,
+    group: str,
 ) -> JudgedHistory:
     """Judge what became of a history.
 
@@ -30,6 +37,8 @@ def judge_run(
     run : BlockRun
     history : History
         Of that run.
+    disobeyed : sequence of str
+        What the block did other than it was told, in words that end a sentence.
     cycle : float
         s.
     number : int
@@ -48,7 +57,7 @@ def judge_run(
         residual=dict(zip(loads, run.residual.tolist(), strict=True)),
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,
-        faults=tuple(_faults(history, run, limits)),
+        faults=(*_faults(history, run, limits), *disobeyed),
     )
 
 
@@ -78,7 +87,7 @@ def _faults(history: History, run: BlockRun, limits: dict[str, float]) -> Iterat
         yield from _axis_faults(history, named, axis, limits)
     if run.stands < 0:
         yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
-    if run.error:
+    if run.error and run.error not in history.errors:
         yield f"the block shows error {run.error}"
     if not run.promise and not history.brakes:
         yield "the block takes its promise back"

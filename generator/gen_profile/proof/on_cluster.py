@@ -39,7 +39,7 @@ class ProofRecipe:
         That the spec names, by their names.
     text : str
         The block.
-    slowed : bool
+    slowed, habits : bool
         As of `Histories`.
     versions : tuple of (str, str)
         Of the libraries that shape the numbers.
@@ -49,6 +49,7 @@ class ProofRecipe:
     files: tuple[tuple[str, bytes], ...] = attrs.field(repr=False)
     text: str = attrs.field(repr=False)
     slowed: bool
+    habits: bool
     versions: tuple[tuple[str, str], ...]
 
     @classmethod
@@ -59,6 +60,7 @@ class ProofRecipe:
             files=tuple(spec.files().items()),
             text=text,
             slowed=histories.slowed,
+            habits=histories.habits,
             versions=versions(),
         )
 
@@ -121,10 +123,11 @@ def judge_part(recipe: ProofRecipe, rows: Sequence[tuple[int, str, list[float]]]
     """
     require_versions(recipe.versions, "this proof")
     spec = recipe.read_spec()
-    histories = Histories.of(spec, slowed=recipe.slowed)
+    histories = Histories.of(spec, slowed=recipe.slowed, habits=recipe.habits)
     with ClosedLoop(spec, recipe.text, histories) as loop:
         made = [(number, group, histories.history(np.array(choices))) for number, group, choices in rows]
         return [
-            judge_run(spec, loop.run(history), history, cycle=loop.cycle, number=number, group=group)
+            judge_run(spec, run, history, disobeyed, cycle=loop.cycle, number=number, group=group)
             for number, group, history in made
+            for run, disobeyed in [loop.watched(history)]
         ]

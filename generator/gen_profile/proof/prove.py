@@ -32,6 +32,7 @@ def prove(
     *,
     histories: int = HISTORIES,
     slowed: bool = True,
+    habits: bool = True,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress = untold,
@@ -45,7 +46,7 @@ def prove(
     text : str
         The block, as it was written.
     histories : int
-    slowed : bool
+    slowed, habits : bool
         As of `Histories`.
     workers : int, optional
         Processors to use; all that there are by default. What is found does not depend on it.
@@ -65,7 +66,7 @@ def prove(
     OutputError
         Dask is not installed.
     """
-    numbering = Numbering.of(Histories.of(spec, slowed=slowed), histories, spec.check.seed)
+    numbering = Numbering.of(Histories.of(spec, slowed=slowed, habits=habits), histories, spec.check.seed)
     with ExitStack() as stack:
         judge: Judge | None = None
         if scheduler is not None:  # before anything takes its time
@@ -116,9 +117,11 @@ def _judge(
     histories = [numbering.history(number) for number in numbers]
     judged = []
     with loop.runs(histories) as runs:
-        for number, history, run in zip(numbers, histories, runs, strict=True):
+        for number, history, watched in zip(numbers, histories, runs, strict=True):
             group = numbering.group(number)
-            judged.append(judge_run(spec, run, history, cycle=loop.cycle, number=number, group=group))
+            judged.append(
+                judge_run(spec, watched[0], history, watched[1], cycle=loop.cycle, number=number, group=group)
+            )
             if number % TOLD == 0:
                 progress("proving", number, numbering.count)
     return judged
@@ -170,6 +173,7 @@ def _verdict(
         seed=numbering.seed,
         count=numbering.count,
         slowed=numbering.histories.slowed,
+        habits=numbering.histories.habits,
         parents=numbering.parents,
         judged=tuple(judged),
         by_fmpy=tuple(by_fmpy),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -72,6 +73,7 @@ class JudgedHistory:
             "live": dict(self.history.live),
             "parameters": dict(self.history.parameters),
             "commands": [self.history.described(command) for command in self.history.commands],
+            "changes": self.history.other_inputs,
             "hoisting": {
                 name: [{"time_s": time, "value": value} for time, value in corners]
                 for name, corners in self.history.hoisting.items()
@@ -99,6 +101,8 @@ class Proof(Examination):
         With which the histories were drawn, and how many.
     slowed : bool
         Whether override and velocity limit varied, too.
+    habits : bool
+        Whether commands also came as operators and controllers give them.
     parents : sequence of sequences of int
         From which histories each round of the search began.
     judged : tuple of JudgedHistory
@@ -117,6 +121,7 @@ class Proof(Examination):
     seed: int
     count: int
     slowed: bool
+    habits: bool
     parents: Sequence[Sequence[int]]
     judged: tuple[JudgedHistory, ...]
     by_fmpy: tuple[int, ...]
@@ -146,9 +151,9 @@ class Proof(Examination):
         by_kind: dict[str, list[JudgedHistory]] = {}
         for judged in self.judged:
             for fault in judged.faults:
-                by_kind.setdefault(fault.split(" by ")[0], []).append(judged)
+                by_kind.setdefault(kind_of(fault), []).append(judged)
         for kind, those in by_kind.items():
-            first = next(fault for fault in those[0].faults if fault.split(" by ")[0] == kind)
+            first = next(fault for fault in those[0].faults if kind_of(fault) == kind)
             others = f", and likewise in {len(those) - 1} others" if len(those) > 1 else ""
             sentences.append(f"In history {those[0].number} {first}{others}.")
         if not self.apart <= AGREEMENT:
@@ -180,6 +185,7 @@ class Proof(Examination):
             "histories": self.count,
             "seed": self.seed,
             "slowed": self.slowed,
+            "habits": self.habits,
             "search_parents": [list(numbers) for numbers in self.parents],
             "share": self.share(self.worst),
             "worst": self.described(self.worst),
@@ -208,3 +214,8 @@ class Proof(Examination):
             "worst_share": max(shares),
             "quantiles": {f"{part:g}": float(q) for part, q in zip(QUANTILES, quantiles, strict=True)},
         }
+
+
+def kind_of(fault: str) -> str:
+    """Leave out the numbers of a fault."""
+    return re.split(" by |, at ", fault, maxsplit=1)[0]

@@ -4,6 +4,7 @@
  * last change; then the loads are watched.
  */
 #include <math.h>
+#include <string.h>
 
 #include "called_fmu.h"
 
@@ -15,6 +16,7 @@ typedef struct {
     size_t n_inputs, n_outputs, n_axes;
     const size_t *axes;                  /* n_axes x 3: places of position, velocity and acceleration among outputs */
     size_t busy, promise, error;         /* likewise */
+    size_t size;                         /* of the instance in bytes */
 } Block;
 
 typedef struct {
@@ -32,6 +34,8 @@ typedef struct {
     size_t n_hoists;                     /* axes that follow an input of the block */
     const size_t *hoists, *told;         /* their places among the setpoints, and of the inputs */
     const double *ratios;                /* of the axis's position to the input */
+    size_t n_marks;
+    const long *marks;                   /* rising cycles, before which the block's instance is copied */
 } History;
 
 /* Of an axis; gap: by how far the position is not the velocity's integral, nor this the acceleration's. */
@@ -42,7 +46,9 @@ typedef struct {
 typedef struct {
     Extremes *axes;                      /* n_axes */
     double *on_the_way, *residual;       /* n_loads: greatest sway at any time, and of what remains */
-    double *trace;                       /* cycles x (n_outputs + n_loads), or null */
+    double *trace;                       /* n_outputs + n_loads columns of n_rows cycles each, or null */
+    char *copies;                        /* of the instance, as marked */
+    long n_rows;
     long stands, cycles;                 /* stands: the cycle from which the axes do, or -1 */
     int status, fault, error;
     bool promise;                        /* at the end */
@@ -95,17 +101,19 @@ static void take_loads(const History *history, const double *sway, bool counts, 
 
 /* `room`: 2 x n_outputs + n_loads + n_axes. */
 EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history, double *room, Found *found) {
-    const size_t row_size = block->n_outputs + history->n_loads;
     double *before = NULL, *now = room, *other = room + block->n_outputs;
     double *sway = room + 2 * block->n_outputs, *stood = sway + history->n_loads;
     long last = history->begins[history->n_rows - 1], end = last + history->longest;
-    size_t row = 0;
+    size_t row = 0, mark = 0;
     begin_axes(block, found);
     found->stands = -1;
     found->status = begin(fmu, 0.0, history->parameter_references, history->n_parameters, history->parameters);
     for (long k = 0; k < end && found->status == GOOD; k++, found->cycles = k) {
         while (row + 1 < history->n_rows && history->begins[row + 1] <= k) row++;
         const double *inputs = history->inputs + row * block->n_inputs;
+        for (; mark < history->n_marks && history->marks[mark] == k; mark++) {
+            memcpy(found->copies + mark * block->size, block->instance, block->size);
+        }
         found->fault = block->play(block->instance, inputs, 1, now);
         if (found->fault != 0) return;
         take_states(block, now, found);
@@ -127,10 +135,10 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         if (found->status == GOOD) found->status = step(fmu, (double)k * history->cycle, history->cycle);
         if (found->status == GOOD) found->status = get(fmu, history->load_references, history->n_loads, sway);
         take_loads(history, sway, found->stands >= 0 && k >= found->stands + history->settle, found);
-        if (found->trace != NULL) {
-            double *kept = found->trace + (size_t)k * row_size;
-            for (size_t i = 0; i < block->n_outputs; i++) kept[i] = now[i];
-            for (size_t i = 0; i < history->n_loads; i++) kept[block->n_outputs + i] = sway[i];
+        if (found->trace != NULL && k < found->n_rows) {
+            double *kept = found->trace + k;
+            for (size_t i = 0; i < block->n_outputs; i++, kept += found->n_rows) *kept = now[i];
+            for (size_t i = 0; i < history->n_loads; i++, kept += found->n_rows) *kept = sway[i];
         }
         before = now;
         now = other;

@@ -1,0 +1,310 @@
+"""How operators and controllers give commands: again and again, by taps, with a change of mind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import inf, nan
+from typing import Any
+
+import attrs
+
+from gen_profile.planner.commands import Command
+
+REPEATED = 16  # commands
+CREEPING = 40
+LONGEST_WAIT = 0.6  # s, from one of them to the next
+SOON = 100  # cycles, in which a mind is changed
+STOPS = 4
+WRONG = 0.5  # s, at least, in which values count that cannot be
+OUTSIDE = 10.0  # m (or rad) beyond the targets
+
+_MORE = 0.6180339887  # turns one choice into others
+
+
+@attrs.frozen(kw_only=True)
+class Change:
+    """Inputs that differ for some time from what the commands say.
+
+    Attributes
+    ----------
+    time, lasts : float
+        s; less than a cycle is one.
+    inputs : mapping of str to float
+        By the block's names.
+    """
+
+    time: float
+    lasts: float
+    inputs: Mapping[str, float]
+
+
+@attrs.frozen(kw_only=True)
+class Manner:
+    """What becomes of a command.
+
+    Attributes
+    ----------
+    commands : tuple of Command
+        In its place.
+    changes : tuple of Change
+    errors : tuple of int
+        That the block must show.
+    """
+
+    commands: tuple[Command, ...]
+    changes: tuple[Change, ...] = ()
+    errors: tuple[int, ...] = ()
+
+
+@attrs.frozen(kw_only=True)
+class Surroundings:
+    """What a manner depends on.
+
+    Attributes
+    ----------
+    cycle, period : float
+        s, of the task and of the slowest swing.
+    targets, speeds : tuple of (float, float)
+        Ends of each axis's targets, and of its velocities.
+    suffixes : tuple of str
+        Of the names of each axis's inputs.
+    live : mapping of str to (float, float)
+        Ranges of the live parameters.
+    told : mapping of str to float
+        What the block is told of them.
+    """
+
+    cycle: float
+    period: float
+    targets: tuple[tuple[float, float], ...]
+    speeds: tuple[tuple[float, float], ...]
+    suffixes: tuple[str, ...]
+    live: Mapping[str, tuple[float, float]]
+    told: Mapping[str, float]
+
+    def target(self, share: float) -> tuple[float, ...]:
+        """Choose a place."""
+        return tuple(low + _share(share, k) * (high - low) for k, (low, high) in enumerate(self.targets))
+
+    def speed(self, share: float) -> tuple[float, ...]:
+        """Choose a velocity of at least a third of the greatest."""
+        return tuple(
+            (high if _share(share, k) > 0.5 else low) * (0.3 + 0.7 * _share(share, k + 1))
+            for k, (low, high) in enumerate(self.speeds)
+        )
+
+
+def manner(command: Command, which: float, how: float, around: Surroundings) -> Manner:
+    """Give a command as it is, in half of all cases, or by one of the habits.
+
+    Parameters
+    ----------
+    command : Command
+    which, how : float
+        Shares from 0 to 1.
+    around : Surroundings
+    """
+    number = int(2.0 * len(HABITS) * (which - 0.5)) if which >= 0.5 else -1
+    return (
+        Manner(commands=(command,))
+        if number < 0
+        else HABITS[min(number, len(HABITS) - 1)](command, how, around)
+    )
+
+
+def _share(share: float, number: int) -> float:
+    return (share + _MORE * (number + 1)) % 1.0
+
+
+def _log(low: float, high: float, share: float) -> float:
+    return float(low * (high / low) ** share)
+
+
+def _towards(command: Command, share: float, around: Surroundings) -> Command:
+    """Give the command, or one to a position where it is another."""
+    if command.command == "position":
+        return command
+    return attrs.evolve(command, command="position", values=around.target(share))
+
+
+def _followed(first: Command, after: float, **changes: Any) -> Command:
+    return attrs.evolve(first, time=first.time + after, **changes)
+
+
+def _again(command: Command, how: float, around: Surroundings) -> Manner:
+    """Give the same target cyclically, as a panel does."""
+    wait = _log(2.0 * around.cycle, LONGEST_WAIT, how)
+    first = _towards(command, how, around)
+    return Manner(commands=tuple(_followed(first, k * wait) for k in range(REPEATED)))
+
+
+def _creeping(command: Command, how: float, around: Surroundings) -> Manner:
+    """Let a target creep towards the middle, every few cycles."""
+    wait, first = _log(2.0 * around.cycle, 20.0 * around.cycle, how), _towards(command, how, around)
+    step = _log(5e-6, 1e-3, _share(how, 5))
+    commands = []
+    for k in range(CREEPING):
+        values = tuple(
+            value + k * step * (high - low) * (1.0 if value < 0.5 * (low + high) else -1.0)
+            for value, (low, high) in zip(first.values, around.targets, strict=True)
+        )
+        commands.append(
+            _followed(
+                first,
+                k * wait,
+                values=tuple(
+                    min(max(v, low), high) for v, (low, high) in zip(values, around.targets, strict=True)
+                ),
+            )
+        )
+    return Manner(commands=tuple(commands))
+
+
+def _tap(command: Command, how: float, around: Surroundings) -> Manner:
+    """Tap the stick."""
+    lasts = _log(around.cycle, 0.5 * around.period, how)
+    stick = attrs.evolve(command, command="velocity", values=around.speed(how))
+    return Manner(commands=(stick, _followed(stick, lasts, values=(0.0,) * len(around.speeds))))
+
+
+def _reversal(command: Command, how: float, around: Surroundings) -> Manner:
+    """Throw the stick over for a short time."""
+    lasts = _log(around.cycle, 0.5 * around.period, how)
+    stick = attrs.evolve(command, command="velocity", values=around.speed(how))
+    back, again = around.period * (0.3 + _share(how, 4)), tuple(-value for value in stick.values)
+    return Manner(commands=(stick, _followed(stick, back, values=again), _followed(stick, back + lasts)))
+
+
+def _changed_mind(command: Command, how: float, around: Surroundings) -> Manner:
+    """Command something else before the first was planned."""
+    wait, first = _log(around.cycle, SOON * around.cycle, how), _towards(command, how, around)
+    others = (
+        ("position", around.target(_share(how, 6))),
+        ("stop", ()),
+        ("velocity", around.speed(how)),
+        ("position", first.values),
+    )
+    return Manner(
+        commands=(
+            first,
+            *(
+                _followed(first, (k + 1) * wait, command=kind, values=values)
+                for k, (kind, values) in enumerate(others)
+            ),
+        )[: 2 + int(3.0 * _share(how, 7))]
+    )
+
+
+def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
+    """Stop on the way to one target, and go on."""
+    wait, first = _log(2.0 * around.cycle, around.period, how), _towards(command, how, around)
+    commands = [first]
+    for k in range(STOPS):
+        commands.append(_followed(first, (2 * k + 1) * wait, command="stop", values=()))
+        commands.append(_followed(first, (2 * k + 2) * wait))
+    return Manner(commands=tuple(commands))
+
+
+def _slowed_on_the_way(command: Command, how: float, around: Surroundings) -> Manner:
+    """Change override or velocity limit while the axis moves, without a new command."""
+    later, lasts = around.period * _share(how, 3), around.period * (1.0 + 5.0 * _share(how, 4))
+    share = 0.3 + 0.5 * how
+    inputs = {"rOverride": share}
+    if _share(how, 5) < 0.5:
+        inputs = {
+            f"fVelocityLimit{end}": share * most
+            for end, (_, most) in zip(around.suffixes, around.speeds, strict=True)
+        }
+    return Manner(
+        commands=(command,), changes=(Change(time=command.time + later, lasts=lasts, inputs=inputs),)
+    )
+
+
+def _held(command: Command, how: float, around: Surroundings) -> Manner:
+    """Hold by an override of 0, and go on."""
+    later, lasts = around.period * _share(how, 3), _log(around.cycle, 3.0 * around.period, how)
+    return Manner(
+        commands=(command,),
+        changes=(Change(time=command.time + later, lasts=lasts, inputs={"rOverride": 0.0}),),
+    )
+
+
+def _wild(command: Command, how: float, around: Surroundings) -> Manner:
+    """Give one cycle of a live parameter, override or velocity limit that cannot be, or a spike."""
+    values: list[dict[str, float]] = [
+        {"rOverride": nan},
+        {"rOverride": 1.5},
+        {f"fVelocityLimit{around.suffixes[0]}": -1.0},
+    ]
+    for name, (low, high) in around.live.items():
+        spike = low + _share(how, 8) * (high - low)
+        values += [{f"f{name}": wild} for wild in (nan, inf, 0.9 * low - 1.0, 1.001 * high, spike, spike)]
+    inputs = values[int(how * len(values)) % len(values)]
+    later = around.period * _share(how, 3)
+    return Manner(commands=(command,), changes=(Change(time=command.time + later, lasts=0.0, inputs=inputs),))
+
+
+def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
+    """Give a live parameter, override or velocity limit that cannot be for long; acknowledge the error."""
+    later, lasts = around.period * _share(how, 3), WRONG * (1.0 + _share(how, 4))
+    values = [
+        (5, {"rOverride": -0.1}),
+        (5, {"rOverride": 1.01}),
+        (5, {f"fVelocityLimit{around.suffixes[-1]}": nan}),
+    ]
+    for name, (low, high) in around.live.items():
+        values += [
+            (2, {f"f{name}": 0.99 * low - 1e-3}),
+            (2, {f"f{name}": 1.01 * high}),
+            (2, {f"f{name}": nan}),
+        ]
+    error, inputs = values[int(how * len(values)) % len(values)]
+    begin = command.time + later
+    reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
+    again = _followed(command, later + lasts + 10.0 * around.cycle)
+    return Manner(
+        commands=(command, again),
+        changes=(Change(time=begin, lasts=lasts, inputs=inputs), reset),
+        errors=(error,),
+    )
+
+
+def _correction(command: Command, how: float, around: Surroundings) -> Manner:
+    """Give the last axis alone another target, not far away, on the way or after the arrival."""
+    first, (low, high) = _towards(command, how, around), around.targets[-1]
+    step = (
+        _log(1e-4, 0.1, _share(how, 3))
+        * (high - low)
+        * (1.0 if first.values[-1] < 0.5 * (low + high) else -1.0)
+    )
+    other = (*first.values[:-1], first.values[-1] + step)
+    return Manner(
+        commands=(first, _followed(first, around.period * (1.0 + 8.0 * _share(how, 4)), values=other))
+    )
+
+
+def _refused(command: Command, how: float, around: Surroundings) -> Manner:
+    """Give a target that is none, on the way to another."""
+    first, wait = _towards(command, how, around), around.period * _share(how, 3)
+    low, high = around.targets[-1]
+    wrong = (*first.values[:-1], (nan, inf, low - OUTSIDE, high + OUTSIDE)[int(4.0 * how) % 4])
+    return Manner(
+        commands=(first, _followed(first, wait, values=wrong), _followed(first, wait + 0.5 * around.period)),
+        errors=(3,),
+    )
+
+
+HABITS: tuple[Callable[[Command, float, Surroundings], Manner], ...] = (
+    _again,
+    _creeping,
+    _tap,
+    _reversal,
+    _changed_mind,
+    _stop_and_go,
+    _slowed_on_the_way,
+    _held,
+    _wild,
+    _wrong,
+    _correction,
+    _refused,
+)

@@ -1,0 +1,265 @@
+"""Whether a planner block did what it was told, in time, and whether what it told was true."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from gen_profile.proof.followed import (
+    ENABLED,
+    EXACT,
+    FROM_REST,
+    IN_VELOCITY,
+    TO_STICK,
+    TO_STOP,
+    Flags,
+    Followed,
+    Measured,
+    Motion,
+    arriving,
+    calmed,
+    reaching,
+    slowing,
+)
+from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, Order
+from gen_profile.proof.statements import numbers, promises, stops, truths, velocities
+
+STILL = 1e-6  # m, from a target that an axis need not leave for
+
+WORDS = {
+    POSITION: "a target is reached later than allowed by {over:.3g} s",
+    VELOCITY: "a stick's velocity is reached later than allowed by {over:.3g} s",
+    STOP: "a stop ends later than allowed by {over:.3g} s",
+    "left": "a target is left again by {needed:.3g} m",
+    "against": "an axis moves against its command longer than allowed by {over:.3g} s",
+    "idle": "the axis stands though it is told to move, longer than allowed by {over:.3g} s",
+    "reaction": "a command is obeyed later than stated by {over:.3g} s",
+    "ends": "a stop leaves its stated ends by {over:.3g} m",
+    "loose": "the stated ends of a stop are wider than a stop can be by {over:.3g} m",
+    "fast": "a velocity is above override or velocity limit by {over:.3g} m/s",
+    "done": "bDone is set away from the target or before the axis stands",
+    "not done": "bDone is not set where the axis stands at its target",
+    "busy": "bBusy is not set while the axis moves",
+    "not busy": "bBusy stays set after a stop",
+    "vanished": "none of bBusy, bDone, bCommandAborted and bError tells of a command",
+    "in velocity": "bInVelocity is set without the velocity of the command",
+    "not in velocity": "bInVelocity is not set at the velocity of the command",
+    "aborted": "bCommandAborted is set though no command was replaced",
+    "not aborted": "bCommandAborted is not set though a command was replaced",
+    "error": "bError and nErrorId contradict each other",
+    "refused": "nErrorId does not tell why a command is refused",
+    "untold": "nErrorId tells an error without a cause by {needed:.0f}",
+    "disabled": "bEnabled is not set",
+    QUICK_STOP: "a quick stop ends later than allowed by {over:.3g} s",
+    "jump": "a position is not the integral of the velocity in a quick stop by {needed:.3g} m",
+    "distance": "fDistanceToGo is wrong by {needed:.3g} m",
+    "time": "fTimeToGo is wrong by {needed:.3g} s",
+    "stop distance": "fStopDistance is not the greater distance to the stated ends by {needed:.3g} m",
+    "promise": "bPromise and nPromise contradict each other",
+    "lost": "nPromise tells a reason that is none",
+    "kept": "bPromise is set though it cannot be known",
+    "no number": "an output is no number",
+}
+
+
+def faults(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[str]:
+    """Say what is wrong, each in words that end a sentence; each kind once, where it is worst."""
+    worst: dict[str, Measured] = {}
+    for met in measured(followed, reactions):
+        if not met.needed <= met.allowed:
+            known = worst.get(met.what)
+            if known is None or met.needed - met.allowed > known.needed - known.allowed:
+                worst[met.what] = met
+    for what, met in worst.items():
+        words = WORDS[what].format(needed=met.needed, over=met.needed - met.allowed)
+        yield f"{words}, at {met.cycle * followed.cycle:.2f} s"
+
+
+def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[Measured]:
+    """Measure all that is judged.
+
+    Parameters
+    ----------
+    followed : Followed
+    reactions : mapping of int to int or None
+        Of some orders' beginnings, how many cycles later the first setpoint came that would not have come
+        without the order; None for none at all.
+    """
+    motion = Motion.of(followed)
+    if not np.isfinite(motion.position.sum() + motion.velocity.sum() + motion.acceleration.sum()):
+        yield Measured("no number", 0, 1.0, 0.0)
+        return
+    for judge in (
+        _arrivals,
+        _directions,
+        _velocity_limits,
+        _quick_stops,
+        truths,
+        velocities,
+        stops,
+        numbers,
+        promises,
+    ):
+        yield from judge(followed, motion)
+    yield from _reactions(followed, motion, reactions)
+
+
+def _arrivals(followed: Followed, motion: Motion) -> Iterator[Measured]:
+    """Judge targets, velocities and stops at their latest times, of the orders that hold so long."""
+    for order in followed.orders:
+        begin, end = order.begin, order.end
+        if (end - begin) * followed.cycle < FROM_REST * followed.period:
+            continue  # it was replaced before
+        place, before = motion.position[:, begin], motion.velocity[:, begin]
+        own = slice(begin, end)
+        match order.kind:
+            case "position":
+                if not min(order.tops) > 0.0:
+                    continue
+                allowed = arriving(followed, place, before, order)
+                there = (motion.away[own] <= EXACT) & motion.stands[own]
+            case "velocity":
+                tops = [(1.0 - followed.reserve) * top for top in order.tops]
+                wanted = [min(max(w, -top), top) for w, top in zip(order.values, tops, strict=True)]
+                allowed = reaching(followed, before, wanted)
+                there = np.ones(end - begin, dtype=bool)
+                for k, w in enumerate(wanted):
+                    there &= _near(followed, motion, k, w, own)
+            case "quick-stop":
+                continue
+            case _:
+                allowed = slowing(followed, before, TO_STOP)
+                there = motion.stands[own]
+        latest = begin + followed.after(allowed)
+        first = begin + int(np.argmax(there)) if there.any() else end
+        if first < end:
+            yield Measured(order.kind, begin, (first - begin) * followed.cycle, allowed)
+        elif end > latest:
+            yield Measured(order.kind, begin, (end - begin) * followed.cycle, allowed)
+        if first < end and order.kind == POSITION:
+            yield Measured("left", first, float(motion.away[first:end].max()), max(EXACT, followed.wander))
+
+
+def _near(followed: Followed, motion: Motion, axis: int, wanted: float, own: slice) -> Flags:
+    """Whether an axis has a velocity, or is at the end of its way."""
+    limits = followed.limits[axis]
+    reached = (
+        np.abs(motion.velocity[axis, own] - wanted)
+        <= IN_VELOCITY * limits.velocity + followed.reserve * limits.velocity
+    )
+    low, high = limits.targets
+    if not wanted or reached[-1]:
+        return reached
+    room = high - motion.position[axis, own] if wanted > 0.0 else motion.position[axis, own] - low
+    speed = abs(wanted)
+    return reached | (
+        room
+        <= speed
+        * (speed / limits.acceleration + limits.acceleration / limits.jerk + TO_STICK * followed.period)
+    )
+
+
+def _directions(followed: Followed, motion: Motion) -> Iterator[Measured]:
+    """Judge that axes go never the wrong way, nor at rest, for longer than it takes to turn round."""
+    against, wants = np.zeros((2, followed.cycles), dtype=bool)
+    near = max(STILL, followed.wander)
+    for velocity, position, way, limits in zip(
+        motion.velocity, motion.position, motion.way, followed.limits, strict=True
+    ):
+        slack = (EXACT + 1.5 * followed.reserve) * limits.velocity
+        low, high = limits.targets
+        room = np.where(way > 0.0, high - position, position - low)
+        there = np.where(
+            motion.goes, np.abs(way) > near, room * (way != 0.0) > 0.1 * followed.period * np.abs(way)
+        )
+        against |= (velocity * np.sign(way) < -slack) & (there | ~motion.goes)
+        wants |= there
+    for order in followed.orders:
+        if not min(order.tops) > 0.0:
+            against[order.begin : order.end] = wants[order.begin : order.end] = False
+    for begin, end in _runs(against):
+        allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
+        yield Measured("against", begin, (end - begin) * followed.cycle, allowed)
+    for begin, end in _runs(wants & motion.stands):
+        ready = ENABLED if begin < followed.after(ENABLED) else 0.0
+        allowed = followed.reaction + ready + calmed(followed) * followed.period
+        yield Measured("idle", begin, (end - begin) * followed.cycle, allowed)
+
+
+def _runs(flags: Flags) -> list[tuple[int, int]]:
+    """Find where flags are set, as pairs of first and behind last."""
+    if not flags.any():
+        return []
+    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _velocity_limits(followed: Followed, motion: Motion) -> Iterator[Measured]:
+    """Judge override and velocity limit from when they must be kept."""
+    latest, before = 0, tuple(own.velocity for own in followed.limits)
+    for order in followed.orders:
+        if any(now < then for now, then in zip(order.tops, before, strict=True)):
+            takes = followed.reaction + slowing(followed, motion.velocity[:, order.begin], TO_STOP)
+            latest = order.begin + followed.after(takes)
+        before = order.tops
+        begin = max(order.begin, latest)
+        if begin >= order.end or order.kind in (STOP, QUICK_STOP):
+            continue
+        for k, (top, own) in enumerate(zip(order.tops, followed.limits, strict=True)):
+            if top < own.velocity:
+                fastest = np.abs(motion.velocity[k, begin : order.end])
+                at = int(np.argmax(fastest))
+                slack = (EXACT + 1.5 * followed.reserve) * own.velocity
+                yield Measured("fast", begin + at, float(fastest[at]), top + slack)
+
+
+def _quick_stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
+    """Judge quick stops: at once, on the straightest way."""
+    for order in followed.orders:
+        if order.kind != QUICK_STOP:
+            continue
+        begin, end = max(order.begin, 1), order.end
+        stands = motion.stands[begin:end]
+        rests = begin + int(np.argmax(stands)) if stands.any() else end
+        allowed = 3.0 * followed.cycle + max(
+            (abs(v) + 0.5 * a * a / jerk) / deceleration + (abs(a) + deceleration) / jerk
+            for v, a, (deceleration, jerk) in zip(
+                motion.velocity[:, begin - 1].tolist(),
+                motion.acceleration[:, begin - 1].tolist(),
+                (own.quick for own in followed.limits),
+                strict=True,
+            )
+        )
+        yield Measured(QUICK_STOP, order.begin, min(rests - begin, (end - begin)) * followed.cycle, allowed)
+        if rests == begin:
+            continue
+        for x, v, own in zip(motion.position, motion.velocity, followed.limits, strict=True):
+            steps = np.diff(x[begin - 1 : rests]) - 0.5 * followed.cycle * (
+                v[begin - 1 : rests - 1] + v[begin:rests]
+            )
+            jump = np.abs(steps)
+            if len(jump):
+                allowed = own.quick[1] * followed.cycle**3
+                yield Measured("jump", begin + int(np.argmax(jump)), float(jump.max()), EXACT + allowed)
+
+
+def _reactions(followed: Followed, motion: Motion, reactions: Mapping[int, int | None]) -> Iterator[Measured]:
+    """Judge setpoints that would not have come without the order, in time."""
+    late = followed.after(followed.reaction)
+    for order in followed.orders:
+        if order.begin not in reactions:
+            continue
+        found = reactions[order.begin]
+        if found is None or (found > late and _obeys_anyway(motion, order, order.begin + late)):
+            continue  # what came before ends or goes on as the order asks
+        yield Measured("reaction", order.begin, found * followed.cycle, followed.reaction)
+
+
+def _obeys_anyway(motion: Motion, order: Order, at: int) -> bool:
+    """Whether axes go on as before, and the right way."""
+    velocity = motion.velocity[:, at]
+    if order.kind == STOP:
+        return False
+    wanted = np.array(order.values) - (motion.position[:, at] if order.kind == POSITION else 0.0)
+    return bool((velocity * wanted >= 0.0).all())

@@ -1,0 +1,161 @@
+"""What a planner block is told, from its inputs alone: which command holds from which cycle to which."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import inf
+
+import attrs
+
+from gen_profile.motion.profile import Array
+from gen_profile.planner.interface import BlockAxis
+
+POSITION, VELOCITY, STOP, QUICK_STOP = "position", "velocity", "stop", "quick-stop"
+
+
+@attrs.frozen(kw_only=True)
+class Order:
+    """A command that holds, and how fast it may be followed.
+
+    Attributes
+    ----------
+    begin, end : int
+        Cycles; the end is that of the next one's begin.
+    kind : str
+        One of those above.
+    values : tuple of float
+        Of each axis the target or the velocity; none of a stop.
+    tops : tuple of float
+        Of each axis the greatest velocity, by limit, override and velocity limit; 0 holds.
+    refused : int
+        Error for which it is a stop.
+    edge : int
+        Cycle in which the command came; before `begin` where but the velocity limits have changed since.
+    """
+
+    begin: int
+    end: int
+    kind: str
+    values: tuple[float, ...]
+    tops: tuple[float, ...]
+    edge: int
+    refused: int = 0
+
+
+@attrs.frozen(kw_only=True)
+class Ends:
+    """Between which a block may move an axis, in its unit and s; `quick`: deceleration and jerk."""
+
+    velocity: float
+    acceleration: float
+    jerk: float
+    targets: tuple[float, float]
+    quick: tuple[float, float] = (inf, inf)
+
+
+@attrs.frozen(kw_only=True)
+class Inputs:
+    """What is known of a block's inputs.
+
+    Attributes
+    ----------
+    names : sequence of str
+    axes : sequence of BlockAxis
+    limits : sequence of Ends
+        Of the same axes.
+    live : mapping of str to (float, float)
+        Ranges of the live parameters.
+    held : int
+        Cycles in which wrong values of them, of override and of velocity limit do not count.
+    """
+
+    names: Sequence[str]
+    axes: Sequence[BlockAxis]
+    limits: Sequence[Ends]
+    live: Mapping[str, tuple[float, float]] = attrs.field(factory=dict)
+    held: int = 0
+
+
+def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tuple[Order, ...]:
+    """Read rows of inputs as the block's header tells.
+
+    Parameters
+    ----------
+    begins : (rows,) sequence of int
+        From which cycle each row holds.
+    rows : (rows, inputs) array
+    inputs : Inputs
+    last : int
+        Cycle after the last one.
+    """
+    found = list[Order]()
+    for order in sorted(_changes(begins, rows, inputs), key=lambda order: order.begin):
+        if found and found[-1].begin == order.begin:
+            found.pop()
+        if not found or not _same(order, found[-1]):
+            found.append(order)
+    ends = [*(order.begin for order in found[1:]), last]
+    return tuple(attrs.evolve(order, end=end) for order, end in zip(found, ends, strict=True))
+
+
+def _same(order: Order, before: Order) -> bool:
+    """Whether nothing new is told; stops know no velocity limit."""
+    again = (order.kind, order.values, order.refused) == (before.kind, before.values, before.refused)
+    return again and (order.kind in (STOP, QUICK_STOP) or order.tops == before.tops)
+
+
+def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Order]:
+    """Give an order for every row, and one where wrong values have lasted too long."""
+    place = {name: number for number, name in enumerate(inputs.names)}
+
+    def of(name: str) -> list[int]:
+        return [place[axis.of(name)] for axis in inputs.axes]
+
+    targets, sticks, slow = of("fTarget"), of("fVelocityCommand"), of("fVelocityLimit")
+    reset = place.get("bReset")
+    kind, values, execute, edge, since, latched = STOP, tuple[float, ...](), False, 0, -1, 0
+    full = tops = tuple(own.velocity for own in inputs.limits)
+    for begin, end, row in zip(begins, [*begins[1:], begins[-1]], rows.tolist(), strict=True):
+        given, wrong = [row[number] for number in slow], _wrong(row, place, slow, inputs.live)
+        since = -1 if not wrong else begin if since < 0 else since
+        if reset is None or row[reset]:
+            latched = 0
+        if not wrong:
+            tops = tuple(
+                min(row[place["rOverride"]] * most, limit or most)
+                for most, limit in zip(full, given, strict=True)
+            )
+        was, rises, refused = (kind, values), bool(row[place["bExecute"]]) and not execute, latched
+        execute = bool(row[place["bExecute"]])
+        if row[place["bQuickStop"]]:
+            kind, values = QUICK_STOP, ()
+        elif latched or row[place["bStop"]] or not row[place["bEnable"]]:
+            kind, values = STOP, ()
+        elif row[place["bVelocity"]]:
+            kind, values = VELOCITY, tuple(row[number] for number in sticks)
+        elif rises:
+            kind, values = POSITION, tuple(row[number] for number in targets)
+            within = zip(values, (own.targets for own in inputs.limits), strict=True)
+            if not all(low <= value <= high for value, (low, high) in within):
+                kind, values, refused = STOP, (), 3
+        elif kind in (VELOCITY, QUICK_STOP):
+            kind, values = STOP, ()
+        if rises or was != (kind, values):
+            edge = begin
+        yield Order(begin=begin, end=begin, kind=kind, values=values, tops=tops, edge=edge, refused=refused)
+        if wrong and not latched and end > since + inputs.held:
+            kind, values, latched, edge = STOP, (), wrong, since + inputs.held
+            yield Order(begin=edge, end=edge, kind=kind, values=values, tops=tops, edge=edge, refused=wrong)
+
+
+def _wrong(
+    row: Sequence[float],
+    place: Mapping[str, int],
+    slow: Sequence[int],
+    live: Mapping[str, tuple[float, float]],
+) -> int:
+    """Give the error of values that cannot be, if they last; 0 for none."""
+    if not all(low <= row[place[f"f{name}"]] <= high for name, (low, high) in live.items()):
+        return 2
+    good = 0.0 <= row[place["rOverride"]] <= 1.0 and all(row[number] >= 0.0 for number in slow)
+    return 0 if good else 5

@@ -1,0 +1,168 @@
+"""Whether what a planner block states of itself is true, in every cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gen_profile.proof.followed import (
+    ENABLED,
+    EXACT,
+    IN_VELOCITY,
+    TO_STOP,
+    Followed,
+    Measured,
+    Motion,
+    never,
+    slowing,
+)
+from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, Order
+
+BARELY = 5e-7  # share of the greatest velocity, within which one certainly is reached
+ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
+
+
+def truths(followed: Followed, motion: Motion) -> Iterator[Measured]:
+    """Judge the outputs that are truth values."""
+    done, busy, aborted, error, enabled = (
+        followed.issued[name] != 0.0 for name in ("bDone", "bBusy", "bCommandAborted", "bError", "bEnabled")
+    )
+    yield from never("busy", ~(motion.stands | busy))
+    yield from never("error", error != (followed.issued["nErrorId"] != 0.0))
+    yield from never("disabled", ~enabled)
+    yield from never("done", done & (busy | ~motion.stands | (motion.away > EXACT)))
+    rises = done.copy()
+    rises[1:] &= ~done[:-1]
+    yield from never("done", rises & ~motion.goes)  # it may last after the command, but not begin
+    told = done | busy | aborted | error
+    quiet, there = motion.goes & ~told, motion.goes & motion.stands & (motion.away <= EXACT)
+    may_be, wrong = np.zeros((2, followed.cycles), dtype=bool)
+    before = None
+    for order in followed.orders:
+        own = slice(order.begin, order.end)
+        if order.refused:
+            wrong[own] = True
+            shown = followed.issued["nErrorId"][order.begin : order.end][:2]  # in that cycle or the next
+            yield Measured("refused", order.begin, float((shown != order.refused).all()), 0.0)
+        if before and before.kind in (POSITION, VELOCITY):
+            may_be[order.begin :] = True
+            ended = (done | error)[before.begin : order.begin].any()
+            if before.kind == POSITION and order.edge == order.begin and not ended:
+                yield Measured("not aborted", order.begin, float(not aborted[order.begin]), 0.0)
+        if order.kind == POSITION and quiet[own].any():
+            ended = (done | error)[own]
+            until = int(np.argmax(ended)) if ended.any() else len(ended)
+            yield from never("vanished", quiet[own][:until], order.begin)
+        if (
+            order.kind == POSITION
+            and not followed.reserve
+            and there[order.begin + 1 : order.end].any()
+            and not done[own].any()
+        ):
+            yield Measured("not done", order.begin, 1.0, 0.0)
+        if order.kind == STOP and not followed.reserve:
+            latest = order.begin + followed.after(slowing(followed, motion.velocity[:, order.begin], TO_STOP))
+            if latest < order.end:
+                yield from never(
+                    "not busy", busy[latest : order.end] & motion.stands[latest : order.end], latest
+                )
+        before = order
+    yield from never("untold", error & ~wrong)
+    yield from never("aborted", aborted & ~may_be & ~error)
+
+
+def velocities(followed: Followed, motion: Motion) -> Iterator[Measured]:
+    """BInVelocity where the stick's velocity is issued, and nowhere else."""
+    shown = followed.issued["bInVelocity"] != 0.0
+    sticks = np.zeros(followed.cycles, dtype=bool)
+    for order in followed.orders:
+        sticks[order.begin : order.end] = order.kind == VELOCITY
+    apart = np.zeros(followed.cycles)
+    for velocity, wanted, limits in zip(motion.velocity, motion.way, followed.limits, strict=True):
+        np.maximum(apart, np.abs(velocity - wanted) / limits.velocity, out=apart)
+    yield from never("not in velocity", sticks & (apart <= BARELY) & ~shown)
+    yield from never("in velocity", shown & ~(sticks & (apart <= IN_VELOCITY)))
+
+
+def stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
+    """Judge stops by the ends that were stated when they came."""
+    stated = f"fStopLow{followed.axes[0].suffix}" in followed.issued
+    if stated:
+        ends = np.maximum(
+            followed.of("fStopHigh") - motion.position, motion.position - followed.of("fStopLow")
+        )
+        apart = np.abs(followed.of("fStopDistance") - ends).max(axis=0)
+        yield Measured("stop distance", int(np.argmax(apart)), float(apart.max()), EXACT)
+    targets = list[tuple[float, ...]]()
+    for order in followed.orders:
+        if order.kind == POSITION:
+            targets.append(order.values)
+        if order.kind != STOP:
+            continue
+        known = np.abs(
+            np.array([*targets, motion.position[:, order.begin]]) - motion.position[:, order.begin]
+        ).max(axis=0)
+        begin, own = order.begin, slice(order.begin, order.end)
+        takes = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
+        for k, axis in enumerate(followed.axes):
+            place = motion.position[k, own]
+            if stated:
+                low, high = (
+                    float(followed.issued[axis.of(name)][begin]) for name in ("fStopLow", "fStopHigh")
+                )
+            else:
+                distance = float(followed.issued[axis.of("fStopDistance")][begin])
+                low, high = place[0] - distance, place[0] + distance
+            yield Measured("ends", begin, max(low - place.min(), place.max() - high), EXACT)
+            leads = (
+                known[k] + followed.limits[k].velocity * takes
+            )  # a stop that is not planned yet may end there
+            yield Measured("loose", begin, max(place[0] - low, high - place[0]), leads)
+
+
+def numbers(followed: Followed, motion: Motion) -> Iterator[Measured]:
+    """Judge the outputs that are distances and times."""
+    wrong = np.abs(followed.of("fDistanceToGo") - motion.way).max(axis=0) * motion.goes
+    at = int(np.argmax(wrong))
+    yield Measured("distance", at, float(wrong[at]), max(EXACT, followed.wander))
+    if followed.reserve:
+        return  # calming goes on as long as it must
+    time, slot = followed.issued["fTimeToGo"], 0.1 * followed.period + 2.0 * followed.cycle
+    for order in followed.orders:
+        moving = np.flatnonzero(~motion.stands[order.begin : order.end])
+        if not len(moving):
+            continue
+        rests = order.begin + int(moving[-1]) + 1
+        if rests >= order.end or not _is_end(motion, order, rests):
+            continue
+        first = max(order.begin, rests - followed.after(0.5 * followed.period))
+        error = np.abs(time[first:rests] - (rests - np.arange(first, rests)) * followed.cycle)
+        yield Measured("time", first + int(np.argmax(error)), float(error.max()), slot)
+        begun = order.begin + followed.after(followed.reaction + followed.period)
+        if begun < rests:
+            left = (rests - np.arange(begun, rests)) * followed.cycle
+            over = np.abs(time[begun:rests] - left) - ROUGHLY * left
+            yield Measured("time", begun + int(np.argmax(over)), float(over.max()), followed.period)
+        after = np.abs(time[rests + 1 : order.end])
+        yield Measured("time", rests + 1, float(after.max(initial=0.0)), EXACT)
+
+
+def _is_end(motion: Motion, order: Order, at: int) -> bool:
+    """Whether an axis that stands has nowhere else to go."""
+    if order.kind == POSITION:
+        return bool(np.abs(motion.position[:, at] - order.values).max() <= EXACT)
+    return not any(order.values)
+
+
+def promises(followed: Followed, motion: Motion) -> Iterator[Measured]:
+    """Judge the promise, and why it is dropped."""
+    promise, why = followed.issued["bPromise"] != 0.0, followed.issued["nPromise"]
+    yield from never("promise", promise != (why == 0.0))
+    ready = followed.after(ENABLED + followed.reaction)
+    yield from never("lost", why[ready:] > 2.0, ready)
+    yield from never("lost", why == 1.0)  # live parameters keep their stated rates, but for spikes
+    braked = next((order.begin for order in followed.orders if order.kind == QUICK_STOP), followed.cycles)
+    yield from never("lost", why[:braked] == 2.0)
+    if braked < followed.cycles and not motion.stands[max(0, braked - 1)]:
+        yield from never("kept", promise[braked:], braked)

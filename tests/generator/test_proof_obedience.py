@@ -1,0 +1,300 @@
+"""Judging whether a block obeys: synthetic motions, each fault by itself, and blocks that disobey."""
+
+import attrs
+import numpy as np
+import pytest
+from generator.mutants import judged
+from generator.planned_machines import BAY
+
+from gen_profile.planner.design import planner_block
+from gen_profile.planner.interface import BlockAxis
+from gen_profile.proof.followed import Followed
+from gen_profile.proof.habits import HABITS
+from gen_profile.proof.histories import Histories
+from gen_profile.proof.obedience import WORDS, faults, measured
+from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, Ends, Inputs, Order, orders
+from gen_profile.proof.verdict import kind_of
+from gen_profile.spec.reading import parse_spec
+
+CYCLE, CYCLES = 0.01, 6000
+TARGET, TOLD, STICK, STOPPED = 5.0, 100, 2500, 4000  # m; cycles in which commands come
+LIMITS = Ends(velocity=1.0, acceleration=0.5, jerk=5.0, targets=(-100.0, 100.0), quick=(1.0, 10.0))
+
+
+def told(begin, end, kind, *values, top=1.0):
+    return Order(begin=begin, end=end, kind=kind, values=values, tops=(top,), edge=begin)
+
+
+def obedient():
+    """A move of 5 m, a stick of 0.8 m/s and a stop, by ramps that meet their commands exactly."""
+    time = CYCLE * np.arange(CYCLES)
+    corners = [(0, 0), (1.2, 0), (3.2, 1), (6.2, 1), (8.2, 0), (25.2, 0), (27.2, 0.8), (40.2, 0.8), (42.2, 0)]
+    velocity = np.interp(time, *np.transpose(corners))
+    velocity[820:2521] = velocity[4220:] = 0.0
+    acceleration = np.gradient(velocity, CYCLE) * (velocity != 0.0)
+    position = np.concatenate([[0.0], np.cumsum(0.5 * CYCLE * (velocity[1:] + velocity[:-1]))])
+    position[820:2521] = TARGET  # but for rounding
+    stands = (velocity == 0.0) & (acceleration == 0.0)
+    cycle = np.arange(CYCLES)
+    goes, sticks = (cycle >= TOLD) & (cycle < STICK), (cycle >= STICK) & (cycle < STOPPED)
+    there = goes & stands & (cycle > 800)
+    ends = np.maximum(position[-1] - position, 0.0) * (cycle >= STICK)
+    left = np.where(cycle < 820, (820 - cycle) * CYCLE, np.maximum(4220 - cycle, 0) * CYCLE)
+    issued = {
+        "fPosition": position,
+        "fVelocity": velocity,
+        "fAcceleration": acceleration,
+        "bBusy": 1.0 * (~stands | (goes & ~there)),
+        "bDone": 1.0 * there,
+        "bInVelocity": 1.0 * (sticks & (np.abs(velocity - 0.8) < 1e-9)),
+        "bCommandAborted": np.zeros(CYCLES),
+        "bError": np.zeros(CYCLES),
+        "nErrorId": np.zeros(CYCLES),
+        "bEnabled": np.ones(CYCLES),
+        "bPromise": np.ones(CYCLES),
+        "nPromise": np.zeros(CYCLES),
+        "fDistanceToGo": np.where(goes, TARGET - position, 0.0),
+        "fTimeToGo": left * ~stands,
+        "fStopDistance": ends,
+        "fStopLow": position.copy(),
+        "fStopHigh": position + ends,
+    }
+    return Followed(
+        cycle=CYCLE,
+        period=2.0,
+        reaction=1.5,
+        axes=[BlockAxis(name="")],
+        limits=[LIMITS],
+        orders=[
+            told(0, TOLD, STOP),
+            told(TOLD, STICK, POSITION, TARGET),
+            told(STICK, STOPPED, VELOCITY, 0.8),
+            told(STOPPED, CYCLES, STOP),
+        ],
+        issued=issued,
+    )
+
+
+REACTIONS = {TOLD: 20, STICK: 20, STOPPED: 20}
+
+
+def kinds(followed, reactions=REACTIONS):
+    return {kind_of(fault) for fault in faults(followed, reactions)}
+
+
+def with_output(name, within, value):
+    followed = obedient()
+    for one in [name] if isinstance(name, str) else name:
+        followed.issued[one][within] = value
+    return followed
+
+
+def with_orders(*given, moved=0.0, **changes):
+    followed = attrs.evolve(obedient(), orders=given, **changes)
+    followed.issued["fPosition"][510:] += moved
+    return followed
+
+
+def test_a_block_that_obeys_has_no_fault():
+    assert kinds(obedient()) == set()
+    assert len(list(measured(obedient(), REACTIONS))) > 10
+
+
+REST, MOVE, STICKS, STOPS = obedient().orders
+FAULTS = {
+    POSITION: with_orders(REST, attrs.evolve(MOVE, values=(5.1,)), STICKS, STOPS),
+    VELOCITY: with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.9,)), STOPS),
+    STOP: with_orders(REST, attrs.evolve(MOVE, end=200), told(200, CYCLES, STOP)),
+    "left": with_output("fPosition", slice(1500, 1600), 5.01),
+    "against": with_orders(REST, attrs.evolve(MOVE, values=(-5.0,)), STICKS, STOPS),
+    "idle": with_orders(
+        REST,
+        attrs.evolve(MOVE, end=STICK - 500),
+        attrs.evolve(STICKS, begin=STICK - 500, edge=STICK - 500),
+        STOPS,
+    ),
+    "ends": with_output("fStopHigh", STOPPED, obedient().issued["fPosition"][-1] - 0.01),
+    "loose": with_output("fStopHigh", STOPPED, 100.0),
+    "fast": with_orders(
+        REST,
+        attrs.evolve(MOVE, end=150),
+        attrs.evolve(MOVE, begin=150, tops=(0.3,)),
+        STICKS,
+        STOPS,
+        reaction=0.2,
+    ),
+    "done": with_output("bDone", slice(780, 800), 1.0),
+    "not done": with_output("bDone", slice(0, None), 0.0),
+    "busy": with_output("bBusy", 500, 0.0),
+    "not busy": with_output("bBusy", slice(4000, None), 1.0),
+    "vanished": with_output("bBusy", 110, 0.0),
+    "in velocity": with_output("bInVelocity", 2600, 1.0),
+    "not in velocity": with_output("bInVelocity", 3500, 0.0),
+    "aborted": with_output("bCommandAborted", 300, 1.0),
+    "not aborted": with_orders(
+        REST, attrs.evolve(MOVE, end=300), told(300, STICK, POSITION, 5.0000001), STICKS, STOPS
+    ),
+    "error": with_output("bError", 300, 1.0),
+    "refused": with_orders(attrs.evolve(REST, refused=3), MOVE, STICKS, STOPS),
+    "untold": with_output(("bError", "nErrorId"), slice(300, 400), 1.0),
+    QUICK_STOP: with_orders(REST, attrs.evolve(MOVE, end=500), told(500, CYCLES, QUICK_STOP)),
+    "jump": with_orders(REST, attrs.evolve(MOVE, end=500), told(500, CYCLES, QUICK_STOP), moved=0.001),
+    "disabled": with_output("bEnabled", 300, 0.0),
+    "distance": with_output("fDistanceToGo", 300, 1.0),
+    "time": with_output("fTimeToGo", slice(720, 820), 3.0),
+    "stop distance": with_output("fStopDistance", 300, 1.0),
+    "promise": with_output("bPromise", 300, 0.0),
+    "lost": with_output("nPromise", slice(2000, 3000), 1.0),
+    "kept": with_orders(REST, attrs.evolve(MOVE, end=300), told(300, CYCLES, QUICK_STOP)),
+    "no number": with_output("fVelocity", 300, np.nan),
+}
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_every_fault_is_found(what):
+    assert kind_of(WORDS[what]) in kinds(FAULTS[what])
+
+
+def test_every_kind_of_fault_is_tried():
+    assert {*FAULTS, "reaction"} == set(WORDS)
+
+
+def test_a_command_that_changes_nothing_for_too_long_is_obeyed_late():
+    late = kind_of(WORDS["reaction"])
+    assert kinds(obedient(), {STOPPED: 149}) == set()
+    assert kinds(obedient(), {STOPPED: 152}) == {late}
+    assert kinds(obedient(), {TOLD: 152}) == set()  # the way was the right one
+    assert kinds(obedient(), {STOPPED: None}) == set()  # what came before ended anyway, and in time
+
+
+def test_faults_tell_when_and_by_how_much():
+    (fault,) = faults(FAULTS["distance"], REACTIONS)
+    assert fault == "fDistanceToGo is wrong by 3.19 m, at 3.00 s"
+
+
+NAMES = [
+    "bEnable",
+    "bExecute",
+    "bVelocity",
+    "bStop",
+    "bQuickStop",
+    "rOverride",
+    "fTarget",
+    "fVelocityCommand",
+    "fVelocityLimit",
+    "fL",
+    "bReset",
+]
+INPUTS = Inputs(names=NAMES, axes=[BlockAxis(name="")], limits=[LIMITS], live={"L": (1.0, 2.0)}, held=20)
+
+
+def read(*rows):
+    """Orders from cycles and inputs that differ from those before."""
+    values, given = dict.fromkeys(NAMES, 0.0) | {"bEnable": 1.0, "rOverride": 1.0, "fL": 1.5}, []
+    for _, changes in rows:
+        values |= changes
+        given.append(list(values.values()))
+    return orders([begin for begin, _ in rows], np.array(given), INPUTS, 1000)
+
+
+def test_orders_are_read_from_inputs():
+    found = read(
+        (0, {}),
+        (10, {"bExecute": 1.0, "fTarget": 5.0}),
+        (20, {"bExecute": 0.0}),
+        (30, {"bExecute": 1.0}),
+        (40, {"bExecute": 0.0, "rOverride": 0.5}),
+        (50, {"bVelocity": 1.0, "fVelocityCommand": -0.3, "rOverride": 1.0, "fVelocityLimit": 0.2}),
+        (60, {"bVelocity": 0.0, "fVelocityLimit": 0.0}),
+        (70, {"bExecute": 1.0, "fTarget": 1000.0}),
+        (80, {"bExecute": 0.0, "bQuickStop": 1.0, "rOverride": np.nan}),
+    )
+    assert [(one.begin, one.kind, one.values, one.tops, one.edge, one.refused) for one in found] == [
+        (0, STOP, (), (1.0,), 0, 0),
+        (10, POSITION, (5.0,), (1.0,), 10, 0),  # and nothing new with the second edge
+        (40, POSITION, (5.0,), (0.5,), 30, 0),
+        (50, VELOCITY, (-0.3,), (0.2,), 50, 0),
+        (60, STOP, (), (1.0,), 60, 0),
+        (70, STOP, (), (1.0,), 70, 3),
+        (80, QUICK_STOP, (), (1.0,), 80, 0),
+    ]
+    assert [one.end for one in found] == [*(one.begin for one in found[1:]), 1000]
+
+
+def test_wrong_values_count_once_they_have_lasted():
+    found = read(
+        (0, {"bExecute": 1.0, "fTarget": 5.0}),
+        (10, {"fL": 3.0}),
+        (25, {"fL": 1.0}),
+        (40, {"rOverride": 2.0}),
+        (70, {"rOverride": 1.0}),
+        (80, {"bExecute": 0.0}),
+        (90, {"bExecute": 1.0}),
+        (95, {"bExecute": 0.0, "bReset": 1.0}),
+        (99, {"bExecute": 1.0, "bReset": 0.0}),
+    )
+    assert [(one.begin, one.kind, one.refused) for one in found] == [
+        (0, POSITION, 0),
+        (60, STOP, 5),
+        (95, STOP, 0),
+        (99, POSITION, 0),
+    ]
+
+
+@pytest.fixture(scope="module")
+def bay():
+    spec = parse_spec(BAY)
+    histories = Histories.of(spec)
+    drawn = [histories.history(choices) for choices in histories.drawn(12, seed=4)]
+    text = planner_block(spec).text
+    return spec, text, histories, drawn, [found for _, found in judged(spec, text, histories, drawn)]
+
+
+def disobedient(text, before="", after=""):
+    """A block that does something more before and after all that it does."""
+    head, _, body = text.rpartition("END_VAR\n")
+    body = body.replace("END_FUNCTION_BLOCK", f"{after}\nEND_FUNCTION_BLOCK")
+    return head.replace("\nVAR\n", "\nVAR\n    nLate : DINT;\n", 1) + f"END_VAR\n{before}\n{body}"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "what"),
+    [
+        ("fTarget := 0.5 * fTarget;", "", "distance"),
+        ("fTarget := 0.5 * fTarget;", "", POSITION),
+        ("bExecute := FALSE; bVelocity := FALSE;", "", "idle"),
+        (
+            "IF bStop THEN nLate := nLate + 1; ELSE nLate := 0; END_IF; bStop := nLate > 1200;",
+            "",
+            "reaction",
+        ),
+        ("", "bDone := bDone OR ((nCommand = 1) AND (ABS(fDistanceToGo) < 0.01));", "done"),
+        ("rOverride := 1.0; fVelocityLimit := 0.0;", "", "fast"),
+    ],
+)
+def test_a_block_that_disobeys_fails(bay, before, after, what):
+    spec, text, histories, drawn, sound = bay
+    found = dict(judged(spec, disobedient(text, before, after), histories, drawn))
+    assert any(kind_of(WORDS[what]) in found[number] - shown for number, shown in enumerate(sound))
+
+
+def test_histories_hold_what_operators_and_controllers_do(bay):
+    histories = Histories.of(bay[0])
+    before = attrs.evolve(histories, habits=False)
+    assert histories.choices == before.choices + 2 * 16
+    plain = before.history(before.drawn(8, seed=1)[5])
+    assert not plain.changes
+    drawn = [histories.history(choices) for choices in histories.drawn(400, seed=1)]
+    assert all(
+        history.commands == tuple(sorted(history.commands, key=lambda one: one.time)) for history in drawn
+    )
+    inputs = {name for history in drawn for change in history.changes for name in change.inputs}
+    assert inputs == {"rOverride", "fVelocityLimit", "fL1", "fm2", "bReset"}
+    assert any(history.errors for history in drawn)
+    again = [sum(map(_same, history.commands, history.commands[1:])) for history in drawn]
+    assert max(again) > 10
+    assert len(HABITS) > 8
+
+
+def _same(first, second):
+    return first.command == second.command == "position" and first.values == second.values
