@@ -150,7 +150,8 @@ class PlannedMotion:
         self._called = self._cycle = -1  # latest cycle of the block, and of the bus
         self._still = 0
         self._ends = False  # whether it is to stand, whatever the operator wants
-        self._error, self._failure = 0, ""
+        self._error, self._shown_at = 0, 0  # what the block shows, and since which of its cycles
+        self._failure = ""
         self._step: Step | None = None
 
     @property
@@ -229,7 +230,9 @@ class PlannedMotion:
         first, before = (self._rows[0], self._rows[-1]) if self._rows else (issued, issued)
         self._rows = [first, before, issued]
         self._cycle += 1
-        self._error = int(next((error for error in shown if error), 0))
+        before, self._error = self._error, int(next((error for error in shown if error), 0))
+        if self._error != before:
+            self._shown_at = self._called
         if self._error and not self._operator.attends:
             self._give_up(self._refusal)
         if self._cycle == self.most:
@@ -254,7 +257,7 @@ class PlannedMotion:
 
     @property
     def _refusal(self) -> str:
-        at = self._called * self._values["fCycleTime"]
+        at = self._shown_at * self._values["fCycleTime"]
         return (
             f"At {at:.6g} s the block refused its commands: error {self._error}, which its header explains."
         )
@@ -289,7 +292,9 @@ class PlannedMotion:
     def _words(self) -> str:
         if self._status is None:
             return ""
-        commanded = "stopping without sway" if self._ends else self._operator.commanded
+        commanded = (
+            "stopping without sway, at once when asked again" if self._ends else self._operator.commanded
+        )
         return self._status.words(
             self._called, dict(zip(self._outputs, self._rows[-1], strict=True)), commanded
         )
