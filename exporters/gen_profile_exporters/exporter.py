@@ -13,6 +13,8 @@ from gen_profile.units import AxisScale
 from gen_profile_exporters.block_source import BlockSource
 from gen_profile_exporters.machine_variants import AxisVariants, machine_variants
 
+UNSTATED_LAG = 0.03  # s, of drives of which nobody states one: a position loop of some 33/s
+
 
 @attrs.frozen(kw_only=True)
 class Target:
@@ -32,6 +34,8 @@ class Target:
         The bus and the drives on it.
     variants : tuple of AxisVariants
         What a controller may change of the motion, axis by axis; empty for nothing.
+    lag : float
+        Greatest time in s by which the axes come after their setpoints.
     """
 
     name: str
@@ -40,6 +44,7 @@ class Target:
     export: ExportSpec
     can: CanSpec
     variants: tuple[AxisVariants, ...] = ()
+    lag: float = UNSTATED_LAG
 
     @property
     def cycle_time(self) -> float:
@@ -108,4 +113,12 @@ def target_of(spec: Spec) -> Target:
         export=spec.export,
         can=spec.can,
         variants=machine_variants(spec),
+        lag=_greatest_lag(spec),
     )
+
+
+def _greatest_lag(spec: Spec) -> float:
+    """Take the greatest lag that the spec designs for, or checks."""
+    path = spec.check.path
+    stated = [lag for lag in (spec.actuator.tau, path.lag and path.lag[1]) if lag is not None]
+    return max(stated, default=UNSTATED_LAG) + path.latency

@@ -115,7 +115,7 @@ def test_in_words_even_where_the_log_cannot_be_written(deployed, tmp_path, full_
     table = ("--log", tmp_path / "driven.csv")
     outcome = patiently(deployed / "paper.log", "--simulate-drive", "--self-test", *table)
     assert outcome.code == 2
-    assert re.fullmatch(f"Error: {FULL}", outcome.errors[0])
+    assert re.fullmatch(f"Error: {FULL} The motion is done all the same[.]", outcome.errors[0])
     assert re.search("^done: 151 of 151 setpoints sent$", outcome.out, re.MULTILINE)
     lateness = r"half below \d+ µs, 99 % below \d+ µs, all below \d+ µs"
     assert re.search(rf"^lateness: {lateness}; drift −?[\d.]+ µs$", outcome.out, re.MULTILINE)
@@ -283,6 +283,23 @@ def test_nobody_on_the_bus(deployed, tmp_path, full_disk):
     assert (outcome.code, outcome.document["state"], outcome.document["drive"]) == (6, "aborted", None)
     assert "does not answer" in outcome.document["reason"]
     assert re.fullmatch(FULL, outcome.document["notes"][-1])
+
+
+@pytest.mark.slow
+def test_a_log_that_could_not_be_written_is_told_in_the_document(deployed, tmp_path, full_disk, hasty):
+    outcome = streamed(deployed / "paper.log", "--simulate-drive", "--log", tmp_path / "driven.csv")
+    error = outcome.document["error"]
+    assert (outcome.code, outcome.document["state"]) == (error["exit_code"], "done") == (2, "done")
+    assert re.fullmatch(f"{FULL} The motion is done all the same[.]", error["message"])
+
+
+def test_a_full_disk_is_seen_before_anything_moves(deployed, tmp_path, monkeypatch):
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=2000))
+    outcome = run_here("stream", deployed / "paper.log", "--simulate-drive", "--log", tmp_path / "driven.csv")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "its disk has no room for it (2000 bytes)" in outcome.err
+    assert "configure" not in outcome.err
 
 
 def test_nobody_who_takes_the_outcome(deployed):

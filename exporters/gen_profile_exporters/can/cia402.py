@@ -23,6 +23,7 @@ class State(Enum):
     QUICK_STOP = ("quick stop active", 0b000_0111, 0b110_1111)
     FAULT_REACTION = ("fault reaction active", 0b000_1111, 0b100_1111)
     FAULT = ("fault", 0b000_1000, 0b100_1111)
+    UNKNOWN = ("unknown", 1, 0)  # of a statusword that none of these matches; nothing follows from it
 
     def __init__(self, words: str, bits: int, mask: int) -> None:
         self.words = words
@@ -42,11 +43,12 @@ class Controlword(IntEnum):
 
 
 MODES = {"ip": 7, "csp": 8, "csv": 9}  # 6060h
-MOVING = frozenset({State.ENABLED, State.QUICK_STOP, State.FAULT_REACTION})
+# in which a drive moves its axis, or may
+MOVING = frozenset({State.ENABLED, State.QUICK_STOP, State.FAULT_REACTION, State.UNKNOWN})
 FAULTS = frozenset({State.FAULT_REACTION, State.FAULT})
 
 
 def state_of(statusword: int) -> State:
-    """Read the state; a combination that the standard does not know counts as not ready."""
+    """Read the state."""
     matching = (state for state in State if statusword & state.mask == state.bits)
-    return next(matching, State.NOT_READY)
+    return next(matching, State.UNKNOWN)

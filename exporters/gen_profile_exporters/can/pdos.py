@@ -10,6 +10,8 @@ RPDO3   feed-forward 60B2h beside 60B1h: 80 bits are more than one    every cycl
 TPDO1   feedback     statusword 6041h, actual position 6064h          on SYNC
 ======= ============ ================================================ =========================
 
+Where a drive's own mapping tells the position in a TPDO of its own, that one is called ``position``.
+
 The controlword has a PDO of its own, so that setpoints which still wait in a queue cannot undo a quick stop.
 In a drive whose mapping is fixed (``can.fixed_pdos``) it may share one with the setpoint. Then both go in one
 frame, every cycle, and a quick stop goes the same way after them.
@@ -97,17 +99,14 @@ class Layout:
     ----------
     received : mapping of int to tuple of Field
         What the drive is sent, in the order in which a cycle sends it.
-    feedback : int
-        The TPDO that tells statusword and actual position.
-    told : tuple of Field
-        What that holds.
+    told : mapping of int to tuple of Field
+        What the drive sends at each SYNC: statusword and actual position, in one TPDO or in two.
     fixed : bool
         Whether the drive's own mapping says so, and must not be changed.
     """
 
     received: Pdos
-    feedback: int
-    told: tuple[Field, ...]
+    told: Pdos
     fixed: bool
 
     @property
@@ -140,7 +139,9 @@ class Layout:
         """Name a PDO in use as `can.cob_ids` does."""
         if pdo == self.leading:
             return "setpoint"
-        return {self.feedback: "feedback", self.command: "command"}.get(pdo, "feed_forward")
+        if pdo in self.told:
+            return "feedback" if STATUSWORD in self.told[pdo] else "position"
+        return "command" if pdo == self.command else "feed_forward"
 
     def offset(self, wanted: Field, fields: Sequence[Field]) -> int:
         """Tell at which byte of a PDO a field begins."""
@@ -158,12 +159,10 @@ def layout(can: CanSpec) -> Layout:
     if not can.fixed_pdos.stated:
         return Layout(
             received={RPDO1: (CONTROLWORD,), **_setpoints(can)},
-            feedback=TPDO1,
-            told=(STATUSWORD, ACTUAL_POSITION),
+            told={TPDO1: (STATUSWORD, ACTUAL_POSITION)},
             fixed=False,
         )
-    feedback, told = _fixed_feedback(can)
-    return Layout(received=_fixed_received(can), feedback=feedback, told=told, fixed=True)
+    return Layout(received=_fixed_received(can), told=_fixed_told(can), fixed=True)
 
 
 def setpoint_fields(can: CanSpec) -> tuple[Field, ...]:
@@ -223,15 +222,25 @@ def _sent(entry: int, needed: Sequence[Field], place: str) -> Field:
     )
 
 
-def _fixed_feedback(can: CanSpec) -> tuple[int, tuple[Field, ...]]:
-    for number, (pdo, entries) in enumerate(zip(TPDOS, can.fixed_pdos.sent, strict=True), start=1):
-        if {STATUSWORD.mapping, ACTUAL_POSITION.mapping} <= set(entries):
-            place = f"can.fixed_pdos.tpdo{number}"
-            return pdo, _sized(tuple(_told(entry, place) for entry in entries), place)
-    raise ExportError(
-        f"can.fixed_pdos: no TPDO holds both {_words(STATUSWORD)} and {_words(ACTUAL_POSITION)}, by which "
-        "the drive is watched; state it, or use a drive whose PDOs can be mapped."
-    )
+def _fixed_told(can: CanSpec) -> Pdos:
+    """Choose the TPDO with both, else the first with each."""
+    stated = dict(zip(TPDOS, can.fixed_pdos.sent, strict=True))
+    wanted = (STATUSWORD, ACTUAL_POSITION)
+    both = [pdo for pdo, entries in stated.items() if {field.mapping for field in wanted} <= set(entries)]
+    chosen = dict.fromkeys(both[:1])
+    for field in () if both else wanted:
+        holding = [pdo for pdo, entries in stated.items() if field.mapping in entries]
+        if not holding:
+            raise ExportError(
+                f"can.fixed_pdos: no TPDO holds {_words(field)}, by which the drive is watched; state it, or "
+                "use a drive whose PDOs can be mapped."
+            )
+        chosen |= dict.fromkeys(holding[:1])
+    found = {}
+    for pdo in chosen:
+        place = f"can.fixed_pdos.tpdo{TPDOS.index(pdo) + 1}"
+        found[pdo] = _sized(tuple(_told(entry, place) for entry in stated[pdo]), place)
+    return found
 
 
 def _told(entry: int, place: str) -> Field:

@@ -19,15 +19,11 @@ import attrs
 
 from gen_profile.errors import ExportError
 from gen_profile.spec.can import CanSpec
-from gen_profile.units import AxisScale
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import MODES
+from gen_profile_exporters.can.following_window import windows
 from gen_profile_exporters.can.pdos import Field
-from gen_profile_exporters.can.scaling import (
-    Demand,
-    magnitude_counts,
-    travel_counts,
-)
+from gen_profile_exporters.can.scaling import Demand, travel_counts
 from gen_profile_exporters.exporter import Target
 
 QUICK_STOP_ON_LOST_CONNECTION = 3  # 6007h
@@ -51,6 +47,7 @@ NAMES = {
     "setpoint": "setpoint",
     "feed_forward": "feed-forward",
     "feedback": "feedback",
+    "position": "actual position",
 }
 
 Lists = Mapping[int, "tuple[Entry, ...]"]
@@ -157,7 +154,14 @@ def _entries(
     yield Entry(0x6007, 0, 16, QUICK_STOP_ON_LOST_CONNECTION, "connection lost: quick stop")
     yield Entry(0x605A, 0, 16, RAMP_THEN_DISABLE, "quick stop: brake on its ramp and disable")
     yield Entry(0x6085, 0, 32, demand.quick_stop[column], "deceleration of a quick stop (counts/s²)")
-    yield from _limits(axis, can)
+    if can.following_error is not None:
+        window = windows(demand, target)[column]
+        watches = can.mode != "csv"  # there, the streamer does
+        yield Entry(0x6065, 0, 32, window, "following error window (counts)", optional=not watches)
+    travel = travel_counts(axis, can)
+    if travel is not None:
+        yield Entry(0x607D, 1, 32, travel[0], "lower end of the travel (counts)")
+        yield Entry(0x607D, 2, 32, travel[1], "upper end of the travel (counts)")
     for index, pair, meaning in (
         (0x608F, can.encoder, "encoder: increments per motor revolutions"),
         (0x6091, can.gear, "gear: motor revolutions per shaft revolutions"),
@@ -186,11 +190,13 @@ def _mapping(node: int, own: Mapping[int, int], can: CanSpec) -> Iterator[Entry]
             yield Entry(
                 PARAMETERS[pdo], 5, 16, timeout_ms(can), "longest wait for a setpoint (ms)", optional=True
             )
-    answer, parameters = NO_REMOTE_REQUEST | own[layout.feedback], PARAMETERS[layout.feedback]
-    yield from _pdo(parameters, answer, ON_SYNC, layout.told, NAMES["feedback"], fixed=layout.fixed)
+    for pdo, fields in layout.told.items():
+        answer, name = NO_REMOTE_REQUEST | own[pdo], NAMES[layout.role(pdo)]
+        yield from _pdo(PARAMETERS[pdo], answer, ON_SYNC, fields, name, fixed=layout.fixed)
     for pdo, index in PARAMETERS.items():
         if pdo not in own:
-            yield Entry(index, 1, 32, OFF | pdo + node, "not used: off", optional=True)
+            remote = NO_REMOTE_REQUEST if pdo in pdos.TPDOS else 0
+            yield Entry(index, 1, 32, OFF | remote | pdo + node, "not used: off", optional=True)
 
 
 def _pdo(
@@ -217,14 +223,3 @@ def _fixed_entries(mapping: int, fields: Sequence[Field], name: str) -> Iterator
     yield Entry(mapping, 0, 8, len(fields), f"{name}: entries, as can.fixed_pdos has them", fixed=True)
     for number, field in enumerate(fields, start=1):
         yield Entry(mapping, number, 32, field.mapping, f"{name}: {field.name or 'not used'}", fixed=True)
-
-
-def _limits(axis: AxisScale, can: CanSpec) -> Iterator[Entry]:
-    if can.following_error is not None:
-        window = magnitude_counts(can.following_error, axis)
-        watches = can.mode != "csv"  # there, the streamer does
-        yield Entry(0x6065, 0, 32, window, "following error window (counts)", optional=not watches)
-    travel = travel_counts(axis, can)
-    if travel is not None:
-        yield Entry(0x607D, 1, 32, travel[0], "lower end of the travel (counts)")
-        yield Entry(0x607D, 2, 32, travel[1], "upper end of the travel (counts)")

@@ -267,12 +267,13 @@ def planned(
     cycle = block.inputs["fCycleTime"]
     if commands_path is None:
         limits = [spec.limits.of(number).velocity or 0.0 for number in planned_axes(spec)]
-        operator = Keyboard(sys.stdin.fileno(), block.axes, limits, cycle)
+        operator = Keyboard(sys.stdin.fileno(), block.axes, limits)
         click.echo(operator.help, err=True)
     else:
         commands = read_commands(_read(commands_path), block.axes, live_inputs(block.inputs, block.axes))
         operator = CommandList(commands, cycle)
-    return Source(spec=spec, plan=PlannedMotion(spec, block, operator, _numbers(live_parameters)))
+    numbers, watched = _numbers(live_parameters), sys.stderr.isatty()
+    return Source(spec=spec, plan=PlannedMotion(spec, block, operator, numbers, watched=watched))
 
 
 @contextmanager

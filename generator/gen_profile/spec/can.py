@@ -32,12 +32,15 @@ class CobIdsSpec(Checked, table="can.cob_ids"):
         The torque beside a velocity, 400h + node id.
     feedback : int or None
         Statusword and actual position, 180h + node id.
+    position : int or None
+        The actual position, where a drive's fixed mapping has it apart from the statusword.
     """
 
     command: PdoCobId | None = None
     setpoint: PdoCobId | None = None
     feed_forward: PdoCobId | None = None
     feedback: PdoCobId | None = None
+    position: PdoCobId | None = None
 
 
 Mapped = tuple[Unsigned32, ...]
@@ -113,8 +116,8 @@ class CanSpec(Checked, table="can"):
     start_tolerance : float
         How far the axis may stand from the first setpoint, in m (or rad).
     following_error : float or None
-        Window 6065h in m (or rad); None leaves the drive's own. In csv, where no drive watches it, the
-        streamer does, and it must be stated.
+        How far an axis may be off the motion in m (or rad) before it is stopped, and the drive's window
+        6065h; None derives it from the motion's lag, and leaves the drive's own. It must be stated in csv.
     quick_stop : float or None
         Deceleration 6085h in m/s² (or rad/s²); None takes twice the motion's greatest acceleration.
     travel : mapping of str to (float, float)

@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 import select
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command
 from gen_profile.planner.interface import BlockAxis
+from gen_profile.streaming.status import in_units
 
 SHARE = 0.1  # of the greatest velocity, by which an arrow changes that of the stick
-PAUSE = 0.25  # s between two reports
-PROMISES = {0: "no sway", 1: "may sway", 2: "may sway", 3: "not ready", 4: "not ready"}  # by nPromise
 ARROWS = "← →", "↓ ↑"  # of the first axis and the second
 CURSOR = {b"C": (0, 1), b"D": (0, -1), b"A": (1, 1), b"B": (1, -1)}  # keys' last bytes: axis, tenths more
 CURSOR_KEY = 3  # bytes of an escape sequence, also in application mode
@@ -99,14 +98,6 @@ class Keys:
         return Command(time=0.0, command=command, values=values)
 
 
-def in_units(values: Iterable[float], axes: Iterable[BlockAxis], form: str, per: str = "") -> str:
-    """Write a value of each axis with its name, where it has one, and its unit."""
-    return ", ".join(
-        f"{axis.name} {form.format(value)} {axis.unit}{per}".lstrip()
-        for value, axis in zip(values, axes, strict=True)
-    )
-
-
 def _in_foreground(terminal: int) -> bool:
     """Tell whether keys can be read, as nobody in the background can."""
     if sys.platform == "win32":
@@ -130,8 +121,6 @@ class Keyboard:
         Its file descriptor.
     axes, greatest
         As of `Keys`.
-    cycle : float
-        The block's, in s.
 
     Raises
     ------
@@ -139,16 +128,15 @@ class Keyboard:
         It is no terminal in the foreground.
     """
 
-    def __init__(
-        self, terminal: int, axes: Sequence[BlockAxis], greatest: Sequence[float], cycle: float
-    ) -> None:
+    attends = True
+
+    def __init__(self, terminal: int, axes: Sequence[BlockAxis], greatest: Sequence[float]) -> None:
         if not _in_foreground(terminal):
             raise SpecError(
                 "The keyboard: standard input is no terminal in the foreground (of Linux or macOS); give a "
                 "file of commands."
             )
         self._terminal, self._axes, self._keys = terminal, axes, Keys(axes, greatest)
-        self._pause, self._reported, self._told = round(PAUSE / cycle), 0, ""
 
     @property
     def help(self) -> str:
@@ -163,6 +151,12 @@ class Keyboard:
     def over(self) -> bool:
         """Whether the end was asked for, or the terminal is gone."""
         return self._keys.over
+
+    @property
+    def commanded(self) -> str:
+        """What holds, and what is being typed."""
+        typed = f"to {self._keys.typed}_ {self._axes[-1].unit}" if self._keys.typed else ""
+        return "; ".join(filter(None, [self._keys.shown, typed]))
 
     @contextmanager
     def operated(self) -> Iterator[None]:
@@ -191,19 +185,3 @@ class Keyboard:
         if cycle == 0 and sent:
             return ()
         return tuple(self._keys.take(sent or b"\x04"))
-
-    def words(self, cycle: int, issued: Mapping[str, float]) -> str:
-        """Say now and then where the axis is, and what was commanded."""
-        if cycle < self._reported + self._pause:
-            return ""
-        self._reported = cycle
-        state = PROMISES[int(issued["nPromise"])]
-        if issued["nErrorId"]:
-            state = f"error {issued['nErrorId']:.0f}"
-        places = in_units((issued[a.of("fPosition")] for a in self._axes), self._axes, "{:.3f}")
-        speeds = in_units((issued[a.of("fVelocity")] for a in self._axes), self._axes, "{:+.3f}", "/s")
-        said = f"{places}, {speeds}, {state}; {self._keys.shown}"
-        if self._keys.typed:
-            said += f"; to {self._keys.typed}_ {self._axes[-1].unit}"
-        before, self._told = self._told, said
-        return "" if said == before else said

@@ -18,6 +18,7 @@ from gen_profile.planner.interface import ISSUED, LOST, live_inputs
 from gen_profile.planner.machine import planned_axes
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import Spec
+from gen_profile.streaming.status import StatusLine
 from gen_profile.suggestion import suggestion
 from gen_profile.units import AxisScale
 from gen_profile_exporters.can import frames
@@ -47,14 +48,19 @@ class Operator(Protocol):
     def over(self) -> bool:
         """Whether no further command will come."""
 
+    @property
+    def attends(self) -> bool:
+        """Whether it sees what the block shows, and can command something else."""
+
+    @property
+    def commanded(self) -> str:
+        """What holds now, in words; empty where who commanded it knows."""
+
     def operated(self) -> AbstractContextManager[object]:
         """Hold what commands are taken from."""
 
     def due(self, cycle: int) -> Iterable[Command]:
         """Give the commands that begin in a cycle of the block, or began since the one before."""
-
-    def words(self, cycle: int, issued: Mapping[str, float]) -> str:
-        """Say how it is, where there is anything new to say; given the block's cycle and outputs."""
 
 
 class CommandList:
@@ -66,6 +72,8 @@ class CommandList:
     cycle : float
         The block's, in s.
     """
+
+    attends, commanded = False, ""
 
     def __init__(self, commands: Sequence[Command], cycle: float) -> None:
         self._left = list(zip(begins_of(commands, cycle), commands, strict=True))
@@ -84,11 +92,6 @@ class CommandList:
         while self._left and self._left[0][0] <= cycle:
             yield self._left.pop(0)[1]
 
-    def words(self, cycle: int, issued: Mapping[str, float]) -> str:
-        """Say nothing: who wrote the commands knows them."""
-        del cycle, issued
-        return ""
-
 
 class PlannedMotion:
     """A planner block that drives its axes: a `gen_profile_exporters.can.streaming.plan.SetpointSource`.
@@ -102,6 +105,8 @@ class PlannedMotion:
     operator : Operator
     live : mapping of str to float
         Live parameters by name that differ from what the block takes them for.
+    watched : bool
+        Whether anybody sees how the axes are, now and then.
 
     Raises
     ------
@@ -113,7 +118,13 @@ class PlannedMotion:
     """
 
     def __init__(
-        self, spec: Spec, block: BlockInstance, operator: Operator, live: Mapping[str, float]
+        self,
+        spec: Spec,
+        block: BlockInstance,
+        operator: Operator,
+        live: Mapping[str, float],
+        *,
+        watched: bool = True,
     ) -> None:
         everything, numbers = target_of(spec), planned_axes(spec)
         self.target = attrs.evolve(
@@ -129,6 +140,7 @@ class PlannedMotion:
         self._block, self._axes, self._operator = block, block.axes, operator
         self._values = block.inputs | {"bEnable": 1.0} | _live_values(block, live)
         self._calls = _calls(spec, self._values["fCycleTime"])
+        self._status = StatusLine(self._axes, self._values["fCycleTime"]) if watched else None
         self._still_enough = round(STILL / spec.can.sync_period)
         self._frames = frames.setpoint_frames(self.target)
         self._outputs = {name: place for place, name in enumerate(block.outputs)}
@@ -137,7 +149,9 @@ class PlannedMotion:
         self._lost: set[int] = set()
         self._called = self._cycle = -1  # latest cycle of the block, and of the bus
         self._still = 0
-        self._ends: str | None = None
+        self._ends = False  # whether it is to stand, whatever the operator wants
+        self._error, self._shown_at = 0, 0  # what the block shows, and since which of its cycles
+        self._failure = ""
         self._step: Step | None = None
 
     @property
@@ -159,12 +173,17 @@ class PlannedMotion:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What the block showed beside setpoints."""
-        remarks = [self._ends] if self._ends else []
+        remarks = []
         if shown := [str(number) for number in dict.fromkeys(self.columns["error_id"].tolist()) if number]:
             remarks.append(f"The block showed error {', '.join(shown)}, which its header explains.")
         if lost := [LOST[number] for number in sorted(self._lost)]:
             remarks.append(f"The load may sway, because {' and '.join(lost)}.")
         return tuple(remarks)
+
+    @property
+    def failure(self) -> str:
+        """Why the commands were not carried out to their end, a sentence; empty where they were."""
+        return self._failure or (self._refusal if self._error else "")
 
     def operated(self) -> AbstractContextManager[object]:
         """Hold what commands are taken from."""
@@ -198,19 +217,24 @@ class PlannedMotion:
     def end(self) -> bool:
         """Stop without sway, whatever the operator wants."""
         self._values |= inputs_of(Command(time=0.0, command="stop"), self._axes)
-        self._ends = self._ends or ""
+        self._ends = True
         return True
 
     def _advance(self) -> None:
         """Call the block for one period of SYNC; its latest call is that of the next cycle."""
         if self._cycle + 1 == LONGEST:
-            self.end()
-            self._ends = f"A stream lasts {LONGEST} cycles at most; then the axis was stopped without sway."
+            self._give_up(f"A stream lasts {LONGEST} cycles at most.")
         calls = self._calls if self._rows else 1
-        issued = self._block.call(np.array([self._inputs() for _ in range(calls)]))[-1]
+        rows = self._block.call(np.array([self._inputs() for _ in range(calls)]))
+        issued, shown = rows[-1], rows[:, self._outputs["nErrorId"]]
         first, before = (self._rows[0], self._rows[-1]) if self._rows else (issued, issued)
         self._rows = [first, before, issued]
         self._cycle += 1
+        before, self._error = self._error, int(next((error for error in shown if error), 0))
+        if self._error != before:
+            self._shown_at = self._called
+        if self._error and not self._operator.attends:
+            self._give_up(self._refusal)
         if self._cycle == self.most:
             raise StreamAborted("The stop without sway took too long.")
         number = int(self._of("nPromise"))
@@ -221,10 +245,22 @@ class PlannedMotion:
         """Give the inputs of the block's next cycle."""
         self._called += 1
         self._values["bExecute"] = 0.0
-        for command in () if self._ends is not None else self._operator.due(self._called):
+        for command in () if self._ends else self._operator.due(self._called):
             self._values |= inputs_of(command, self._axes)
             self._still = 0
         return list(self._values.values())
+
+    def _give_up(self, failure: str) -> None:
+        """End, as what was asked for cannot be carried out; the first reason holds."""
+        self._failure = self._failure or failure
+        self.end()
+
+    @property
+    def _refusal(self) -> str:
+        at = self._shown_at * self._values["fCycleTime"]
+        return (
+            f"At {at:.6g} s the block refused its commands: error {self._error}, which its header explains."
+        )
 
     def _of(self, output: str) -> float:
         return float(self._rows[-1][self._outputs[output]])
@@ -242,16 +278,25 @@ class PlannedMotion:
         scaled = setpoints(sampled, self.target)
         row = 1 if csv else 2  # a velocity leads from one position to the next
         at_sync = scaled.position[1]
-        over = self._ends is not None or self._operator.over
+        over = self._ends or self._operator.over
         moves = self._of("bBusy") > 0.0 or bool(columns[1][-1].any())
         self._still = self._still + 1 if over and not moves else 0
-        self._log[self._cycle] = *at_sync, self._of("bPromise"), self._of("nErrorId")
-        outputs = dict(zip(self._outputs, self._rows[-1], strict=True))
+        self._log[self._cycle] = *at_sync, self._of("bPromise"), self._error
         self._step = Step(
             messages=cycle_of(self._frames, scaled.sent[row].tolist()),
             position=scaled.position[2],
             at_sync=at_sync,
-            words=self._operator.words(self._called, outputs),
+            words=self._words(),
+        )
+
+    def _words(self) -> str:
+        if self._status is None:
+            return ""
+        commanded = (
+            "stopping without sway, at once when asked again" if self._ends else self._operator.commanded
+        )
+        return self._status.words(
+            self._called, dict(zip(self._outputs, self._rows[-1], strict=True)), commanded
         )
 
 

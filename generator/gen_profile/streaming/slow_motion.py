@@ -18,6 +18,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.streaming.outcome import Source
 from gen_profile.streaming.stream import designed, standing
 from gen_profile.suggestion import suggestion
+from gen_profile_exporters.can.following_window import LEAST_USEFUL
 from gen_profile_exporters.can.host.port import Port
 from gen_profile_exporters.can.streaming.approach import CREEP, SHARE
 
@@ -99,10 +100,13 @@ def slow(source: Source, start: Sequence[float], target: Sequence[float]) -> Spe
         shortest=False,
         final_velocity=(0.0,) * len(target),
     )
+    window = spec.can.following_error  # stated for the whole motion, and maybe too wide for a slow one
+    can = spec.can if window is None else attrs.evolve(spec.can, following_error=min(window, LEAST_USEFUL))
     return attrs.evolve(
         spec,
         name=f"{spec.name[:59]}-slow",
         move=move,
+        can=can,
         limits=attrs.evolve(spec.limits, velocity=None, acceleration=None, axis=limits),
     )
 

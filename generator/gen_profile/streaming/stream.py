@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,11 +22,13 @@ from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.streaming.outcome import Source, StreamOutcome
 from gen_profile_exporters.can import frames
+from gen_profile_exporters.can.following_window import LEAST_USEFUL, useful
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock, SharedClock, SystemClock
 from gen_profile_exporters.can.host.console import stopped_by_signals, told_aside
 from gen_profile_exporters.can.host.lateness import Lateness, rehearse
 from gen_profile_exporters.can.host.port import Port
 from gen_profile_exporters.can.host.realtime import PEER_PRIORITY, priority, real_time
+from gen_profile_exporters.can.scaling import magnitude_counts
 from gen_profile_exporters.can.startup import startup_lists
 from gen_profile_exporters.can.streaming.plan import plan_of
 from gen_profile_exporters.exporter import target_of
@@ -289,20 +291,32 @@ def serve(bank: DriveBank, stop: Callable[[], bool]) -> None:
 
 
 def drive_bank(
-    source_spec: Spec, bus: can.BusABC, load: CraneLoad, make: DriveVariant, clock: Clock | None = None
+    source_spec: Spec,
+    bus: can.BusABC,
+    load: CraneLoad,
+    make: DriveVariant,
+    clock: Clock | None = None,
+    *,
+    windows: Mapping[str, int] | None = None,
 ) -> DriveBank:
     """Put a simulated drive on the bus for every axis, at rest at the start of the move.
 
-    They are those that the spec asks for, by vendor, product, serial number and fixed mapping.
+    They are those that the spec asks for, by vendor, product, serial number and fixed mapping. Their
+    following error windows in counts are those given by axis, or so narrow that every motion may have them.
     """
     from gen_profile_exporters.can.simulation.drive_bank import DriveBank  # noqa: PLC0415  # canopen is an extra
     from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive  # noqa: PLC0415
 
     target = target_of(source_spec)
     scales = [axis.counts_per_si for axis in target.axes]
+    own = {axis.name: magnitude_counts(LEAST_USEFUL, axis) for axis in target.axes} | dict(windows or {})
     axes = zip(target.axes, frames.nodes(target), source_spec.move.start, strict=True)
     drives = [
-        SimulatedDrive(node, _of_identity(make, target.can, axis.name), round(at * axis.counts_per_si))
+        SimulatedDrive(
+            node,
+            attrs.evolve(_of_identity(make, target.can, axis.name), following_error=own[axis.name]),
+            round(at * axis.counts_per_si),
+        )
         for axis, node, at in axes
     ]
     channels = frames.channels(target) if target.can.channels else ()
@@ -358,7 +372,10 @@ def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
         opened(port, target_of(source.spec)) as bus,
     ):
         clock = SharedClock(longest=period // 4)
-        clock.work = drive_bank(source.spec, bus, load, DriveVariant(), clock).poll
+        target = source.plan.target
+        names = [axis.name for axis in target.axes]
+        windows = dict(zip(names, useful(source.plan.demand, target), strict=True))
+        clock.work = drive_bank(source.spec, bus, load, DriveVariant(), clock, windows=windows).poll
         found = _Simulation(clock)
         yield found
         found.sway = load.residual_sway()

@@ -38,6 +38,10 @@ def refused(bench, reason):
         ),
         ({"make": DriveVariant(following_error=0)}, r"does not watch its following error"),
         (
+            {"make": DriveVariant(following_error=0x7FFF_FFFF)},
+            r"window of 2\.15e\+03 \(6065h is 7FFFFFFFh\) is wider than .* set 0\.132 \(132\d{3} counts\)",
+        ),
+        (
             {"vendor": 1},
             r"node 1 is another drive: its vendor is 000002E5h, and can\.vendor asks for 00000001h",
         ),
@@ -48,7 +52,16 @@ def refused(bench, reason):
             r"60C2h:01 \(interpolation period: digits\) must hold 4h, .* keeps 2h",
         ),
     ],
-    ids=["position", "monitoring off", "monitoring none", "vendor", "product", "mode", "fixed period"],
+    ids=[
+        "position",
+        "monitoring off",
+        "monitoring none",
+        "monitoring wide",
+        "vendor",
+        "product",
+        "mode",
+        "fixed period",
+    ],
 )
 @pytest.mark.parametrize("other", [False, True], ids=["usual", "other"])
 def test_unfit_drives(options, reason, other):
@@ -251,7 +264,7 @@ def test_a_drive_that_falls_silent_while_it_is_set_up():
     ("cob_id", "data", "reason"),
     [
         (0x080, b"", "second controller"),
-        (0x081, b"\x30\x81" + bytes(6), "emergency 8130h"),
+        (0x081, b"\x20\x31" + bytes(6), "emergency 3120h"),
         (0x601, bytes(8), "second"),
     ],
 )
@@ -268,3 +281,73 @@ def test_another_cycle_than_the_logs():
         ExportError, match=r"can\.sync_period: the log's cycle is 0\.004 s and the spec's 0\.002 s"
     ):
         plan_of(log, target(sync_period=0.002, bitrate=1_000_000))
+
+
+NO_REMOTE = DriveVariant(remote_requests=False)
+
+
+@pytest.mark.parametrize("make", [NO_REMOTE, attrs.evolve(NO_REMOTE, own_mapping=True)], ids=["usual", "own"])
+def test_a_drive_that_forbids_remote_requests(make):
+    """It takes no COB-ID of a TPDO with bit 30 clear (CiA 301)."""
+    with Bench(make=make) as bench:
+        record = bench.run()
+    assert (record.phase, record.reason, record.aftermath) == (Phase.DONE, "", "")
+
+
+def test_pdos_that_are_off_already_are_left_alone():
+    """Whatever COB-ID waits in them; and what is switched off keeps the rest of its entry."""
+    with Bench(make=NO_REMOTE) as bench:
+        found = {index: bench.drive.value(index, 1) for index in (0x1801, 0x1802, 0x1803, 0x1402)}
+        bench.drive.store(0x1803, 1, 0xC000_0123)
+        bench.drive._values.clear()
+        held = {}
+        bench.at_cycle(100, lambda: held.update({index: bench.drive.value(index, 1) for index in found}))
+        bench.run()
+        after = {index: bench.drive.value(index, 1) for index in found}
+    assert found[0x1801] >> 30 == 1
+    assert held == found | {0x1801: found[0x1801] | 1 << 31, 0x1803: 0xC000_0123}
+    assert after == found | {0x1803: 0xC000_0123}
+
+
+def test_a_statusword_that_no_state_matches():
+    with Bench() as bench:
+        bench.drive.store(0x6041, 0, 0x0001)
+        refused(bench, "tells the statusword 0001h, which is no state of CiA 402")
+
+
+class TestAfterAStreamThatWasKilled:
+    """The drive still follows, or brakes, until it misses our heartbeat; the next stream waits for that."""
+
+    TIMEOUT = 0.4  # s
+
+    @pytest.mark.parametrize("after", [5, 150, 250, 420])
+    def test_it_begins_without_being_asked_twice(self, after):
+        class Killed(BaseException):
+            pass
+
+        def die(message):
+            if bench.streamer.cycles_sent >= 120:
+                raise Killed
+            return True
+
+        with Bench(make=DriveVariant(miss="hold"), timeout=self.TIMEOUT, start_tolerance=1.0) as bench:
+            bench.streamer_end.sending = die
+            with pytest.raises(Killed):
+                bench.run()
+            bench.streamer_end.sending = lambda message: True
+            bench.wait(after)
+            assert bench.drive.state is State.ENABLED or after > 400
+            while bench.streamer_end.recv(0) is not None:  # before it was there
+                pass
+            bench.renew()
+            record = bench.run()
+            lost = [frame for frame in bench.of(0x081) if frame.data[:2] in (b"\x30\x81", b"\x50\x82")]
+        assert lost, record.reason
+        assert (record.phase, record.reason) == (Phase.DONE, ""), record.reason
+
+    def test_one_that_another_controller_has_enabled_is_refused_at_once(self):
+        with Bench() as bench:
+            bench.drive.store(0x1016, 1, 5 << 16 | 500)
+            bench.drive.store(0x6041, 0, State.ENABLED.bits)
+            refused(bench, "somebody else commands it")
+            assert bench.now < 200

@@ -9,7 +9,7 @@ from exporters.motions import quintic, target
 from numpy.testing import assert_array_equal
 
 from gen_profile.errors import ExportError
-from gen_profile.spec.can import FixedPdosSpec
+from gen_profile.spec.can import CobIdsSpec, FixedPdosSpec
 from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.export.exporter import encode, replay
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
@@ -92,6 +92,47 @@ class TestOneFrame:
             assert "Frame 401h came from somebody else" in bench.run().reason
 
 
+SPLIT = FixedPdosSpec(
+    rpdo2=(CONTROLWORD, POSITION), tpdo1=(STATUSWORD, 0x60610008), tpdo2=(ACTUAL,), tpdo3=(0x606C0020,)
+)
+
+
+class TestTwoAnswers:
+    """Statusword in one TPDO, actual position in another: the commonest default of drives."""
+
+    @pytest.fixture
+    def bench(self):
+        with Bench(profile=PROFILE, make=DriveVariant(fixed_pdos=SPLIT), fixed_pdos=SPLIT) as bench:
+            yield bench
+
+    def test_a_whole_stream(self, bench):
+        record = bench.run()
+        assert (record.reason, record.aftermath, record.final) == ("", "", (400_000,))
+        assert_array_equal(record.actual[1:, 0], bench.plan.motion.position[:-1, 0])
+        assert {0x181, 0x281, 0x301} == {f.cob_id for f in bench.heard if 0x180 < f.cob_id < 0x580}
+
+    @pytest.mark.parametrize("lost", [0x181, 0x281])
+    def test_either_is_missed(self, bench, lost):
+        bench.at_cycle(
+            100, lambda: setattr(bench.drive_end, "sending", lambda message: message.arbitration_id != lost)
+        )
+        record = bench.run()
+        assert "axis cart: no feedback for" in record.reason
+
+    def test_its_files(self):
+        own = target(fixed_pdos=SPLIT, sync_period=0.01, cob_ids={"cart": CobIdsSpec(position=0x2AA)})
+        files = {file.filename.partition(".")[2]: file.content for file in encode(PROFILE, own)}
+        database = cantools.database.load_string(files["dbc"].decode(), "dbc")
+        told = [database.get_message_by_name(f"cart_{name}") for name in ("Feedback", "Position")]
+        assert [(m.frame_id, m.length) for m in told] == [(0x181, 3), (0x2AA, 4)]
+        rows = {
+            (r["object"], r["meaning"]): r["value"]
+            for r in csv.DictReader(files["startup.csv"].decode().splitlines())
+        }
+        assert rows["1801h", "actual position: on"] == "0x400002AA"
+        assert rows["1802h", "not used: off"] == "0xC0000381"
+
+
 def test_a_drive_with_another_mapping_is_not_moved():
     fixed = FixedPdosSpec(rpdo3=(POSITION, CONTROLWORD), tpdo3=(STATUSWORD, ACTUAL))
     with Bench(make=FIXED, fixed_pdos=fixed) as bench:
@@ -154,7 +195,7 @@ def test_a_log_whose_controlword_was_altered():
             FixedPdosSpec(rpdo3=(CONTROLWORD,), tpdo3=(STATUSWORD, ACTUAL)),
             r"one RPDO with 607Ah \(607A0020h\), found 0",
         ),
-        (FixedPdosSpec(rpdo3=(CONTROLWORD, POSITION)), "no TPDO holds both 6041h .* and 6064h"),
+        (FixedPdosSpec(rpdo3=(CONTROLWORD, POSITION)), r"no TPDO holds 6041h \(60410010h\), by which"),
         (
             FixedPdosSpec(rpdo3=(CONTROLWORD, POSITION), rpdo4=(CONTROLWORD,), tpdo3=(STATUSWORD, ACTUAL)),
             r"one RPDO with 6040h \(60400010h\), found 2",
@@ -162,6 +203,10 @@ def test_a_log_whose_controlword_was_altered():
         (
             FixedPdosSpec(rpdo3=(CONTROLWORD, POSITION, 0x60710010), tpdo3=(STATUSWORD, ACTUAL)),
             r"rpdo3: nobody knows what to send as 6071h:00",
+        ),
+        (
+            FixedPdosSpec(rpdo3=(CONTROLWORD, POSITION), tpdo2=(STATUSWORD,)),
+            r"no TPDO holds 6064h \(60640020h\), by which",
         ),
         (
             FixedPdosSpec(rpdo3=(CONTROLWORD, POSITION), tpdo3=(STATUSWORD, ACTUAL, 0x606C0020)),

@@ -75,5 +75,5 @@ def test_an_interface_that_goes_down_is_a_sentence():
         bench.at_cycle(50, lambda: setattr(bench.streamer_end, "receiving", down))
         record = bench.run()
     assert record.phase is Phase.ABORTED
-    assert "the interface went down. Not every drive confirmed the quick stop" in record.reason
+    assert "the interface went down. Not every axis is known to stand" in record.reason
     assert bench.of(0x201)[-1].data == QUICK_STOP

@@ -3,6 +3,7 @@
 import csv
 import os
 import pty
+import re
 import struct
 import termios
 from contextlib import suppress
@@ -20,6 +21,7 @@ from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.can import CanSpec
 from gen_profile.streaming.keyboard import Keyboard, Keys
 from gen_profile.streaming.planned_motion import CommandList, PlannedMotion
+from gen_profile_exporters.can.cia402 import State
 from gen_profile_exporters.can.streaming.record import Phase
 
 COUNTS = 1_000_000
@@ -141,6 +143,28 @@ def test_the_axis_begins_where_it_stands_and_only_within_the_travel():
     assert not bench.of(0x301)
 
 
+def test_the_screen_shows_beforehand_how_far_a_stop_leads():
+    source = source_of(spec_of(), LONG)
+    with bench_of(source) as bench:
+        shown = []
+        bench.at_cycle(150, lambda: bench.streamer.ask_to_stop("Stopped by SIGINT."))
+        bench.streamer._tell = lambda words: shown.append(
+            (words, 0 if source.goal is None else source.goal[0], bench.fault_at)
+        )
+        record = bench.run()
+    lines = [
+        (float(found[1]), at, asked)
+        for words, at, asked in shown
+        if (found := re.search(r"m/s, stops within ([\d.]+) m, no sway", words))
+    ]
+    (within, at, _) = [line for line in lines if line[2] is None][-1]
+    assert record.final[0] > at
+    later = 0.4 * 0.25 + 0.02  # m, of what the axis goes on between two lines
+    assert (record.final[0] - at) / COUNTS <= within + later
+    assert any("stopping without sway" in words for words, _, _ in shown)
+    assert len(lines) <= record.sent * CYCLE / 0.25 + 1
+
+
 def test_a_setpoint_that_comes_too_late_is_left_out():
     """The block goes on meanwhile, so that the axis is where it would be."""
     source = source_of(spec_of(), LONG.replace("0.4", "0.2") + "0.8,stop,\n")
@@ -160,6 +184,32 @@ def test_errors_and_lost_promises_are_told():
         "The block showed error 3, which its header explains.",
         "The load may sway, because a live parameter changed on the way.",
     )
+
+
+@pytest.mark.parametrize("calls", [1, 2])
+@pytest.mark.parametrize(
+    ("commands", "at", "error"),
+    [
+        ("time_s,command,value\n0.1,position,7.0\n", 0.1, 3),  # outside the travel
+        ("time_s,command,value\n0.1,position,7.0\n0.11,position,0.2\n5.0,position,0.0\n", 0.1, 3),
+        ("time_s,command,value,L1\n0.1,velocity,0.2,\n0.5,velocity,0.2,70.0\n", 0.5, 2),
+    ],
+)
+def test_what_the_block_refuses_is_not_done(commands, at, error, calls):
+    """Nothing of a file is carried out after that; the axis stands, without sway."""
+    source = source_of(spec_of(sync_period=calls * CYCLE), commands)
+    with bench_of(source) as bench:
+        record = bench.run()
+        assert bench.drive.state is State.SWITCH_ON_DISABLED
+    assert record.phase is Phase.ABORTED
+    words = (
+        r"At ([\d.]+) s the block refused its commands: error (\d), .* The axes were stopped without sway\."
+    )
+    found = re.fullmatch(words, record.reason)
+    assert float(found[1]) == pytest.approx(at, abs=2 * CYCLE)
+    assert int(found[2]) == error
+    assert QUICK_STOP not in [frame.data for frame in bench.of(0x201)]
+    assert record.sent * calls * CYCLE < at + 4.0
 
 
 def test_a_block_that_does_not_fit_the_bus_is_refused():
@@ -202,7 +252,7 @@ def terminal(monkeypatch):
 def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
     ours, theirs = terminal
     before = termios.tcgetattr(theirs)
-    keyboard = Keyboard(theirs, AXES, [0.5], CYCLE)
+    keyboard = Keyboard(theirs, AXES, [0.5])
     source = source_of(spec_of(), keyboard)
     with keyboard.operated(), bench_of(source) as bench:
         os.write(ours, b"\x1b[D")  # before the motion begins
@@ -218,9 +268,37 @@ def test_the_keyboard_drives_and_the_terminal_comes_back(terminal):
     assert any("stick at 0.15 m/s" in words for words in bench.phases)
 
 
+def test_who_sees_the_error_may_go_on(terminal):
+    """But where the last command was refused, it was not carried out."""
+    ours, theirs = terminal
+    for then, reason in ((b"0.05\r", ""), (b"", r"At 0\.1\d* s the block refused its commands: error 3")):
+        keyboard = Keyboard(theirs, AXES, [0.5])
+        with keyboard.operated(), bench_of(source_of(spec_of(), keyboard)) as bench:
+            bench.at_cycle(10, lambda: os.write(ours, b"7.0\r"))
+            bench.then_at_cycle(60, lambda then=then: os.write(ours, then))
+            bench.then_at_cycle(600, lambda: os.write(ours, b"x"))
+            record = bench.run()
+        assert re.match(reason, record.reason), record.reason
+        assert (record.phase is Phase.DONE) == (not reason)
+        assert any("error 3" in words for words in bench.phases)
+
+
+@pytest.mark.parametrize("mode", [{}, {"mode": "csv", "following_error": 0.02}], ids=["csp", "csv"])
+def test_one_that_runs_off_is_stopped(mode):
+    with bench_of(source_of(spec_of(**mode), LONG)) as bench:
+        bench.drive._watch_following_error = lambda: None
+        bench.at_cycle(80, lambda: setattr(bench.drive, "runaway", -300_000.0))
+        record = bench.run()
+    assert "off the motion, more than can.following_error" in record.reason
+    assert record.reason.endswith("The axes were stopped.")
+    stop = next(frame.at for frame in bench.of(0x201) if frame.data == QUICK_STOP)
+    window = 0.02 if mode else 1.5 * 0.5 * (0.03 + 2 * CYCLE) + 0.001  # by the velocity limit
+    assert stop - bench.fault_at <= 1e3 * (window / 0.3 + 2 * CYCLE)
+
+
 def test_a_terminal_that_is_gone_stops_the_axis(terminal):
     ours, theirs = terminal
-    keyboard = Keyboard(theirs, AXES, [0.5], CYCLE)
+    keyboard = Keyboard(theirs, AXES, [0.5])
     source = source_of(spec_of(), keyboard)
     with keyboard.operated(), bench_of(source) as bench:
         bench.at_cycle(10, lambda: os.write(ours, b"\x1b[C"))
@@ -234,6 +312,6 @@ def test_a_terminal_that_is_gone_stops_the_axis(terminal):
 def test_what_is_no_terminal_is_refused():
     reading, writing = os.pipe()
     with pytest.raises(SpecError, match="standard input is no terminal"):
-        Keyboard(reading, AXES, [0.5], 0.004)
+        Keyboard(reading, AXES, [0.5])
     os.close(reading)
     os.close(writing)

@@ -88,7 +88,7 @@ def test_a_drive_that_did_not_stop_keeps_its_time_outs():
     with Bench(timeout=0.02) as bench:
         bench.at_cycle(100, lambda: setattr(bench.drive_end, "sending", lambda _: False))
         record = bench.run()
-        assert "Not every drive confirmed" in record.reason
+        assert "Not every axis is known to stand" in record.reason
         assert bench.drive.value(0x1016, 1) == OURS
         assert bench.drive.value(0x6007) == 3
 
@@ -116,3 +116,64 @@ def test_a_drive_that_still_brakes_keeps_its_ramp():
         bench.run()
         assert held(bench.drive) == before
     assert set(ramps) == {2_000_000}
+
+
+def tell_statusword(bench, word):
+    """Have the drive tell one statusword always, by PDO and by SDO."""
+    drive = bench.drive
+    pack = drive._pack_feedback
+    drive._pack_feedback = lambda: (pack(), drive.store(0x6041, 0, word))
+
+
+RAMPS = {"profile": quintic((0.0, 0.3), duration=3.0), "quick_stop": 1.4}
+
+
+@pytest.mark.parametrize("word", [0x0001, 0x0250], ids=["no state", "switch on disabled"])
+class TestADriveThatBrakesWhateverItsStatuswordSays:
+    def stopped(self, bench, word):
+        bench.drive.store(0x6085, 0, 500_000)
+        bench.drive._values.pop((0x6085, 0), None)
+        ramps, said = [], []
+        look = lambda: bench.drive.state is State.QUICK_STOP and ramps.append(bench.drive.value(0x6085))  # noqa: E731
+        bench.clock.actors.append(look)
+        bench.streamer._tell = lambda phase: said.append((phase, bench.drive.velocity))
+        bench.at_cycle(
+            375, lambda: (tell_statusword(bench, word), bench.streamer.ask_to_stop("Interrupted."))
+        )
+        return bench.run(), set(ramps), said
+
+    def test_it_keeps_its_ramp_until_it_stands(self, word):
+        with Bench(**RAMPS) as bench:
+            record, ramps, said = self.stopped(bench, word)
+            assert ramps == {1_400_000}
+            assert said[-1] == ("aborted", 0.0)
+            put_back = bench.drive.value(0x6085)
+        known = word == 0x0250
+        assert record.reason.endswith("The axes were stopped.") == known
+        assert put_back == (500_000 if known else 1_400_000)
+        assert known or "(cart: statusword 0001h, which is no state of CiA 402)" in record.reason
+
+    def test_one_that_does_not_brake_is_not_said_to_stand(self, word):
+        with Bench(**RAMPS) as bench:
+            ways = ("_obey", "_lose_connection", "fault")
+            bench.then_at_cycle(374, lambda: [setattr(bench.drive, way, lambda _: None) for way in ways])
+            bench.then_at_cycle(375, lambda: setattr(bench.drive, "runaway", 100_000.0))
+            record, _, _ = self.stopped(bench, word)
+            assert bench.drive.value(0x6085) == 1_400_000
+        assert "were stopped" not in record.reason
+        known = "'switch on disabled', but not seen to stand" if word == 0x0250 else "statusword 0001h"
+        assert f"Not every axis is known to stand (cart: {known}" in record.reason
+
+
+def test_settings_are_not_put_back_under_an_axis_that_still_moves():
+    """It coasts after the motion, without power."""
+    with Bench(quick_stop=2.0) as bench:
+        before = held(bench.drive)
+
+        release = lambda: "disable" in bench.phases and bench.drive.state is State.SWITCH_ON_DISABLED  # noqa: E731
+        bench.clock.actors.append(
+            lambda: release() and bench.drive.store(0x6064, 0, int(400_000 + 100 * bench.now))
+        )
+        record = bench.run()
+        assert held(bench.drive) != before
+    assert record.aftermath == "Node 1 is not known to stand; its settings stay those of the motion."

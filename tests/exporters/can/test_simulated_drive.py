@@ -11,7 +11,7 @@ import pytest
 from exporters.can.bench import Bench
 
 from gen_profile.errors import StreamAborted
-from gen_profile_exporters.can.cia402 import Controlword, State, state_of
+from gen_profile_exporters.can.cia402 import MOVING, Controlword, State, state_of
 from gen_profile_exporters.can.host.realtime import real_time
 from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant, dictionary
 from gen_profile_exporters.can.simulation.simulated_drive import SimulatedDrive
@@ -68,8 +68,13 @@ class TestStates:
         assert bench.drive.state is State.FAULT
         assert [frame.data[:2] for frame in bench.of(0x081)] == [b"\x10\x32"]
 
-    def test_unknown_statuswords_are_not_ready(self):
-        assert state_of(0x0001) is State.NOT_READY
+    def test_of_a_statusword_that_no_state_matches_nothing_is_known(self):
+        assert state_of(0x0001) is State.UNKNOWN
+        masks = [(0x4F, {0x00, 0x40, 0x0F, 0x08}), (0x6F, {0x21, 0x23, 0x27, 0x07})]  # of CiA 402-2
+        for word in range(1 << 7):
+            known = any(word & mask in patterns for mask, patterns in masks)
+            assert (state_of(word) is not State.UNKNOWN) == known
+            assert known or state_of(word) in MOVING
 
 
 def enabled(bench, **settings):

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 
 import can
@@ -58,7 +60,7 @@ class TestADriveThatTakesNoPdos:
             beats = [frame.at for frame in bench.of(0x77F)]
             (emergency,) = bench.of(0x081)
         assert "left the NMT state" in record.reason
-        assert "(missing: cart)" in record.reason
+        assert "(cart: no answer)" in record.reason
         assert beats[-1] <= quick_stops(bench)[0] + 20 + PERIOD
         assert emergency.at <= beats[-1] + 20 + 1
         assert bench.drive.state is State.SWITCH_ON_DISABLED
@@ -89,7 +91,7 @@ def test_a_dead_drive_confirms_nothing():
         in_phase(bench, "enable", lambda: setattr(bench, "drives_alive", False))
         record = bench.run()
     assert "no feedback" in record.reason
-    assert "Not every drive confirmed the quick stop (missing: cart)" in record.reason
+    assert "Not every axis is known to stand (cart: no answer)" in record.reason
 
 
 @pytest.mark.parametrize("phase", ["configure", "align", "enable", "hold", "disable"])
@@ -103,7 +105,7 @@ def test_an_interface_that_is_down_is_a_sentence_whenever_it_goes_down(phase, wa
         record = bench.run()
     assert record.phase is Phase.ABORTED
     assert "Network is down" in record.reason
-    assert ("Not every drive confirmed" in record.reason) == (phase != "configure")
+    assert ("Not every axis is known to stand" in record.reason) == (phase != "configure")
 
 
 def test_a_stop_needs_no_listener():
@@ -133,7 +135,25 @@ class TestConsole:
         asked = []
         with console.stopped_by_signals(asked.append):
             os.kill(os.getpid(), number)
-        assert asked == [f"Stopped by {signal.Signals(number).name}."]
+        named = {each.value: each.name for each in signal.Signals}
+        assert asked == [f"Stopped by {named.get(number, f'signal {number}')}."]
+
+    def test_no_signal_ends_it_that_can_be_caught(self):
+        """A process that gets all of them but those that tell of its own fault lives to its end."""
+        program = """
+import os, signal
+from gen_profile_exporters.can.host.console import stopped_by_signals
+faults = {getattr(signal, f"SIG{name}") for name in "SEGV BUS FPE ILL ABRT TRAP SYS".split()}
+asked = []
+with stopped_by_signals(asked.append):
+    for number in signal.valid_signals() - faults - {signal.SIGKILL, signal.SIGSTOP}:
+        os.kill(os.getpid(), number)
+print(*asked)
+"""
+        done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True)
+        assert done.returncode == 0
+        for name in ("SIGVTALRM", "SIGRTMIN", "SIGPROF", "SIGIO", "signal 50", "SIGTERM"):
+            assert f"Stopped by {name}." in done.stdout
 
     def test_they_are_what_they_were_afterwards(self):
         before = [signal.getsignal(number) for number in console.STOPS]

@@ -96,7 +96,7 @@ class TestWholeStream:
 
     def test_a_lagging_axis_is_waited_for(self):
         load = RigidLoad([0.1], lag=0.97)
-        with Bench(load=load) as bench:
+        with Bench(load=load, following_error=0.1) as bench:
             record = bench.run()
         assert record.phase is Phase.DONE
         assert abs(record.final[0] - 400_000) < 1000

@@ -12,7 +12,13 @@ from gen_profile_exporters.can.scaling import exact
 from gen_profile_exporters.exporter import Target
 
 MASTER_NAME = "Controller"
-NAMES = {"command": "Command", "setpoint": "Setpoint", "feed_forward": "FeedForward"}
+NAMES = {
+    "command": "Command",
+    "setpoint": "Setpoint",
+    "feed_forward": "FeedForward",
+    "feedback": "Feedback",
+    "position": "Position",
+}
 
 
 def dbc(target: Target) -> bytes:
@@ -28,9 +34,10 @@ def dbc(target: Target) -> bytes:
             _message(own[pdo], f"{name}_{NAMES[layout.role(pdo)]}", fields, axis, (MASTER_NAME, name))
             for pdo, fields in layout.received.items()
         ]
-        blocks.append(
-            _message(own[layout.feedback], f"{name}_Feedback", layout.told, axis, (name, MASTER_NAME))
-        )
+        blocks += [
+            _message(own[pdo], f"{name}_{NAMES[layout.role(pdo)]}", fields, axis, (name, MASTER_NAME))
+            for pdo, fields in layout.told.items()
+        ]
     return ("\n\n".join(blocks) + "\n").encode("ascii")
 
 

@@ -9,9 +9,20 @@ from contextlib import contextmanager, suppress
 from threading import Thread
 from types import FrameType
 
-# what else would kill the streamer, or freeze it, with the axes under way; where the system has them
-_NAMES = "INT TERM HUP QUIT TSTP ALRM USR1 USR2 XCPU PWR BREAK"
-STOPS = tuple(number for number in signal.Signals if number.name.removeprefix("SIG") in _NAMES.split())
+# Everything that would kill the streamer, or freeze it, with the axes under way stops them, but for what no
+# program can catch, what tells of a program that cannot go on, and what does nothing by itself.
+_UNSTOPPABLE = "KILL STOP"
+_BROKEN = "SEGV BUS FPE ILL ABRT IOT TRAP SYS EMT"
+_HARMLESS = "CHLD CLD CONT URG WINCH INFO PIPE XFSZ"  # Python itself ignores the last two
+_BACKGROUND = "TTIN TTOU"  # freezes one that reads or writes there; ignored, it may write, and reads nothing
+
+
+def _named(names: str) -> set[int]:
+    return {number for number in signal.Signals if number.name.removeprefix("SIG") in names.split()}
+
+
+QUIET = _named(_BACKGROUND)
+STOPS = signal.valid_signals() - _named(f"{_UNSTOPPABLE} {_BROKEN} {_HARMLESS}") - QUIET
 LAST_WORDS = 0.5  # s, for a terminal to take them
 
 
@@ -20,15 +31,23 @@ def stopped_by_signals(ask_to_stop: Callable[[str], None]) -> Iterator[None]:
     """Have signals stop the axes as any other fault does; one that `nohup` has ignored stays ignored."""
 
     def stop(number: int, _: FrameType | None) -> None:
-        ask_to_stop(f"Stopped by {signal.Signals(number).name}.")
+        ask_to_stop(f"Stopped by {_name(number)}.")
 
     ignored = {number for number in STOPS if signal.getsignal(number) is signal.SIG_IGN} - {signal.SIGINT}
-    before = {number: signal.signal(number, stop) for number in STOPS if number not in ignored}
+    handlers = dict.fromkeys(STOPS - ignored, stop) | dict.fromkeys(QUIET, signal.SIG_IGN)
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _name(number: int) -> str:
+    """Name a signal; of those for anybody's use only the first and the last have names."""
+    with suppress(ValueError):
+        return signal.Signals(number).name
+    return f"signal {number}"
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
 from canopen.objectdictionary.eds import export_eds
 
 from gen_profile.spec.can import FixedPdosSpec
-from gen_profile_exporters.can.startup import AT_ONCE, OFF, PDO_PARAMETERS
+from gen_profile_exporters.can.startup import AT_ONCE, NO_REMOTE_REQUEST, OFF, PDO_PARAMETERS
 
 U8, U16, U32 = datatypes.UNSIGNED8, datatypes.UNSIGNED16, datatypes.UNSIGNED32
 I8, I16, I32 = datatypes.INTEGER8, datatypes.INTEGER16, datatypes.INTEGER32
@@ -27,7 +27,7 @@ PDO_BITS = 64  # what a frame carries
 NOT_MAPPABLE, PDO_TOO_LONG = 0x0604_0041, 0x0604_0042
 OUT_OF_RANGE, WRONG_STATE = 0x0609_0030, 0x0800_0022
 TRANSMISSION_TYPES = {*range(241), *AT_ONCE}  # the others are reserved, or wait for remote requests
-WINDOW = 1 << 31  # counts; a drive's own following error window, wide open but watched
+WINDOW = 50_000  # counts; a drive's own following error window
 
 
 @attrs.frozen(kw_only=True)
@@ -53,6 +53,8 @@ class DriveVariant:
         6065h, in counts.
     modes : int
         6502h.
+    remote_requests : bool
+        Whether its TPDOs can be asked for by remote frames; where not, it takes no COB-ID that allows them.
     """
 
     vendor: int = VENDOR
@@ -65,6 +67,7 @@ class DriveVariant:
     fixed_pdos: FixedPdosSpec = attrs.field(factory=FixedPdosSpec)
     following_error: int = WINDOW
     modes: int = 1 << 8 | 1 << 7 | 1 << 6  # csv, csp and ip
+    remote_requests: bool = True
 
 
 def dictionary(node: int, make: DriveVariant) -> canopen.ObjectDictionary:
@@ -112,20 +115,31 @@ def eds(node: int, make: DriveVariant, file_name: str = "drive.eds") -> str:
 
 
 def refusal(
-    found: canopen.ObjectDictionary, held: Callable[[int, int], int], index: int, sub: int, value: int
+    make: DriveVariant,
+    found: canopen.ObjectDictionary,
+    held: Callable[[int, int], int],
+    place: tuple[int, int],
+    value: int,
 ) -> int | None:
     """Tell by which SDO abort code a drive refuses to be set so, or None.
 
     Parameters
     ----------
+    make : DriveVariant
     found : canopen.ObjectDictionary
     held : callable
         What an object (index, subindex) holds.
-    index, sub, value : int
-        An object that is there, and what somebody writes to it, unsigned.
+    place : (int, int)
+        Index and subindex of an object that is there.
+    value : int
+        What somebody writes to it, unsigned.
     """
+    index, sub = place
     if index == 0x6060:
         return None if value == 0 or supports(held(0x6502, 0), value) else OUT_OF_RANGE
+    asked_for = sub == 1 and not value & NO_REMOTE_REQUEST
+    if asked_for and index in PDO_PARAMETERS and index >= 0x1800 and not make.remote_requests:
+        return OUT_OF_RANGE
     if index in PDO_PARAMETERS:
         return _refusal_of_parameter(index, held(index, 1), sub, value)
     if index - 0x200 in PDO_PARAMETERS:
@@ -222,7 +236,9 @@ def _records(
             (0x1400, 0x200, received, "RPDO"),
             (0x1800, 0x180, sent, "TPDO"),
         ):
-            used = cob_id + 0x100 * pdo + node if mapping else OFF | cob_id + 0x100 * pdo + node
+            used = cob_id + 0x100 * pdo + node | (0 if mapping else OFF)
+            if word == "TPDO" and not make.remote_requests:
+                used |= NO_REMOTE_REQUEST
             kinds = {1: U32, 2: U8, 3: U16, 5: U16}
             yield base + pdo, f"{word} {pdo + 1} parameter", kinds, "rw", (used, 255, 0, 0, 0)
             entries = (*mapping, *(0,) * (MAPPED - len(mapping)))

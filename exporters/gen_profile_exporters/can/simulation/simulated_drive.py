@@ -52,6 +52,12 @@ class SimulatedDrive:
     make : DriveVariant
     position : int
         Where the axis stands, in counts.
+
+    Attributes
+    ----------
+    runaway : float or None
+        Velocity in counts/s with which the axis goes off while it is enabled, whatever is asked of it; the
+        drive tells truly where it is, and brakes when it is to stop.
     """
 
     def __init__(self, node: int, make: DriveVariant, position: int) -> None:
@@ -59,6 +65,7 @@ class SimulatedDrive:
         self.state = State.SWITCH_ON_DISABLED
         self.command = self.actual = float(position)
         self.velocity = 0.0  # counts/s, of the command
+        self.runaway: float | None = None
         self.was_enabled = False
         self._misses, self._fresh, self._flags, self._late = 0, False, 0, 0.0
         self._controlword = 0
@@ -68,7 +75,7 @@ class SimulatedDrive:
         self._master_heard: int | None = None
         self._syncs = 0
         self._told: dict[int, tuple[int, bytes]] = {}  # by TPDO that is sent on change: when, and what
-        self.local: Any = _Node(node, dictionary(node, make), self.value)
+        self.local: Any = _Node(node, make, self.value)
         self.local.add_write_callback(self._written)
         self._pack_feedback()
 
@@ -152,6 +159,11 @@ class SimulatedDrive:
         before = self.command
         if self.state is State.ENABLED:
             self._follow()
+        if self.runaway is not None and self.state is State.ENABLED:
+            self.velocity = self.runaway
+            return self.actual + self.runaway * self.period
+        if self.runaway is not None:
+            self.command = self.actual
         if self.state in {State.QUICK_STOP, State.FAULT_REACTION}:
             self._brake()
         elif self.state is not State.ENABLED:
@@ -196,7 +208,9 @@ class SimulatedDrive:
     def _written(self, index: int, subindex: int, od: object, data: bytes) -> None:
         del od
         self._values.pop((index, subindex), None)
-        if index == 0x6040:
+        if index == 0x1016:
+            self._master_heard = None  # the next heartbeat is the first one
+        elif index == 0x6040:
             self._obey(int.from_bytes(data, "little"))
         elif index == 0x6060:
             mode = int.from_bytes(data, "little", signed=True)
@@ -322,9 +336,9 @@ class SimulatedDrive:
 class _Node(canopen.LocalNode):
     """canopen's node, which refuses by SDO what a drive does."""
 
-    def __init__(self, node: int, found: canopen.ObjectDictionary, held: Callable[[int, int], int]) -> None:
-        super().__init__(node, found)
-        self._held = held
+    def __init__(self, node: int, make: DriveVariant, held: Callable[[int, int], int]) -> None:
+        super().__init__(node, dictionary(node, make))
+        self._make, self._held = make, held
 
     def set_data(self, index: int, subindex: int, data: bytes, check_writable: bool = False) -> None:
         if check_writable:
@@ -335,7 +349,8 @@ class _Node(canopen.LocalNode):
         entry = self.object_dictionary.get_variable(index, sub)
         if entry is None or len(entry) != 8 * len(data):
             return  # which canopen refuses by itself
-        code = refusal(self.object_dictionary, self._held, index, sub, int.from_bytes(data, "little"))
+        written = int.from_bytes(data, "little")
+        code = refusal(self._make, self.object_dictionary, self._held, (index, sub), written)
         if code is not None:
             raise canopen.SdoAbortedError(code)
 

@@ -21,16 +21,27 @@ from gen_profile.errors import StreamAborted
 from gen_profile.units import AxisScale
 from gen_profile_exporters.can import frames
 from gen_profile_exporters.can.cia402 import FAULTS, MODES, MOVING, Controlword, State, state_of
+from gen_profile_exporters.can.following_window import useful
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.scaling import Demand, magnitude_counts
-from gen_profile_exporters.can.startup import AT_ONCE, PDO_PARAMETERS, Entry, startup_lists
+from gen_profile_exporters.can.startup import (
+    AT_ONCE,
+    NO_REMOTE_REQUEST,
+    OFF,
+    PDO_PARAMETERS,
+    Entry,
+    startup_lists,
+)
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.restoration import (
     HEARTBEAT_WATCHED,
     Place,
     Restoration,
+    pdo_of,
     settings_of,
+    time_of_ours,
 )
+from gen_profile_exporters.can.streaming.standing import trembling
 from gen_profile_exporters.exporter import Target
 
 CIA_402 = 402  # low word of 1000h
@@ -41,6 +52,7 @@ COB_ID_BITS = 0x8000_07FF  # of a PDO's COB-ID entry: what must come back as it 
 START, PRE_OPERATIONAL = 0x01, 0x80  # NMT commands
 WINDOW_OFF = 0xFFFF_FFFF  # of 6065h
 RESET_PATIENCE = NANOSECONDS  # for a drive to leave its fault
+STOP_PATIENCE = 2 * NANOSECONDS  # for one that lost its streamer to brake
 SCALING = {0x608F, 0x6091, 0x6092}  # of positions, in the drive
 PERIOD_DIGITS, PERIOD_EXPONENT = (0x60C2, 1), (0x60C2, 2)
 
@@ -96,8 +108,10 @@ def configure(
         _require_identity(link, node, target)
         if reset_fault:
             _reset_fault(link, node)
+        watched = _upload(link, node, *HEARTBEAT_WATCHED, optional=True)
+        _await_own_stop(link, node, watched)
         _require_rest(link, node)
-        found.remember_watch(node.number, _upload(link, node, *HEARTBEAT_WATCHED, optional=True))
+        found.remember_watch(node.number, watched)
         _download(link, node, *HEARTBEAT_WATCHED, bytes(4))  # as a stream that was killed has set it
     link.meanwhile = meanwhile
     for node in nodes:
@@ -148,7 +162,8 @@ def release(link: Link, target: Target, found: Restoration) -> tuple[str, ...]:
     for number in frames.nodes(target):
         with suppress(StreamAborted, SdoError, struct.error):
             link.sdo(number).download(*HEARTBEAT_WATCHED, bytes(4))
-    return found.put_back(link)
+    allowed = [trembling(axis) for axis in target.axes]
+    return found.put_back(link, dict(zip(frames.nodes(target), allowed, strict=True)))
 
 
 def nmt(command: int, node: int) -> can.Message:
@@ -169,7 +184,7 @@ def _require_fit(link: Link, node: Node, target: Target, demand: Demand) -> int:
     if (shown := _read(link, node, 0x6061, bits=8)) != mode:
         raise StreamAborted(f"axis {node.name}: the drive shows mode {shown} (6061h) instead of {mode}.")
     if target.can.mode != "csv":  # in which the streamer watches, not the drive
-        _require_window(link, node)
+        _require_window(link, node, target, demand)
     _require_travel(link, node, demand)
     _require_homed(link, node, target)
     return _require_start(link, node, target, demand)
@@ -198,7 +213,7 @@ def _require_identity(link: Link, node: Node, target: Target) -> None:
 
 def _reset_fault(link: Link, node: Node) -> None:
     """Reset a fault, by a rising edge, and give the drive time for it."""
-    if state_of(_read(link, node, 0x6041)) is not State.FAULT:
+    if state_of(_read(link, node, 0x6041, bits=16)) is not State.FAULT:
         return
     channel = link.sdo(node.number)
     try:
@@ -207,12 +222,27 @@ def _reset_fault(link: Link, node: Node) -> None:
     except (SdoError, struct.error) as error:
         raise _silent(node, error) from error
     deadline = link.clock.now() + RESET_PATIENCE
-    while state_of(_read(link, node, 0x6041)) in FAULTS and link.clock.now() < deadline:
+    while state_of(_read(link, node, 0x6041, bits=16)) in FAULTS and link.clock.now() < deadline:
         link.wait_until(link.clock.now() + RESET_PATIENCE // 10)
 
 
+def _await_own_stop(link: Link, node: Node, watched: bytes | None) -> None:
+    """Let a drive stop by itself whose streamer was killed just now, and is still waited for."""
+    patience = time_of_ours(watched)
+    if not patience:
+        return
+    deadline = link.clock.now() + patience + STOP_PATIENCE
+    while state_of(_read(link, node, 0x6041, bits=16)) in MOVING and link.clock.now() < deadline:
+        link.wait_until(link.clock.now() + STOP_PATIENCE // 100)
+
+
 def _require_rest(link: Link, node: Node) -> None:
-    state = state_of(_read(link, node, 0x6041))
+    state = state_of(word := _read(link, node, 0x6041, bits=16))
+    if state is State.UNKNOWN:
+        raise StreamAborted(
+            f"axis {node.name}: the drive tells the statusword {word:04X}h, which is no state of CiA 402; "
+            "find out in its manual what it means."
+        )
     if state in FAULTS:
         raise StreamAborted(
             f"axis {node.name}: the drive is in the state {state.words!r}; find out why, and reset it there "
@@ -237,9 +267,10 @@ def _set(link: Link, node: Node, entries: Sequence[Entry], found: Restoration) -
         return _upload(link, node, index, sub, optional=True)
 
     found.remember(node.number, settings_of(held, changed, read))
+    touched = {pdo_of(index) for index, _ in changed}  # and so put back, whole where they are PDOs
     for entry in entries:
-        if not entry.fixed:
-            _download(link, node, entry.index, entry.sub, entry.data)
+        if pdo_of(entry.index) in touched and not entry.fixed:
+            _download(link, node, entry.index, entry.sub, _written(entry, held))
     if differing := _differing(_held(link, node, final), final):
         entry, kept = differing[0]
         holds = "nothing" if kept is None else f"{int.from_bytes(kept, 'little'):X}h"
@@ -248,6 +279,19 @@ def _set(link: Link, node: Node, entries: Sequence[Entry], found: Restoration) -
             f"{int.from_bytes(entry.data, 'little'):X}h, but the drive keeps {holds} there; set the drive, "
             "or adapt the spec to it."
         )
+
+
+def _written(entry: Entry, held: Mapping[Place, bytes | None]) -> bytes:
+    """Tell what to write; a PDO is switched off with what it held, as that must not change before."""
+    before = held[entry.index, entry.sub]
+    if before is None or not _switches_off(entry):
+        return entry.data
+    kept = int.from_bytes(before, "little") | entry.value & NO_REMOTE_REQUEST
+    return (OFF | kept).to_bytes(4, "little")
+
+
+def _switches_off(entry: Entry) -> bool:
+    return entry.index in PDO_PARAMETERS and entry.sub == 1 and bool(entry.value & OFF)
 
 
 def _held(link: Link, node: Node, final: Mapping[Place, Entry]) -> dict[Place, bytes | None]:
@@ -270,6 +314,8 @@ def _differing(
 def _same(entry: Entry, data: bytes | None) -> bool:
     if data is None:
         return entry.optional
+    if _switches_off(entry):
+        return bool(int.from_bytes(data, "little") & OFF)
     if entry.index in PDO_PARAMETERS and entry.sub == 1:
         apart = int.from_bytes(data, "little") ^ int.from_bytes(entry.data, "little")
         return not apart & COB_ID_BITS
@@ -285,12 +331,19 @@ def _interpolation_period(objects: Mapping[Place, bytes | None]) -> Decimal | No
     return Decimal(int.from_bytes(digits, "little")).scaleb(int.from_bytes(exponent, "little", signed=True))
 
 
-def _require_window(link: Link, node: Node) -> None:
-    window = _read(link, node, 0x6065)
+def _require_window(link: Link, node: Node, target: Target, demand: Demand) -> None:
+    """Require a window that stops the axis soon; ours is beside it, but the drive's works without the bus."""
+    window, widest = _read(link, node, 0x6065), useful(demand, target)[node.column]
+    scale = abs(target.axes[node.column].counts_per_si)
+    cure = f"set {widest / scale:.3g} ({widest} counts) or less there, or state can.following_error"
     if window in {0, WINDOW_OFF}:
         raise StreamAborted(
-            f"axis {node.name}: the drive does not watch its following error (6065h is {window:X}h); set it "
-            "there, or state can.following_error."
+            f"axis {node.name}: the drive does not watch its following error (6065h is {window:X}h); {cure}."
+        )
+    if window > widest:
+        raise StreamAborted(
+            f"axis {node.name}: the drive's following error window of {window / scale:.3g} (6065h is "
+            f"{window:X}h) is wider than is useful for this motion; {cure}."
         )
 
 

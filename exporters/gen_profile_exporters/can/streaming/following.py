@@ -1,13 +1,18 @@
-"""Whether drives took the setpoints: what each told of its way, held against the motion."""
+"""Whether drives take the setpoints: what each tells of its way, held against the motion."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can.frames import Integers
+from gen_profile_exporters.can.streaming.watch import WatchedAxis
+from gen_profile_exporters.exporter import Target
 
 LAG = 0.1  # s; a drive may be so late, and is not taken for one that stands still
 SLOW = 0.1  # of the motion's greatest step; slower setpoints tell nothing
@@ -67,3 +72,45 @@ def standstills(
             apart = np.abs(actual[cycles, column] - led[cycles, column]).max()
             found.append(Standstill(column=column, cycles=tuple(map(int, cycles)), apart=int(apart)))
     return tuple(found)
+
+
+class Following:
+    """Holds what each axis tells of its position to where it was led, whatever its drive makes of it.
+
+    Parameters
+    ----------
+    axes : sequence of WatchedAxis
+    target : Target
+    windows : sequence of int
+        How far each may be off, in counts.
+    """
+
+    def __init__(self, axes: Sequence[WatchedAxis], target: Target, windows: Sequence[int]) -> None:
+        self._axes, self._windows = axes, windows
+        self._scales = [abs(axis.counts_per_si) for axis in target.axes]
+        self._led: Integers | None = None
+        self._judged = [0] * len(axes)  # instants of the positions judged last
+
+    def lead(self, led: Integers) -> None:
+        """Take down where the axes are to be by the SYNC that was sent just now, in counts."""
+        self._led = led
+
+    def require(self) -> None:
+        """Require that each position told since the last time is near where the axis was to be.
+
+        Raises
+        ------
+        StreamAborted
+        """
+        for column, axis in enumerate(self._axes):
+            if self._led is None or axis.placed == self._judged[column]:
+                continue
+            self._judged[column] = axis.placed
+            apart, window = abs(axis.position - int(self._led[column])), self._windows[column]
+            if apart > window:
+                off, most = (counts / self._scales[column] for counts in (apart, window))
+                raise StreamAborted(
+                    f"axis {axis.name}: it is {off:.3g} off the motion, more than can.following_error "
+                    f"({most:.3g}, stated or from the motion's lag); check whether it is blocked or runs "
+                    "away, the drive's scaling, and how far it lags."
+                )

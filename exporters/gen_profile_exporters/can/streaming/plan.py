@@ -77,6 +77,10 @@ class SetpointSource(Protocol):
     def columns(self) -> Mapping[str, Integers]:
         """What else is known of every cycle, by name."""
 
+    @property
+    def failure(self) -> str:
+        """Why the motion ended before its end though all was well, a sentence; empty where it did not."""
+
     def operated(self) -> AbstractContextManager[object]:
         """Hold what commands are taken from, as long as axes may move."""
 
@@ -107,6 +111,7 @@ class StreamPlan:
     cycles: tuple[Cycle, ...]
     remarks: tuple[str, ...] = ()
     columns: Mapping[str, Integers] = attrs.field(factory=dict)
+    failure: str = ""
 
     @cached_property
     def demand(self) -> Demand:

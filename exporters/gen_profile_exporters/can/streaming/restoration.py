@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 
 from canopen import SdoAbortedError
 from canopen.sdo.exceptions import SdoError
@@ -14,6 +14,7 @@ from gen_profile_exporters.can.cia402 import MOVING, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS
 from gen_profile_exporters.can.startup import OFF, PDO_PARAMETERS
 from gen_profile_exporters.can.streaming.link import Link
+from gen_profile_exporters.can.streaming.standing import Standing
 
 MAPPING = 0x200  # from a PDO's parameters to its mapping
 MOST_MAPPED = 64  # entries of a mapping (CiA 301); greater counts are of another kind of PDO
@@ -42,20 +43,26 @@ class Restoration:
 
     def remember_watch(self, node: int, watched: bytes | None) -> None:
         """Keep whose heartbeat a drive watched, unless that was ours, of a stream that was killed."""
-        value = int.from_bytes(watched or b"", "little")
-        if value & 0xFFFF and value >> 16 & 0x7F != frames.MASTER:
-            self.remember(node, [(*HEARTBEAT_WATCHED, value.to_bytes(4, "little"))])
+        if watched is not None and not time_of_ours(watched) and int.from_bytes(watched[:2], "little"):
+            self.remember(node, [(*HEARTBEAT_WATCHED, watched)])
 
-    def put_back(self, link: Link) -> tuple[str, ...]:
-        """Set the drives to what they held; tell what they did not take, a sentence each.
+    def put_back(self, link: Link, trembling: Mapping[int, int]) -> tuple[str, ...]:
+        """Set the drives to what they held, once their axes stand; tell what did not go, a sentence each.
 
-        A drive that is still braking needs the ramp of the motion, and gets its own settings afterwards.
+        An axis that still moves needs the ramp of the motion.
+
+        Parameters
+        ----------
+        link : Link
+        trembling : mapping of int to int
+            By how many counts the axis of each node may tremble while it stands.
         """
-        return tuple(words for node in self._found for words in self._put_back_one(link, node))
+        standing = _standing(link, {node: Standing(trembling[node]) for node in self._found})
+        return tuple(words for node in self._found for words in self._put_back_one(link, node, standing))
 
-    def _put_back_one(self, link: Link, node: int) -> Iterator[str]:
-        if not _is_off(link, node):
-            yield f"Node {node} does not say that it is switched off; its settings stay those of the motion."
+    def _put_back_one(self, link: Link, node: int, standing: Container[int]) -> Iterator[str]:
+        if node not in standing:
+            yield f"Node {node} is not known to stand; its settings stay those of the motion."
             return
         for index, sub, data in self._found[node]:
             try:
@@ -67,18 +74,41 @@ class Restoration:
                 return
 
 
-def _is_off(link: Link, node: int) -> bool:
-    """Wait until a drive is not powered to move; asked by SDO, apart from what it told before."""
-    deadline = link.clock.now() + PATIENCE
-    while link.clock.now() < deadline:
-        try:
-            told = link.sdo(node).upload(pdos.STATUSWORD.index, pdos.STATUSWORD.sub)
-        except SILENCE:
-            return False
-        if state_of(int.from_bytes(told[:2], "little")) not in MOVING:
-            return True
+def _standing(link: Link, measured: Mapping[int, Standing]) -> set[int]:
+    """Wait until drives are not powered to move and their axes stand; asked by SDO, not believed."""
+    waiting, standing, deadline = set(measured), set[int](), link.clock.now() + PATIENCE
+    while waiting and link.clock.now() < deadline:
+        for node in sorted(waiting):
+            try:
+                if _is_off(link, node):
+                    measured[node].take(_asked(link, node, pdos.ACTUAL_POSITION), link.clock.now())
+                    standing |= {node} if measured[node].proved() else set()
+            except SILENCE:
+                waiting.discard(node)
+        waiting -= standing
         link.wait_until(link.clock.now() + PATIENCE // 100)
-    return False
+    return standing
+
+
+def _is_off(link: Link, node: int) -> bool:
+    return state_of(_asked(link, node, pdos.STATUSWORD)) not in MOVING
+
+
+def _asked(link: Link, node: int, field: pdos.Field) -> int:
+    told = link.sdo(node).upload(field.index, field.sub)
+    (value,) = pdos.packing([field]).unpack_from(told)
+    return int(value)
+
+
+def time_of_ours(watched: bytes | None) -> int:
+    """Tell for how long in ns a drive waits for our heartbeat, by its 1016h:01; 0 where for none of ours."""
+    value = int.from_bytes(watched or b"", "little")
+    return (value & 0xFFFF) * NANOSECONDS // 1000 if value >> 16 & 0x7F == frames.MASTER else 0
+
+
+def pdo_of(index: int) -> int:
+    """Tell whose parameters an object or mapping belongs to; itself where it is of no PDO."""
+    return index - MAPPING if index - MAPPING in PDO_PARAMETERS else index
 
 
 def settings_of(
@@ -96,14 +126,14 @@ def settings_of(
         Reads another object of the drive.
     """
     changed = [place for place in changed if place != HEARTBEAT_WATCHED]
-    pdos = {index if index in PDO_PARAMETERS else index - MAPPING for index, _ in changed}
-    pdos = {index for index in pdos & PDO_PARAMETERS if held.get((index + MAPPING, 0)) is not None}
+    pdos = {pdo_of(index) for index, _ in changed} & PDO_PARAMETERS
+    pdos = {index for index in pdos if held.get((index + MAPPING, 0)) is not None}
     for index in sorted(pdos):
         remapped = any(place[0] == index + MAPPING for place in changed)
         yield from _pdo(index, held, read, remapped=remapped)
     for index, sub in changed:
         data = held[index, sub]
-        if data is not None and not {index, index - MAPPING} & pdos:
+        if data is not None and pdo_of(index) not in pdos:
             yield index, sub, data
 
 

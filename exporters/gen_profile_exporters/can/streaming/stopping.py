@@ -1,17 +1,18 @@
 """The quick stop: the one place that stops axes, and does nothing else.
 
 It is sent at once by PDO and repeated every cycle until every drive says, after it was sent, that it is not
-powered to move. The drives brake on their own ramp (6085h), which needs nothing more from a controller or a
-bus that just proved unreliable. A drive that does not obey at once, such as one that left the NMT state
-operational and takes no PDOs, gets it by SDO as well; and when one still does not after its time-out, our
-heartbeat ends, and it stops by itself, as it was set up to. What happened is told by a value; whoever reports
-it does so afterwards.
+powered to move, and has told the same place for a while. The drives brake on their own ramp (6085h), which
+needs nothing more from a controller or a bus that just proved unreliable. A drive that does not obey at once,
+such as one that left the NMT state operational and takes no PDOs, gets it by SDO as well; and when one still
+does not after its time-out, our heartbeat ends, and it stops by itself, as it was set up to. What happened is
+told by a value; whoever reports it does so afterwards.
 """
 
 from __future__ import annotations
 
 import itertools
 import struct
+from collections.abc import Mapping
 from contextlib import suppress
 
 import attrs
@@ -21,14 +22,13 @@ from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import Controlword
 from gen_profile_exporters.can.host.clock import NANOSECONDS
+from gen_profile_exporters.can.pdos import Field
 from gen_profile_exporters.can.streaming.pacer import Pacer
 from gen_profile_exporters.can.streaming.watch import Watch, WatchedAxis
 
 AGAIN = NANOSECONDS // 20  # after which an SDO counts as lost
-_SDO = struct.Struct("<BHBHxx")  # an expedited transfer of 16 bits: command, index, subindex, data (CiA 301)
+_SDO = struct.Struct("<BHB4s")  # an expedited transfer: command, index, subindex, data (CiA 301)
 _WRITE, _READ, _READ_ANSWER = 0x2B, 0x40, 0x40  # commands; of an answer the upper three bits
-CONTROLWORD = (pdos.CONTROLWORD.index, pdos.CONTROLWORD.sub)
-STATUSWORD = (pdos.STATUSWORD.index, pdos.STATUSWORD.sub)
 
 
 @attrs.frozen(kw_only=True)
@@ -37,20 +37,21 @@ class Stop:
 
     Attributes
     ----------
-    unconfirmed : tuple of str
-        Axes whose drives did not say that they are switched off.
+    unconfirmed : mapping of str to str
+        What is known of each axis that is not known to stand.
     """
 
-    unconfirmed: tuple[str, ...]
+    unconfirmed: Mapping[str, str]
 
     @property
     def words(self) -> str:
         """A sentence."""
         if not self.unconfirmed:
             return "The axes were stopped."
+        known = "; ".join(f"{name}: {what}" for name, what in self.unconfirmed.items())
         return (
-            f"Not every drive confirmed the quick stop (missing: {', '.join(self.unconfirmed)}): they stop "
-            "by their own time-outs; make sure that the axes stand before you approach them."
+            f"Not every axis is known to stand ({known}): our heartbeat ended, without which a drive is to "
+            "stop by itself; make sure that the axes stand before you approach them."
         )
 
 
@@ -82,16 +83,16 @@ def quick_stop(pacer: Pacer, watch: Watch, patience: int) -> Stop:
                 pacer.beat()
         with suppress(StreamAborted):
             pacer.link.wait_until(clock.now() + pacer.period)
-        unconfirmed = tuple(axis.name for axis in watch.axes if not axis.stands(begun))
+        unconfirmed = [axis for axis in watch.axes if not axis.stands(begun)]
         if not unconfirmed or clock.now() - begun > patience:
-            return Stop(unconfirmed=unconfirmed)
+            return Stop(unconfirmed={axis.name: axis.known(begun) for axis in unconfirmed})
         for service in services:
             if service.begun or not service.axis.obeys(begun):
                 service.ask()
 
 
 class _Service:
-    """Quick stop by SDO and what the statusword then is, in turn, for a drive that takes no PDOs."""
+    """Quick stop by SDO, then statusword and position, in turn, for a drive that takes no PDOs."""
 
     def __init__(self, pacer: Pacer, axis: WatchedAxis) -> None:
         self.axis = axis
@@ -99,7 +100,11 @@ class _Service:
         self.begun = False
         self._asked: int | None = None  # when the request was sent that is not answered yet
         self._requests = itertools.cycle(
-            [(_WRITE, *CONTROLWORD, Controlword.QUICK_STOP), (_READ, *STATUSWORD, 0)]
+            [
+                _request(_WRITE, pdos.CONTROLWORD, Controlword.QUICK_STOP),
+                _request(_READ, pdos.STATUSWORD),
+                _request(_READ, pdos.ACTUAL_POSITION),
+            ]
         )
         pacer.link.subscribe(self._take)
 
@@ -108,16 +113,21 @@ class _Service:
         self.begun = True
         if self._asked is None or self._clock.now() - self._asked > AGAIN:
             self._asked = self._clock.now()
-            request = _SDO.pack(*next(self._requests))
-            _try(self._pacer, frames.message(frames.SDO_REQUEST + self.axis.node, request))
+            _try(self._pacer, frames.message(frames.SDO_REQUEST + self.axis.node, next(self._requests)))
 
     def _take(self, message: can.Message) -> None:
         if message.arbitration_id != frames.SDO_ANSWER + self.axis.node or len(message.data) != _SDO.size:
             return
         self._asked = None
-        command, index, sub, value = _SDO.unpack(message.data)
-        if command & 0xE0 == _READ_ANSWER and (index, sub) == STATUSWORD:
-            self.axis.statusword, self.axis.heard = value, self._clock.now()
+        command, index, sub, data = _SDO.unpack(message.data)
+        for field in (pdos.STATUSWORD, pdos.ACTUAL_POSITION):
+            if command & 0xE0 == _READ_ANSWER and (index, sub) == (field.index, field.sub):
+                (value,) = pdos.packing([field]).unpack_from(data)
+                self.axis.take(field, value, self._clock.now())
+
+
+def _request(command: int, field: Field, value: int = 0) -> bytes:
+    return _SDO.pack(command, field.index, field.sub, value.to_bytes(4, "little"))
 
 
 def _try(pacer: Pacer, frame: can.Message) -> None:

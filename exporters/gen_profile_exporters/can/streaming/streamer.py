@@ -17,18 +17,22 @@ import numpy as np
 from gen_profile.errors import StreamAborted
 from gen_profile_exporters.can import frames, pdos, startup
 from gen_profile_exporters.can.cia402 import FOLLOWS, Controlword, State
+from gen_profile_exporters.can.following_window import windows
 from gen_profile_exporters.can.frames import Integers
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 from gen_profile_exporters.can.scaling import magnitude_counts
 from gen_profile_exporters.can.streaming import configuration
 from gen_profile_exporters.can.streaming.approach import approach
+from gen_profile_exporters.can.streaming.following import Following
 from gen_profile_exporters.can.streaming.link import Link
 from gen_profile_exporters.can.streaming.pacer import Pacer
 from gen_profile_exporters.can.streaming.plan import Cycle, SetpointSource, Step, cycles_of, preload
 from gen_profile_exporters.can.streaming.record import Book, Phase, Record, Recorder
 from gen_profile_exporters.can.streaming.restoration import Restoration
+from gen_profile_exporters.can.streaming.standing import STILL, Standing, trembling
 from gen_profile_exporters.can.streaming.stopping import quick_stop
 from gen_profile_exporters.can.streaming.watch import SupervisionLevel, Watch, WatchedAxis
+from gen_profile_exporters.exporter import Target
 
 ALIGN_CYCLES = 10  # of preloads before power goes on
 SETTLED_CYCLES = 10  # within the tolerance, before power goes off
@@ -69,22 +73,16 @@ class Streamer:
         self._reset_fault = reset_fault
         self._link = Link(bus, clock)
         self._pacer = Pacer(self._link, target)
-        layout = pdos.layout(target.can)
         self._watch = Watch(
-            [
-                WatchedAxis(axis.name, node, own[layout.feedback])
-                for axis, node, own in zip(
-                    target.axes, frames.nodes(target), frames.cob_ids(target), strict=True
-                )
-            ],
+            _watched(target),
             clock,
             period=self._pacer.period,
             heartbeat=startup.heartbeat_ms(target.can) * NANOSECONDS // 1000,
             timeout=self._pacer.timeout,
-            told=layout.told,
             ours=frames.commanding_cob_ids(target),
         )
         self._link.subscribe(self._watch.take)
+        self._following = Following(self._watch.axes, target, windows(source.demand, target))
         self._recorder = Recorder(book or Book.blank(source.most, len(target.axes)))
         self._found = Restoration()
         self._left: tuple[str, ...] = ()  # of the settings found, what could not be put back
@@ -92,7 +90,6 @@ class Streamer:
         self._can_end = False  # whether the source issues setpoints now
         self._ended = ""  # why it was asked to end
         self._commanded = False
-        self._led: Integers | None = None  # where the axes are to be by the latest SYNC
         self._answers_for = -1  # cycle whose answers are still to come
         self._sent_at = 0
 
@@ -124,8 +121,8 @@ class Streamer:
         except BaseException:  # a bug, maybe, but the axes must not run on
             self._stop()
             raise
-        if self._ended:
-            return self._record(Phase.ABORTED, f"{self._ended} The axes were stopped without sway.")
+        if why := self._ended or self._source.failure:
+            return self._record(Phase.ABORTED, f"{why} The axes were stopped without sway.")
         return self._record(Phase.DONE, "")
 
     def _begin(self, phase: Phase) -> None:
@@ -169,7 +166,7 @@ class Streamer:
         self._begin(Phase.ALIGN)
         self._commanded = True
         self._pacer.standing = self._preload = preload(self._target, standing)
-        self._led = np.array(standing)
+        self._following.lead(np.array(standing))
         configuration.start(self._link, self._target)
         self._pacer.begin()
         for _ in range(ALIGN_CYCLES):
@@ -189,8 +186,7 @@ class Streamer:
         if len(way.position):
             self._begin(Phase.APPROACH)
         for messages, led in zip(cycles_of(way, self._target), way.at_sync, strict=True):
-            self._cycle(messages)
-            self._led = led
+            self._cycle(messages, led)
 
     def _stream(self, standing: Sequence[int]) -> Step:
         """Send every cycle at its instant; return the last."""
@@ -212,7 +208,8 @@ class Streamer:
             pacer.send(last.messages)
             self._sent_at = self._clock.now()
             self._recorder.take_sent(cycle, self._sent_at - pacer.due)
-            self._led, self._answers_for = last.at_sync, cycle
+            self._following.lead(last.at_sync)
+            self._answers_for = cycle
             sent, cycle = last, cycle + 1
             due = source.step(cycle)  # now, while there is time
             if last.words:
@@ -225,14 +222,17 @@ class Streamer:
         """Repeat the last setpoint until the axes stand at it."""
         self._begin(Phase.HOLD)
         allowed = [magnitude_counts(self._target.can.start_tolerance, axis) for axis in self._target.axes]
-        settled, deadline = 0, self._clock.now() + PATIENCE
+        settled, heard, deadline = 0, 0, self._clock.now() + PATIENCE
         while settled < SETTLED_CYCLES:
-            self._cycle(last.messages)
-            self._led = last.position
+            self._cycle(last.messages, last.position)
             apart = [
                 abs(axis.position - int(at)) for axis, at in zip(self._watch.axes, last.position, strict=True)
             ]
-            settled = settled + 1 if all(a <= b for a, b in zip(apart, allowed, strict=True)) else 0
+            before, heard = heard, min(axis.heard for axis in self._watch.axes)
+            if any(a > b for a, b in zip(apart, allowed, strict=True)):
+                settled = 0
+            elif heard > before:  # what was told once counts once
+                settled += 1
             if self._clock.now() > deadline:
                 raise StreamAborted(f"The axes do not settle at the target; they stand {apart} counts off.")
 
@@ -266,7 +266,7 @@ class Streamer:
         """Time in ns in which every axis comes to rest on its ramp from its greatest velocity."""
         demand = self._source.demand
         ramps = [v / braking for v, braking in zip(demand.velocity, demand.quick_stop, strict=True)]
-        return STOP_MARGIN + 10 * self._pacer.period + int(max(ramps) * NANOSECONDS)
+        return STOP_MARGIN + STILL + 10 * self._pacer.period + int(max(ramps) * NANOSECONDS)
 
     def _command(self, word: int, state: State, setpoints: Cycle, *, bits: int = 0) -> None:
         """Send a controlword every cycle until all drives are in a state."""
@@ -280,12 +280,14 @@ class Streamer:
                 )
             self._cycle(cycle)
 
-    def _cycle(self, messages: Cycle) -> None:
-        """Send frames and SYNC at the next instant, judged before."""
+    def _cycle(self, messages: Cycle, led: Integers | None = None) -> None:
+        """Send frames and SYNC at the next instant, by which the axes are led to a place; judged before."""
         self._judge()
         self._pacer.missed()
         self._pacer.send(messages)
         self._sent_at = self._clock.now()
+        if led is not None:
+            self._following.lead(led)
         self._pacer.next()
 
     def _judge(self) -> None:
@@ -295,10 +297,8 @@ class Streamer:
         told = all(axis.heard >= self._sent_at for axis in self._watch.axes)
         if told and self._answers_for >= 0:
             self._recorder.take_answer(self._answers_for, [axis.position for axis in self._watch.axes])
-        following = self._watch.alert is SupervisionLevel.FOLLOWING
-        if told and following and self._target.can.mode == "csv":
-            self._require_following()
         self._answers_for = -1
+        self._following.require()
 
     def _require_well(self) -> None:
         self._watch.require_well()
@@ -307,18 +307,6 @@ class Streamer:
             if self._ended or not self._can_end or not self._source.end():
                 raise StreamAborted(asked)
             self._ended = asked
-
-    def _require_following(self) -> None:
-        """Hold the axes to the motion where no drive does: in csv it controls its velocity only."""
-        can = self._target.can
-        assert self._led is not None  # drives are told where to be before they are enabled
-        for axis, scale, at in zip(self._watch.axes, self._target.axes, self._led, strict=True):
-            apart = abs(axis.position - int(at))
-            if apart > magnitude_counts(can.following_error or can.start_tolerance, scale):
-                raise StreamAborted(
-                    f"axis {axis.name}: it is {apart / abs(scale.counts_per_si):.3g} off the motion, more "
-                    "than can.following_error; check the drive's scaling, or whether the axis is blocked."
-                )
 
     def _require_skippable(self, sent: Step, following: Step, cycle: int, missed: int) -> None:
         """Pass over one setpoint that is too late, if the next one is no greater a step than any other."""
@@ -345,3 +333,18 @@ class Streamer:
             launched=self._link.launching is not None,
             period=self._pacer.period,
         )
+
+
+def _watched(target: Target) -> list[WatchedAxis]:
+    """Make an axis to be watched for each of a target's."""
+    told = pdos.layout(target.can).told
+    drives = zip(target.axes, frames.nodes(target), frames.cob_ids(target), strict=True)
+    return [
+        WatchedAxis(
+            name=axis.name,
+            node=node,
+            feedback={own[pdo]: fields for pdo, fields in told.items()},
+            standing=Standing(trembling(axis)),
+        )
+        for axis, node, own in drives
+    ]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
+from functools import partial
 
 import attrs
 import can
@@ -13,11 +14,13 @@ from gen_profile_exporters.can import frames, pdos
 from gen_profile_exporters.can.cia402 import FAULTS, FOLLOWING_ERROR, FOLLOWS, MOVING, State, state_of
 from gen_profile_exporters.can.host.clock import NANOSECONDS, Clock
 from gen_profile_exporters.can.pdos import Field
+from gen_profile_exporters.can.streaming.standing import Standing
 
 OPERATIONAL = 5
 # command specifiers of SDO requests (CiA 301) that change nothing: upload, its segments, abort, block upload
 READING = {2, 3, 4, 5}
 HEARTBEATS_MISSED = 3
+LEFT_ALONE = {0x8130, 0x8250}  # emergencies of CiA 301: no heartbeat came any more, no setpoint
 BUS_OFF, CONTROLLER_STATE, PASSIVE = 0x40, 0x04, 0x30  # of SocketCAN's error frames (linux/can/error.h)
 
 
@@ -38,34 +41,60 @@ class WatchedAxis:
     ----------
     name : str
     node : int
-    feedback : int
-        COB-ID of what the drive tells at each SYNC.
+    feedback : mapping of int to tuple of Field
+        What the drive tells at each SYNC, by COB-ID: statusword and position, together or apart.
+    standing : Standing
+        Whether it stands, by what it told of its position.
     statusword, position : int
-        Of its last feedback; the statusword is 0 before the first one.
-    heard, beat : int
-        Instants in ns of the last feedback and heartbeat.
+        The latest; 0 before the first ones.
+    stated, placed, beat : int
+        Instants in ns of the latest statusword, position and heartbeat; 0 before the first ones.
     """
 
     name: str
     node: int
-    feedback: int
+    feedback: Mapping[int, tuple[Field, ...]]
+    standing: Standing
     statusword: int = 0
     position: int = 0
-    heard: int = 0
+    stated: int = 0
+    placed: int = 0
     beat: int = 0
+
+    @property
+    def heard(self) -> int:
+        """Instant in ns since when nothing is missing of its feedback."""
+        return min(self.stated, self.placed)
 
     @property
     def state(self) -> State:
         """State that the statusword tells."""
         return state_of(self.statusword)
 
+    def take(self, field: Field, value: int, now: int) -> None:
+        """Take down what it told."""
+        if field == pdos.STATUSWORD:
+            self.statusword, self.stated = value, now
+        elif field == pdos.ACTUAL_POSITION:
+            self.position, self.placed = value, now
+            self.standing.take(value, now)
+
     def stands(self, since: int) -> bool:
-        """Whether the drive said after an instant that it is not powered to move."""
-        return self.heard > since and self.state not in MOVING
+        """Whether the drive said after an instant that it is not powered to move, and the axis stood."""
+        return self.stated > since and self.state not in MOVING and self.standing.proved(since)
 
     def obeys(self, since: int) -> bool:
         """Whether the drive said after an instant that it no longer follows setpoints."""
-        return self.heard > since and self.state is not State.ENABLED
+        return self.stated > since and self.state not in {State.ENABLED, State.UNKNOWN}
+
+    def known(self, since: int) -> str:
+        """Say what is known of an axis since an instant that does not stand, as far as anybody knows."""
+        if self.heard <= since:
+            return "no answer"
+        if self.state is State.UNKNOWN:
+            return f"statusword {self.statusword:04X}h, which is no state of CiA 402"
+        seen = "" if self.state in MOVING else ", but not seen to stand"
+        return f"{self.state.words!r}{seen}"
 
 
 class Watch:
@@ -79,8 +108,6 @@ class Watch:
         SYNC period, and period of the drives' heartbeats, in ns.
     timeout : int
         How long a drive may leave SYNC unanswered, in ns.
-    told : sequence of Field
-        What the drives' feedback holds.
     ours : iterable of int
         COB-IDs of commands and setpoints, which nobody else may send.
     """
@@ -93,26 +120,20 @@ class Watch:
         period: int,
         heartbeat: int,
         timeout: int,
-        told: Sequence[Field],
         ours: Iterable[int],
     ) -> None:
         self.axes = tuple(axes)
         self.alert = SupervisionLevel.LISTENING
         self.fault: str | None = None
         self._clock, self._period, self._heartbeat, self._timeout = clock, period, heartbeat, timeout
-        self._feedback = pdos.packing(told)
-        used = [field for field in told if field.used]
-        self._statusword, self._position = map(used.index, (pdos.STATUSWORD, pdos.ACTUAL_POSITION))
-        self._takers = {
-            cob_id: (take, axis)
-            for axis in self.axes
-            for cob_id, take in (
-                (axis.feedback, self._take_feedback),
-                (frames.EMCY + axis.node, self._take_emergency),
-                (frames.HEARTBEAT + axis.node, self._take_heartbeat),
-                (frames.SDO_REQUEST + axis.node, self._take_request),
-            )
-        }
+        self._demanded = 0  # instant since when drives are to answer
+        self._takers: dict[int, Callable[[bytes], None]] = {}
+        for axis in self.axes:
+            for cob_id, fields in axis.feedback.items():
+                self._takers[cob_id] = partial(self._take_feedback, axis, fields)
+            self._takers[frames.EMCY + axis.node] = partial(self._take_emergency, axis)
+            self._takers[frames.HEARTBEAT + axis.node] = partial(self._take_heartbeat, axis)
+            self._takers[frames.SDO_REQUEST + axis.node] = partial(self._take_request, axis)
         self._ours = {frames.NMT, frames.SYNC, frames.HEARTBEAT + frames.MASTER, *ours}
 
     def take(self, message: can.Message) -> None:
@@ -123,14 +144,12 @@ class Watch:
             if message.arbitration_id in self._ours:
                 self._find_second_controller(message.arbitration_id)
             elif message.arbitration_id in self._takers:
-                take, axis = self._takers[message.arbitration_id]
-                take(axis, bytes(message.data))
+                self._takers[message.arbitration_id](bytes(message.data))
 
     def raise_alert(self, alert: SupervisionLevel) -> None:
         """Demand more from now on."""
         if self.alert < SupervisionLevel.CYCLIC <= alert:
-            for axis in self.axes:
-                axis.heard = axis.beat = self._clock.now()
+            self._demanded = self._clock.now()
         self.alert = alert
 
     def require_well(self) -> None:
@@ -159,21 +178,24 @@ class Watch:
         if self.alert < SupervisionLevel.CYCLIC or not data or data[0] >> 5 not in READING:
             self._find_second_controller(frames.SDO_REQUEST + axis.node)
 
-    def _take_feedback(self, axis: WatchedAxis, data: bytes) -> None:
-        if len(data) == self._feedback.size:
-            values = self._feedback.unpack(data)
-            axis.statusword, axis.position = values[self._statusword], values[self._position]
-            axis.heard = self._clock.now()
-            self._look_at(axis)
+    def _take_feedback(self, axis: WatchedAxis, fields: Sequence[Field], data: bytes) -> None:
+        packing = pdos.packing(fields)
+        if len(data) == packing.size:
+            used = [field for field in fields if field.used]
+            for field, value in zip(used, packing.unpack(data), strict=True):
+                axis.take(field, value, self._clock.now())
+            if pdos.STATUSWORD in used:
+                self._look_at(axis)
         elif self.alert >= SupervisionLevel.CYCLIC:
             self._find(
-                f"axis {axis.name}: feedback of {len(data)} bytes instead of {self._feedback.size}; "
+                f"axis {axis.name}: feedback of {len(data)} bytes instead of {packing.size}; "
                 "the drive's mapping was changed."
             )
 
     def _take_emergency(self, axis: WatchedAxis, data: bytes) -> None:
         code = int.from_bytes(data[:2], "little")
-        if code:
+        left = code in LEFT_ALONE and self.alert < SupervisionLevel.CYCLIC  # by a stream that was killed
+        if code and not left:
             self._find(f"axis {axis.name}: the drive reports emergency {code:04X}h; see its manual.")
 
     def _take_heartbeat(self, axis: WatchedAxis, data: bytes) -> None:
@@ -194,12 +216,13 @@ class Watch:
     def _look_for_silence(self) -> None:
         now = self._clock.now()
         for axis in self.axes:
-            if now - axis.heard > self._timeout + self._period:
+            heard, beat = max(axis.heard, self._demanded), max(axis.beat, self._demanded)
+            if now - heard > self._timeout + self._period:
                 self._find(
-                    f"axis {axis.name}: no feedback for {(now - axis.heard) / NANOSECONDS * 1e3:.3g} ms; "
+                    f"axis {axis.name}: no feedback for {(now - heard) / NANOSECONDS * 1e3:.3g} ms; "
                     "the drive, the cable or SYNC failed."
                 )
-            if now - axis.beat > HEARTBEATS_MISSED * self._heartbeat + self._period:
+            if now - beat > HEARTBEATS_MISSED * self._heartbeat + self._period:
                 self._find(f"axis {axis.name}: no heartbeat; the drive or the cable failed.")
 
     def _look_at(self, axis: WatchedAxis) -> None:

@@ -20,8 +20,9 @@ from gen_profile.errors import OutputError, StreamAborted
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from gen_profile.streaming.outcome import StreamOutcome
+    from gen_profile.streaming.outcome import Source, StreamOutcome
 
+FEW_ROWS, CELL = 10_000, 16  # of a log of unknown length, and bytes of a number in it
 _MISSES = ("extrapolate", "hold", "stop")
 
 
@@ -99,6 +100,8 @@ def stream(table: Path | None, as_json: bool, **options: Any) -> None:
             print_outcome(plan, plan_words(plan, units(source)), as_json)
             return
         port = request.port(source.spec.can)
+        if table is not None:
+            _require_room(table, source)
         notes = request.measured(source, tell)
     with request.shown(source) as (tell_phase, book):
         outcome = run.stream(
@@ -180,6 +183,24 @@ for parameter in stream.params:
         parameter.metavar = "[ARTEFACT|SPEC.toml]"
 
 
+def _require_room(table: Path, source: Source) -> None:
+    """Refuse to begin where the disk cannot take the log; later, the motion would be done without it.
+
+    Raises
+    ------
+    OutputError
+    """
+    import shutil
+
+    try:
+        free = shutil.disk_usage(table.parent).free
+    except OSError:  # writing it will tell
+        return
+    rows, columns = source.plan.planned or FEW_ROWS, 1 + 2 * len(source.axes)
+    if free < rows * columns * CELL:
+        raise OutputError(f"--log {table}: its disk has no room for it ({free} bytes); choose another place.")
+
+
 def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None:
     """Report what became of a stream, by every way that still takes it, and end in the exit code of that."""
     import attrs
@@ -187,13 +208,17 @@ def _conclude(outcome: StreamOutcome, table: Path | None, as_json: bool) -> None
     from gen_profile.artefacts.writing import deliver
 
     code, complaints = (0, []) if outcome.done else (StreamAborted.exit_code, [_aborted(outcome)])
+    unwritten: dict[str, Any] | None = None
     if table is not None:
         try:
             deliver(table, outcome.table())
         except OutputError as error:
+            sentences = f"{error} The motion is done all the same." if outcome.done else str(error)
             outcome = attrs.evolve(outcome, notes=(*outcome.notes, str(error)))
-            code, complaints = code or OutputError.exit_code, [*complaints, f"Error: {error}"]
-    said = [_refusal(print_outcome, outcome.to_dict(), outcome_words(outcome), as_json)]
+            code, complaints = code or OutputError.exit_code, [*complaints, f"Error: {sentences}"]
+            unwritten = {"type": type(error).__name__, "message": sentences, "exit_code": code}
+    document = {**outcome.to_dict(), "error": unwritten}
+    said = [_refusal(print_outcome, document, outcome_words(outcome), as_json)]
     said += [_refusal(click.echo, complaint, err=True) for complaint in complaints]
     refusals = [refusal for refusal in said if refusal is not None]
     if refusals and not code:

@@ -155,7 +155,7 @@ class StreamRequest:
         from gen_profile.streaming import live_page, live_terminal
         from gen_profile.streaming.live import watched
 
-        if self.block is not None and self.commands_path is None:  # by hand
+        if self.block is not None and sys.stderr.isatty():  # where the axes are, and how far a stop leads
             with status_line() as tell:
                 yield tell, None
         elif self.live == "terminal":
