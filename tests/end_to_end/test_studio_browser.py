@@ -35,9 +35,9 @@ def browser():
 
 @pytest.fixture(scope="module")
 def page(browser):
-    with studio("--preset", "paper") as (address, _):
+    with studio("--preset", "paper") as running:
         browser.size(1400, 900)
-        browser.visit(address)
+        running.open(browser)
         browser.wait(SETTLED.format("passed"))
         yield browser
         assert browser.complaints() == []

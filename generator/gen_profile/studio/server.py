@@ -1,9 +1,4 @@
-"""The studio's page and what it says: on this machine only, for who knows the address.
-
-Three things keep others out: the server listens on the loopback interface, its address holds a token that
-nobody can guess, and requests that name another host or come from another page are refused (a page elsewhere
-could have its own name resolve to this machine: CWE-350).
-"""
+"""The studio's page and what it says, on this machine alone, to browsers that were let in."""
 
 from __future__ import annotations
 
@@ -13,12 +8,12 @@ import json
 import math
 import secrets
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import attrs
-import tornado.httpserver
 import tornado.netutil
 import tornado.web
 import tornado.websocket
@@ -26,6 +21,7 @@ import tornado.websocket
 from gen_profile.errors import GenProfileError, OutputError, SpecError
 from gen_profile.spec.reading import presets
 from gen_profile.studio.desk import Desk
+from gen_profile.studio.entrance import PATIENCE, BoundedServer, Entering, Entrance, Guarded, started_browser
 from gen_profile.studio.orders import DriveQuestion, LogQuestion, Order, Question
 from gen_profile.studio.state import StudioState, WrittenSpec, opened_start, preset_start
 from gen_profile.studio.workers import Message, Part, Workers
@@ -44,10 +40,10 @@ KINDS = {
     ".json": "application/json",
 }
 ASSETS = {
-    "": ("gen_profile.studio", "studio.html"),
     **{
         name: ("gen_profile.studio", name)
         for name in (
+            "studio.html",
             "studio.css",
             "studio.js",
             "knobs.js",
@@ -132,46 +128,10 @@ class Studio:
         return {path: digest for path, digest in found.items() if self.agreed.get(path) != digest}
 
 
-class Guarded(tornado.web.RequestHandler):
-    """Answers only who knows the address, and calls this machine by its number."""
-
-    @property
-    def host(self) -> str:
-        """Under which this server is known."""
-        return str(self.settings["host"])
-
-    def prepare(self) -> None:
-        """Refuse strangers."""
-        token = self.path_kwargs.get("token", "")
-        known = secrets.compare_digest(token, self.settings["token"])
-        here = self.request.headers.get("Origin", f"http://{self.host}") == f"http://{self.host}"
-        elsewhere = self.request.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin")
-        if not known or self.request.host != self.host or not here or elsewhere:
-            raise tornado.web.HTTPError(404)
-
-    def set_default_headers(self) -> None:
-        """Let nothing but the page's own scripts run, and nothing be kept, framed or told to others."""
-        host = self.settings["host"]
-        self.set_header(
-            "Content-Security-Policy",
-            f"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
-            f"connect-src 'self' ws://{host}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
-        )
-        self.set_header("Cache-Control", "no-store")
-        self.set_header("X-Content-Type-Options", "nosniff")
-        self.set_header("Referrer-Policy", "no-referrer")
-        self.set_header("Cross-Origin-Resource-Policy", "same-origin")
-        self.clear_header("Server")
-
-    def write_error(self, status_code: int, **_: Any) -> None:
-        """Say nothing to strangers."""
-        self.finish(f"{status_code}")
-
-
 class Asset(Guarded):
     """A file of the page."""
 
-    def get(self, token: str, name: str) -> None:
+    def get(self, name: str = "studio.html") -> None:
         """Send it."""
         if name not in ASSETS:
             raise tornado.web.HTTPError(404)
@@ -180,10 +140,14 @@ class Asset(Guarded):
         self.finish((resources.files(package) / "assets" / file).read_bytes())
 
 
+class Page(Entering, Asset):
+    """The page itself."""
+
+
 class Download(Guarded):
     """A file that a page had made."""
 
-    def get(self, token: str, name: str) -> None:
+    def get(self, name: str) -> None:
         """Send it under its name."""
         made = self.settings["made"]
         if name not in made:
@@ -372,7 +336,14 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         return {"name": name, "bytes": len(content), "link": f"made/{key}"}
 
 
-def serve(start: WrittenSpec, port: int, ready: Callable[[str], None]) -> None:
+def serve(
+    start: WrittenSpec,
+    port: int,
+    *,
+    browser: bool,
+    ready: Callable[[str, str], None],
+    renew: Callable[[str], None],
+) -> None:
     """Serve pages until interrupted.
 
     Parameters
@@ -380,18 +351,28 @@ def serve(start: WrittenSpec, port: int, ready: Callable[[str], None]) -> None:
     start : WrittenSpec
     port : int
         0 for any that is free.
-    ready : str → None
-        Is told the address.
+    browser : bool
+        Whether the user's browser is started.
+    ready : (str, str) → None
+        Is told the address, and the code for another browser.
+    renew : str → None
+        Is told another code when one was used.
 
     Raises
     ------
     OutputError
         The port is taken.
     """
-    asyncio.run(_serve(start, port, ready))
+    asyncio.run(_serve(start, port, browser, ready, renew))
 
 
-async def _serve(start: WrittenSpec, port: int, ready: Callable[[str], None]) -> None:
+async def _serve(
+    start: WrittenSpec,
+    port: int,
+    browser: bool,
+    ready: Callable[[str, str], None],
+    renew: Callable[[str], None],
+) -> None:
     workers = Workers()
     studio = Studio(start=start, workers=workers)
     if not start.programs:  # the first picture is on its way before the browser is
@@ -402,27 +383,37 @@ async def _serve(start: WrittenSpec, port: int, ready: Callable[[str], None]) ->
     except OSError as error:
         workers.close()
         raise OutputError(f"port {port}: {error.strerror}; leave it out to take one that is free.") from error
-    host, token = f"{LOOPBACK}:{sockets[0].getsockname()[1]}", secrets.token_urlsafe(16)
+    entrance = Entrance(host=f"{LOOPBACK}:{sockets[0].getsockname()[1]}", renew=renew)
+    _server(studio, entrance).add_sockets(sockets)
+    ready(f"http://{entrance.host}/", entrance.code)
+    with ExitStack() as stack:
+        stack.callback(workers.close)
+        if browser:
+            with suppress(OSError):  # without a file there is still the code
+                stack.enter_context(started_browser(entrance))
+        await asyncio.Event().wait()
+
+
+def _server(studio: Studio, entrance: Entrance) -> BoundedServer:
     application = tornado.web.Application(
         [
-            (r"/(?P<token>[\w-]+)/(?P<name>live)", Conversation),
-            (r"/(?P<token>[\w-]+)/made/(?P<name>[\w-]+)", Download),
-            (r"/(?P<token>[\w-]+)/(?P<name>[\w.-]*)", Asset),
-            (r"/.*", Guarded),
+            ("/", Page),
+            ("/live", Conversation),
+            (r"/made/(?P<name>[\w-]+)", Download),
+            (r"/(?P<name>.*)", Asset),
         ],
         websocket_max_message_size=MOST_UPLOAD,
         log_function=lambda _: None,
         studio=studio,
-        host=host,
-        token=token,
+        entrance=entrance,
         made={},
     )
-    server = tornado.httpserver.HTTPServer(
-        application, max_body_size=MOST_MESSAGE, max_header_size=MOST_MESSAGE
+    server = BoundedServer(
+        application,
+        max_body_size=MOST_MESSAGE,
+        max_header_size=MOST_MESSAGE,
+        idle_connection_timeout=PATIENCE,
+        body_timeout=PATIENCE,
     )
-    server.add_sockets(sockets)
-    ready(f"http://{host}/{token}/")
-    try:
-        await asyncio.Event().wait()
-    finally:
-        workers.close()
+    application.settings["trust"] = server.trust
+    return server

@@ -362,7 +362,7 @@
 
   // wiring --------------------------------------------------------------------------------------------------
 
-  const socket = new WebSocket(`ws://${location.host}${location.pathname}live`);
+  const socket = new WebSocket(`ws://${location.host}/live`);
   const say = (message) => socket.send(JSON.stringify(message));
   socket.addEventListener("open", () => say({ say: "open", address: location.hash.slice(1) }));
   socket.addEventListener("close", () => notice(phrase("closed")));
