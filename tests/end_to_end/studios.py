@@ -65,6 +65,7 @@ class Studio:
         window.visit(self.address)
         window.find("input[name=word]").send_keys(f"{self.code}\n")
         window.wait("return document.querySelector('#pill') !== null")
+        window.complaints()  # of the code's page, which is a refusal
 
 
 @contextmanager

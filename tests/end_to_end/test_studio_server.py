@@ -7,6 +7,7 @@ import json
 import os
 import signal
 import socket
+import sys
 import time
 from pathlib import Path
 from urllib.error import URLError
@@ -17,6 +18,7 @@ import pytest
 from end_to_end.studios import HANG, closed, conversation, status, studio, workers_of
 from tornado.httpclient import HTTPClientError
 
+SPY = Path(__file__).with_name("touched_paths.py")
 OWN = Path(__file__).parents[2] / "examples" / "inclined_crane.py"
 # Tornado's client says so of connections that the server refuses or ends
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
@@ -129,16 +131,52 @@ def showing(content):
     return {"say": "show", "serial": 1, "state": {"preset": preset, "edits": {}}}
 
 
-def test_a_spec_that_is_dropped_opens_and_runs_no_program_by_itself(running, tmp_path):
-    marker = tmp_path / "ran"
-    machine = tmp_path / "machine.py"
+def agreeing(*files):
+    return {"say": "agree", "files": [*map(str, files)]}
+
+
+def own_spec(machine):
+    return f"plant.file = {json.dumps(str(machine))}\nmove = {{distance = 1.0, duration = 6.0}}\n".encode()
+
+
+@pytest.mark.slow
+def test_nothing_of_a_file_is_touched_before_the_user_agrees(tmp_path):
+    """Where it lies on another computer, a look is enough to tell that one who looked."""
+    marker, touched = tmp_path / "ran", tmp_path / "touched"
+    machine = tmp_path / "elsewhere" / "machine.py"
+    machine.parent.mkdir()
     machine.write_text(f"open({str(marker)!r}, 'w').close()\n{OWN.read_text('utf-8')}", "utf-8")
-    own = f"plant.file = {json.dumps(str(machine))}\nmove = {{distance = 1.0, duration = 6.0}}\n".encode()
-    heard = conversation(running, dropped("bay.toml", own), showing(own), until="consent")
-    assert heard["opened"]["preset"] == showing(own)["state"]["preset"]
-    assert heard["consent"]["files"][0]["path"] == str(machine) and not marker.exists()
-    endless = own.replace(json.dumps(str(machine)).encode(), b'"/dev/zero"')
-    heard = conversation(running, dropped("bay.toml", endless), showing(endless), until="failure")
+    own = own_spec(machine)
+    foreign = own.replace(b"plant.file", b"check.fmu").replace(b".py", b".fmu")
+    spying = (sys.executable, SPY, touched, machine.parent)
+    with studio(program=spying) as running:
+        logged = {"use": "", "columns": None, "after": 0.0, "at": [], "free": []}
+        driven = {"drive": 1, "command": "", "values": [], "live": {}}
+        for content in (own, foreign):
+            state = showing(content)["state"]
+            asking = [
+                showing(content),
+                {"say": "make", "state": state, "formats": [], "report": False},
+                {"say": "drive", "number": 1, "state": state, **driven},
+                dropped("bay.csv", b""),
+                {"say": "read", "number": 1, "state": state, **logged},
+                agreeing(machine.parent / "another.py"),
+                "nonsense",
+            ]
+            heard = conversation(running, dropped("bay.toml", content), *asking, until="failure")
+            assert heard["opened"]["preset"] == state["preset"]
+            assert heard["consent"]["files"][0].startswith(str(machine.parent))
+        time.sleep(1.0)
+        assert not touched.exists() and not marker.exists()
+        agreed = (showing(own), agreeing(machine))
+        conversation(running, dropped("bay.toml", own), *agreed, until="setting")
+        assert marker.exists() and touched.exists()
+
+
+def test_what_is_no_file_is_not_read_for_ever(running):
+    endless = own_spec("/dev/zero")
+    sayings = (dropped("bay.toml", endless), showing(endless), agreeing("/dev/zero"))
+    heard = conversation(running, *sayings, until="failure")
     assert heard["failure"]["sentences"] == ["Cannot read /dev/zero: it is no file."]
 
 
@@ -170,10 +208,15 @@ def test_a_machine_of_one_s_own_runs_only_when_the_user_agrees(tmp_path):
     with studio("own.toml", folder=tmp_path) as running:
         begin = {"say": "open", "address": ""}
         asked = conversation(running, begin, until="consent")
-        assert asked["consent"]["files"][0]["path"] == str(machine)
+        assert asked["consent"]["files"] == [str(machine)]
         assert "curves" not in asked and not marker.exists()
-        agreed = conversation(running, begin, {"say": "agree"}, until="setting")
-        assert marker.exists() and "consent" in agreed
+        agreed = conversation(running, begin, agreeing(machine), until="setting")
+        assert marker.exists() and agreed["consent"]["changed"] is False
+        assert "consent" not in conversation(running, begin, until="setting")
+        marker.unlink()
+        machine.write_text(machine.read_text("utf-8") + "# a change\n", "utf-8")
+        again = conversation(running, begin, until="consent")
+        assert again["consent"]["changed"] is True and not marker.exists()
 
 
 @pytest.mark.slow

@@ -249,6 +249,16 @@ def test_a_start_that_is_no_spec_is_a_sentence():
         _ = start.document
 
 
+def test_a_program_that_changed_since_the_user_agreed_is_not_run(tmp_path):
+    (tmp_path / "machine.py").write_text("raise SystemExit('it ran')", "utf-8")
+    start = WrittenSpec(words=("x.toml",), text='plant.file = "machine.py"', folder=tmp_path)
+    agreed = {"plant.file": "0" * 64}
+    question = Question(start=start, state=StudioState(), agreed=agreed)
+    for read in (question.spec, question.beginning):
+        with pytest.raises(SpecError, match="it was not run"):
+            read()
+
+
 def random_edits(chance, listed):
     """Turn some knobs as a hand might, within their bounds and beyond."""
     edits = {}

@@ -121,11 +121,13 @@ def test_nothing_longer_is_asked_for_where_there_is_no_motion():
     assert len(hands.taken) == 1
 
 
-def test_the_same_state_is_asked_for_once():
+def test_the_same_question_is_asked_for_once_and_every_number_is_answered():
     _, hands, _, desk = page()
     desk.show(0, "state")
-    desk.show(1, "state")
+    desk.show(0, "state")
     assert len(hands.taken[0].jobs) == 1
+    desk.show(2, "state")  # the page asked something else meanwhile, which was not let run
+    assert hands.taken[0].jobs[-1].number == 2
 
 
 def test_a_worker_that_dies_is_told_of_and_the_next_question_has_another():

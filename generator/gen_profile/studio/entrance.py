@@ -36,7 +36,7 @@ from gen_profile.private_folder import temporary_folder
 KEY_LASTS = 120.0  # s in which the user's browser must have started
 LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"  # none that look alike
 CODE_LENGTH = 8  # letters: 40 bits
-WRONG = 1.0  # s that a wrong word takes: with MOST_STRANGERS at once, guessing a code takes centuries
+PAUSE = 1.0  # s before a code is looked at: with MOST_STRANGERS at once, guessing takes centuries
 MOST_STRANGERS = 64  # connections that have not shown the cookie
 PATIENCE = 10.0  # s for a request to be sent, whoever sends it
 NOTHING = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'"  # of a page's policy
@@ -61,7 +61,9 @@ class Entrance:
     code : str
         For a browser that the studio did not start.
     key : str
-        For the one that it starts, for a while.
+        For the one that it starts.
+    until : float
+        Time of `time.monotonic` at which the key ends.
     """
 
     host: str
@@ -69,7 +71,7 @@ class Entrance:
     cookie: str = attrs.field(factory=lambda: secrets.token_urlsafe(32), repr=False)
     code: str = attrs.field(factory=_code, repr=False)
     key: str = attrs.field(factory=lambda: secrets.token_urlsafe(32), repr=False)
-    began: float = attrs.field(factory=time.monotonic)
+    until: float = attrs.field(factory=lambda: time.monotonic() + KEY_LASTS)
 
     @property
     def name(self) -> str:
@@ -80,18 +82,20 @@ class Entrance:
         """Whether this is the cookie."""
         return secrets.compare_digest((cookie or "").encode(), self.cookie.encode())
 
-    def takes(self, word: str) -> bool:
-        """Whether a word lets a browser in; it does so once."""
-        if time.monotonic() < self.began + KEY_LASTS and secrets.compare_digest(
-            word.encode(), self.key.encode()
-        ):
-            self.began = -KEY_LASTS
-            return True
-        if secrets.compare_digest(re.sub(r"[\s-]", "", word).lower().encode(), self.code.encode()):
+    def takes_key(self, word: str) -> bool:
+        """Whether this is the key; it is taken once."""
+        taken = time.monotonic() < self.until and secrets.compare_digest(word.encode(), self.key.encode())
+        self.until = 0.0 if taken else self.until
+        return taken
+
+    def takes_code(self, word: str) -> bool:
+        """Whether this is the code, however it is written; it is taken once."""
+        typed = re.sub(r"[\s-]", "", word).lower()
+        taken = secrets.compare_digest(typed.encode(), self.code.encode())
+        if taken:
             self.code = _code()
             self.renew(self.code)
-            return True
-        return False
+        return taken
 
 
 @contextmanager
@@ -163,7 +167,7 @@ class Guarded(RequestHandler):
         if not near or not self.entrance.knows(self.get_cookie(self.entrance.name)):
             self.meet_stranger()
         else:
-            self.settings["trust"](cast("HTTP1Connection", self.request.connection).stream)
+            self.settings["trust"](_stream(self))
 
     def meet_stranger(self) -> None:
         """Answer who does not hold the cookie, or follows a link from elsewhere."""
@@ -215,21 +219,27 @@ class Entering(Guarded):
 
     async def post(self) -> None:
         """Let a browser in once for a word."""
-        taken, by_hand = (
-            self.entrance.takes(self.get_body_argument("word", "")),
-            self.request.headers.get("Origin") != "null",
-        )
+        word, stream = self.get_body_argument("word", ""), _stream(self)
+        taken = self.entrance.takes_key(word)
+        if not taken:
+            await asyncio.sleep(PAUSE)
+            if stream.closed():
+                return
+            taken = self.entrance.takes_code(word)
         if taken:
             self.set_cookie(self.entrance.name, self.entrance.cookie, httponly=True, samesite="Strict")
         else:
-            await asyncio.sleep(WRONG)
             self.set_status(403)
-        if not by_hand:
+        if self.request.headers.get("Origin") == "null":
             self.finish(GO_ON)
         elif taken:
             self.redirect("/", status=303)
         else:
             self.ask_for_code(wrong=True)
+
+
+def _stream(handler: RequestHandler) -> IOStream:
+    return cast("HTTP1Connection", handler.request.connection).stream
 
 
 def _asset(name: str) -> str:
