@@ -301,6 +301,9 @@ def test_what_cannot_be_offers_its_cure_as_a_button(page):
     field.send_keys(Keys.CONTROL, "a", Keys.NULL, "0.05\n")
     page.wait(SETTLED.format("failed"))
     page.wait("return document.querySelector('#cures button') !== null")
+    faded = "['#margins', '#designs'].map((part) => getComputedStyle(document.querySelector(part)).opacity)"
+    assert page.run(f"return {faded}") == ["0.35", "0.35"]
     page.find("#cures button").click()
     page.wait(SETTLED.format("passed"))
+    assert page.run(f"return {faded}") == ["1", "1"]
     assert page.run("return document.querySelectorAll('#reasons li').length") == 0

@@ -208,6 +208,7 @@ def test_what_cannot_be_says_why_and_what_would_help():
     edits = {"move.duration": 1.5, "limits.velocity": 0.15}
     found = parts(picture(of("paper", edits)))
     assert found["failure"]["sentences"] and found["failure"]["cures"]
+    assert found["failure"]["answer"] == "none"
     (cure,) = found["failure"]["cures"]
     healed = parts(picture(of("paper", {**edits, **cure})))
     assert "verdict" in healed and "failure" not in healed
@@ -241,6 +242,12 @@ def test_a_margin_of_travel_is_the_share_of_it_that_is_used(travel, share):
 def test_a_value_that_does_not_fit_is_told_at_its_knob():
     found = parts(picture(of("paper", {"plant.m1": -1.0, "limits.velocity": "fast"})))
     assert {fault["place"] for fault in found["faults"]["faults"]} == {"plant.m1", "limits.velocity"}
+
+
+def test_a_spec_that_does_not_fit_is_not_called_a_motion_that_cannot_be():
+    start = WrittenSpec(words=("x.toml",), text='plant.type = "cran"', folder=PAPER.folder)
+    found = parts(picture(Question(start=start, state=StudioState())))
+    assert found["failure"]["answer"] == "faulty" and "cran" in found["failure"]["sentences"][1]
 
 
 def test_a_start_that_is_no_spec_is_a_sentence():

@@ -149,6 +149,7 @@ def test_a_worker_that_dies_before_it_begins_is_no_fault_of_the_question():
     assert told == [] and [hand.jobs[0].question for hand in hands.taken] == ["harmless"] * 3
     hands.taken[2].hear(hands.taken[2], Message(number=-1, name=LOST))  # none can be had
     assert names(told) == [(0, "failure")]
+    assert json.loads(told[0].text)["answer"] == "unanswered"
 
 
 def test_a_page_that_comes_late_hears_what_was_found_before():
