@@ -25,7 +25,7 @@ ARGUMENTS = (
     "--force-device-scale-factor=1",
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",  # offline, whatever a page asks for
 )
-PATIENCE = 20.0  # s until a page that does not answer counts as broken
+PATIENCE = 300.0  # s until a page that does not answer counts as broken
 
 
 class Browser:

@@ -11,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from end_to_end.studios import closed, conversation, status, studio
 from headless import browser as start
+from selenium.webdriver.common.keys import Keys
 
 from gen_profile.studio.entrance import PATIENCE
 from gen_profile.studio.state import StudioState
@@ -97,6 +98,34 @@ def test_a_link_holds_the_state_alone_and_a_stranger_needs_the_code():
         window.wait("return document.querySelector('#command')?.textContent.endsWith('move.duration=3.3')")
         assert window.run("return location.href") == f"{running.address}#{state.address}"
         assert [one for one in window.complaints() if "403" not in one] == []
+
+
+@pytest.mark.slow
+def test_a_page_goes_on_when_the_studio_is_there_again():
+    with start() as window:
+        with studio() as running:
+            running.open(window)
+            window.wait("return document.querySelector('#pill.passed') !== null")
+            field = window.find('input[type=number][aria-label="Duration"]')
+            field.send_keys(Keys.CONTROL, "a", Keys.NULL, "3.2\n")
+            window.wait("return document.querySelector('#pill.passed') !== null && location.hash !== ''")
+            port = urlsplit(running.address).port
+        window.wait("return document.querySelector('#notice').textContent.includes('was closed')")
+        with studio("--port", str(port)) as running:
+            window.wait("return document.querySelector('#notice').textContent.includes('type the code')")
+            page = window.driver.current_window_handle
+            window.driver.switch_to.new_window("tab")
+            running.open(window)
+            window.driver.switch_to.window(page)
+            window.wait("return document.querySelector('#notice').hidden")
+            field.send_keys(Keys.CONTROL, "a", Keys.NULL, "3.3\n")
+            window.wait("return document.querySelector('#answer').textContent !== 'Solving …'")
+            window.wait("return document.querySelector('#pill.passed') !== null")
+            window.wait("return document.querySelector('#command').textContent.includes('=3.3')")
+            boxes = window.run(
+                "return [...document.querySelectorAll('#formats input')].map((box) => box.value)"
+            )
+            assert len(boxes) == len(set(boxes))
 
 
 def half_sent(address):

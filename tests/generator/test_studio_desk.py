@@ -1,5 +1,6 @@
 """Who answers a page whose questions come faster than answers: workers and a clock of the tests' own."""
 
+import asyncio
 import json
 
 from gen_profile.studio.desk import CALM, PATIENCE, Desk
@@ -150,6 +151,16 @@ def test_a_worker_that_dies_before_it_begins_is_no_fault_of_the_question():
     hands.taken[2].hear(hands.taken[2], Message(number=-1, name=LOST))  # none can be had
     assert names(told) == [(0, "failure")]
     assert json.loads(told[0].text)["answer"] == "unanswered"
+
+
+def test_what_a_worker_says_after_the_studio_ended_is_let_go():
+    _, hands, told, desk = page()
+    desk.show(0, "state")
+    loop = asyncio.new_event_loop()
+    loop.close()
+    desk._picture._loop = loop
+    hands.taken[0].say("curves")
+    assert told == []
 
 
 def test_a_page_that_comes_late_hears_what_was_found_before():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Protocol
 
 import attrs
@@ -79,7 +80,8 @@ class QuestionLine:
         self._worker.ask(self._job)
 
     def _heard_elsewhere(self, worker: Worker, message: Message) -> None:
-        self._loop.call_soon_threadsafe(self._heard, worker, message)
+        with suppress(RuntimeError):  # the loop was closed: the studio ends
+            self._loop.call_soon_threadsafe(self._heard, worker, message)
 
     def _heard(self, worker: Worker, message: Message) -> None:
         if worker is not self._worker:

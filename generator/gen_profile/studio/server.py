@@ -159,7 +159,7 @@ class Asset(Guarded):
         self.finish((resources.files(package) / "assets" / file).read_bytes())
 
 
-class Page(Entering, Asset):
+class FrontPage(Entering, Asset):
     """The page itself."""
 
 
@@ -424,7 +424,7 @@ async def _serve(
 def _server(studio: Studio, entrance: Entrance) -> BoundedServer:
     application = tornado.web.Application(
         [
-            ("/", Page),
+            ("/", FrontPage),
             ("/live", Conversation),
             (r"/made/(?P<name>[\w-]+)", Download),
             (r"/(?P<name>.*)", Asset),

@@ -5,6 +5,7 @@
   const { element } = knobs;
   const WORDS = await (await fetch("words.json")).json();
   const LANGUAGES = ["en", "de"];
+  const COME_BACK = 2000; // ms between looks whether the studio is there again
   const ONCE = new Set(["hello", "state", "opened", "consent"]); // parts that do something: no other language shows them again
   let language = localStorage.getItem("language") ?? (navigator.language.startsWith("de") ? "de" : "en");
   let state = { preset: "", edits: {} };
@@ -193,7 +194,8 @@
       $("preset").replaceChildren(element("option", { value: "" }, start.replace("--preset ", "")), ...Object.entries(presets).filter(([name]) => start !== `--preset ${name}`).map(([name]) => element("option", { value: name }, name)));
       opened.forEach(offer);
       const boxes = Object.entries(formats).map(([name, about]) => element("label", { title: about }, element("input", { type: "checkbox", value: name, checked: name === "csv" }), name));
-      $("formats").append(...boxes);
+      if (!$("formats").querySelector("input")) $("formats").append(...boxes);
+      $("preset").value = state.preset;
     },
     state({ preset, edits: taken }) {
       state = { preset, edits: taken };
@@ -377,14 +379,34 @@
 
   // wiring --------------------------------------------------------------------------------------------------
 
-  const socket = new WebSocket(`ws://${location.host}/live`);
-  const say = (message) => socket.send(JSON.stringify(message));
-  socket.addEventListener("open", () => say({ say: "open", address: location.hash.slice(1) }));
-  socket.addEventListener("close", () => notice(phrase("closed")));
-  socket.addEventListener("message", ({ data }) => {
-    inbox.push(data);
-    receive();
-  });
+  let socket;
+  const send = (message) => socket.readyState === WebSocket.OPEN && socket.send(message);
+  const say = (message) => send(JSON.stringify(message));
+
+  /** Talk to the studio; one that is back is told the state that this page has. */
+  function connect() {
+    socket = new WebSocket(`ws://${location.host}/live`);
+    socket.addEventListener("open", () => {
+      if (asked === null) return say({ say: "open", address: location.hash.slice(1) });
+      asked = null;
+      notice("");
+      logs.forget();
+      ask();
+    });
+    socket.addEventListener("close", comeBack);
+    socket.addEventListener("message", ({ data }) => {
+      inbox.push(data);
+      receive();
+    });
+  }
+
+  /** Wait until the studio is there again, and this browser is let in. */
+  async function comeBack() {
+    const answer = await fetch("words.json").catch(() => null);
+    if (answer?.ok) return connect();
+    notice(phrase(answer ? "restarted" : "closed"));
+    setTimeout(comeBack, COME_BACK);
+  }
 
   /** Take what has come, unless the browser is to draw first. */
   function receive() {
@@ -459,10 +481,11 @@
   });
   driving.lend({ phrase, filled, placed, say, edit, begin, knob: at, state: () => state });
   logs.begin({
-    phrase, filled, notice, edit, drawing, say, send: (blob) => socket.send(blob), state: () => state,
+    phrase, filled, notice, edit, drawing, say, send, state: () => state,
     mostUpload: () => latest.hello.most_upload,
   });
   const theme = localStorage.getItem("theme");
   if (theme) document.documentElement.dataset.theme = theme;
   speak();
+  connect();
 })();
