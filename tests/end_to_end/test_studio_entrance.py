@@ -1,4 +1,4 @@
-"""Who gets into the studio: the browser that it starts, one whose user types the code, and nobody else."""
+"""Who gets into the studio: the browser that it starts, one whose user types the code, and no other."""
 
 import asyncio
 import json
@@ -143,7 +143,7 @@ def until_closed(connection):
 
 
 @pytest.mark.slow
-def test_strangers_who_hold_connections_keep_nobody_out(tmp_path):
+def test_strangers_who_hold_connections_keep_no_user_out(tmp_path):
     with (tmp_path / "told").open("w+") as told, studio(told=told) as running, ExitStack() as held:
         place, begun = urlsplit(running.address), [*half_sent(urlsplit(running.address).netloc)]
         cookie = running.cookie

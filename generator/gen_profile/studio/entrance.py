@@ -38,7 +38,7 @@ LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"  # none that look alike
 CODE_LENGTH = 8  # letters: 40 bits
 PAUSE = 1.0  # s before a code is looked at: with MOST_STRANGERS at once, guessing takes centuries
 MOST_STRANGERS = 64  # connections that have not shown the cookie
-PATIENCE = 10.0  # s for a request to be sent, whoever sends it
+PATIENCE = 10.0  # s for a request to be sent
 NOTHING = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'"  # of a page's policy
 # for what a file asks for: redirected, it would still be the file that asks, and no cookie would be sent
 GO_ON = '<!doctype html><title>gen-profile studio</title><meta http-equiv="refresh" content="0;url=/">'
@@ -57,7 +57,7 @@ class Entrance:
     host : str
         The server's address and port.
     renew : str → None
-        Is told another code when one was used.
+        Takes another code when one was used.
     code : str
         For a browser that the studio did not start.
     key : str

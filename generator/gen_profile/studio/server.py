@@ -380,9 +380,9 @@ def serve(
     browser : bool
         Whether the user's browser is started.
     ready : (str, str) → None
-        Is told the address, and the code for another browser.
+        Takes the address, and the code for another browser.
     renew : str → None
-        Is told another code when one was used.
+        Takes another code when one was used.
 
     Raises
     ------
