@@ -42,11 +42,11 @@ def test_the_first_part_of_a_picture_beside_the_solve():
 def test_from_the_knob_s_event_to_the_picture_drawn():
     """The browser's own clock: from the event's time stamp to the frame after the curves were drawn."""
     began = time.perf_counter()
-    with studio("--preset", "paper") as (address, _):
+    with studio("--preset", "paper") as running:
         started = time.perf_counter() - began
         with browser() as page:
             page.size(1400, 900)
-            page.visit(address)
+            running.open(page)
             page.wait("return document.documentElement.dataset.drawn === 'true'")
             page.wait("return document.querySelectorAll('#designs tr').length > 5")
             for _ in range(TURNS):

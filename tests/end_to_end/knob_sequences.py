@@ -16,9 +16,8 @@ from typing import Any
 import attrs
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from end_to_end.studios import studio, workers_of
-from tornado.httpclient import HTTPRequest
-from tornado.websocket import WebSocketClientConnection, websocket_connect
+from end_to_end.studios import Studio, studio, workers_of
+from tornado.websocket import WebSocketClientConnection
 
 PRESETS = ("", "paper-beta0", "gantry-crane", "slosh-tank", "flexible-joint", "tower-crane")
 BORED = 0.7  # s after which a hand turns the next knob, answered or not
@@ -65,10 +64,9 @@ class Page:
         self.knobs: list[dict[str, Any]] = []
 
     @classmethod
-    async def open(cls, address: str) -> Page:
+    async def open(cls, running: Studio) -> Page:
         """Open a page."""
-        live, origin = f"{address.replace('http:', 'ws:')}live", address.rsplit("/", 2)[0]
-        page = cls(await websocket_connect(HTTPRequest(live, headers={"Origin": origin})))
+        page = cls(await running.connect())
         await page._connection.write_message(json.dumps({"say": "open", "address": ""}))
         await page.answer()
         return page
@@ -107,10 +105,10 @@ class Page:
             pass
 
 
-async def turn_knobs(address: str, seed: str, first: int, count: int) -> Counter[str]:
+async def turn_knobs(running: Studio, seed: str, first: int, count: int) -> Counter[str]:
     """Turn knobs in sequences, some on one page, and tell how often each ended how."""
     ends = Counter[str]()
-    page = await Page.open(address)
+    page = await Page.open(running)
     for index in range(first, first + count):
         chance = random.Random(f"{seed}-{index}")
         preset, edits = chance.choice(PRESETS), dict[str, Any](name=f"{seed}-{index}")
@@ -124,7 +122,7 @@ async def turn_knobs(address: str, seed: str, first: int, count: int) -> Counter
         ends[await page.answer(BORED)] += 1
         if index % SEQUENCES == SEQUENCES - 1:
             await page.close()
-            page = await Page.open(address)
+            page = await Page.open(running)
     await page.show("", {"name": "at last"})
     ends[f"at last: {await page.answer()}"] += 1
     await page.close()
@@ -161,13 +159,15 @@ def main() -> None:
     parser.add_argument("--seed", default="knobs")
     parser.add_argument("--first", type=int, default=0)
     arguments = parser.parse_args()
-    with tempfile.TemporaryFile("w+") as told, studio("--preset", "paper", told=told) as (address, server):
+    with tempfile.TemporaryFile("w+") as told, studio("--preset", "paper", told=told) as running:
         warm = 50
-        print(asyncio.run(turn_knobs(address, "warm", 0, warm)), Footprint.of(server), sep="\n", flush=True)
+        print(
+            asyncio.run(turn_knobs(running, "warm", 0, warm)), Footprint.of(running.pid), sep="\n", flush=True
+        )
         began = time.perf_counter()
-        ends = asyncio.run(turn_knobs(address, arguments.seed, arguments.first, arguments.count))
+        ends = asyncio.run(turn_knobs(running, arguments.seed, arguments.first, arguments.count))
         print(f"{arguments.count} sequences, {time.perf_counter() - began:.0f} s: {dict(ends)}")
-        print(Footprint.of(server))
+        print(Footprint.of(running.pid))
         told.seek(0)
         print("told:", told.read() or "nothing")
 

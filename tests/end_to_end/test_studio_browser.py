@@ -1,12 +1,16 @@
 """The studio in a headless Chromium: knobs turned by keys and mouse, and what is then to be seen."""
 
+import io
 import json
 import os
+import shlex
+import subprocess
+import zipfile
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+from command_line import PROGRAM
 from end_to_end.studios import studio
 from headless import browser as start
 from selenium.webdriver.common.keys import Keys
@@ -18,6 +22,7 @@ from gen_profile.spec.reading import preset_spec, preset_text
 
 pytestmark = pytest.mark.slow
 
+OWN = Path(__file__).parents[2] / "examples" / "inclined_crane.py"
 SETTLED = "return document.querySelector('#pill').classList.contains('{}')"
 DURATION = 'input[type=range][aria-label="Duration"]'
 DROP = """
@@ -35,9 +40,9 @@ def browser():
 
 @pytest.fixture(scope="module")
 def page(browser):
-    with studio("--preset", "paper") as (address, _):
+    with studio("--preset", "paper") as running:
         browser.size(1400, 900)
-        browser.visit(address)
+        running.open(browser)
         browser.wait(SETTLED.format("passed"))
         yield browser
         assert browser.complaints() == []
@@ -174,6 +179,50 @@ def test_a_log_that_is_chosen_tells_parameters_that_are_taken(page, tmp_path):
     page.find("#forget").click()
 
 
+def test_a_program_runs_only_by_a_deliberate_act(page, tmp_path):
+    ran = tmp_path / "ran"
+    (tmp_path / "machine.py").write_text(
+        f"open({str(ran)!r}, 'w').close()\n{OWN.read_text('utf-8')}", "utf-8"
+    )
+    own = f"plant.file = '{tmp_path}/machine.py'\nmove = {{distance = 1.0, duration = 6.0}}\n"
+    opened = "return document.querySelector('#consent').open"
+    for refusal in (Keys.ENTER, Keys.ESCAPE, Keys.SPACE):
+        page.run(DROP, own)
+        page.wait(opened)
+        assert str(tmp_path) in page.find("#programs").text
+        assert page.find("#refuse") == page.driver.switch_to.active_element
+        assert not page.find("#agree").is_enabled()
+        page.driver.switch_to.active_element.send_keys(refusal)
+        page.wait("return !document.querySelector('#consent').open")
+        page.wait("return document.querySelector('#answer').textContent.startsWith('Nothing was run')")
+        page.wait("return document.querySelector('#pill').classList.contains('failed')")
+        page.find("#undo").click()
+        page.wait(SETTLED.format("passed"))
+    assert not ran.exists()
+    page.run(DROP, own)
+    page.wait(opened)
+    page.find("#trust").click()
+    page.find("#agree").click()
+    page.wait(
+        SETTLED.format("passed") + " && document.querySelector('#command').textContent.includes('bay.toml')"
+    )
+    assert ran.exists()
+    page.find("#undo").click()
+    page.wait("return !document.querySelector('#command').textContent.includes('bay.toml')")
+    page.wait(SETTLED.format("passed"))
+
+
+def test_the_question_whether_a_program_may_run_is_accessible(page):
+    page.run(DROP, "plant.file = '/machine.py'\nmove = {distance = 1.0, duration = 6.0}\n")
+    page.wait("return document.querySelector('#consent').open")
+    try:
+        assert violations(page) == []
+    finally:
+        page.find("#refuse").click()
+        page.find("#undo").click()
+        page.wait(SETTLED.format("passed"))
+
+
 def test_a_planner_block_is_driven_by_hand(page):
     page.find("#begin").click()
     page.wait("return document.querySelector('#undriven.bad') !== null")
@@ -221,18 +270,26 @@ def test_it_speaks_german_of_what_is_shown(page):
     page.find("#language").click()
 
 
-def test_the_full_check_gives_files(page):
+def test_the_full_check_gives_the_files_that_the_command_line_makes(page, tmp_path):
     page.run("document.querySelector('#formats').scrollIntoView()")
+    page.find("#formats input[value=plc]").click()
     page.find("#make").click()
     page.wait("return document.querySelector('#outcome a, #outcome .bad') !== null")
     link = page.find("#outcome a").get_attribute("href")
     content = page.run_async(
         """
         const [link, done] = arguments;
-        fetch(link).then((answer) => answer.bytes()).then((bytes) => done([...bytes].slice(0, 2)))""",
+        fetch(link).then((answer) => answer.bytes()).then((bytes) => done([...bytes]))""",
         link,
     )
-    assert bytes(content) == b"PK" and urlsplit(link).hostname == "127.0.0.1"
+    command = shlex.split(page.find("#command").text)
+    subprocess.run([PROGRAM, *command[1:], "--out", tmp_path / "same"], check=True, capture_output=True)
+    with zipfile.ZipFile(io.BytesIO(bytes(content))) as archive:
+        made = {name: archive.read(name) for name in archive.namelist()}
+    assert made == {path.name: path.read_bytes() for path in (tmp_path / "same").iterdir()}
+    assert {Path(name).suffix for name in made} == {".csv", ".st", ".json"}
+    page.find("#formats input[value=plc]").click()
+    assert "--export" not in page.find("#command").text
 
 
 def test_what_cannot_be_offers_its_cure_as_a_button(page):
@@ -244,6 +301,9 @@ def test_what_cannot_be_offers_its_cure_as_a_button(page):
     field.send_keys(Keys.CONTROL, "a", Keys.NULL, "0.05\n")
     page.wait(SETTLED.format("failed"))
     page.wait("return document.querySelector('#cures button') !== null")
+    faded = "['#margins', '#designs'].map((part) => getComputedStyle(document.querySelector(part)).opacity)"
+    assert page.run(f"return {faded}") == ["0.35", "0.35"]
     page.find("#cures button").click()
     page.wait(SETTLED.format("passed"))
+    assert page.run(f"return {faded}") == ["1", "1"]
     assert page.run("return document.querySelectorAll('#reasons li').length") == 0

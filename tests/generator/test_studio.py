@@ -208,6 +208,7 @@ def test_what_cannot_be_says_why_and_what_would_help():
     edits = {"move.duration": 1.5, "limits.velocity": 0.15}
     found = parts(picture(of("paper", edits)))
     assert found["failure"]["sentences"] and found["failure"]["cures"]
+    assert found["failure"]["answer"] == "none"
     (cure,) = found["failure"]["cures"]
     healed = parts(picture(of("paper", {**edits, **cure})))
     assert "verdict" in healed and "failure" not in healed
@@ -243,10 +244,26 @@ def test_a_value_that_does_not_fit_is_told_at_its_knob():
     assert {fault["place"] for fault in found["faults"]["faults"]} == {"plant.m1", "limits.velocity"}
 
 
+def test_a_spec_that_does_not_fit_is_not_called_a_motion_that_cannot_be():
+    start = WrittenSpec(words=("x.toml",), text='plant.type = "cran"', folder=PAPER.folder)
+    found = parts(picture(Question(start=start, state=StudioState())))
+    assert found["failure"]["answer"] == "faulty" and "cran" in found["failure"]["sentences"][1]
+
+
 def test_a_start_that_is_no_spec_is_a_sentence():
     start = WrittenSpec(words=("x.toml",), text="plant = 3 3", folder=PAPER.folder)
     with pytest.raises(SpecError, match=r"x\.toml: not valid TOML"):
         _ = start.document
+
+
+def test_a_program_that_changed_since_the_user_agreed_is_not_run(tmp_path):
+    (tmp_path / "machine.py").write_text("raise SystemExit('it ran')", "utf-8")
+    start = WrittenSpec(words=("x.toml",), text='plant.file = "machine.py"', folder=tmp_path)
+    agreed = {"plant.file": "0" * 64}
+    question = Question(start=start, state=StudioState(), agreed=agreed)
+    for read in (question.spec, question.beginning):
+        with pytest.raises(SpecError, match="it was not run"):
+            read()
 
 
 def random_edits(chance, listed):

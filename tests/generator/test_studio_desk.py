@@ -1,5 +1,6 @@
 """Who answers a page whose questions come faster than answers: workers and a clock of the tests' own."""
 
+import asyncio
 import json
 
 from gen_profile.studio.desk import CALM, PATIENCE, Desk
@@ -121,11 +122,13 @@ def test_nothing_longer_is_asked_for_where_there_is_no_motion():
     assert len(hands.taken) == 1
 
 
-def test_the_same_state_is_asked_for_once():
+def test_the_same_question_is_asked_for_once_and_every_number_is_answered():
     _, hands, _, desk = page()
     desk.show(0, "state")
-    desk.show(1, "state")
+    desk.show(0, "state")
     assert len(hands.taken[0].jobs) == 1
+    desk.show(2, "state")  # the page asked something else meanwhile, which was not let run
+    assert hands.taken[0].jobs[-1].number == 2
 
 
 def test_a_worker_that_dies_is_told_of_and_the_next_question_has_another():
@@ -147,6 +150,17 @@ def test_a_worker_that_dies_before_it_begins_is_no_fault_of_the_question():
     assert told == [] and [hand.jobs[0].question for hand in hands.taken] == ["harmless"] * 3
     hands.taken[2].hear(hands.taken[2], Message(number=-1, name=LOST))  # none can be had
     assert names(told) == [(0, "failure")]
+    assert json.loads(told[0].text)["answer"] == "unanswered"
+
+
+def test_what_a_worker_says_after_the_studio_ended_is_let_go():
+    _, hands, told, desk = page()
+    desk.show(0, "state")
+    loop = asyncio.new_event_loop()
+    loop.close()
+    desk._picture._loop = loop
+    hands.taken[0].say("curves")
+    assert told == []
 
 
 def test_a_page_that_comes_late_hears_what_was_found_before():

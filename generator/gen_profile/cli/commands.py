@@ -301,7 +301,7 @@ def _check_block(
     default=0,
     help="Port on the loopback interface; any that is free by default.",
 )
-@click.option("--no-browser", is_flag=True, help="Open no browser; print the address only.")
+@click.option("--no-browser", is_flag=True, help="Open no browser; print the address and a code for one.")
 @output_options
 def studio(
     chosen: SpecChoice,
@@ -322,20 +322,21 @@ def studio(
         chosen.spec()
     from gen_profile.studio.server import serve
 
-    def ready(address: str) -> None:
+    def ready(address: str, code: str) -> None:
         if as_json:
             import json
 
-            click.echo(json.dumps({"address": address}, indent=2))
+            click.echo(json.dumps({"address": address, "code": code}, indent=2))
         else:
-            click.echo(f"Studio at {address}\nCtrl-C ends it.", err=True)
-        if not no_browser:
-            import webbrowser
+            click.echo(
+                f"Studio at {address}\nA browser that asks for a code: {code}\nCtrl-C ends it.", err=True
+            )
 
-            webbrowser.open(address)
+    def renew(code: str) -> None:
+        click.echo(f"The code was used. Another browser that asks for one: {code}", err=True)
 
     try:
-        serve(start, port, ready)
+        serve(start, port, browser=not no_browser, ready=ready, renew=renew)
     except KeyboardInterrupt:
         click.echo("The studio is closed.", err=True)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Protocol
 
 import attrs
 
-from gen_profile.studio.workers import BEGUN, ENDED, LOST, Job, Message, Worker, Workers
+from gen_profile.studio.workers import BEGUN, ENDED, LOST, Job, Message, Worker, Workers, failure
 
 PATIENCE = 0.6  # s that a question may wait for the first part of an older one's answer
 CALM = 0.3  # s without a new question, after which what takes longer is asked for
@@ -79,7 +80,8 @@ class QuestionLine:
         self._worker.ask(self._job)
 
     def _heard_elsewhere(self, worker: Worker, message: Message) -> None:
-        self._loop.call_soon_threadsafe(self._heard, worker, message)
+        with suppress(RuntimeError):  # the loop was closed: the studio ends
+            self._loop.call_soon_threadsafe(self._heard, worker, message)
 
     def _heard(self, worker: Worker, message: Message) -> None:
         if worker is not self._worker:
@@ -90,8 +92,7 @@ class QuestionLine:
             return
         if message.name == LOST:
             self.stop()
-            told: dict[str, Any] = {"part": "failure", "sentences": [GONE], "cures": []}
-            told |= {"of": self._job.kind, "serial": self._job.number}
+            told = {**failure("unanswered", [GONE]), "of": self._job.kind, "serial": self._job.number}
             message = Message(
                 number=self._job.number, kind=self._job.kind, name="failure", text=json.dumps(told)
             )
@@ -124,7 +125,7 @@ class Desk:
 
     def show(self, number: int, question: Any) -> None:
         """Ask for the picture of a state."""
-        if question != self._question:
+        if (number, question) != (self._newest, self._question):  # else it is on its way: the first page's
             self._newest, self._question = number, question
             self._depth.pause()
             self._picture.ask(number, question)

@@ -21,10 +21,13 @@ class Question:
     start : WrittenSpec
     state : StudioState
         Its edits are those of the start.
+    agreed : mapping of str to str
+        SHA-256 of the programs that the user lets run, by the keys that name them.
     """
 
     start: WrittenSpec
     state: StudioState
+    agreed: Mapping[str, str] = attrs.field(factory=dict)
 
     def document(self) -> dict[str, Any]:
         """State the spec as nested plain values."""
@@ -37,7 +40,25 @@ class Question:
         ------
         SpecError
         """
-        return spec_from_dict(self.document(), self.start.folder)
+        return self._read(self.document())
+
+    def beginning(self) -> Spec:
+        """Read the spec without the edits.
+
+        Raises
+        ------
+        SpecError
+        """
+        return self._read(self.start.document)
+
+    def _read(self, document: dict[str, Any]) -> Spec:
+        """Read a spec; a program that was changed since the user agreed is refused where it is read."""
+        for key, digest in self.agreed.items():
+            name, file = key.split(".")
+            table = document.get(name)
+            if isinstance(table, dict) and file in table:
+                document = {**document, name: {f"{file}_sha256": digest, **table}}
+        return spec_from_dict(document, self.start.folder)
 
 
 @attrs.frozen(kw_only=True)

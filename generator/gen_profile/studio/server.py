@@ -1,9 +1,4 @@
-"""The studio's page and what it says: on this machine only, for who knows the address.
-
-Three things keep others out: the server listens on the loopback interface, its address holds a token that
-nobody can guess, and requests that name another host or come from another page are refused (a page elsewhere
-could have its own name resolve to this machine: CWE-350).
-"""
+"""The studio's page and what it says, on this machine alone, to browsers that were let in."""
 
 from __future__ import annotations
 
@@ -12,13 +7,13 @@ import hashlib
 import json
 import math
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack, suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import attrs
-import tornado.httpserver
 import tornado.netutil
 import tornado.web
 import tornado.websocket
@@ -26,9 +21,10 @@ import tornado.websocket
 from gen_profile.errors import GenProfileError, OutputError, SpecError
 from gen_profile.spec.reading import presets
 from gen_profile.studio.desk import Desk
+from gen_profile.studio.entrance import PATIENCE, BoundedServer, Entering, Entrance, Guarded, started_browser
 from gen_profile.studio.orders import DriveQuestion, LogQuestion, Order, Question
 from gen_profile.studio.state import StudioState, WrittenSpec, opened_start, preset_start
-from gen_profile.studio.workers import Message, Part, Workers
+from gen_profile.studio.workers import Message, Part, Workers, failure
 from gen_profile_exporters.registry import find_exporter, formats
 
 LOOPBACK = "127.0.0.1"
@@ -44,10 +40,10 @@ KINDS = {
     ".json": "application/json",
 }
 ASSETS = {
-    "": ("gen_profile.studio", "studio.html"),
     **{
         name: ("gen_profile.studio", name)
         for name in (
+            "studio.html",
             "studio.css",
             "studio.js",
             "knobs.js",
@@ -75,7 +71,7 @@ class Studio:
         What the command named.
     workers : Workers
     agreed : dict of Path to str
-        Programs that the user lets run, with their SHA-256.
+        Programs that the user lets run, with their SHA-256 when he said so.
     opened : dict of str to WrittenSpec
         Specs that were dropped on a page, by the name that its state holds.
     first : Desk or None
@@ -114,64 +110,47 @@ class Studio:
             del self.opened[next(iter(self.opened))]
         return key
 
-    def unknown_programs(self, start: WrittenSpec) -> dict[Path, str]:
-        """List programs of a spec that the user has not agreed to, as they are now.
+    def permitted(self, question: Question) -> Question | None:
+        """Take a question whose programs the user lets run, as they are; None if he is to be asked.
+
+        No file is touched that he was not asked of: its name alone may lead to another computer.
+
+        Raises
+        ------
+        OutputError
+            A program cannot be read.
+        """
+        programs = question.start.programs
+        if not all(path in self.agreed for path in programs.values()):
+            return None
+        found = {key: _digest(path) for key, path in programs.items()}
+        known = all(self.agreed[path] == found[key] for key, path in programs.items())
+        return attrs.evolve(question, agreed=found) if known else None
+
+    def agree(self, programs: Iterable[Path]) -> None:
+        """Let programs run as they are now.
 
         Raises
         ------
         OutputError
             One cannot be read.
         """
-        strange = [path for path in start.programs if path.exists() and not path.is_file()]
-        if strange:
-            raise OutputError(f"Cannot read {strange[0]}: it is no file.")
-        try:
-            found = {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in start.programs}
-        except OSError as error:
-            raise OutputError(f"Cannot read {error.filename}: {error.strerror}.") from error
-        return {path: digest for path, digest in found.items() if self.agreed.get(path) != digest}
+        self.agreed |= {path: _digest(path) for path in programs}
 
 
-class Guarded(tornado.web.RequestHandler):
-    """Answers only who knows the address, and calls this machine by its number."""
-
-    @property
-    def host(self) -> str:
-        """Under which this server is known."""
-        return str(self.settings["host"])
-
-    def prepare(self) -> None:
-        """Refuse strangers."""
-        token = self.path_kwargs.get("token", "")
-        known = secrets.compare_digest(token, self.settings["token"])
-        here = self.request.headers.get("Origin", f"http://{self.host}") == f"http://{self.host}"
-        elsewhere = self.request.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin")
-        if not known or self.request.host != self.host or not here or elsewhere:
-            raise tornado.web.HTTPError(404)
-
-    def set_default_headers(self) -> None:
-        """Let nothing but the page's own scripts run, and nothing be kept, framed or told to others."""
-        host = self.settings["host"]
-        self.set_header(
-            "Content-Security-Policy",
-            f"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
-            f"connect-src 'self' ws://{host}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
-        )
-        self.set_header("Cache-Control", "no-store")
-        self.set_header("X-Content-Type-Options", "nosniff")
-        self.set_header("Referrer-Policy", "no-referrer")
-        self.set_header("Cross-Origin-Resource-Policy", "same-origin")
-        self.clear_header("Server")
-
-    def write_error(self, status_code: int, **_: Any) -> None:
-        """Say nothing to strangers."""
-        self.finish(f"{status_code}")
+def _digest(path: Path) -> str:
+    if path.exists() and not path.is_file():
+        raise OutputError(f"Cannot read {path}: it is no file.")
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise OutputError(f"Cannot read {path}: {error.strerror}.") from error
 
 
 class Asset(Guarded):
     """A file of the page."""
 
-    def get(self, token: str, name: str) -> None:
+    def get(self, name: str = "studio.html") -> None:
         """Send it."""
         if name not in ASSETS:
             raise tornado.web.HTTPError(404)
@@ -180,10 +159,14 @@ class Asset(Guarded):
         self.finish((resources.files(package) / "assets" / file).read_bytes())
 
 
+class FrontPage(Entering, Asset):
+    """The page itself."""
+
+
 class Download(Guarded):
     """A file that a page had made."""
 
-    def get(self, token: str, name: str) -> None:
+    def get(self, name: str) -> None:
         """Send it under its name."""
         made = self.settings["made"]
         if name not in made:
@@ -206,7 +189,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         self.set_nodelay(True)
         self._studio: Studio = self.settings["studio"]
         self._serial, self._made = 0, list[str]()
-        self._pending: tuple[StudioState, dict[Path, str]] | None = None
+        self._pending: tuple[StudioState, list[Path]] | None = None
         self._dropped: tuple[str, bytes] | None = None
         desk, self._studio.first = self._studio.first, None
         self._desk = desk or Desk(self._studio.workers, asyncio.get_running_loop())
@@ -244,9 +227,10 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             }
             act[said["say"]](said)
         except GenProfileError as error:
-            self._tell({"part": "failure", "sentences": str(error).splitlines(), "cures": []})
+            answer = "faulty" if isinstance(error, SpecError) else "unanswered"
+            self._tell(failure(answer, str(error).splitlines()))
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-            self._tell({"part": "failure", "sentences": ["The page said something unheard of."], "cures": []})
+            self._tell(failure("unanswered", ["The page said something unheard of."]))
 
     def on_close(self) -> None:
         """Let go of the page's workers and files."""
@@ -271,30 +255,36 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
 
     def _ask(self, state: StudioState) -> None:
         """Ask for a picture, once the user lets run what the spec wants to run."""
-        question = self._studio.question(state)
-        unknown = self._studio.unknown_programs(question.start)
-        if unknown:
-            self._pending = (state, unknown)
-            files = [{"path": str(path), "sha256": digest} for path, digest in unknown.items()]
-            self._tell({"part": "consent", "files": files})
-        else:
+        question = self._permitted(state)
+        if question is not None:
             self._desk.show(self._serial, question)
 
-    def _agree(self, _: dict[str, Any]) -> None:
-        if self._pending is not None:
-            state, unknown = self._pending
-            self._studio.agreed |= unknown
+    def _permitted(self, state: StudioState) -> Question | None:
+        """Say what is asked for, or ask the user first whether he lets its programs run."""
+        question = self._studio.question(state)
+        permitted = self._studio.permitted(question)
+        if permitted is None:
+            programs = [*question.start.programs.values()]
+            self._pending = (state, programs)
+            changed = all(path in self._studio.agreed for path in programs)
+            self._tell({"part": "consent", "files": [*map(str, programs)], "changed": changed})
+        return permitted
+
+    def _agree(self, said: dict[str, Any]) -> None:
+        """Let run what the page showed, and nothing that took its place meanwhile."""
+        if self._pending is not None and said["files"] == [*map(str, self._pending[1])]:
+            state, programs = self._pending
             self._pending = None
+            self._studio.agree(programs)
             self._ask(state)
 
     def _make(self, said: dict[str, Any]) -> None:
-        question = self._studio.question(StudioState.from_json(said["state"]))
+        question = self._permitted(StudioState.from_json(said["state"]))
         names = tuple(str(name) for name in said["formats"][: len(formats())])
         for name in names:
             find_exporter(name)
-        if self._studio.unknown_programs(question.start):
-            return
-        self._desk.make(Order(question=question, formats=names or ("csv",), report=bool(said["report"])))
+        if question is not None:
+            self._desk.make(Order(question=question, formats=names or ("csv",), report=bool(said["report"])))
 
     def _drop(self, said: dict[str, Any], content: bytes) -> None:
         """Take a file that was dropped on the page: a spec to start with, or a log."""
@@ -311,8 +301,8 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
 
     def _read(self, said: dict[str, Any]) -> None:
         """Ask what the log tells, once its spec may run what it wants to run."""
-        question = self._studio.question(StudioState.from_json(said["state"]))
-        if self._dropped is None or self._studio.unknown_programs(question.start):
+        question = self._permitted(StudioState.from_json(said["state"]))
+        if self._dropped is None or question is None:
             return
         name, content = self._dropped
         columns, after, at = said["columns"], float(said["after"]), tuple(map(float, said["at"]))
@@ -332,8 +322,8 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
 
     def _drive(self, said: dict[str, Any]) -> None:
         """Let a planner block go on for a moment, once its spec may run what it wants to run."""
-        question = self._studio.question(StudioState.from_json(said["state"]))
-        if self._studio.unknown_programs(question.start):
+        question = self._permitted(StudioState.from_json(said["state"]))
+        if question is None:
             return
         asked = DriveQuestion(
             question=question,
@@ -372,7 +362,14 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         return {"name": name, "bytes": len(content), "link": f"made/{key}"}
 
 
-def serve(start: WrittenSpec, port: int, ready: Callable[[str], None]) -> None:
+def serve(
+    start: WrittenSpec,
+    port: int,
+    *,
+    browser: bool,
+    ready: Callable[[str, str], None],
+    renew: Callable[[str], None],
+) -> None:
     """Serve pages until interrupted.
 
     Parameters
@@ -380,49 +377,70 @@ def serve(start: WrittenSpec, port: int, ready: Callable[[str], None]) -> None:
     start : WrittenSpec
     port : int
         0 for any that is free.
-    ready : str → None
-        Is told the address.
+    browser : bool
+        Whether the user's browser is started.
+    ready : (str, str) → None
+        Takes the address, and the code for another browser.
+    renew : str → None
+        Takes another code when one was used.
 
     Raises
     ------
     OutputError
         The port is taken.
     """
-    asyncio.run(_serve(start, port, ready))
+    asyncio.run(_serve(start, port, browser, ready, renew))
 
 
-async def _serve(start: WrittenSpec, port: int, ready: Callable[[str], None]) -> None:
-    workers = Workers()
-    studio = Studio(start=start, workers=workers)
-    if not start.programs:  # the first picture is on its way before the browser is
-        studio.first = Desk(workers, asyncio.get_running_loop())
-        studio.first.show(0, studio.question(StudioState()))
-    try:
-        sockets = tornado.netutil.bind_sockets(port, LOOPBACK)
-    except OSError as error:
-        workers.close()
-        raise OutputError(f"port {port}: {error.strerror}; leave it out to take one that is free.") from error
-    host, token = f"{LOOPBACK}:{sockets[0].getsockname()[1]}", secrets.token_urlsafe(16)
+async def _serve(
+    start: WrittenSpec,
+    port: int,
+    browser: bool,
+    ready: Callable[[str, str], None],
+    renew: Callable[[str], None],
+) -> None:
+    with ExitStack() as stack:
+        workers = Workers()
+        stack.callback(workers.close)
+        studio = Studio(start=start, workers=workers)
+        if not start.programs:  # the first picture is on its way before the browser is
+            studio.first = Desk(workers, asyncio.get_running_loop())
+            studio.first.show(0, studio.question(StudioState()))
+        try:
+            sockets = tornado.netutil.bind_sockets(port, LOOPBACK)
+        except OSError as error:
+            raise OutputError(
+                f"port {port}: {error.strerror}; leave it out to take one that is free."
+            ) from error
+        entrance = Entrance(host=f"{LOOPBACK}:{sockets[0].getsockname()[1]}", renew=renew)
+        _server(studio, entrance).add_sockets(sockets)
+        ready(f"http://{entrance.host}/", entrance.code)
+        if browser:
+            with suppress(OSError):  # without a file there is still the code
+                stack.enter_context(started_browser(entrance))
+        await asyncio.Event().wait()
+
+
+def _server(studio: Studio, entrance: Entrance) -> BoundedServer:
     application = tornado.web.Application(
         [
-            (r"/(?P<token>[\w-]+)/(?P<name>live)", Conversation),
-            (r"/(?P<token>[\w-]+)/made/(?P<name>[\w-]+)", Download),
-            (r"/(?P<token>[\w-]+)/(?P<name>[\w.-]*)", Asset),
-            (r"/.*", Guarded),
+            ("/", FrontPage),
+            ("/live", Conversation),
+            (r"/made/(?P<name>[\w-]+)", Download),
+            (r"/(?P<name>.*)", Asset),
         ],
         websocket_max_message_size=MOST_UPLOAD,
         log_function=lambda _: None,
         studio=studio,
-        host=host,
-        token=token,
+        entrance=entrance,
         made={},
     )
-    server = tornado.httpserver.HTTPServer(
-        application, max_body_size=MOST_MESSAGE, max_header_size=MOST_MESSAGE
+    server = BoundedServer(
+        application,
+        max_body_size=MOST_MESSAGE,
+        max_header_size=MOST_MESSAGE,
+        idle_connection_timeout=PATIENCE,
+        body_timeout=PATIENCE,
     )
-    server.add_sockets(sockets)
-    ready(f"http://{host}/{token}/")
-    try:
-        await asyncio.Event().wait()
-    finally:
-        workers.close()
+    application.settings["trust"] = server.trust
+    return server

@@ -69,12 +69,19 @@ class WrittenSpec:
             raise SpecError(f"{' '.join(self.words)}: not valid TOML: {error}.") from error
 
     @property
-    def programs(self) -> tuple[Path, ...]:
-        """Files that the spec names and whose code would run: a machine of one's own, somebody else's FMU."""
-        named = (self.document.get(table) for table in ("plant", "check"))
-        tables = (table if isinstance(table, dict) else {} for table in named)
-        files = [table.get(key) for table, key in zip(tables, ("file", "fmu"), strict=True)]
-        return tuple((self.folder / name).absolute() for name in files if isinstance(name, str))
+    def programs(self) -> Mapping[str, Path]:
+        """Files that the spec names and whose code would run, by key; nothing of them is looked at.
+
+        They are a machine of one's own, and somebody else's FMU.
+        """
+        keys = {"plant": "file", "check": "fmu"}
+        tables = {name: self.document.get(name) for name in keys}
+        named = {
+            f"{name}.{keys[name]}": table.get(keys[name])
+            for name, table in tables.items()
+            if isinstance(table, dict)
+        }
+        return {key: (self.folder / file).absolute() for key, file in named.items() if isinstance(file, str)}
 
 
 def changed_start(words: tuple[str, ...], text: str, changes: tuple[str, ...], folder: Path) -> WrittenSpec:

@@ -17,7 +17,7 @@ import numpy as np
 from gen_profile.charts.curves import motion_figure, select_machines, sway_figure
 from gen_profile.comparison.candidates import own_method
 from gen_profile.designs.plan import Plan, draft, judged
-from gen_profile.errors import GenProfileError, SpecError
+from gen_profile.errors import GenProfileError, InfeasibleProblem, LimitViolation, SolverDiverged, SpecError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
 from gen_profile.evaluation.phrases import machine, move, place_unit
 from gen_profile.motion.metrics import extremes, greatest, peak
@@ -27,11 +27,11 @@ from gen_profile.solvers.method_selection import ANSWER, OTHERWISE
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import doubts
-from gen_profile.spec.reading import spec_from_dict
 from gen_profile.studio.curves_json import curves_json
 from gen_profile.studio.knobs import knobs
 from gen_profile.studio.orders import Question
 from gen_profile.studio.state import command_of, text_of
+from gen_profile.studio.workers import failure
 from gen_profile.work import OutOfWork, budget
 
 SAMPLES = 300  # of a curve: as many as a panel has pixels
@@ -43,6 +43,7 @@ FIGURES = {
     "sway": "sway_transient_peak_m",
     "residual": "sway_residual_worst_m",
 }
+NO_MOTION = (InfeasibleProblem, SolverDiverged, LimitViolation, OutOfWork)
 SEARCHING = "Looking for what would help …"
 CURE = re.compile(r"(\w+(?:\.\w+)+) = (\[[^]]*\]|\"[^\"]*\"|[-+0-9.e]*[0-9])")
 SENTENCES = re.compile(r"\n|(?<=\.) (?=[A-Z])")
@@ -58,7 +59,7 @@ def picture(question: Question) -> Iterator[Part]:
         with budget(*ANSWER):
             found = draft(spec)
             if found.motion is None:
-                yield {"part": "failure", "sentences": [SEARCHING], "cures": []}
+                yield failure("none", [SEARCHING])
             else:
                 yield from _seen(found.spec, sketch(found.spec, found.motion))
             yield _setting(question, spec)
@@ -84,13 +85,12 @@ def _seen(spec: Spec, evaluation: MotionEvaluation) -> Iterator[Part]:
 def _setting(question: Question, spec: Spec) -> Part:
     """Tell the knobs, and how else the same is stated."""
     start, state = question.start, question.state
-    beginning = spec_from_dict(start.document, start.folder)
     return {
         "part": "setting",
         "name": spec.name,
         "summary": spec.machine().summary,
         "machine": spec.plant.type,
-        "knobs": [_json(knob) for knob in knobs(spec, question.document(), beginning)],
+        "knobs": [_json(knob) for knob in knobs(spec, question.document(), question.beginning())],
         "command": command_of(start, state.edits),
         "text": text_of(start, state.edits),
         "address": state.address,
@@ -169,13 +169,14 @@ def _verdict(found: Plan) -> Part:
 def _failure(question: Question, error: Exception) -> Iterator[Part]:
     """Say why there is no motion, what would help, and keep the knobs usable."""
     if isinstance(error, SpecError):
-        sentences = str(error).splitlines()
+        answer, sentences = "faulty", str(error).splitlines()
         yield {"part": "faults", "faults": [fault(sentence) for sentence in sentences]}
         if question.state.edits:
             return
     else:
+        answer = "none" if isinstance(error, NO_MOTION) else "unanswered"
         sentences = SENTENCES.split(str(error) or Status.GIVEN_UP.value)
-    yield {"part": "failure", "sentences": sentences, "cures": cures(" ".join(sentences))}
+    yield failure(answer, sentences, cures(" ".join(sentences)))
 
 
 def fault(sentence: str) -> dict[str, str]:

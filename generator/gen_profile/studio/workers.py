@@ -8,7 +8,7 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from multiprocessing.connection import Connection
@@ -59,6 +59,20 @@ class Message:
     name: str
     text: str = "{}"
     file: tuple[str, bytes] | None = None
+
+
+def failure(answer: str, sentences: Sequence[str], cures: Sequence[Mapping[str, Any]] = ()) -> Part:
+    """Say why there is no picture, and what would help.
+
+    Parameters
+    ----------
+    answer : {"none", "faulty", "unanswered"}
+        Whether there is no such motion, a value does not fit, or no answer was found.
+    sentences : sequence of str
+    cures : sequence of mapping
+        Edits of the spec.
+    """
+    return {"part": "failure", "answer": answer, "sentences": [*sentences], "cures": [*cures]}
 
 
 Hear = Callable[["Worker", Message], None]
@@ -218,4 +232,4 @@ def _parts(job: Job) -> Iterator[Mapping[str, Any]]:
         yield from getattr(import_module(module), name)(job.question)
     except Exception as error:
         sentence = f"Internal error ({type(error).__name__}: {error}); undo the last change."
-        yield {"part": "failure", "sentences": [sentence], "cures": []}
+        yield failure("unanswered", [sentence])

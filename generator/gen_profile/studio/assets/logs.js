@@ -222,5 +222,5 @@ const logs = (() => {
     });
   }
 
-  return { begin, show, planned, speak };
+  return { begin, show, planned, speak, forget };
 })();

@@ -5,6 +5,7 @@
   const { element } = knobs;
   const WORDS = await (await fetch("words.json")).json();
   const LANGUAGES = ["en", "de"];
+  const COME_BACK = 2000; // ms between looks whether the studio is there again
   const ONCE = new Set(["hello", "state", "opened", "consent"]); // parts that do something: no other language shows them again
   let language = localStorage.getItem("language") ?? (navigator.language.startsWith("de") ? "de" : "en");
   let state = { preset: "", edits: {} };
@@ -193,7 +194,8 @@
       $("preset").replaceChildren(element("option", { value: "" }, start.replace("--preset ", "")), ...Object.entries(presets).filter(([name]) => start !== `--preset ${name}`).map(([name]) => element("option", { value: name }, name)));
       opened.forEach(offer);
       const boxes = Object.entries(formats).map(([name, about]) => element("label", { title: about }, element("input", { type: "checkbox", value: name, checked: name === "csv" }), name));
-      $("formats").append(...boxes);
+      if (!$("formats").querySelector("input")) $("formats").append(...boxes);
+      $("preset").value = state.preset;
     },
     state({ preset, edits: taken }) {
       state = { preset, edits: taken };
@@ -234,7 +236,7 @@
       document.title = `${part.name} · gen-profile studio`;
       knobs.show(part.knobs, setting());
       knobs.blame([]);
-      $("command").textContent = part.command;
+      showCommand();
       notice(part.doubts.length ? `${phrase("beware")}: ${part.doubts.map(placed).join(" ")}` : "");
       if (latest.curves && String(handles) !== String(draggable())) take(latest.curves); // they came before their knobs
       tellAddress();
@@ -261,17 +263,21 @@
       judge("failed", phrase("faulty"), (others.length ? others : faults).map(placed), []);
       settled(true);
     },
-    failure({ sentences, cures }) {
-      judge("failed", phrase("none"), sentences.map((one) => phrase(one)), cures);
+    failure({ answer, sentences, cures }) {
+      judge("failed", phrase(answer), sentences.map((one) => phrase(one)), cures);
       settled(true);
     },
     spectrum: ({ panels }) => curves.draw($("spectrum"), panels, drawing()),
     robustness: ({ panels }) => curves.draw($("robustness"), panels, drawing()),
     maps: (part) => maps.show($("maps"), part.maps, drawing()),
     comparison: () => listDesigns(),
-    consent({ files }) {
-      $("programs").replaceChildren(...files.map(({ path, sha256 }) => element("li", {}, path, element("br"), element("code", {}, sha256))));
-      $("consent").showModal();
+    consent({ files, changed }) {
+      $("programs").replaceChildren(...files.map((path) => element("li", {}, element("code", {}, path))));
+      $("changed").hidden = !changed;
+      $("trust").checked = false;
+      $("agree").disabled = true;
+      if (!$("consent").open) $("consent").showModal();
+      $("refuse").focus();
     },
     progress({ stage, done: so, total, remark }) {
       $("stop").hidden = false;
@@ -285,6 +291,9 @@
       $("outcome").replaceChildren(verdict, ...sentences.map((one) => element("p", {}, one)), ...link);
     },
   };
+
+  /** Say that files were not made, for the process that made them has ended. */
+  const unmade = ({ sentences }) => parts.made({ passed: false, sentences, scenarios: 0, file: null });
 
   function take(part) {
     parts[part.part]?.(part);
@@ -347,6 +356,14 @@
     $("margins").replaceChildren(...rows);
   }
 
+  const formats = () => [...$("formats").querySelectorAll("input:checked")].map((box) => box.value);
+
+  /** Write the command line that makes the files that are ticked; it writes a CSV where none is named. */
+  function showCommand() {
+    const named = formats().join() === "csv" ? [] : formats();
+    $("command").textContent = [latest.setting.command, ...named.map((name) => `--export ${name}`)].join(" ");
+  }
+
   function listDesigns() {
     designs.show(latest.comparison, latest.verdict?.point && { ...latest.verdict.point, method: "now" }, pins, {
       phrase, limit: latest.verdict?.allowed, residual: filled("residual", { load: phrase(latest.animation?.animation.load ?? "load") }),
@@ -362,14 +379,34 @@
 
   // wiring --------------------------------------------------------------------------------------------------
 
-  const socket = new WebSocket(`ws://${location.host}${location.pathname}live`);
-  const say = (message) => socket.send(JSON.stringify(message));
-  socket.addEventListener("open", () => say({ say: "open", address: location.hash.slice(1) }));
-  socket.addEventListener("close", () => notice(phrase("closed")));
-  socket.addEventListener("message", ({ data }) => {
-    inbox.push(data);
-    receive();
-  });
+  let socket;
+  const send = (message) => socket.readyState === WebSocket.OPEN && socket.send(message);
+  const say = (message) => send(JSON.stringify(message));
+
+  /** Talk to the studio; one that is back is told the state that this page has. */
+  function connect() {
+    socket = new WebSocket(`ws://${location.host}/live`);
+    socket.addEventListener("open", () => {
+      if (asked === null) return say({ say: "open", address: location.hash.slice(1) });
+      asked = null;
+      notice("");
+      logs.forget();
+      ask();
+    });
+    socket.addEventListener("close", comeBack);
+    socket.addEventListener("message", ({ data }) => {
+      inbox.push(data);
+      receive();
+    });
+  }
+
+  /** Wait until the studio is there again, and this browser is let in. */
+  async function comeBack() {
+    const answer = await fetch("words.json").catch(() => null);
+    if (answer?.ok) return connect();
+    notice(phrase(answer ? "restarted" : "closed"));
+    setTimeout(comeBack, COME_BACK);
+  }
 
   /** Take what has come, unless the browser is to draw first. */
   function receive() {
@@ -377,9 +414,10 @@
   }
 
   function hear(part) {
-    const elsewhere = { log: logs, drive: driving }[part.of];
+    const lost = part.part === "failure";
+    const elsewhere = { log: logs.show, drive: driving.show, files: lost && unmade, depth: lost && (() => {}) }[part.of];
     if (elsewhere) {
-      elsewhere.show(part);
+      elsewhere(part);
       return;
     }
     // while a hand is on a knob, curves of a moment ago are welcome, but nothing that would take the knob back
@@ -419,7 +457,8 @@
     localStorage.setItem("language", language);
     speak();
   });
-  const order = (report) => say({ say: "make", state, report, formats: [...$("formats").querySelectorAll("input:checked")].map((box) => box.value) });
+  const order = (report) => say({ say: "make", state, report, formats: formats() });
+  $("formats").addEventListener("change", () => { if (latest.setting) showCommand(); });
   $("make").addEventListener("click", () => order(false));
   $("report").addEventListener("click", () => order(true));
   $("stop").addEventListener("click", () => { say({ say: "stop" }); $("stop").hidden = true; $("outcome").replaceChildren(); });
@@ -433,14 +472,20 @@
     $("copy").textContent = phrase("copied");
     setTimeout(() => { $("copy").textContent = phrase("copy"); }, 1500);
   });
-  $("agree").addEventListener("click", () => { $("consent").close(); say({ say: "agree" }); });
-  $("refuse").addEventListener("click", () => { $("consent").close(); notice(phrase("refused")); });
+  $("trust").addEventListener("change", () => { $("agree").disabled = !$("trust").checked; });
+  $("agree").addEventListener("click", () => { $("consent").close("agreed"); say({ say: "agree", files: latest.consent.files }); });
+  $("refuse").addEventListener("click", () => $("consent").close());
+  $("consent").addEventListener("close", () => {
+    if (!$("consent").returnValue) hear({ part: "failure", answer: "refused", sentences: [], cures: [], serial });
+    $("consent").returnValue = "";
+  });
   driving.lend({ phrase, filled, placed, say, edit, begin, knob: at, state: () => state });
   logs.begin({
-    phrase, filled, notice, edit, drawing, say, send: (blob) => socket.send(blob), state: () => state,
+    phrase, filled, notice, edit, drawing, say, send, state: () => state,
     mostUpload: () => latest.hello.most_upload,
   });
   const theme = localStorage.getItem("theme");
   if (theme) document.documentElement.dataset.theme = theme;
   speak();
+  connect();
 })();
