@@ -319,10 +319,8 @@ class Planner:
 
     def _command(self, orders: _Orders, columns: dict[str, Array]) -> None:
         """Let another command take the place of the one that holds; one that was stopped is given anew."""
-        columns |= {
-            "bReset": np.full(1, float(orders.reset)),
-            "bLoadAtRest": np.full(1, float(orders.load_at_rest)),
-        }
+        noted = {"bReset": orders.reset, "bLoadAtRest": orders.load_at_rest}
+        columns |= {name: np.full(1, float(is_so)) for name, is_so in noted.items() if name in self._inputs}
         if orders.reset:
             self._target = None
         if orders.target is not None:

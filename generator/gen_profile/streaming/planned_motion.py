@@ -148,6 +148,7 @@ class PlannedMotion:
         self._log = np.zeros((self.most, len(numbers) + 2), dtype=np.int64)  # setpoints, promise, error
         self._lost: set[int] = set()
         self._called = self._cycle = -1  # latest cycle of the block, and of the bus
+        self._waiting: list[Command] = []
         self._still = 0
         self._ends = False  # whether it is to stand, whatever the operator wants
         self._error, self._shown_at = 0, 0  # what the block shows, and since which of its cycles
@@ -244,11 +245,15 @@ class PlannedMotion:
     def _inputs(self) -> list[float]:
         """Give the inputs of the block's next cycle."""
         self._called += 1
-        self._values["bExecute"] = 0.0
-        for command in () if self._ends else self._operator.due(self._called):
-            self._values |= inputs_of(command, self._axes)
+        due = [] if self._ends else [*self._waiting, *self._operator.due(self._called)]
+        self._values["bReset"], self._waiting = float(bool(due)), []
+        for command in due:
             self._still = 0
-        return list(self._values.values())
+            if command.command == "position" and self._values["bExecute"]:
+                self._values["bExecute"], self._waiting = 0.0, [command]  # falls, so that there is an edge
+            else:
+                self._values |= inputs_of(command, self._axes)
+        return [self._values[name] for name in self._block.inputs]
 
     def _give_up(self, failure: str) -> None:
         """End, as what was asked for cannot be carried out; the first reason holds."""
