@@ -161,9 +161,10 @@ def test_every_kind_of_fault_is_tried():
 
 def test_a_command_that_changes_nothing_for_too_long_is_obeyed_late():
     late = kind_of(WORDS["reaction"])
-    assert kinds(obedient(), {STOPPED: 149}) == set()
-    assert kinds(obedient(), {STOPPED: 152}) == {late}
-    assert kinds(obedient(), {TOLD: 152}) == set()  # the way was the right one
+    early = with_orders(REST, attrs.evolve(MOVE, end=200), told(200, CYCLES, STOP), reaction=0.5)
+    assert late not in kinds(early, {200: 49})
+    assert late in kinds(early, {200: 52})
+    assert kinds(obedient(), {TOLD: 152, STOPPED: 152}) == set()  # the way was the right one
     assert kinds(obedient(), {STOPPED: None}) == set()  # what came before ended anyway, and in time
 
 
@@ -212,10 +213,10 @@ def test_orders_are_read_from_inputs():
     assert [(one.begin, one.kind, one.values, one.tops, one.edge, one.refused) for one in found] == [
         (0, STOP, (), (1.0,), 0, 0),
         (10, POSITION, (5.0,), (1.0,), 10, 0),  # and nothing new with the second edge
-        (40, POSITION, (5.0,), (0.5,), 30, 0),
+        (40, POSITION, (5.0,), (0.5,), 10, 0),
         (50, VELOCITY, (-0.3,), (0.2,), 50, 0),
         (60, STOP, (), (1.0,), 60, 0),
-        (70, STOP, (), (1.0,), 70, 3),
+        (70, STOP, (), (1.0,), 60, 3),
         (80, QUICK_STOP, (), (1.0,), 80, 0),
     ]
     assert [one.end for one in found] == [*(one.begin for one in found[1:]), 1000]

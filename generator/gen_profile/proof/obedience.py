@@ -260,6 +260,6 @@ def _obeys_anyway(motion: Motion, order: Order, at: int) -> bool:
     """Whether axes go on as before, and the right way."""
     velocity = motion.velocity[:, at]
     if order.kind == STOP:
-        return False
+        return bool(((velocity * motion.acceleration[:, at] < 0.0) | (velocity == 0.0)).all())
     wanted = np.array(order.values) - (motion.position[:, at] if order.kind == POSITION else 0.0)
     return bool((velocity * wanted >= 0.0).all())

@@ -114,6 +114,7 @@ def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Ord
     targets, sticks, slow = of("fTarget"), of("fVelocityCommand"), of("fVelocityLimit")
     reset = place.get("bReset")
     kind, values, execute, edge, since, latched = STOP, tuple[float, ...](), False, 0, -1, 0
+    neutral = True  # the stick, since an error stopped the axis
     full = tops = tuple(own.velocity for own in inputs.limits)
     for begin, end, row in zip(begins, [*begins[1:], begins[-1]], rows.tolist(), strict=True):
         given, wrong = [row[number] for number in slow], _wrong(row, place, slow, inputs.live)
@@ -125,13 +126,15 @@ def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Ord
                 min(row[place["rOverride"]] * most, limit or most)
                 for most, limit in zip(full, given, strict=True)
             )
+        at_rest = not row[place["bVelocity"]] or not any(row[number] for number in sticks)
+        neutral = not latched and (neutral or at_rest)
         was, rises, refused = (kind, values), bool(row[place["bExecute"]]) and not execute, latched
         execute = bool(row[place["bExecute"]])
         if row[place["bQuickStop"]]:
             kind, values = QUICK_STOP, ()
         elif latched or row[place["bStop"]] or not row[place["bEnable"]]:
             kind, values = STOP, ()
-        elif row[place["bVelocity"]]:
+        elif row[place["bVelocity"]] and neutral:
             kind, values = VELOCITY, tuple(row[number] for number in sticks)
         elif rises:
             kind, values = POSITION, tuple(row[number] for number in targets)
@@ -140,11 +143,11 @@ def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Ord
                 kind, values, refused = STOP, (), 3
         elif kind in (VELOCITY, QUICK_STOP):
             kind, values = STOP, ()
-        if rises or was != (kind, values):
+        if was != (kind, values):
             edge = begin
         yield Order(begin=begin, end=begin, kind=kind, values=values, tops=tops, edge=edge, refused=refused)
         if wrong and not latched and end > since + inputs.held:
-            kind, values, latched, edge = STOP, (), wrong, since + inputs.held
+            kind, values, latched, edge, neutral = STOP, (), wrong, since + inputs.held, False
             yield Order(begin=edge, end=edge, kind=kind, values=values, tops=tops, edge=edge, refused=wrong)
 
 

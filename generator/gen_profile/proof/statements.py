@@ -38,11 +38,12 @@ def truths(followed: Followed, motion: Motion) -> Iterator[Measured]:
     told = done | busy | aborted | error
     quiet, there = motion.goes & ~told, motion.goes & motion.stands & (motion.away <= EXACT)
     may_be, wrong = np.zeros((2, followed.cycles), dtype=bool)
-    before = None
+    before, stands = None, False
     for order in followed.orders:
         own = slice(order.begin, order.end)
+        stands = bool(order.refused) or (stands and order.kind == STOP)  # until the next command
+        wrong[own] = stands
         if order.refused:
-            wrong[own] = True
             shown = followed.issued["nErrorId"][order.begin : order.end][:2]  # in that cycle or the next
             yield Measured("refused", order.begin, float((shown != order.refused).all()), 0.0)
         if before and before.kind in (POSITION, VELOCITY):
