@@ -156,7 +156,7 @@ class TestInPython:
         It is the first that is played, and none of Python's; there bExecute falls when the next target comes.
         """
         commands = (
-            "time_s,command,value,L1\n0.404,position,3.0,5.5\n2.004,position,2.5,\n4.004,velocity,0.3,\n"
+            "time_s,command,value,L1\n0.404,position,3.0,5.5\n2.008,position,2.5,\n4.004,velocity,0.3,\n"
             "8.004,stop,,\n"
         )
         played = np.genfromtxt(io.StringIO(play(block.text, commands).table), delimiter=",", names=True)

@@ -241,11 +241,11 @@ def input_rows(
     values = dict(values)
     rows = {0: list(values.values())}
     for command, begin in zip(commands, begins_of(commands, cycle), strict=True):
-        again = command.command == "position" and values["bExecute"]
+        if command.command == "position" and values["bExecute"]:
+            values["bExecute"] = 0.0  # for a cycle, so that there is an edge
+            rows[begin - 1] = list(values.values())
         values |= inputs_of(command, axes)
-        if again:  # bExecute falls for a cycle, so that there is an edge
-            rows[begin] = list((values | {"bExecute": 0.0}).values())
-        rows[begin + bool(again)] = list(values.values())
+        rows[begin] = list(values.values())
     return list(rows), np.array(list(rows.values()), dtype=np.float64)
 
 
