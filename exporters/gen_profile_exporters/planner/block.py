@@ -73,6 +73,7 @@ AT_ONCE = 2.0  # of full speed, from a slot's pulse to the next: no bound
 RESERVE = 0.1  # share of the limits that only calming takes up, where live parameters change on the way
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
+AXIS_LOOP = re.compile(r"(?ms)^( *)FOR (\w+) := 0 TO cAxes - 1 DO[^\n]*\n(.*?)^\1END_FOR;[^\n]*\n")
 FOLLOWED = re.compile(r"(?ms)^@where_followed\n(.*?)^@end\n")
 PART = re.compile(r"(?m)^( *)@(\w+)\n")
 TEXT = Path(__file__).with_name("text")
@@ -201,7 +202,8 @@ def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
     text = FOLLOWED.sub(r"\1" if constants.rates else "", _part("block"))
     values = _values(constants)
-    return _narrow(_with_while_loops(re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)))
+    text = re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
+    return _narrow(_with_while_loops(_without_loops(text) if len(constants.axes) == 1 else text))
 
 
 @cache
@@ -212,6 +214,16 @@ def _part(name: str, margin: str = "") -> str:
         return _part(hole[2], hole[1]) if (TEXT / f"{hole[2]}.st").is_file() else hole[0]
 
     return indent(PART.sub(named, (TEXT / f"{name}.st").read_text("ascii")), margin)
+
+
+def _without_loops(text: str) -> str:
+    """Take the loops over axes away where there is one axis."""
+
+    def once(loop: re.Match[str]) -> str:
+        margin, counter, body = loop.groups()
+        return f"{margin}{counter} := 0;\n" + re.sub("(?m)^ {4}", "", _without_loops(body))
+
+    return AXIS_LOOP.sub(once, text)
 
 
 def _with_while_loops(text: str) -> str:
