@@ -46,3 +46,7 @@ battery *arguments:
 # Random sequences of knobs in the studio: how they end, and what they leave behind.
 knobs *arguments:
     python tests/end_to_end/knob_sequences.py {{ arguments }}
+
+# Random programs of Structured Text: do the C made of them and the tests' interpreter agree?
+interpreters *arguments:
+    python tests/exporters/interpreters.py {{ arguments }}
