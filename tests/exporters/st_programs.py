@@ -1,4 +1,4 @@
-"""Random programs in the subset of Structured Text that is translated to C, and what they give where known."""
+"""Random programs in the subset of Structured Text that is translated to C, and their values where known."""
 
 import math
 import random
