@@ -9,17 +9,19 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from exporters.st_interpreter import FunctionBlock, StError
-from exporters.st_programs import FAULT, INPUTS, SHOWN, draw
+from exporters.st_programs import FAULT, INPUTS, SHOWN, block, draw
 from lark.exceptions import LarkError
 
 from gen_profile.errors import ExportError
 from gen_profile_exporters.st_to_c import translate
 
 BATCH = 500  # programs in a C file
+TOGETHER = 15  # in a function block
 CYCLES = 3
 REFUSED = "refused"
 DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -29,7 +31,7 @@ NAMES = (*"cwe", "sound", "within", "turn", "nonzero", "whole", "rounded", "root
 def runner(translation):
     """C that plays a program's cycles; it returns how many ended without a fault."""
     name = translation.name
-    taken = "".join(f"fb.{name} = *in++; " for name in INPUTS)
+    taken = "".join(f"fb.{name} = *in++; " for name in ("which", *INPUTS))
     shown = "".join(
         f"*out++ = fb.{name}{element}; "
         for name, length in SHOWN.items()
@@ -103,28 +105,35 @@ def bits(found):
     return b"".join(b"none" if value != value else struct.pack("d", value) for value in found)
 
 
+def blocks(programs):
+    """Write programs in few texts, which are read faster, and each that may be refused in one of its own."""
+    sound = [program for program in programs if not program.spoiled]
+    groups = [sound[first : first + TOGETHER] for first in range(0, len(sound), TOGETHER)]
+    for number, group in enumerate([*groups, *([program] for program in programs if program.spoiled)]):
+        name = f"P{number}"
+        yield name, block(name, ["\n".join(program.lines) for program in group]), group
+
+
 def differences(programs):
     """Compare programs; gives how each one ended, and what differs in words."""
     ends, words = Counter(), []
-    translations, places = [], {}
-    for program in programs:
-        try:
-            translation = translate(program.text)
-        except ExportError:
-            continue
-        places[program.name] = len(translations)
-        translations.append(translation)
+    translations, written = {}, [*blocks(programs)]
+    for name, text, _ in written:
+        with suppress(ExportError):
+            translations[name] = translate(text)
     with tempfile.TemporaryDirectory() as folder:
-        run = compiled(translations, folder)
-        for program in programs:
-            place = places.get(program.name)
-            in_c = REFUSED if place is None else run(place, program.rows)
-            due = interpreted(program.text, program.rows)
-            if [*map(bits, in_c)] != [*map(bits, due)]:
-                words.append(f"{program.seed}: C {in_c}, interpreter {due}\n{program.text}")
-            if program.result and due != REFUSED and bits(due[0]) != bits(program.result):
-                words.append(f"{program.seed}: both {due[0]}, expected {program.result}\n{program.text}")
-            ends[due if due == REFUSED else FAULT if due[-1] == FAULT else "value"] += 1
+        run = compiled([*translations.values()], folder)
+        for name, text, group in written:
+            for number, program in enumerate(group):
+                rows = [{"which": number} | row for row in program.rows]
+                in_c = run([*translations].index(name), rows) if name in translations else REFUSED
+                due = interpreted(text, rows)
+                ends[due if due == REFUSED else FAULT if due[-1] == FAULT else "value"] += 1
+                told = "\n".join([*map(str, rows), *program.lines])
+                if [*map(bits, in_c)] != [*map(bits, due)]:
+                    words.append(f"{program.seed}: C {in_c}, interpreter {due}\n{told}")
+                if program.result and bits(due[0]) != bits(program.result):
+                    words.append(f"{program.seed}: both {due[0]}, expected {program.result}\n{told}")
     return ends, words
 
 
@@ -142,7 +151,7 @@ def main():
         ended, words = differences([draw(f"{arguments.seed}-{k}", CYCLES) for k in batch])
         ends += ended
         found += words
-        print(*words, sep="\n", end="", flush=True)
+        print(*words, f"{batch.stop - arguments.first} compared", sep="\n", flush=True)
     print(f"{arguments.count} programs: {dict(ends)}; {len(found)} differ")
     sys.exit(bool(found))
 

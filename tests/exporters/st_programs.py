@@ -5,7 +5,9 @@ import random
 from typing import NamedTuple
 
 DECLARATIONS = """
-VAR_INPUT x : LREAL; z : LREAL := -0.5; m : DINT; n : DINT := 010; p : BOOL; q : BOOL := TRUE; END_VAR
+VAR_INPUT
+    which : DINT; x : LREAL; z : LREAL := -0.5; m : DINT; n : DINT := 010; p : BOOL; q : BOOL := TRUE;
+END_VAR
 VAR_OUTPUT y : LREAL; k : DINT := -1; b : BOOL; END_VAR
 VAR
     v : ARRAY [0..3] OF LREAL := [1.0, -2.0E+0, 0.5, -0.0]; t : ARRAY [0..2] OF DINT := [3, -7, 08];
@@ -190,22 +192,20 @@ class Writer:
 
 
 class Program(NamedTuple):
-    """A function block, the inputs of its cycles, and what the first shows where that is known otherwise."""
+    """Statements, the inputs of their cycles, and what the first shows where that is known otherwise."""
 
     seed: str
-    text: str
+    lines: list
     rows: list
     result: tuple | str
-
-    @property
-    def name(self):
-        return f"P{self.seed.rpartition('-')[2]}"
+    spoiled: bool
 
 
 def draw(seed, cycles):
     """Draw a program: of every four one with parts of other types, and one whose values are known."""
     number = int(seed.rpartition("-")[2])
-    writer = Writer(seed, spoil=0.015 if number % 4 == 3 else 0.0)
+    spoiled = number % 4 == 3
+    writer = Writer(seed, spoil=0.015 if spoiled else 0.0)
     rows = [writer.inputs() for _ in range(cycles)]
     result = ()
     if number % 4 == 1:
@@ -223,8 +223,15 @@ def draw(seed, cycles):
             result = FAULT
     else:
         lines = [line for _ in range(2) for line in writer.statements(2)]
-    text = f"FUNCTION_BLOCK P{number}{DECLARATIONS}" + "\n".join(lines) + "\nEND_FUNCTION_BLOCK\n"
-    return Program(seed, text, rows, result)
+    return Program(seed, lines, rows, result, spoiled)
+
+
+def block(name, bodies):
+    """Write a function block that does one of several programs in a cycle."""
+    cases = [f"{number}:\n{body}" for number, body in enumerate(bodies)]
+    return "\n".join(
+        [f"FUNCTION_BLOCK {name}{DECLARATIONS}CASE which OF", *cases, "END_CASE;", "END_FUNCTION_BLOCK"]
+    )
 
 
 def value(tree, variables):

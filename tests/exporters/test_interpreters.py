@@ -14,7 +14,8 @@ from gen_profile.errors import ExportError
 from gen_profile_exporters.st_to_c import translate
 
 COUNT = int(os.environ.get("PROGRAMS", "2000"))
-GIVEN = dict(zip(INPUTS, (2.5, -0.5, 7, -2, True, False), strict=True))
+LAST = DECLARATIONS.count("\n") + 1  # line, of a body
+GIVEN = {"which": 0} | dict(zip(INPUTS, (2.5, -0.5, 7, -2, True, False), strict=True))
 LEAST = "(-2147483647 - 1)"
 
 # x = 2.5, z = -0.5, m = 7, n = -2, p, not q
@@ -114,7 +115,7 @@ BROKEN_DECLARATIONS = [
 ]
 
 
-def block(body, number=0):
+def text_of(body, number=0):
     return f"FUNCTION_BLOCK P{number}{DECLARATIONS}{body} END_FUNCTION_BLOCK"
 
 
@@ -122,7 +123,9 @@ def block(body, number=0):
 def in_c(tmp_path_factory):
     """What each body shows at first, all compiled at once."""
     bodies = [*(body for body, *_ in VALUES), *FAULTS]
-    run = compiled([translate(block(body, k)) for k, body in enumerate(bodies)], tmp_path_factory.mktemp("c"))
+    run = compiled(
+        [translate(text_of(body, k)) for k, body in enumerate(bodies)], tmp_path_factory.mktemp("c")
+    )
     return {body: run(k, [GIVEN] * CYCLES)[0] for k, body in enumerate(bodies)}
 
 
@@ -130,20 +133,20 @@ def in_c(tmp_path_factory):
 @pytest.mark.parametrize(("body", "name", "value"), VALUES)
 def test_both_know_the_value(in_c, body, name, value):
     assert in_c[body][[*SHOWN].index(name)] == value
-    assert bits(in_c[body]) == bits(interpreted(block(body), [GIVEN])[0])
+    assert bits(in_c[body]) == bits(interpreted(text_of(body), [GIVEN])[0])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("body", FAULTS)
 def test_both_end_where_the_language_defines_no_value(in_c, body):
-    assert in_c[body] == interpreted(block(body), [GIVEN])[0] == FAULT
+    assert in_c[body] == interpreted(text_of(body), [GIVEN])[0] == FAULT
 
 
 @pytest.mark.parametrize("body", REFUSED)
 def test_both_refuse_what_the_language_does_not_have(body):
-    with pytest.raises(ExportError, match=r"^The text is no function block .*: line 9[:,].*\.$"):
-        translate(block(body))
-    assert interpreted(block(body), [GIVEN]) == "refused"
+    with pytest.raises(ExportError, match=rf"^The text is no function block .*: line {LAST}[:,].*\.$"):
+        translate(text_of(body))
+    assert interpreted(text_of(body), [GIVEN]) == "refused"
 
 
 @pytest.mark.parametrize("declaration", BROKEN_DECLARATIONS)
@@ -170,7 +173,7 @@ def test_what_c_cannot_take_is_refused(declaration, words):
 
 def test_nesting_without_end_is_refused_in_a_sentence():
     with pytest.raises(ExportError, match="nested too deeply"):
-        translate(block(f"y := {'(' * 3000}x{')' * 3000};"))
+        translate(text_of(f"y := {'(' * 3000}x{')' * 3000};"))
 
 
 @pytest.mark.slow
