@@ -50,3 +50,7 @@ knobs *arguments:
 # Changed texts of the planner block: which of them its proof lets pass.
 mutants *arguments:
     python tests/generator/mutants.py {{ arguments }}
+
+# Random programs of Structured Text: do the C made of them and the tests' interpreter agree?
+interpreters *arguments:
+    python tests/exporters/interpreters.py {{ arguments }}

@@ -1,22 +1,35 @@
 """From Structured Text to C99: the subset of IEC 61131-3 that the planner block is written in.
 
 One function block per text: scalars of BOOL, DINT and LREAL and one-dimensional arrays of them, assignments,
-IF, CASE, FOR, WHILE, and ABS, SQRT, LREAL_TO_DINT, DINT_TO_LREAL. The C code needs no library but libm and
-allocates nothing; an instance is one structure. Compiled without contraction of products and sums, it
-computes bit for bit what the text says.
+IF, CASE, FOR, WHILE, and ABS, SQRT, LREAL_TO_DINT (half to even), DINT_TO_LREAL. The C code needs no library
+but libm and allocates nothing; an instance is one structure. Compiled without contraction of products and
+sums, it computes bit for bit what the text says.
+
+What the standard calls an error is either refused, as are types that do not fit and loops that write their
+own counter, or, where only the execution shows it, one of the `FAULTS` of checked C. There both sides of AND
+and OR are evaluated, as by many controllers: one side is no guard for the other.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer
-from lark.exceptions import LarkError, UnexpectedInput
+from lark.exceptions import UnexpectedInput, VisitError
 
 from gen_profile.errors import ExportError
+from gen_profile_exporters.st_variables import (
+    NO_BLOCK,
+    StVariable,
+    c_constants,
+    c_initials,
+    c_literal,
+    c_member,
+    declared,
+    refused,
+)
 
 _GRAMMAR = r"""
     start: "FUNCTION_BLOCK"i NAME section* body "END_FUNCTION_BLOCK"i
@@ -70,33 +83,40 @@ FAULTS = (
     "goes beyond the end of an array",
     "repeats a loop without end",
     "divides by zero",
+    "leaves the range of DINT",
+    "takes the square root of a negative number",
 )
 MOST_TURNS = 200_000  # of all loops in one cycle
-_NO_BLOCK = "The text is no function block that can be executed here"
-_TYPES = {"BOOL": "bool", "DINT": "int32_t", "LREAL": "double"}
-_OPERATORS = {"=": "==", "<>": "!=", "AND": "&&", "OR": "||"}
-_FUNCTIONS = {
-    "ABS": ("fabs", "LREAL"),
-    "SQRT": ("sqrt", "LREAL"),
-    "LREAL_TO_DINT": ("(int32_t)nearbyint", "DINT"),
-    "DINT_TO_LREAL": ("(double)", "LREAL"),
+_NUMBERS = ("LREAL", "DINT")
+_PLAIN: dict[tuple[str, ...], str] = {  # C of an operator or a function, and the types that it takes
+    **{(o, t, t): f"{{}} {o} {{}}" for o in ("+", "-", "*", "/", "<", "<=", ">", ">=") for t in _NUMBERS},
+    **{("=", t, t): "{} == {}" for t in (*_NUMBERS, "BOOL")},
+    **{("<>", t, t): "{} != {}" for t in (*_NUMBERS, "BOOL")},
+    ("AND", "BOOL", "BOOL"): "{} && {}",
+    ("OR", "BOOL", "BOOL"): "({}) || ({})",
+    ("NOT", "BOOL"): "!{}",
+    **{(sign, t): sign + "{}" for sign in "+-" for t in _NUMBERS},
+    ("ABS", "LREAL"): "fabs({})",
+    ("ABS", "DINT"): "(int32_t)fabs({})",
+    ("SQRT", "LREAL"): "sqrt({})",
+    ("LREAL_TO_DINT", "LREAL"): "(int32_t)nearbyint({})",
+    ("DINT_TO_LREAL", "DINT"): "(double)({})",
 }
-
-
-class StVariable(NamedTuple):
-    """A declaration: its section, name, type, length (0: a scalar) and initial values as C writes them."""
-
-    section: str
-    name: str
-    type: str
-    length: int
-    initial: tuple[str, ...]
-
-    @property
-    def start(self) -> float:
-        """Initial value of a scalar; truth values as 0 and 1."""
-        text = self.initial[0] if self.initial else "0"
-        return {"true": 1.0, "false": 0.0}[text] if text in ("true", "false") else float(text)
+_CHECKED = {  # macros in their place
+    ("+", "DINT", "DINT"): "SUM({}, {})",
+    ("-", "DINT", "DINT"): "DIFFERENCE({}, {})",
+    ("*", "DINT", "DINT"): "PRODUCT({}, {})",
+    ("/", "DINT", "DINT"): "QUOTIENT({}, {})",
+    ("/", "LREAL", "LREAL"): "RATIO({}, {})",
+    ("AND", "BOOL", "BOOL"): "BOTH({}, {})",
+    ("OR", "BOOL", "BOOL"): "EITHER({}, {})",
+    ("-", "DINT"): "DIFFERENCE(0, {})",
+    ("ABS", "DINT"): "ROUNDED(fabs({}))",
+    ("SQRT", "LREAL"): "ROOT({})",
+    ("LREAL_TO_DINT", "LREAL"): "ROUNDED({})",
+}
+_GIVES = {"LREAL_TO_DINT": "DINT", "DINT_TO_LREAL": "LREAL"}  # others but comparisons what they take
+_SAME = ("+", "-", "*", "/", "ABS", "SQRT")
 
 
 class Translation(NamedTuple):
@@ -111,7 +131,8 @@ class Translation(NamedTuple):
     header, source : str
         `source` includes ``NAME.h``. Compiled with ``COUNT_OPERATIONS``, it adds up floating-point operations
         in ``NAME_operations``. Compiled with ``CHECKED``, it ends whatever an altered text may do, and the
-        instance's ``fault_`` tells what that was, by its place in `FAULTS`.
+        instance's ``fault_`` tells what that was, by its place in `FAULTS`. An LREAL that is divided by zero
+        is one only with ``TRAPPING``, too: planner blocks discard what comes of it.
     """
 
     name: str
@@ -122,10 +143,11 @@ class Translation(NamedTuple):
 
 
 class _Code(NamedTuple):
-    """C code of an expression, its type, and how many floating-point operations it takes."""
+    """C code of an expression, its type, its line, and how many floating-point operations it takes."""
 
     text: str
     type: str
+    line: int
     work: int = 0
 
 
@@ -170,16 +192,18 @@ def translate_statements(text: str, owners: Mapping[str, str], *, checked: bool 
     """
     try:
         tree = _parser().parse(text)
-        variables = [v for section in tree.find_data("section") for v in _declared(section)]
+        variables = declared(tree)
+        _require_writable(tree, variables)
         translated: Any = _Translator(variables, owners, checked).transform(tree)
-        name, *_, body = translated.children
     except UnexpectedInput as error:
         place = f"line {error.line}, column {error.column}"
-        raise ExportError(f"{_NO_BLOCK}: {place} is not understood.") from error
-    except (LarkError, KeyError) as error:
-        reason = getattr(error, "orig_exc", error)
-        raise ExportError(f"{_NO_BLOCK}: {reason.args[0]}.") from error
-    return Statements(str(name), variables, body)
+        raise ExportError(f"{NO_BLOCK}: {place} is not understood.") from error
+    except VisitError as error:
+        raise error.orig_exc from error
+    except RecursionError as error:
+        raise ExportError("The text is nested too deeply to be executed here.") from error
+    name, *_, body = translated.children
+    return Statements(str(name), list(variables.values()), body)
 
 
 @cache
@@ -187,88 +211,98 @@ def _parser() -> Lark:
     return Lark(_GRAMMAR, parser="lalr", propagate_positions=False)
 
 
-def _declared(section: Any) -> Iterator[StVariable]:
-    kind, *rest = section.children
-    constant = bool(rest) and isinstance(rest[0], Token)
-    for declaration in rest[constant:]:
-        name, type_, initial = declaration.children
-        *bounds, scalar = map(str, type_.children)
-        length = int(bounds[1]) - int(bounds[0]) + 1 if bounds else 0
-        if bounds and int(bounds[0]) != 0:
-            raise KeyError(f"{name} does not begin with index 0")
-        literals = [] if initial is None else initial.children if initial.data == "listed" else [initial]
-        values = tuple("".join(part.lower() for part in v.children if part is not None) for v in literals)
-        yield StVariable(
-            "VAR CONSTANT" if constant else kind.upper(), str(name), scalar.upper(), length, values
-        )
+def _require_writable(tree: Any, variables: Mapping[str, StVariable]) -> None:
+    """Refuse that inputs and constants are written, and counters within their loops."""
+    for name in _written(tree):
+        variable = variables.get(name.lower())
+        if variable is not None and variable.section not in ("VAR", "VAR_OUTPUT"):
+            raise refused(name, f"{name} is {variable.section}, which is not written")
+    for loop in tree.find_data("count"):
+        counter, *_, body = loop.children
+        for name in _written(body):
+            if name.lower() == counter.lower():
+                raise refused(name, f"{name} counts the loop around it, which must not write it")
+
+
+def _written(tree: Any) -> Iterator[Token]:
+    """Find the names of variables that statements write."""
+    yield from (assignment.children[0].children[0] for assignment in tree.find_data("assignment"))
+    yield from (loop.children[0] for loop in tree.find_data("count"))
 
 
 class _Translator(Transformer[Token, object]):
     """Expressions become `_Code`, statements lines of C."""
 
-    def __init__(self, variables: list[StVariable], owners: Mapping[str, str], checked: bool) -> None:
+    def __init__(self, variables: dict[str, StVariable], owners: Mapping[str, str], checked: bool) -> None:
         super().__init__()
-        self._variables = {v.name.lower(): v for v in variables}
-        self._owners, self._checked = {"VAR CONSTANT": "", **owners}, checked
+        self._variables, self._checked = variables, checked
+        self._owners = {"VAR CONSTANT": "", **owners}
+        self._templates = _PLAIN | _CHECKED if checked else _PLAIN
 
     def real(self, parts):  # type: ignore[no-untyped-def]
-        return _Code(str(parts[0]), "LREAL")
+        return _Code(c_literal(parts[0]), "LREAL", parts[0].line)
 
     def whole(self, parts):  # type: ignore[no-untyped-def]
-        return _Code(str(parts[0]), "DINT")
+        return _Code(c_literal(parts[0]), "DINT", parts[0].line)
 
     def truth(self, parts):  # type: ignore[no-untyped-def]
-        return _Code(parts[0].lower(), "BOOL")
+        return _Code(c_literal(parts[0]), "BOOL", parts[0].line)
 
     def grouped(self, parts):  # type: ignore[no-untyped-def]
-        return _Code(f"({parts[0].text})", *parts[0][1:])
+        return parts[0]._replace(text=f"({parts[0].text})")
 
     def variable(self, parts):  # type: ignore[no-untyped-def]
-        name, index = parts
-        declared = self._variables.get(name.lower())
-        if declared is None:
-            raise KeyError(f"{name} is not declared")
-        if (index is None) != (declared.length == 0):
-            raise KeyError(f"{name} is {'an array' if declared.length else 'no array'}")
-        element = "" if index is None else f"[{self._index(index.text, declared.length)}]"
-        return _Code(f"{self._owned(declared)}{element}", declared.type)
+        return self._place(*parts)
 
-    def _owned(self, variable: StVariable) -> str:
-        return self._owners.get(variable.section, "fb->") + variable.name
+    def _place(self, name: Token, index: _Code | None = None) -> _Code:
+        variable = self._variables.get(name.lower())
+        if variable is None:
+            raise refused(name, f"{name} is not declared")
+        if (index is None) != (variable.length == 0):
+            raise refused(name, f"{name} is {'an array' if variable.length else 'no array'}")
+        owned, line = self._owners.get(variable.section, "fb->") + variable.name, name.line or 0
+        if index is None:
+            return _Code(owned, variable.type, line)
+        self._require(index, "DINT", f"an index of {name}")
+        place = f"AT({index.text}, {variable.length})" if self._checked else index.text
+        return _Code(f"{owned}[{place}]", variable.type, line, index.work)
 
-    def _index(self, index: str, length: int) -> str:
-        return f"AT({index}, {length})" if self._checked else index
+    @staticmethod
+    def _require(code: _Code, type_: str, what: str) -> None:
+        if code.type != type_:
+            raise refused(code.line, f"{what} must be {type_}, not {code.type}")
 
     def _counted(self, work: int) -> list[str]:
         return [f"OPERATIONS({work});"] if work and self._checked else []
 
+    def _applied(self, operator: Token, *operands: _Code) -> _Code:
+        name, types = operator.upper(), [operand.type for operand in operands]
+        template = self._templates.get((name, *types))
+        if template is None:
+            raise refused(operator, f"{name} does not take {' and '.join(types)}")
+        gives = _GIVES.get(name, types[0] if name in _SAME else "BOOL")
+        texts, work = [o.text for o in operands], sum(o.work for o in operands)
+        return _Code(template.format(*texts), gives, operands[0].line, work)
+
     def prefixed(self, parts):  # type: ignore[no-untyped-def]
-        sign, operand = parts
-        return _Code(("!" if sign.upper() == "NOT" else sign) + operand.text, *operand[1:])
+        operator, operand = parts
+        if operand.text.startswith(operator):  # C has -- and ++, too
+            operand = operand._replace(text=f"({operand.text})")
+        return self._applied(operator, operand)
 
     def binary(self, parts):  # type: ignore[no-untyped-def]
         left, operator, right = parts
-        operator = operator.upper()
-        if left.type != right.type:
-            raise KeyError(f"{left.text} {operator} {right.text} mixes {left.type} and {right.type}")
-        type_ = left.type if operator in "+-*/" else "BOOL"
-        work = left.work + right.work + (left.type == "LREAL")
-        left_text, right_text = left.text, right.text
-        if operator == "/" and type_ == "DINT" and self._checked:
-            return _Code(f"QUOTIENT({left_text}, {right_text})", type_, work)
-        if operator == "OR":
-            left_text, right_text = f"({left_text})", f"({right_text})"
-        return _Code(f"{left_text} {_OPERATORS.get(operator, operator)} {right_text}", type_, work)
+        code = self._applied(operator, left, right)
+        return code._replace(work=code.work + (left.type == "LREAL"))
 
     def call(self, parts):  # type: ignore[no-untyped-def]
-        function, type_ = _FUNCTIONS[parts[0].upper()]
-        return _Code(f"{function}({parts[1].text})", type_, parts[1].work + 1)
+        code = self._applied(*parts)
+        return code._replace(work=code.work + ("LREAL" in (code.type, parts[1].type)))
 
     def assignment(self, parts):  # type: ignore[no-untyped-def]
         target, value = parts
-        if target.type != value.type:
-            raise KeyError(f"{target.text} takes no {value.type}")
-        return [*self._counted(value.work), f"{target.text} = {value.text};"]
+        self._require(value, target.type, "what is assigned here")
+        return [*self._counted(target.work + value.work), f"{target.text} = {value.text};"]
 
     def body(self, statements):  # type: ignore[no-untyped-def]
         return [line for statement in statements for line in statement]
@@ -280,40 +314,54 @@ class _Translator(Transformer[Token, object]):
         return parts
 
     def label(self, parts):  # type: ignore[no-untyped-def]
-        return [str(number) for number in parts[:-1]], parts[-1]
+        return parts[:-1], parts[-1]
 
     def choice(self, parts):  # type: ignore[no-untyped-def]
         *branches, otherwise = parts
         lines = self._counted(sum(condition.work for condition, _ in branches))
         word = "if"
         for condition, body in branches:
+            self._require(condition, "BOOL", "a condition")
             lines += [f"{word} ({condition.text}) {{", *_indented(body)]
             word = "} else if"
         return [*lines, *(["} else {", *_indented(otherwise)] if otherwise else []), "}"]
 
     def switch(self, parts):  # type: ignore[no-untyped-def]
         selector, *labels, otherwise = parts
-        lines = [f"switch ({selector.text}) {{"]
+        self._require(selector, "DINT", "what CASE takes")
+        lines, known = [*self._counted(selector.work), f"switch ({selector.text}) {{"], set()
         for numbers, body in labels:
-            lines += [f"case {number}:" for number in numbers] + _indented([*body, "break;"])
+            for number in numbers:
+                if (case := c_literal(number)) in known:
+                    raise refused(number, f"CASE has {case} twice")
+                known.add(case)
+                lines.append(f"case {case}:")
+            lines += _indented([*body, "break;"])
         return [*lines, "default:", *_indented([*(otherwise or []), "break;"]), "}"]
 
     def count(self, parts):  # type: ignore[no-untyped-def]
         name, first, last, body = parts
-        variable = self._owned(self._variables[name.lower()])
-        end = f"last_{self._variables[name.lower()].name}"  # loops within each other have other variables
-        goes_on = f"{variable} <= {end}{self._turn}"
-        loop = f"for ({variable} = {first.text}; {goes_on}; ++{variable}) {{"
+        counter = self._place(name)
+        for code in (counter, first, last):
+            self._require(code, "DINT", "what FOR counts")
+        end = f"last_{name}_"  # a name that the language does not have
+        goes_on = f"{counter.text} <= {end}{self._turn}"
+        next_ = f"{counter.text} = SUM({counter.text}, 1)" if self._checked else f"++{counter.text}"
         return [
+            *self._counted(first.work + last.work),
             "{",
             f"    const int32_t {end} = {last.text};",
-            *_indented([loop, *_indented(body), "}"]),
+            *_indented(
+                [f"for ({counter.text} = {first.text}; {goes_on}; {next_}) {{", *_indented(body), "}"]
+            ),
             "}",
         ]
 
     def repeat(self, parts):  # type: ignore[no-untyped-def]
         condition, body = parts
-        test = f"({condition.text}){self._turn}" if self._checked else condition.text
+        self._require(condition, "BOOL", "a condition")
+        counted = f"OPERATIONS({condition.work}), " if condition.work and self._checked else ""
+        test = f"({counted}{condition.text}){self._turn}" if self._checked else condition.text
         return [f"while ({test}) {{", *_indented(body), "}"]
 
     @property
@@ -323,21 +371,6 @@ class _Translator(Transformer[Token, object]):
 
 def _indented(lines: list[str]) -> list[str]:
     return [f"    {line}" for line in lines]
-
-
-def c_constants(variables: Iterable[StVariable], body: list[str]) -> list[str]:
-    """Declare the constants that statements use; compilers warn of others."""
-    used = set(re.findall(r"\w+", "\n".join(body)))
-    return [
-        f"static const {c_member(v)} = {c_initial(v)};"
-        for v in variables
-        if v.section == "VAR CONSTANT" and v.name in used
-    ]
-
-
-def c_member(variable: StVariable) -> str:
-    """Declare a variable."""
-    return f"{_TYPES[variable.type]} {variable.name}" + (f"[{variable.length}]" if variable.length else "")
 
 
 def _header(name: str, variables: list[StVariable]) -> str:
@@ -368,9 +401,7 @@ static void {name}_step({name} *fb);
 
 def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
     constants = c_constants(variables, body)
-    initials = [
-        f"    fb->{v.name} = {v.initial[0]};" for v in variables if v.section != "VAR CONSTANT" and v.initial
-    ]
+    initials = c_initials(variables, dict.fromkeys(("VAR_INPUT", "VAR_OUTPUT", "VAR"), "fb->"))
     return "\n".join(
         [
             "/* Compile without contraction of products and sums (-ffp-contract=off). */",
@@ -390,7 +421,7 @@ def _source(name: str, variables: list[StVariable], body: list[str]) -> str:
             "",
             f"static void {name}_init({name} *fb) {{",
             "    memset(fb, 0, sizeof *fb);",
-            *initials,
+            *_indented(initials),
             "}",
             "",
             f"static void {name}_step({name} *fb) {{",
@@ -408,34 +439,60 @@ def _checks(name: str) -> str:
 #define BEGIN() (fb->turns_ = 0)
 #define AT(index, length) within(fb, index, length)
 #define TURN() turn(fb)
-#define QUOTIENT(dividend, divisor) quotient(fb, dividend, divisor)
+#define SUM(one, other) whole(fb, (int64_t)(one) + (other))
+#define DIFFERENCE(one, other) whole(fb, (int64_t)(one) - (other))
+#define PRODUCT(one, other) whole(fb, (int64_t)(one) * (other))
+#define QUOTIENT(one, other) whole(fb, (int64_t)(one) / (int64_t)nonzero(fb, other))
+#define ROUNDED(value) rounded(fb, value)
+#define ROOT(value) root(fb, value)
+#define BOTH(one, other) ((one) & (other))
+#define EITHER(one, other) ((one) | (other))
+static inline bool sound({name} *fb, bool holds, int32_t fault)
+{{
+    if (!holds && fb->fault_ == 0)
+        fb->fault_ = fault;
+    return holds;
+}}
 static inline int32_t within({name} *fb, int32_t index, int32_t length)
 {{
-    if (index >= 0 && index < length)
-        return index;
-    fb->fault_ = 1;
-    return 0;
+    return sound(fb, index >= 0 && index < length, 1) ? index : 0;
 }}
 static inline bool turn({name} *fb)
 {{
-    if (++fb->turns_ > {MOST_TURNS})
-        fb->fault_ = 2;
-    return fb->fault_ == 0;
+    return sound(fb, ++fb->turns_ <= {MOST_TURNS}, 2) && fb->fault_ == 0;
 }}
-static inline int32_t quotient({name} *fb, int32_t dividend, int32_t divisor)
+static inline double nonzero({name} *fb, double divisor)
 {{
-    if (divisor == 0)
-        fb->fault_ = 3;
-    return divisor == 0 ? 0 : (int32_t)((int64_t)dividend / divisor);
+    return sound(fb, divisor != 0.0, 3) ? divisor : 1.0;
+}}
+static inline int32_t whole({name} *fb, int64_t value)
+{{
+    return sound(fb, value == (int32_t)value, 4) ? (int32_t)value : 0;
+}}
+static inline int32_t rounded({name} *fb, double value)
+{{
+    const double found = nearbyint(value);
+    return sound(fb, found >= -2147483648.0 && found <= 2147483647.0, 4) ? (int32_t)found : 0;
+}}
+static inline double root({name} *fb, double value)
+{{
+    return sqrt(sound(fb, !(value < 0.0), 5) ? value : 0.0);
 }}
 #else
 #define BEGIN() ((void)0)
 #define AT(index, length) (index)
 #define TURN() true
-#define QUOTIENT(dividend, divisor) ((dividend) / (divisor))
+#define SUM(one, other) ((one) + (other))
+#define DIFFERENCE(one, other) ((one) - (other))
+#define PRODUCT(one, other) ((one) * (other))
+#define QUOTIENT(one, other) ((one) / (other))
+#define ROUNDED(value) ((int32_t)nearbyint(value))
+#define ROOT(value) sqrt(value)
+#define BOTH(one, other) ((one) && (other))
+#define EITHER(one, other) ((one) || (other))
+#endif
+#if defined CHECKED && defined TRAPPING
+#define RATIO(one, other) ((one) / nonzero(fb, other))
+#else
+#define RATIO(one, other) ((one) / (other))
 #endif"""
-
-
-def c_initial(variable: StVariable) -> str:
-    """Write its initial value; it has one."""
-    return f"{{{', '.join(variable.initial)}}}" if variable.length else variable.initial[0]

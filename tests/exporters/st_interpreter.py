@@ -4,8 +4,9 @@ One function block per text, with variables of BOOL, INT, DINT, LREAL, DWORD, on
 and instances of other blocks, whose texts are given (a structure is a block without statements, a function
 one that is called by its own name); calls of these, assignments, IF, CASE over integers, FOR, WHILE,
 expressions with the standard's precedence (third edition, table 71), and a few standard functions. It is
-strict where compilers are: every type must fit, integers must not overflow, indices must lie within bounds,
-inputs and constants are not written, initialisers fill their array.
+strict where compilers are: every type must fit, integers must not overflow, in no part of an expression,
+indices must lie within bounds, inputs, constants and counters in their loops are not written, initialisers
+fill their array.
 
 The text is translated to Python once, so that many cycles can be run.
 """
@@ -22,11 +23,12 @@ ZERO = {"BOOL": False, "INT": 0, "DINT": 0, "LREAL": 0.0, "DWORD": 0}
 LITERAL = "integer literal"  # fits INT and DINT
 INTEGERS = ("INT", "DINT", LITERAL)
 INSTANCE = "instance"  # in place of an array's bounds
-MOST_TURNS = 10_000  # of one WHILE
+MOST_TURNS = 200_000  # of all loops in one call
+TURN = ["turns = _turn(turns)"]
 
 # name → types of the arguments ("number": LREAL or integer, all the same), type of the result, Python
 FUNCTIONS = {
-    "abs": (("number",), "number", "abs({})"),
+    "abs": (("number",), "number", "_abs({})"),
     "limit": (("number", "number", "number"), "number", "_limit({}, {}, {})"),
     "sqrt": (("LREAL",), "LREAL", "_sqrt({})"),
     "shr": (("DWORD", "INT"), "DWORD", "({} >> {})"),
@@ -55,10 +57,14 @@ def _sqrt(value):
     return math.sqrt(value)
 
 
+def _abs(value):
+    return abs(value) if isinstance(value, float) else _within(abs(value), *LIMITS["DINT"], "DINT")
+
+
 def _rounded(value):
     """Half to even, as IEC 60559 rounds."""
-    _check(abs(value) < 2.0**31, f"{value} does not fit DINT")
-    return round(value)
+    _check(math.isfinite(value), f"{value} does not fit DINT")
+    return _within(round(value), *LIMITS["DINT"], "DINT")
 
 
 def _signed(bits):
@@ -78,12 +84,13 @@ def _divided(left, right):
 
 
 def _turn(turns):
-    _check(turns < MOST_TURNS, "WHILE goes on and on")
+    _check(turns < MOST_TURNS, "a loop goes on and on")
     return turns + 1
 
 
 RUNTIME = {
-    function.__name__: function for function in (_limit, _sqrt, _rounded, _signed, _within, _divided, _turn)
+    function.__name__: function
+    for function in (_abs, _limit, _sqrt, _rounded, _signed, _within, _divided, _turn)
 }
 
 
@@ -121,6 +128,7 @@ class _Declarations(Interpreter):
 
     def _value(self, name, scalar, bounds, initial):
         if bounds is None:
+            _check(initial is None or initial.data == "literal", f"{name} is no array")
             return ZERO[scalar] if initial is None else _constant(scalar, initial, name)
         length = bounds[1] - bounds[0] + 1
         if initial is None:
@@ -140,6 +148,7 @@ def _constant(scalar, tree, name):
     )
     convert = {"LREAL": float, LITERAL: int, "BOOL": _truth, "DWORD": _bits}[kind]
     value = -convert(token) if sign == "-" else convert(token)
+    _check(scalar != "LREAL" or math.isfinite(value), f"{name} cannot hold {token}")
     return value if scalar in ("BOOL", "LREAL") else _within(value, *LIMITS[scalar], name)
 
 
@@ -157,13 +166,15 @@ class _Translator(Interpreter):
     def __init__(self, declarations, library):
         self.sections, self.types = declarations.sections, declarations.types
         self.library = library
-        self.loops = 0
+        self.loops, self.counters = 0, []
 
     def real(self, tree):
-        return "LREAL", repr(float(tree.children[0]))
+        value = float(tree.children[0])
+        _check(math.isfinite(value), f"LREAL cannot hold {tree.children[0]}")
+        return "LREAL", repr(value)
 
     def integer(self, tree):
-        return LITERAL, str(int(tree.children[0]))
+        return LITERAL, str(_within(int(tree.children[0]), *LIMITS["DINT"], "DINT"))
 
     def boolean(self, tree):
         return "BOOL", str(_truth(tree.children[0]))
@@ -261,7 +272,7 @@ class _Translator(Interpreter):
     def signed(self, tree):
         sign, (type_, code) = tree.children[0], self.visit(tree.children[1])
         _check(type_ in ("LREAL", *INTEGERS), f"{sign} does not take {type_}")
-        return type_, f"({sign}{code})"
+        return type_, _ranged(type_, f"({sign}{code})")
 
     def logic(self, tree):
         # Both sides are evaluated: the standard has no short circuit.
@@ -279,7 +290,8 @@ class _Translator(Interpreter):
         (left, one), operator, (right, other) = self._operands(tree)
         type_ = _common(left, right)
         _check(type_ in ("LREAL", *INTEGERS), f"{operator} does not take {type_}")
-        return type_, f"_divided({one}, {other})" if operator == "/" else f"({one} {operator} {other})"
+        code = f"_divided({one}, {other})" if operator == "/" else f"({one} {operator} {other})"
+        return type_, _ranged(type_, code)
 
     def _operands(self, tree):
         return self.visit(tree.children[0]), tree.children[1], self.visit(tree.children[2])
@@ -289,6 +301,7 @@ class _Translator(Interpreter):
         scalar, place = self._whole(tree.children[0])
         type_, code = self._whole(tree.children[1])
         _check(self.sections[name] in ("VAR", "VAR_OUTPUT"), f"{name} must not be written")
+        _check(name not in self.counters, f"{name} counts the loop around it")
         _check(_fits(type_, scalar), f"{name} : {scalar} cannot hold {type_}")
         if scalar in LIMITS:
             code = f"_within({code}, {LIMITS[scalar][0]}, {LIMITS[scalar][1]}, '{name}')"
@@ -309,26 +322,32 @@ class _Translator(Interpreter):
         selector, *labels, otherwise = tree.children
         type_, code = self.visit(selector)
         _check(type_ in INTEGERS, f"CASE does not take {type_}")
-        branches = []
+        branches, known = [], []
         for label in labels:
-            values = ", ".join(str(int(value)) for value in label.children[:-1])
-            branches.append((f"{code} in ({values},)", self.visit(label.children[-1])))
+            values = [int(value) for value in label.children[:-1]]
+            known += values
+            branches.append((f"{code} in {(*values,)}", self.visit(label.children[-1])))
+        _check(len({*known}) == len(known), "CASE has a value twice")
         return self._chain(branches, otherwise)
 
     def count(self, tree):
         name, first, last, body = tree.children
-        variable = Tree("variable", [name, None])
+        key, variable = name.lower(), Tree("variable", [name, None])
         scalar, place = self.visit(variable)
-        _check(self.sections[name.lower()] == "VAR", f"{name} must not be written")
+        _check(self.sections[key] in ("VAR", "VAR_OUTPUT"), f"{name} must not be written")
+        _check(key not in self.counters, f"{name} counts the loop around it")
         (start, low), (end, high) = self.visit(first), self.visit(last)
         _check(scalar in INTEGERS and _fits(start, scalar) and _fits(end, scalar), "FOR mixes types")
-        return [f"for {place} in range({low}, {high} + 1):", *_indented(self.visit(body)), f"{place} += 1"]
+        self.counters.append(key)
+        self.loops += 1
+        most, next_ = f"last_{self.loops}", _ranged(scalar, f"({place} + 1)")
+        turn = [*TURN, *self.visit(body), f"{place} = {next_}"]
+        self.counters.pop()
+        return [f"{most} = {high}", f"{place} = {low}", f"while {place} <= {most}:", *_indented(turn)]
 
     def repeat(self, tree):
-        self.loops += 1
-        turns = f"turns_{self.loops}"
         condition, body = self._condition(tree.children[0]), self.visit(tree.children[1])
-        return [f"{turns} = 0", f"while {condition}:", *_indented([f"{turns} = _turn({turns})", *body])]
+        return [f"while {condition}:", *_indented([*TURN, *body])]
 
     def _condition(self, tree):
         type_, code = self.visit(tree)
@@ -340,6 +359,11 @@ class _Translator(Interpreter):
         for word, (condition, body) in zip(["if", *["elif"] * len(branches)], branches, strict=False):
             lines += [f"{word} {condition}:", *_indented(body)]
         return lines + (["else:", *_indented(self.visit(otherwise))] if otherwise else [])
+
+
+def _ranged(type_, code):
+    limits = LIMITS.get("DINT" if type_ == LITERAL else type_)
+    return code if limits is None else f"_within({code}, {limits[0]}, {limits[1]}, '{type_}')"
 
 
 def _indented(lines):
@@ -374,7 +398,7 @@ def _translated(text, library):
     tree, declarations = _parsed(text)
     lines = _Translator(declarations, library).visit(tree.children[-1])
     names = ", ".join(f"v_{name}" for name in declarations.types)
-    source = ["def run():", *_indented([f"global {names}" if names else "pass", *lines])]
+    source = ["def run():", *_indented([f"global {names}" if names else "pass", "turns = 0", *lines])]
     return str(tree.children[0]), declarations, compile("\n".join(source), "<structured text>", "exec")
 
 

@@ -8,7 +8,8 @@ from textwrap import indent
 
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File
-from gen_profile_exporters.st_to_c import StVariable, c_constants, c_member, translate_statements
+from gen_profile_exporters.st_to_c import translate_statements
+from gen_profile_exporters.st_variables import StVariable, c_constants, c_initials, c_member
 
 OWNERS = {"VAR_INPUT": "in->", "VAR_OUTPUT": "state->out.", "VAR": "state->"}
 
@@ -124,12 +125,7 @@ def c_files(text: str, file: str) -> tuple[File, File]:
     source, statements = parse_function_block(text), translate_statements(text, OWNERS)
     names = {"file": file, "name": c_name(file), "guard": c_name(file).upper(), "block": source.name}
     by_section = {section: [v for v in statements.variables if v.section == section] for section in OWNERS}
-    initials = [
-        f"{OWNERS[v.section]}{v.name} = {v.initial[0]};"
-        for section in OWNERS
-        for v in by_section[section]
-        if v.initial
-    ]
+    initials = c_initials(statements.variables, OWNERS)
     code = SOURCE.format(
         **names,
         constants="\n".join(c_constants(statements.variables, statements.body)),

@@ -10,7 +10,8 @@ import attrs
 
 from gen_profile.problem.dynamics import dynamics
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
-from gen_profile_exporters.st_to_c import StVariable, Translation, translate
+from gen_profile_exporters.st_to_c import Translation, translate
+from gen_profile_exporters.st_variables import StVariable
 from gen_profile_fmu.model.c_sources import equations_source, model_sources, variables_header
 from gen_profile_fmu.model.contents import PLAIN, PLANT_FILES, Model
 from gen_profile_fmu.model.dependencies import Structure, plant_structure

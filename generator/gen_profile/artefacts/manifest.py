@@ -18,6 +18,7 @@ FILENAME = "manifest.json"
 FORMAT = "gen-profile manifest"
 FORMAT_VERSION = 1
 UNVERIFIED = "unverified"
+PLANNER = "planner"  # format of every file that is a planner block
 LIBRARIES = ("gen-profile", "casadi", "fmpy", "numpy", "scipy")  # that shape the numbers
 SEAL = "manifest_sha256"  # of everything else in it, so that nobody changes a limit or a verdict by hand
 
@@ -93,12 +94,22 @@ class Manifest:
         )
         return attrs.evolve(self, earlier=tuple(one for one in remaining if one.artefacts))
 
-    def covering(self, name: str, digest: str) -> Manifest:
-        """Find the export that a file comes from: by its SHA-256, else by its name, else the latest."""
-        every = (self, *self.earlier)
-        by_content = [one for one in every if any(known.sha256 == digest for known in one.artefacts)]
-        by_name = [one for one in every if any(known.path == name for known in one.artefacts)]
-        return (by_content or by_name or [self])[0]
+    def covering(self, name: str, digest: str, *, planner: bool = False) -> Manifest | None:
+        """Find the export that a file comes from: by its SHA-256, else by its name.
+
+        A motion's file that was altered and renamed is taken for one of the latest motion.
+        """
+        listed = [(one, known) for one in (self, *self.earlier) for known in one.artefacts]
+        alike = [(one, known) for one, known in listed if (known.format == PLANNER) == planner]
+        by_content = [one for one, known in listed if known.sha256 == digest]
+        by_name = [one for one, known in alike if known.path == name]
+        latest = [] if planner else [one for one, _ in alike]
+        return next(iter(by_content or by_name or latest), None)
+
+    def words(self) -> str:
+        """Tell what it is of: the kind and the names of the latest export's files."""
+        kind = "planner block" if any(known.format == PLANNER for known in self.artefacts) else "motion"
+        return f"the {kind} {', '.join(known.path for known in self.artefacts) or self.name}"
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -138,7 +149,7 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
         manifest = _from_dict(document)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise OutputError(
-            f"{source}: not a manifest of this version of gen-profile; export again, or give the spec."
+            f"{source}: not a manifest of this version of gen-profile; export again."
         ) from error
     if seal != found:
         raise OutputError(

@@ -21,13 +21,32 @@ def read_artefact(path: Path) -> bytes:
         raise OutputError(f"Cannot read {path}: {error.strerror or error}.") from error
 
 
-def manifest_beside(path: Path, content: bytes) -> Manifest:
+def manifest_beside(path: Path, content: bytes, *, planner: bool = False) -> Manifest:
     """Read what the manifest beside an artefact says of the export that it comes from.
+
+    Parameters
+    ----------
+    path : Path
+    content : bytes
+    planner : bool
+        Whether it is a planner block.
 
     Raises
     ------
     OutputError
-        There is none, or it cannot be read.
+        There is none, it cannot be read, or it is of other files.
     """
     beside = path.parent / FILENAME
-    return parse_manifest(read_artefact(beside), str(beside)).covering(path.name, sha256(content))
+    if not beside.is_file():
+        raise OutputError(
+            f"There is no {FILENAME} beside {path}; put the one there that was written with it."
+        )
+    found = parse_manifest(read_artefact(beside), str(beside))
+    covering = found.covering(path.name, sha256(content), planner=planner)
+    if covering is None:
+        kind = "planner block" if planner else "motion"
+        raise OutputError(
+            f"{beside} is of {found.words()}, not of the {kind} {path.name}; put the one there that was "
+            "written with it."
+        )
+    return covering

@@ -10,8 +10,8 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from gen_profile.artefacts.manifest import FILENAME, sha256
-from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.artefacts.manifest import sha256
+from gen_profile.artefacts.reading import read_artefact
 from gen_profile.artefacts.writing import deliver
 from gen_profile.certificate.arithmetic.balls import Array
 from gen_profile.certificate.axes.setpoint_limits import Asked, asked_of_axes
@@ -24,7 +24,7 @@ from gen_profile.certificate.theorem import Theorem, ranges_of
 from gen_profile.errors import CertificateError, OutputError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
-from gen_profile.verification.check import spec_of
+from gen_profile.verification.check import spec_and_manifest
 from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
@@ -152,8 +152,7 @@ def _bound_again(
 
 def _read(path: Path, spec: Spec | None) -> _Artefact:
     content = read_artefact(path)
-    manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
-    spec = spec or spec_of(manifest, path)
+    spec, _ = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_of(path)).replay(content, target_of(spec))
     return _Artefact(path=path, sha256=sha256(content), spec=spec, setpoints=setpoints)
 

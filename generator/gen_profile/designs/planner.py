@@ -10,7 +10,7 @@ from typing import Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import Artefact, sha256
+from gen_profile.artefacts.manifest import PLANNER, Artefact, sha256
 from gen_profile.artefacts.writing import staged
 from gen_profile.designs.design import deliver_judged
 from gen_profile.designs.planner_cures import Cure, cures
@@ -18,7 +18,6 @@ from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
 from gen_profile.planner.full_speed import slow_axes
 from gen_profile.progress import Progress, untold
-from gen_profile.proof.check import FORMAT
 from gen_profile.proof.prove import HISTORIES, prove
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
@@ -120,7 +119,7 @@ def deploy_planner(
         if check:
             proof, warnings = prove_on(spec, text), slow_axes(spec, block)
         artefacts = tuple(
-            Artefact(format=FORMAT, path=name, sha256=sha256(content), bytes=len(content))
+            Artefact(format=PLANNER, path=name, sha256=sha256(content), bytes=len(content))
             for name, content in written.items()
         )
         kept = deliver_judged(staging, spec, artefacts, proof, profile_sha256="", keep_failed=keep_failed)

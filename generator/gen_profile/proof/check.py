@@ -9,9 +9,10 @@ from typing import Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import FILENAME, Manifest
-from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.artefacts.manifest import PLANNER, Manifest
+from gen_profile.artefacts.reading import read_artefact
 from gen_profile.errors import ExportError, OutputError, SpecError
+from gen_profile.planner.design import planner_block
 from gen_profile.planner.forms import block_in, is_planner, refuse_c
 from gen_profile.progress import Progress, untold
 from gen_profile.proof.histories import Histories
@@ -19,10 +20,9 @@ from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.prove import HISTORIES, prove, replay
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
-from gen_profile.verification.check import alterations, provenance, spec_of
+from gen_profile.verification.check import alterations, provenance, spec_and_manifest
+from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.registry import container_of
-
-FORMAT = "planner"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -54,7 +54,7 @@ class BlockJudgement:
         named = {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
-            "artefact": {"format": FORMAT, "path": str(self.path), "manifest": self.manifest},
+            "artefact": {"format": PLANNER, "path": str(self.path), "manifest": self.manifest},
         }
         if self.history is None:
             return {**named, "proof": self.check.to_dict()}
@@ -119,9 +119,9 @@ def check_block(
     """
     path = Path(path)
     content = read_artefact(path)
-    manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
-    spec = spec or spec_of(manifest, path)
+    spec, manifest = spec_and_manifest(path, content, spec, planner=True)
     text = block_in(path, content)
+    _require_inputs(path, text, planner_block(spec).text)
     standing = provenance(manifest, content, spec)
     known = _record(manifest) if standing != "none" else {}
     count = histories or known.get("histories", HISTORIES)
@@ -139,6 +139,19 @@ def check_block(
         found = replay(spec, text, numbering, history, progress)
     check = attrs.evolve(found, faults=alterations(path, standing))
     return BlockJudgement(path=path, text=text, spec=spec, check=check, manifest=standing, history=history)
+
+
+def _require_inputs(path: Path, text: str, due: str) -> None:
+    """Refuse a block of other axes or live parameters than a spec's."""
+    found, expected = (
+        [v.name for v in parse_function_block(block).variables if v.section == "VAR_INPUT"]
+        for block in (text, due)
+    )
+    if differing := [name for name in (*found, *expected) if (name in found) != (name in expected)]:
+        raise SpecError(
+            f"{path} is no block of this spec: only one of them has an input {differing[0]}; name the spec "
+            "that it was written of."
+        )
 
 
 def _record(manifest: Manifest | None) -> Mapping[str, Any]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import FILENAME, sha256
+from gen_profile.artefacts.manifest import FILENAME, PLANNER, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import CheckFailed, OutputError, SpecError, StreamAborted
 from gen_profile.progress import Progress
@@ -107,18 +107,18 @@ def verified_block(path: Path, *, accept_unverified: bool = False) -> tuple[Spec
     """
     from gen_profile.planner.execution import BlockInstance  # noqa: PLC0415  # FMPy
     from gen_profile.planner.forms import block_in  # noqa: PLC0415
-    from gen_profile.proof.check import FORMAT, is_planner_block  # noqa: PLC0415
+    from gen_profile.proof.check import is_planner_block  # noqa: PLC0415
 
     if not is_planner_block(path):
         raise SpecError(f"{path}: it holds no planner block that can be executed; C cannot be.")
     content = read_artefact(path)
-    spec = _vouched_spec(path, content, FORMAT, accept_unverified)
+    spec = _vouched_spec(path, content, PLANNER, accept_unverified)
     return spec, BlockInstance(block_in(path, content))
 
 
 def _vouched_spec(path: Path, content: bytes, format_: str, accept_unverified: bool) -> Spec:
     """Take the spec of an artefact that its manifest vouches for."""
-    manifest, beside = manifest_beside(path, content), path.parent / FILENAME
+    manifest, beside = manifest_beside(path, content, planner=format_ == PLANNER), path.parent / FILENAME
     if sha256(content) not in {known.sha256 for known in manifest.artefacts if known.format == format_}:
         raise SpecError(f"{path} is not the file that {beside} vouches for; export and check it again.")
     if manifest.check is None and not accept_unverified:

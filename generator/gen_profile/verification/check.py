@@ -112,8 +112,7 @@ def check_artefact(
     """
     path = Path(path)
     content, format_ = read_artefact(path), format_of(path)
-    manifest = manifest_beside(path, content) if (path.parent / FILENAME).is_file() else None
-    spec = spec or spec_of(manifest, path)
+    spec, manifest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
     variant = parse_variant(spec, scale, mirror, offset)
     standing = provenance(manifest, content, spec)
@@ -193,20 +192,39 @@ def _every_other(setpoints: SampledProfile) -> SampledProfile:
     )
 
 
-def spec_of(manifest: Manifest | None, path: Path) -> Spec:
-    """Read the spec in the manifest beside a file.
+def spec_and_manifest(
+    path: Path, content: bytes, spec: Spec | None, *, planner: bool = False
+) -> tuple[Spec, Manifest | None]:
+    """Take a spec that was named, or else the one in the manifest beside a file.
+
+    Parameters
+    ----------
+    path : Path
+    content : bytes
+    spec : Spec or None
+    planner : bool
+        Whether the file is a planner block.
+
+    Returns
+    -------
+    spec : Spec
+    manifest : Manifest or None
+        None where there is none of this file.
 
     Raises
     ------
     OutputError
+        No spec was named, and no manifest is of this file.
     """
-    if manifest is None:
-        raise OutputError(
-            f"There is no {FILENAME} beside {path}, so its spec is unknown; name the spec: "
-            f"gen-profile check {quote(str(path))} SPEC.toml"
-        )
     try:
-        return spec_from_dict(manifest.spec, path.parent)
+        manifest = manifest_beside(path, content, planner=planner)
+    except OutputError as error:
+        if spec is not None:
+            return spec, None
+        words = f"{str(error).removesuffix('.')}, or name its spec"
+        raise OutputError(f"{words}: gen-profile check {quote(str(path))} SPEC.toml") from error
+    try:
+        return spec or spec_from_dict(manifest.spec, path.parent), manifest
     except SpecError as error:
         raise OutputError(f"The spec in {path.parent / FILENAME} is faulty: {error}") from error
 
@@ -225,6 +243,6 @@ def alterations(path: Path, standing: str) -> tuple[str, ...]:
     if standing != "differs":
         return ()
     return (
-        f"{path.name} is none of the files that {FILENAME} beside it lists: it was altered after its export; "
-        "export it again.",
+        f"{path.name} is none of the files that {FILENAME} beside it lists: it was altered after its export, "
+        "or comes from another; export it again.",
     )

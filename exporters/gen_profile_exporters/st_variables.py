@@ -1,0 +1,138 @@
+"""Declarations of a function block, as C takes them over."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from lark import Token
+
+from gen_profile.errors import ExportError
+
+NO_BLOCK = "The text is no function block that can be executed here"
+MOST_DINT = 2**31 - 1
+_TYPES = {"BOOL": "bool", "DINT": "int32_t", "LREAL": "double"}
+_LITERALS = {"REAL": "LREAL", "INTEGER": "DINT", "TRUTH": "BOOL"}
+_WORDS_OF_C = re.compile(
+    "auto|bool|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int|"
+    "long|register|restrict|return|short|signed|sizeof|static|struct|switch|typedef|union|unsigned|void|"
+    "volatile|while"
+)
+
+
+class StVariable(NamedTuple):
+    """A declaration: its section, name, type, length (0: a scalar) and initial values as C writes them."""
+
+    section: str
+    name: str
+    type: str
+    length: int
+    initial: tuple[str, ...]
+
+    @property
+    def start(self) -> float:
+        """Initial value of a scalar; truth values as 0 and 1."""
+        text = self.initial[0] if self.initial else "0"
+        return {"true": 1.0, "false": 0.0}[text] if text in ("true", "false") else float(text)
+
+
+def refused(place: Token | int, words: str) -> ExportError:
+    """Say what cannot be executed, and in which line."""
+    line = place.line if isinstance(place, Token) else place
+    return ExportError(f"{NO_BLOCK}: line {line}: {words}.")
+
+
+def declared(tree: Any) -> dict[str, StVariable]:
+    """Read all declarations of a block; by their names in lower case.
+
+    Raises
+    ------
+    ExportError
+        A name is declared twice or means something in C, or initial values are not of its type.
+    """
+    found: dict[str, StVariable] = {}
+    for section in tree.find_data("section"):
+        for name, variable in _section(section):
+            if found.setdefault(name.lower(), variable) is not variable:
+                raise refused(name, f"{name} is declared twice")
+    return found
+
+
+def _section(tree: Any) -> Iterator[tuple[Token, StVariable]]:
+    kind, *rest = tree.children
+    constant = bool(rest) and isinstance(rest[0], Token)
+    section = "VAR CONSTANT" if constant else kind.upper()
+    for declaration in rest[constant:]:
+        name, type_, initial = declaration.children
+        *bounds, scalar = map(str, type_.children)
+        if bounds and (int(bounds[0]) != 0 or section in ("VAR_INPUT", "VAR_OUTPUT")):
+            raise refused(name, f"{name} must begin with index 0, and be neither input nor output")
+        length = int(bounds[1]) + 1 if bounds else 0
+        literals = [] if initial is None else initial.children if initial.data == "listed" else [initial]
+        whole = initial is None or (initial.data == "listed") == bool(bounds)
+        if not whole or len(literals) not in {max(1, length), max(1, length) * constant}:
+            raise refused(name, f"{name} has not as many initial values as it takes")
+        if _WORDS_OF_C.fullmatch(name):
+            raise refused(name, f"{name} is a word of C; name it differently")
+        values = tuple(_initial(name, scalar.upper(), *literal.children) for literal in literals)
+        yield name, StVariable(section, str(name), scalar.upper(), length, values)
+
+
+def _initial(name: Token, type_: str, sign: Token | None, value: Token) -> str:
+    if _LITERALS[value.type] != type_ or (sign is not None and type_ == "BOOL"):
+        raise refused(value, f"{name} : {type_} cannot begin as {sign or ''}{value}")
+    return (sign or "") + c_literal(value, spare=int(sign == "-"))
+
+
+def c_literal(value: Token, spare: int = 0) -> str:
+    """Write a literal in C: without the leading zeros of an integer, by which C counts in eights.
+
+    Parameters
+    ----------
+    value : Token
+    spare : int
+        What may be added to the greatest DINT.
+
+    Raises
+    ------
+    ExportError
+        No variable holds it.
+    """
+    if value.type == "TRUTH":
+        return value.lower()
+    if value.type == "REAL" and math.isfinite(float(value)):
+        return value.lower()
+    if value.type == "INTEGER" and int(value) <= MOST_DINT + spare:
+        return str(int(value))
+    raise refused(value, f"no {_LITERALS[value.type]} is as great as {value}")
+
+
+def c_constants(variables: Iterable[StVariable], body: list[str]) -> list[str]:
+    """Declare the constants that statements use; compilers warn of others."""
+    used = set(re.findall(r"\w+", "\n".join(body)))
+    return [
+        f"static const {c_member(v)} = {_braced(v.initial) if v.length else v.initial[0]};"
+        for v in variables
+        if v.section == "VAR CONSTANT" and v.name in used
+    ]
+
+
+def _braced(values: Iterable[str]) -> str:
+    return f"{{{', '.join(values)}}}"
+
+
+def c_member(variable: StVariable) -> str:
+    """Declare a variable."""
+    return f"{_TYPES[variable.type]} {variable.name}" + (f"[{variable.length}]" if variable.length else "")
+
+
+def c_initials(variables: Iterable[StVariable], owners: Mapping[str, str]) -> list[str]:
+    """Set what begins with other values than zero, in structures that stand before a section's names."""
+    return [
+        f"{owners[v.section]}{v.name}{f'[{number}]' if v.length else ''} = {value};"
+        for v in variables
+        if v.section in owners
+        for number, value in enumerate(v.initial)
+    ]
