@@ -127,12 +127,11 @@ class Translation(NamedTuple):
     name : str
         Of the structure, and prefix of its functions ``NAME_init`` and ``NAME_step``.
     inputs, outputs : tuple of StVariable
-        All scalars.
+        Arrays element by element.
     header, source : str
         `source` includes ``NAME.h``. Compiled with ``COUNT_OPERATIONS``, it adds up floating-point operations
         in ``NAME_operations``. Compiled with ``CHECKED``, it ends whatever an altered text may do, and the
-        instance's ``fault_`` tells what that was, by its place in `FAULTS`. An LREAL that is divided by zero
-        is one only with ``TRAPPING``, too: planner blocks discard what comes of it.
+        instance's ``fault_`` tells what that was, by its place in `FAULTS`.
     """
 
     name: str
@@ -161,7 +160,8 @@ def translate(text: str) -> Translation:
     """
     name, variables, body = translate_statements(text, {}, checked=True)
     inputs, outputs = (
-        tuple(v for v in variables if v.section == section) for section in ("VAR_INPUT", "VAR_OUTPUT")
+        tuple(one for v in variables if v.section == section for one in _elements(v))
+        for section in ("VAR_INPUT", "VAR_OUTPUT")
     )
     return Translation(name, inputs, outputs, _header(name, variables), _source(name, variables, body))
 
@@ -228,6 +228,15 @@ def _written(tree: Any) -> Iterator[Token]:
     """Find the names of variables that statements write."""
     yield from (assignment.children[0].children[0] for assignment in tree.find_data("assignment"))
     yield from (loop.children[0] for loop in tree.find_data("count"))
+
+
+def _elements(variable: StVariable) -> Iterator[StVariable]:
+    """Take an array for its elements, which C names alike."""
+    if not variable.length:
+        yield variable
+    for k in range(variable.length):
+        name = f"{variable.name}[{k}]"
+        yield variable._replace(name=name, length=0, initial=variable.initial[k : k + 1])
 
 
 class _Translator(Transformer[Token, object]):
@@ -491,7 +500,7 @@ static inline double root({name} *fb, double value)
 #define BOTH(one, other) ((one) && (other))
 #define EITHER(one, other) ((one) || (other))
 #endif
-#if defined CHECKED && defined TRAPPING
+#ifdef CHECKED
 #define RATIO(one, other) ((one) / nonzero(fb, other))
 #else
 #define RATIO(one, other) ((one) / (other))

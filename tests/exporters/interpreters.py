@@ -56,7 +56,6 @@ def compiled(translations, folder):
     text = "\n".join(
         [
             "#define CHECKED",
-            "#define TRAPPING",
             *map(runner, translations),
             f"static int (*const PROGRAMS[])(const double *, double *) = {{{programs}}};",
             "int run(int program, const double *in, double *out) { return PROGRAMS[program](in, out); }",

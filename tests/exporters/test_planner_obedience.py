@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 from driven_block import CYCLE, Driver, require_limits
 
+import gen_profile as gp
+from gen_profile.errors import SpecError
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import preset_spec
 
 pytestmark = pytest.mark.slow
 
 SPEC = preset_spec("bay-crane")
+ZONED = preset_spec("bay-crane", ["planner.zones=true"])
 LIMITS = (1.1, 0.3, 1.5, 40.0)
 NAN = float("nan")
 
@@ -269,3 +272,68 @@ def test_stated_noise_of_a_live_parameter_keeps_the_promise():
         )
     assert last(driver, "fPosition") == 12.0
     assert driver.outputs["bPromise"][500:].all()
+
+
+class TestZones:
+    """Intervals of the travel that are closed, or passed slowly."""
+
+    @pytest.fixture
+    def planner(self):
+        planner = gp.Planner(ZONED, position=5.0)
+        planner.hold(2.0)
+        planner.restrict(blocked=[(20.0, 24.0)], slow=[(10.0, 14.0, 0.3)])
+        return planner
+
+    def test_no_command_leads_in_or_passes_too_fast(self, planner):
+        there = planner.hold(60.0, target=19.0)
+        assert (there.position[-1], there.done[-1]) == (19.0, True)
+        for target in (22.0, 30.0):
+            refused = planner.hold(1.0, target=target)
+            assert refused.error_id[-1] == 8
+            assert (refused.outputs["nZone"][-1], refused.outputs["bCommandAborted"][-1]) == (1, True)
+        pushed = planner.hold(30.0, velocity=1.1)
+        assert pushed.position.max() <= 20.0 + 1e-9
+        assert pushed.position[-1] == pytest.approx(20.0, abs=0.01)
+        back = planner.hold(60.0, velocity=-1.1)
+        assert back.position[-1] < 0.1
+        for part in (there, back):
+            within = (part.position > 10.0) & (part.position < 14.0)
+            assert within.any()
+            assert np.abs(part.velocity[within]).max() <= 0.3 + 1e-9
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_neither_does_any_hand(self, planner, seed):
+        random = np.random.default_rng(seed)
+        for _ in range(12):
+            command = random.choice(["target", "velocity"])
+            low, high = (0.0, 20.0) if command == "target" else (-1.1, 1.1)
+            part = planner.hold(random.uniform(0.05, 12.0), **{command: random.uniform(low, high)})
+            assert part.position.max() <= 20.0 + 1e-9
+            assert part.outputs["fStopHigh"].max() <= 20.0 + 1e-9
+            within = (part.position > 10.0) & (part.position < 14.0)
+            assert not within.any() or np.abs(part.velocity[within]).max() <= 0.3 + 1e-9
+
+    def test_one_that_is_set_on_the_way_stops_before_it_or_slows_down(self, planner):
+        planner.restrict()
+        planner.hold(10.0, target=35.0)
+        planner.restrict(slow=[(0.0, 40.0, 0.25)])
+        assert np.abs(planner.hold(20.0).velocity[-2000:]).max() <= 0.25 + 1e-9
+        planner.restrict(blocked=[(20.0, 24.0)])
+        stopped = planner.hold(20.0)
+        assert stopped.error_id[-1] == 8
+        assert stopped.outputs["bCommandAborted"][-1]
+        assert (stopped.velocity[-1], stopped.position[-1] <= 20.0) == (0.0, True)
+
+    def test_within_a_blocked_one_an_axis_may_only_leave(self):
+        planner = gp.Planner(ZONED, position=22.0)
+        planner.restrict(blocked=[(20.0, 24.0)])
+        planner.hold(2.0)
+        assert planner.hold(20.0, target=23.0).error_id[-1] == 8
+        assert planner.hold(30.0, target=30.0).done[-1]
+        assert planner.hold(30.0, target=19.0).error_id[-1] == 8
+
+    def test_more_of_them_than_the_block_takes_are_refused(self, planner):
+        with pytest.raises(SpecError, match="takes 8 such intervals, found 9"):
+            planner.restrict(blocked=[(1.0, 2.0)] * 9)
+        with pytest.raises(SpecError, match=r"state planner\.zones = true"):
+            gp.Planner(SPEC).restrict(slow=[(1.0, 2.0, 0.1)])

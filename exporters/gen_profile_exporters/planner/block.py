@@ -2,7 +2,7 @@
 
 The text stands in ``text/``. ``@name`` alone on a line is the part of that name, indented like it, or a value
 as elsewhere; what stands between ``@where_followed`` and ``@end`` is left out where no live parameter changes
-on the way.
+on the way, and between ``@where_zones`` and ``@end`` where there are no zones.
 
 - ``interface.st``: header and declarations.
 - ``inputs.st``, ``slots.st``, ``outputs.st``: what runs in every cycle; between them the committed future,
@@ -32,7 +32,7 @@ on the way.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from textwrap import indent
@@ -57,6 +57,7 @@ CHUNK = 45  # slots that a phase takes at once
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
 ITERATIONS = 6
 HOLD = 0.2  # s, in which an input that is out of range is held
+ZONES = 8  # intervals of each kind that an axis may have
 STILL = 1e-3  # of full speed: a velocity that counts as standing, and a way as none
 ROUNDING = 1e-3  # of a live parameter's greatest rate
 SPARE = 0.3  # slots more than expected, by slots between two measured motions
@@ -74,7 +75,7 @@ RESERVE = 0.1  # share of the limits that only calming takes up, where live para
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
 AXIS_LOOP = re.compile(r"(?ms)^( *)FOR (\w+) := 0 TO cAxes - 1 DO[^\n]*\n(.*?)^\1END_FOR;[^\n]*\n")
-FOLLOWED = re.compile(r"(?ms)^@where_followed\n(.*?)^@end\n")
+WHERE = re.compile(r"(?ms)^@where_(\w+)\n(.*?)^@end\n")
 PART = re.compile(r"(?m)^( *)@(\w+)\n")
 TEXT = Path(__file__).with_name("text")
 PLACE = "fActPosition"
@@ -154,6 +155,8 @@ class PlannerConstants:
         Of live parameters that lower all loads by as much as they grow: the inverse of gravity, in s²/m.
     calm : float
         m, sway up to which nothing is done about it.
+    zones : bool
+        Whether blocked and slow intervals of the travel are inputs.
     operations : int
         That a cycle may spend.
     periods : sequence of float
@@ -187,6 +190,7 @@ class PlannerConstants:
     rates: Mapping[str, float]
     lowers: Mapping[str, float]
     calm: float
+    zones: bool
     operations: int
     periods: Sequence[float]
     doubt: float
@@ -200,7 +204,8 @@ class PlannerConstants:
 
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
-    text = FOLLOWED.sub(r"\1" if constants.rates else "", _part("block"))
+    parts = {"followed": bool(constants.rates), "zones": constants.zones}
+    text = WHERE.sub(lambda part: part[2] if parts[part[1]] else "", _part("block"))
     values = _values(constants)
     text = re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
     return _narrow(_with_while_loops(_without_loops(text) if len(constants.axes) == 1 else text))
@@ -347,7 +352,44 @@ def _interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
             ]
         ),
         "take_axes": "\n".join(taken),
+        **_zones(axes),
         "give_axes": "\n".join(given),
+    }
+
+
+ZONE_INPUTS = {  # of each axis, by the arrays that hold them: what is declared of them
+    "aClosedLow": ("aBlockedLow", ", where blocked intervals begin"),
+    "aClosedHigh": ("aBlockedHigh", ", where they end"),
+    "aLimitedLow": ("aSlowLow", ", where slow intervals begin"),
+    "aLimitedHigh": ("aSlowHigh", ", where they end"),
+    "aLimited": ("aSlowLimit", "/s, greatest velocity there"),
+}
+
+
+def _zones(axes: Sequence[AxisConstants]) -> dict[str, str]:
+    """Declare the intervals of each axis, and carry them to the arrays where all of them are numbers."""
+    declared = [
+        f"    {name}{a.suffix} : ARRAY [0..{ZONES - 1}] OF LREAL; (* {a.unit}{comment} *)"
+        for a in axes
+        for name, comment in ZONE_INPUTS.values()
+    ]
+
+    def each(line: Callable[[int, str, str], str]) -> str:
+        lines = [
+            line(number * ZONES, array, name + a.suffix)
+            for number, a in enumerate(axes)
+            for array, (name, _) in ZONE_INPUTS.items()
+        ]
+        return "\n".join(
+            ["    FOR nIndex := 0 TO cZones - 1 DO", *(f"        {one}" for one in lines), "    END_FOR;"]
+        )
+
+    return {
+        "zone_inputs": "\n".join(declared),
+        "check_zones": each(
+            lambda _, __, name: f"IF NOT (ABS({name}[nIndex]) <= 1.0E+9) THEN nOther := 1; END_IF;"
+        ),
+        "take_zones": each(lambda first, array, name: f"{array}[nIndex + {first}] := {name}[nIndex];"),
     }
 
 
@@ -357,6 +399,7 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
     return {
         "axis": axes,
         "future": axes * FUTURE,
+        "zone": axes * ZONES,
         "power": max(1, len(c.live)) * c.degrees,
         "live": max(1, len(c.live)),
         "mode": modes,
@@ -414,6 +457,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cChunk": CHUNK,
         "cFuture": FUTURE,
         "cWork": _work(c),
+        **({"cZones": ZONES} if c.zones else {}),
         "cHoldCycles": round(HOLD / c.cycle),
         "cIterations": ITERATIONS,
         "cMoreIterations": MORE_ITERATIONS,
@@ -469,7 +513,9 @@ def _longest_kernel(c: PlannerConstants) -> int:
 def _pulse_chunk(c: PlannerConstants) -> int:
     """Slots of a long pulse that can be weighed in one cycle, in which pulses may be added, too."""
     axes = len(c.axes)
-    return (_work(c) - _cycle_work(c) - 80 - FUTURE - 3 * axes * FUTURE) // 55
+    return (_work(c) - _cycle_work(c) - 80 - FUTURE - 3 * axes * FUTURE) // (
+        55 + (5 * ZONES if c.zones else 0)
+    )
 
 
 def _real_constants(c: PlannerConstants) -> dict[str, float]:

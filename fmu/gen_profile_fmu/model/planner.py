@@ -223,7 +223,7 @@ def _issued(block: _PlacedBlock) -> dict[str, tuple[FmuVariable, ...]]:
 
 def _variable(v: StVariable, block: _PlacedBlock, kind: Kind) -> FmuVariable:
     comments = {known.name: known.comment for known in block.source.variables}
-    unit, description = _explained(comments[v.name], is_live=_is_live(v, block.live))
+    unit, description = _explained(comments[v.name.partition("[")[0]], is_live=_is_live(v, block.live))
     return FmuVariable(
         name=_name(v, block),
         description=description or f"{v.name} of the block",

@@ -95,6 +95,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         ),
         rates=spec.planner.live_rate,
         lowers=lowered(spec),
+        zones=spec.planner.zones,
         operations=spec.planner.operations
         or max(OPERATIONS, round(OPERATIONS * spec.export.cycle_time / 1e-3)),
         periods=tuple(2.0 * np.pi / _rates(found, point)[0][0] for point in corners(found.live)),

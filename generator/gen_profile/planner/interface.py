@@ -85,4 +85,4 @@ def live_inputs(inputs: Iterable[str], axes: Iterable[BlockAxis]) -> dict[str, s
     if missing := [name for name in standard if name not in known]:
         raise SpecError(f"The function block has no input {missing[0]}, so it is no planner block.")
     standard += [name for later in LATER for name in (later, *(axis.of(later) for axis in axes))]
-    return {name[1:]: name for name in known if name not in standard}
+    return {name[1:]: name for name in known if name not in standard and "[" not in name}

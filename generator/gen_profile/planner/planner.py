@@ -27,6 +27,7 @@ OWN = {  # of each axis
     "stop_distance": "fStopDistance",
 }
 COMMON = {"busy": "bBusy", "done": "bDone", "promise": "bPromise", "error_id": "nErrorId"}
+ZONES = ("aBlockedLow", "aBlockedHigh", "aSlowLow", "aSlowHigh", "aSlowLimit")
 KINDS = {"b": np.bool_, "n": np.int64}  # by the first letter of an output's name; others are real
 
 
@@ -157,6 +158,41 @@ class Planner:
         self._block.call(
             np.array([list((self._inputs | {"bExecute": 0.0}).values())])
         )  # enabled, no command yet
+
+    def restrict(
+        self,
+        *,
+        blocked: Sequence[tuple[float, float]] = (),
+        slow: Sequence[tuple[float, float, float]] = (),
+        axis: int = 0,
+    ) -> None:
+        """Close intervals of the travel, and limit the velocity in others, until the next call.
+
+        Parameters
+        ----------
+        blocked : sequence of (float, float)
+            m, from and to; no command leads into them.
+        slow : sequence of (float, float, float)
+            m, from and to, and m/s.
+        axis : int
+            Place of the axis in `axes`.
+
+        Raises
+        ------
+        SpecError
+            The block has no zones (``planner.zones``), or not so many.
+        """
+        columns = dict(zip(ZONES, (*zip(*blocked, strict=True),) or ((), ()), strict=False))
+        columns |= dict(zip(ZONES[2:], (*zip(*slow, strict=True),) or ((), (), ()), strict=True))
+        suffix = self._axes[axis].suffix
+        for name, values in columns.items():
+            names = [known for known in self._inputs if known.startswith(f"{name}{suffix}[")]
+            if len(values) > len(names):
+                raise SpecError(
+                    f"Planner: the block takes {len(names)} such intervals, found {len(values)}"
+                    + ("." if names else "; state planner.zones = true.")
+                )
+            self._inputs |= dict.fromkeys(names, 0.0) | dict(zip(names, values, strict=False))
 
     def step(
         self,

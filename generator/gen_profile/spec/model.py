@@ -364,6 +364,8 @@ class PlannerSpec(Checked, table="planner"):
         How fast some of them may change on the way, each in its unit per second.
     live_noise : mapping of str to float
         By how much what the controller is told of some may be off from cycle to cycle, each in its unit.
+    zones : bool
+        Whether blocked and slow intervals of the travel are inputs of the block.
     operations : int or None
         Floating-point operations that the block may spend in a cycle; None takes 3000 for each millisecond.
     quick_stop : float or None
@@ -375,6 +377,7 @@ class PlannerSpec(Checked, table="planner"):
     live: Annotated[Mapping[LiveParameter, Span], example("L1 = [3.0, 9.0]")] = NONE
     live_rate: Annotated[Mapping[LiveRate, Positive], example("NAME = 0.1")] = NONE
     live_noise: Annotated[Mapping[LiveRate, Positive], example("L1 = 0.003")] = NONE
+    zones: bool = False
     operations: Annotated[int, Bounds(least=3000, most=100_000)] | None = None
     quick_stop: Positive | None = None
     quick_stop_jerk: Positive | None = None
