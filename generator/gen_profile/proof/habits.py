@@ -70,8 +70,8 @@ class Surroundings:
         Of the names of each axis's inputs.
     live : mapping of str to (float, float)
         Ranges of the live parameters.
-    told : mapping of str to float
-        What the block is told of them.
+    hoists : bool
+        Whether they change on the way.
     """
 
     cycle: float
@@ -80,7 +80,7 @@ class Surroundings:
     speeds: tuple[tuple[float, float], ...]
     suffixes: tuple[str, ...]
     live: Mapping[str, tuple[float, float]]
-    told: Mapping[str, float]
+    hoists: bool
 
     def target(self, share: float) -> tuple[float, ...]:
         """Choose a place."""
@@ -252,7 +252,7 @@ def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
         (5, {"rOverride": 1.01}),
         (5, {f"fVelocityLimit{around.suffixes[-1]}": nan}),
     ]
-    for name, (low, high) in around.live.items():
+    for name, (low, high) in around.live.items() if not around.hoists else ():  # then the promise is lost
         values += [
             (2, {f"f{name}": 0.99 * low - 1e-3}),
             (2, {f"f{name}": 1.01 * high}),

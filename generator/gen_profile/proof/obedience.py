@@ -13,6 +13,7 @@ from gen_profile.proof.followed import (
     IN_VELOCITY,
     TO_STICK,
     TO_STOP,
+    TO_TURN,
     Flags,
     Followed,
     Measured,
@@ -179,7 +180,7 @@ def _directions(followed: Followed, motion: Motion) -> Iterator[Measured]:
         if not min(order.tops) > 0.0:
             against[order.begin : order.end] = wants[order.begin : order.end] = False
     for begin, end in _runs(against):
-        allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
+        allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_TURN)
         yield Measured("against", begin, (end - begin) * followed.cycle, allowed)
     for begin, end in _runs(wants & motion.stands):
         ready = ENABLED if begin < followed.after(ENABLED) else 0.0
