@@ -54,14 +54,10 @@ def truths(followed: Followed, motion: Motion) -> Iterator[Measured]:
         if order.kind == POSITION and not over and quiet[own].any():
             until = int(np.argmax(ended)) if ended.any() else len(ended)
             yield from never("vanished", quiet[own][:until], order.begin)
-        over = over or bool(ended.any())
-        if (
-            order.kind == POSITION
-            and not followed.reserve
-            and there[order.begin + 1 : order.end].any()
-            and not done[own].any()
-        ):
+        arrives = order.kind == POSITION and there[order.begin + 1 : order.end].any()
+        if arrives and not (over or followed.reserve or done[own].any()):
             yield Measured("not done", order.begin, 1.0, 0.0)
+        over = over or bool(ended.any())
         if order.kind == STOP and not followed.reserve:
             latest = order.begin + followed.after(slowing(followed, motion.velocity[:, order.begin], TO_STOP))
             if latest < order.end:
