@@ -255,7 +255,7 @@ def disobedient(text, before="", after=""):
     """A block that does something more before and after all that it does."""
     head, _, body = text.rpartition("END_VAR\n")
     body = body.replace("END_FUNCTION_BLOCK", f"{after}\nEND_FUNCTION_BLOCK")
-    return head.replace("\nVAR\n", "\nVAR\n    nLate : DINT;\n", 1) + f"END_VAR\n{before}\n{body}"
+    return head.replace("\nVAR\n", "\nVAR\n    nSince : DINT;\n", 1) + f"END_VAR\n{before}\n{body}"
 
 
 @pytest.mark.parametrize(
@@ -265,7 +265,7 @@ def disobedient(text, before="", after=""):
         ("fTarget := 0.5 * fTarget;", "", POSITION),
         ("bExecute := FALSE; bVelocity := FALSE;", "", "idle"),
         (
-            "IF bStop THEN nLate := nLate + 1; ELSE nLate := 0; END_IF; bStop := nLate > 1200;",
+            "IF bStop THEN nSince := nSince + 1; ELSE nSince := 0; END_IF; bStop := nSince > 1200;",
             "",
             "reaction",
         ),
