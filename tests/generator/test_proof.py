@@ -94,7 +94,7 @@ def test_a_move_on_the_machine_as_told_leaves_a_thousandth_of_its_sway(spec, tex
 
 @pytest.mark.slow
 def test_numbers_of_an_earlier_version_mean_what_they_meant(deployed, tmp_path):
-    """Its manifest tells neither of override and velocity limit nor of habits, which its histories left alone."""
+    """Its manifest tells neither of override and velocity limit nor of habits: these histories have none."""
     (tmp_path / "bay 3.st").write_bytes((deployed[0] / "bay 3.st").read_bytes())
     manifest = parse_manifest((deployed[0] / "manifest.json").read_bytes(), "manifest.json")
     check = {key: value for key, value in manifest.check.items() if key not in {"slowed", "habits"}}

@@ -246,7 +246,7 @@ def test_wrong_values_count_once_they_have_lasted():
 def bay():
     spec = parse_spec(BAY)
     histories = Histories.of(spec)
-    drawn = [histories.history(choices) for choices in histories.drawn(12, seed=4)]
+    drawn = [histories.history(choices) for choices in histories.drawn(24, seed=4)]
     text = planner_block(spec).text
     return spec, text, histories, drawn, [found for _, found in judged(spec, text, histories, drawn)]
 
@@ -267,7 +267,7 @@ def disobedient(text, before="", after=""):
         (
             "IF bStop THEN nSince := nSince + 1; ELSE nSince := 0; END_IF; bStop := nSince > 1200;",
             "",
-            "reaction",
+            "ends",
         ),
         ("", "bDone := bDone OR ((nCommand = 1) AND (ABS(fDistanceToGo) < 0.01));", "done"),
         ("rOverride := 1.0; fVelocityLimit := 0.0;", "", "fast"),

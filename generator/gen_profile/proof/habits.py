@@ -261,9 +261,13 @@ def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
     error, inputs = values[int(how * len(values)) % len(values)]
     begin = command.time + later
     reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
-    again = _followed(command, later + lasts + 10.0 * around.cycle)
+    commands = [command, _followed(command, later + lasts + 10.0 * around.cycle)]
+    if command.command == "velocity":  # a stick must have been at 0 before it counts again
+        wait = 0.3 * around.period
+        commands.append(_followed(commands[-1], wait, values=(0.0,) * len(around.speeds)))
+        commands.append(_followed(commands[1], 2.0 * wait))
     return Manner(
-        commands=(command, again),
+        commands=tuple(commands),
         changes=(Change(time=begin, lasts=lasts, inputs=inputs), reset),
         errors=(error,),
     )

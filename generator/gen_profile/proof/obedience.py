@@ -11,6 +11,7 @@ from gen_profile.proof.followed import (
     EXACT,
     FROM_REST,
     IN_VELOCITY,
+    TO_SLOW,
     TO_STICK,
     TO_STOP,
     TO_TURN,
@@ -201,7 +202,7 @@ def _velocity_limits(followed: Followed, motion: Motion) -> Iterator[Measured]:
     latest, before = 0, tuple(own.velocity for own in followed.limits)
     for order in followed.orders:
         if any(now < then for now, then in zip(order.tops, before, strict=True)):
-            takes = followed.reaction + slowing(followed, motion.velocity[:, order.begin], TO_STOP)
+            takes = followed.reaction + slowing(followed, motion.velocity[:, order.begin], TO_SLOW)
             latest = order.begin + followed.after(takes)
         before = order.tops
         begin = max(order.begin, latest)
