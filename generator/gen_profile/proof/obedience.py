@@ -259,9 +259,10 @@ def _reactions(followed: Followed, motion: Motion, reactions: Mapping[int, int |
 
 
 def _obeys_anyway(motion: Motion, order: Order, at: int) -> bool:
-    """Whether axes go on as before, and the right way."""
+    """Whether axes go on as before, and slow down or go the right way."""
     velocity = motion.velocity[:, at]
-    if order.kind == STOP:
-        return bool(((velocity * motion.acceleration[:, at] < 0.0) | (velocity == 0.0)).all())
-    wanted = np.array(order.values) - (motion.position[:, at] if order.kind == POSITION else 0.0)
-    return bool((velocity * wanted >= 0.0).all())
+    right = velocity == 0.0
+    if order.kind != STOP:
+        wanted = np.array(order.values) - (motion.position[:, at] if order.kind == POSITION else 0.0)
+        right = velocity * wanted >= 0.0
+    return bool((right | (velocity * motion.acceleration[:, at] < 0.0)).all())
