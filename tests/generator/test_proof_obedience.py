@@ -246,7 +246,7 @@ def test_wrong_values_count_once_they_have_lasted():
 def bay():
     spec = parse_spec(BAY)
     histories = Histories.of(spec)
-    drawn = [histories.history(choices) for choices in histories.drawn(12, seed=4)]
+    drawn = [histories.history(choices) for choices in histories.drawn(24, seed=4)]
     text = planner_block(spec).text
     return spec, text, histories, drawn, [found for _, found in judged(spec, text, histories, drawn)]
 
@@ -255,7 +255,7 @@ def disobedient(text, before="", after=""):
     """A block that does something more before and after all that it does."""
     head, _, body = text.rpartition("END_VAR\n")
     body = body.replace("END_FUNCTION_BLOCK", f"{after}\nEND_FUNCTION_BLOCK")
-    return head.replace("\nVAR\n", "\nVAR\n    nLate : DINT;\n", 1) + f"END_VAR\n{before}\n{body}"
+    return head.replace("\nVAR\n", "\nVAR\n    nSince : DINT;\n", 1) + f"END_VAR\n{before}\n{body}"
 
 
 @pytest.mark.parametrize(
@@ -265,9 +265,9 @@ def disobedient(text, before="", after=""):
         ("fTarget := 0.5 * fTarget;", "", POSITION),
         ("bExecute := FALSE; bVelocity := FALSE;", "", "idle"),
         (
-            "IF bStop THEN nLate := nLate + 1; ELSE nLate := 0; END_IF; bStop := nLate > 1200;",
+            "IF bStop THEN nSince := nSince + 1; ELSE nSince := 0; END_IF; bStop := nSince > 1200;",
             "",
-            "reaction",
+            "ends",
         ),
         ("", "bDone := bDone OR ((nCommand = 1) AND (ABS(fDistanceToGo) < 0.01));", "done"),
         ("rOverride := 1.0; fVelocityLimit := 0.0;", "", "fast"),

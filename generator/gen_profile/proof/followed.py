@@ -22,10 +22,12 @@ FAR = 1.1  # of the way's time at full speed
 FROM_REST = 1.4  # (1.0)
 ON_WAY = 2.8  # to a target (2.2)
 TO_STICK = 3.0  # to its velocity (2.5)
-TO_STOP = 2.6  # (2.0), also what turns round, and what slows down
+TO_STOP = 2.6  # (2.0)
+TO_SLOW = 1.4  # (1.0) below a new velocity limit
+TO_TURN = 1.6  # (1.1)
 CALMED = 3.0  # more where live parameters change on the way (2.1)
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
-ENABLED = 0.5  # s, after which a block that is enabled is ready
+ENABLED = 1.5  # s, which a block takes once it is enabled (0.9, of a damped crane at 4 ms)
 IN_VELOCITY = 2e-6  # share of the greatest velocity, by which one counts as reached
 
 

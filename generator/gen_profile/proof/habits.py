@@ -70,8 +70,8 @@ class Surroundings:
         Of the names of each axis's inputs.
     live : mapping of str to (float, float)
         Ranges of the live parameters.
-    told : mapping of str to float
-        What the block is told of them.
+    hoists : bool
+        Whether they change on the way.
     """
 
     cycle: float
@@ -80,7 +80,7 @@ class Surroundings:
     speeds: tuple[tuple[float, float], ...]
     suffixes: tuple[str, ...]
     live: Mapping[str, tuple[float, float]]
-    told: Mapping[str, float]
+    hoists: bool
 
     def target(self, share: float) -> tuple[float, ...]:
         """Choose a place."""
@@ -252,7 +252,7 @@ def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
         (5, {"rOverride": 1.01}),
         (5, {f"fVelocityLimit{around.suffixes[-1]}": nan}),
     ]
-    for name, (low, high) in around.live.items():
+    for name, (low, high) in around.live.items() if not around.hoists else ():  # then the promise is lost
         values += [
             (2, {f"f{name}": 0.99 * low - 1e-3}),
             (2, {f"f{name}": 1.01 * high}),
@@ -261,9 +261,13 @@ def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
     error, inputs = values[int(how * len(values)) % len(values)]
     begin = command.time + later
     reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
-    again = _followed(command, later + lasts + 10.0 * around.cycle)
+    commands = [command, _followed(command, later + lasts + 10.0 * around.cycle)]
+    if command.command == "velocity":  # a stick must have been at 0 before it counts again
+        wait = 0.3 * around.period
+        commands.append(_followed(commands[-1], wait, values=(0.0,) * len(around.speeds)))
+        commands.append(_followed(commands[1], 2.0 * wait))
     return Manner(
-        commands=(command, again),
+        commands=tuple(commands),
         changes=(Change(time=begin, lasts=lasts, inputs=inputs), reset),
         errors=(error,),
     )

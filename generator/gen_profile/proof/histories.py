@@ -291,7 +291,7 @@ class Histories:
             assert travel is not None
             places[number] = _between(travel, _widened(start))
         rows = choices[self._first_command : self._first_leg].reshape(MOST_COMMANDS, self._per_command)
-        manners = [*self._manners(rows[: int(amount * MOST_COMMANDS)], first, manner, ending, told)]
+        manners = [*self._manners(rows[: int(amount * MOST_COMMANDS)], first, manner, ending)]
         commands = tuple(command for one in manners for command in one.commands)
         return History(
             live=told,
@@ -323,14 +323,12 @@ class Histories:
         """Parameters of a machine that differs by some errors from what the block is told in a history."""
         return _machine(self.spec, history.live, errors)[0]
 
-    def _manners(
-        self, rows: Array, first: float, manner: float, ending: Sequence[float], told: Mapping[str, float]
-    ) -> Iterator[Manner]:
+    def _manners(self, rows: Array, first: float, manner: float, ending: Sequence[float]) -> Iterator[Manner]:
         """Follow the rows until their time is over, then come to rest."""
         within = max(COMMANDED, PERIODS * self.period)
         likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
         time, last = first * SOONEST, 1 + len(self.axes)
-        around, found = self._surroundings(told), None
+        around, earliest = self._surroundings(), 0.0
         for row in rows.tolist():
             if time > within:
                 break
@@ -340,9 +338,10 @@ class Histories:
             found = Manner(commands=(command,))
             if self.habits:
                 found = habit(command, next(more), next(more), around)
+                earliest = found.commands[-1].time + 2.0 * around.cycle
             yield found
             time = found.commands[-1].time + self.period * SHORTEST * (LONGEST / SHORTEST) ** row[last]
-        time = min(time, max(within, found.commands[-1].time if found else 0.0))
+        time = max(min(time, within), earliest)
         how, *others = ending
         if how < 0.05:
             last_one = Command(time=time, command="quick-stop")
@@ -350,7 +349,7 @@ class Histories:
             last_one = self._command(time, 0 if how < 0.5 else 2, [(how - 0.05) / 0.45, *others])
         yield Manner(commands=(last_one,))
 
-    def _surroundings(self, told: Mapping[str, float]) -> Surroundings:
+    def _surroundings(self) -> Surroundings:
         speeds = tuple(self._velocity(number) for number in self.axes)
         return Surroundings(
             cycle=self.spec.export.cycle_time,
@@ -359,7 +358,7 @@ class Histories:
             speeds=tuple((-speed, speed) for speed in speeds),
             suffixes=tuple(axis.suffix for axis in self.axes.values()),
             live=self.spec.planner.live,
-            told=told,
+            hoists=bool(self.spec.planner.live_rate),
         )
 
     def _slowed(self, command: Command, choice: float = 0.0) -> Command:

@@ -11,8 +11,10 @@ from gen_profile.proof.followed import (
     EXACT,
     FROM_REST,
     IN_VELOCITY,
+    TO_SLOW,
     TO_STICK,
     TO_STOP,
+    TO_TURN,
     Flags,
     Followed,
     Measured,
@@ -179,7 +181,7 @@ def _directions(followed: Followed, motion: Motion) -> Iterator[Measured]:
         if not min(order.tops) > 0.0:
             against[order.begin : order.end] = wants[order.begin : order.end] = False
     for begin, end in _runs(against):
-        allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
+        allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_TURN)
         yield Measured("against", begin, (end - begin) * followed.cycle, allowed)
     for begin, end in _runs(wants & motion.stands):
         ready = ENABLED if begin < followed.after(ENABLED) else 0.0
@@ -200,7 +202,7 @@ def _velocity_limits(followed: Followed, motion: Motion) -> Iterator[Measured]:
     latest, before = 0, tuple(own.velocity for own in followed.limits)
     for order in followed.orders:
         if any(now < then for now, then in zip(order.tops, before, strict=True)):
-            takes = followed.reaction + slowing(followed, motion.velocity[:, order.begin], TO_STOP)
+            takes = followed.reaction + slowing(followed, motion.velocity[:, order.begin], TO_SLOW)
             latest = order.begin + followed.after(takes)
         before = order.tops
         begin = max(order.begin, latest)
@@ -257,9 +259,10 @@ def _reactions(followed: Followed, motion: Motion, reactions: Mapping[int, int |
 
 
 def _obeys_anyway(motion: Motion, order: Order, at: int) -> bool:
-    """Whether axes go on as before, and the right way."""
+    """Whether axes go on as before, and slow down or go the right way."""
     velocity = motion.velocity[:, at]
-    if order.kind == STOP:
-        return bool(((velocity * motion.acceleration[:, at] < 0.0) | (velocity == 0.0)).all())
-    wanted = np.array(order.values) - (motion.position[:, at] if order.kind == POSITION else 0.0)
-    return bool((velocity * wanted >= 0.0).all())
+    right = velocity == 0.0
+    if order.kind != STOP:
+        wanted = np.array(order.values) - (motion.position[:, at] if order.kind == POSITION else 0.0)
+        right = velocity * wanted >= 0.0
+    return bool((right | (velocity * motion.acceleration[:, at] < 0.0)).all())

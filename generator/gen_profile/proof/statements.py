@@ -38,7 +38,7 @@ def truths(followed: Followed, motion: Motion) -> Iterator[Measured]:
     told = done | busy | aborted | error
     quiet, there = motion.goes & ~told, motion.goes & motion.stands & (motion.away <= EXACT)
     may_be, wrong = np.zeros((2, followed.cycles), dtype=bool)
-    before, stands = None, False
+    before, stands, over = None, False, False  # whether a refusal still counts; whether the command has ended
     for order in followed.orders:
         own = slice(order.begin, order.end)
         stands = bool(order.refused) or (stands and order.kind == STOP)  # until the next command
@@ -48,20 +48,16 @@ def truths(followed: Followed, motion: Motion) -> Iterator[Measured]:
             yield Measured("refused", order.begin, float((shown != order.refused).all()), 0.0)
         if before and before.kind in (POSITION, VELOCITY):
             may_be[order.begin :] = True
-            ended = (done | error)[before.begin : order.begin].any()
-            if before.kind == POSITION and order.edge == order.begin and not ended:
+            if before.kind == POSITION and order.edge == order.begin and not over:
                 yield Measured("not aborted", order.begin, float(not aborted[order.begin]), 0.0)
-        if order.kind == POSITION and quiet[own].any():
-            ended = (done | error)[own]
+        over, ended = over and order.edge < order.begin, (done | error)[own]
+        if order.kind == POSITION and not over and quiet[own].any():
             until = int(np.argmax(ended)) if ended.any() else len(ended)
             yield from never("vanished", quiet[own][:until], order.begin)
-        if (
-            order.kind == POSITION
-            and not followed.reserve
-            and there[order.begin + 1 : order.end].any()
-            and not done[own].any()
-        ):
+        arrives = order.kind == POSITION and there[order.begin + 1 : order.end].any()
+        if arrives and not (over or followed.reserve or done[own].any()):
             yield Measured("not done", order.begin, 1.0, 0.0)
+        over = over or bool(ended.any())
         if order.kind == STOP and not followed.reserve:
             latest = order.begin + followed.after(slowing(followed, motion.velocity[:, order.begin], TO_STOP))
             if latest < order.end:
