@@ -93,12 +93,20 @@ class ClosedLoop:
         """Run histories on all workers, in their order; those not begun when it closes are left out."""
         pool = ThreadPoolExecutor(self._workers)
         try:
-            yield pool.map(self.watched, histories)
+            # linearised here, as that is not for several threads
+            known = [(one, self._histories.slowest(one)) for one in histories]
+            yield pool.map(self.watched, *zip(*known, strict=True)) if known else iter(())
         finally:
             pool.shutdown(cancel_futures=True)
 
-    def watched(self, history: History) -> tuple[BlockRun, tuple[str, ...]]:
+    def watched(self, history: History, period: float) -> tuple[BlockRun, tuple[str, ...]]:
         """Let the machine of a history follow the block, and see whether the block obeys.
+
+        Parameters
+        ----------
+        history : History
+        period : float
+            s, of the slowest swing that the block is told of.
 
         Returns
         -------
@@ -113,7 +121,7 @@ class ClosedLoop:
         script, block = self._script(history), self._block.called()
         told = self._watch.orders(script)
         run = self._followed(history, block, script, rows=told[-1].end, marks=self._watch.marks(told))
-        faults = () if run.fault else self._watch.faults(history, script, told, block, run)
+        faults = () if run.fault else self._watch.faults(period, script, told, block, run)
         return attrs.evolve(run, trace=None, copies=None), faults
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:

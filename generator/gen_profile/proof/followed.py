@@ -25,6 +25,7 @@ TO_STICK = 3.0  # to its velocity (2.5)
 TO_STOP = 2.6  # (2.0)
 TO_SLOW = 1.4  # (1.0) below a new velocity limit
 TO_TURN = 1.6  # (1.1)
+RUN_OUT = 0.6  # (0.4) before a motion that ends soon anyway gives way to another
 CALMED = 3.0  # more where live parameters change on the way (2.1)
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
 ENABLED = 1.5  # s, which a block takes once it is enabled (0.9, of a damped crane at 4 ms)

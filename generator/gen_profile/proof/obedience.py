@@ -11,6 +11,7 @@ from gen_profile.proof.followed import (
     EXACT,
     FROM_REST,
     IN_VELOCITY,
+    RUN_OUT,
     TO_SLOW,
     TO_STICK,
     TO_STOP,
@@ -201,7 +202,8 @@ def _velocity_limits(followed: Followed, motion: Motion) -> Iterator[Measured]:
     """Judge override and velocity limit from when they must be kept."""
     latest, before = 0, tuple(own.velocity for own in followed.limits)
     for order in followed.orders:
-        if any(now < then for now, then in zip(order.tops, before, strict=True)):
+        lowered = any(now < then for now, then in zip(order.tops, before, strict=True))
+        if lowered or (order.kind == POSITION and order.begin < latest):  # a new target is planned first
             takes = followed.reaction + slowing(followed, motion.velocity[:, order.begin], TO_SLOW)
             latest = order.begin + followed.after(takes)
         before = order.tops
@@ -248,14 +250,17 @@ def _quick_stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
 
 def _reactions(followed: Followed, motion: Motion, reactions: Mapping[int, int | None]) -> Iterator[Measured]:
     """Judge setpoints that would not have come without the order, in time."""
-    late = followed.after(followed.reaction)
     for order in followed.orders:
         if order.begin not in reactions:
             continue
-        found = reactions[order.begin]
+        found, before = reactions[order.begin], motion.velocity[:, order.begin]
+        allowed = followed.reaction + calmed(followed) * followed.period
+        if before.any():
+            allowed = followed.reaction + slowing(followed, before, RUN_OUT)
+        late = followed.after(allowed)
         if found is None or (found > late and _obeys_anyway(motion, order, order.begin + late)):
             continue  # what came before ends or goes on as the order asks
-        yield Measured("reaction", order.begin, found * followed.cycle, followed.reaction)
+        yield Measured("reaction", order.begin, found * followed.cycle, allowed)
 
 
 def _obeys_anyway(motion: Motion, order: Order, at: int) -> bool:

@@ -14,7 +14,7 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.design import quick_limits, target_range
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed
-from gen_profile.proof.histories import Histories, History
+from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import faults
 from gen_profile.proof.orders import QUICK_STOP, Ends, Inputs, Order, orders
 from gen_profile.spec.model import Spec
@@ -105,32 +105,33 @@ class Watch:
         ]
 
     def faults(
-        self, history: History, script: Script, told: Sequence[Order], block: CalledBlock, run: BlockRun
+        self, period: float, script: Script, told: Sequence[Order], block: CalledBlock, run: BlockRun
     ) -> tuple[str, ...]:
         """Say what is wrong, each in words that end a sentence.
 
         Parameters
         ----------
-        history : History
+        period : float
+            s, of the slowest swing that the block is told of.
         script : Script
-            Of that history.
+            Of a history.
         told : sequence of Order
             Of that script.
         block : CalledBlock
         run : BlockRun
             With its trace, and copies of the block before `marks`.
         """
-        return tuple(faults(*self.followed(history, script, told, block, run)))
+        return tuple(faults(*self.followed(period, script, told, block, run)))
 
     def followed(
-        self, history: History, script: Script, told: Sequence[Order], block: CalledBlock, run: BlockRun
+        self, period: float, script: Script, told: Sequence[Order], block: CalledBlock, run: BlockRun
     ) -> tuple[Followed, dict[int, int | None]]:
         """Give what is to be judged."""
         assert run.trace is not None
         reserve = RESERVE if self.spec.planner.live_rate else 0.0
         followed = Followed(
             cycle=self.cycle,
-            period=self.histories.slowest(history),
+            period=period,
             reaction=self.reaction,
             axes=[*self.histories.axes.values()],
             limits=self.told.limits,
