@@ -28,6 +28,7 @@ from gen_profile_exporters.st_variables import (
     c_literal,
     c_member,
     declared,
+    elements,
     refused,
 )
 
@@ -160,7 +161,7 @@ def translate(text: str) -> Translation:
     """
     name, variables, body = translate_statements(text, {}, checked=True)
     inputs, outputs = (
-        tuple(one for v in variables if v.section == section for one in _elements(v))
+        tuple(one for v in variables if v.section == section for one in elements(v))
         for section in ("VAR_INPUT", "VAR_OUTPUT")
     )
     return Translation(name, inputs, outputs, _header(name, variables), _source(name, variables, body))
@@ -228,15 +229,6 @@ def _written(tree: Any) -> Iterator[Token]:
     """Find the names of variables that statements write."""
     yield from (assignment.children[0].children[0] for assignment in tree.find_data("assignment"))
     yield from (loop.children[0] for loop in tree.find_data("count"))
-
-
-def _elements(variable: StVariable) -> Iterator[StVariable]:
-    """Take an array for its elements, which C names alike."""
-    if not variable.length:
-        yield variable
-    for k in range(variable.length):
-        name = f"{variable.name}[{k}]"
-        yield variable._replace(name=name, length=0, initial=variable.initial[k : k + 1])
 
 
 class _Translator(Transformer[Token, object]):

@@ -136,3 +136,12 @@ def c_initials(variables: Iterable[StVariable], owners: Mapping[str, str]) -> li
         if v.section in owners
         for number, value in enumerate(v.initial)
     ]
+
+
+def elements(variable: StVariable) -> Iterator[StVariable]:
+    """Take an array for its elements, which C names alike."""
+    if not variable.length:
+        yield variable
+    for k in range(variable.length):
+        name = f"{variable.name}[{k}]"
+        yield variable._replace(name=name, length=0, initial=variable.initial[k : k + 1])

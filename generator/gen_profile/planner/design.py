@@ -22,9 +22,9 @@ from gen_profile.planner.machine import (
     second_order_sway,
 )
 from gen_profile.spec.model import Spec
+from gen_profile_exporters.planner.axis_declarations import AxisConstants
 from gen_profile_exporters.planner.block import (
     SLOTS_PER_PERIOD,
-    AxisConstants,
     PlannerConstants,
     block_text,
 )
