@@ -67,8 +67,8 @@ def _section(tree: Any) -> Iterator[tuple[Token, StVariable]]:
     for declaration in rest[constant:]:
         name, type_, initial = declaration.children
         *bounds, scalar = map(str, type_.children)
-        if bounds and (int(bounds[0]) != 0 or section == "VAR_OUTPUT"):
-            raise refused(name, f"{name} must begin with index 0, and be no output")
+        if bounds and int(bounds[0]) != 0:
+            raise refused(name, f"{name} must begin with index 0")
         length = int(bounds[1]) + 1 if bounds else 0
         literals = [] if initial is None else initial.children if initial.data == "listed" else [initial]
         whole = initial is None or (initial.data == "listed") == bool(bounds)

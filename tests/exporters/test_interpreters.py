@@ -162,7 +162,7 @@ def test_both_refuse_declarations_that_do_not_fit(declaration):
     ("declaration", "words"),
     [
         ("VAR CONSTANT a : LREAL; END_VAR", "a has not as many initial values as it takes"),
-        ("VAR_OUTPUT a : ARRAY [0..1] OF LREAL; END_VAR", "a must begin with index 0, and be no output"),
+        ("VAR_OUTPUT a : ARRAY [1..2] OF LREAL; END_VAR", "a must begin with index 0"),
         ("VAR double : LREAL; END_VAR", "double is a word of C; name it differently"),
     ],
 )

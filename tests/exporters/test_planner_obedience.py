@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from command_line import run_here
 from driven_block import CYCLE, Driver, require_limits
 
 import gen_profile as gp
@@ -337,3 +338,29 @@ class TestZones:
             planner.restrict(blocked=[(1.0, 2.0)] * 9)
         with pytest.raises(SpecError, match=r"state planner\.zones = true"):
             gp.Planner(SPEC).restrict(slow=[(1.0, 2.0, 0.1)])
+
+
+def test_events_tell_what_was_commanded_and_what_came_of_it(tmp_path):
+    block = planner_block(preset_spec("bay-crane", ["planner.events=true"])).text
+    (tmp_path / "block.st").write_text(block)
+    rows = ["0.5,position,2", "20,position,50", "21,velocity,0.4", "23,quick-stop,"]
+    (tmp_path / "commands.csv").write_text("\n".join(["time_s,command,value", *rows]) + "\n")
+    played = ("planner", "play", tmp_path / "block.st", "--commands", tmp_path / "commands.csv")
+    events = tmp_path / "events.csv"
+    assert run_here(*played, "--out", tmp_path / "setpoints.csv", "--events", events).code == 0
+    told = run_here("planner", "explain", events, "--json").document["events"]
+    assert [one["code"] for one in told if one["time_s"] < 0.45][:2] == [11, 63]
+    later = [one["code"] for one in told if one["time_s"] > 0.45]
+    assert later == [21, 32, 12, 11, 70, 20, 53, 41, 50, 22, 12, 42, 20, 13, 62, 11]
+    assert next(one for one in told if one["code"] == 70)["value"] == 2.0
+    assert "the target is reached, at 2" in run_here("planner", "explain", events).out
+    plain = run_here("planner", "play", *write_plain(tmp_path), "--events", events)
+    assert (plain.code, "state planner.events = true" in plain.err) == (2, True)
+    events.write_text("time_s,code,value\n1,21,here\n")
+    assert "line 2: three numbers are wanted" in run_here("planner", "explain", events).err
+
+
+def write_plain(folder):
+    """A block without events, and what it is told."""
+    (folder / "plain.st").write_text(planner_block(SPEC).text)
+    return folder / "plain.st", "--commands", folder / "commands.csv", "--out", folder / "plain.csv"

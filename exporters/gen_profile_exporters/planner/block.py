@@ -2,7 +2,7 @@
 
 The text stands in ``text/``. ``@name`` alone on a line is the part of that name, indented like it, or a value
 as elsewhere; what stands between ``@where_followed`` and ``@end`` is left out where no live parameter changes
-on the way, and between ``@where_zones`` and ``@end`` where there are no zones.
+on the way, and likewise what is for zones and events where there are none.
 
 - ``interface.st``: header and declarations.
 - ``inputs.st``, ``slots.st``, ``outputs.st``: what runs in every cycle; between them the committed future,
@@ -105,6 +105,8 @@ class PlannerConstants:
         Of live parameters that lower all loads by as much as they grow: the inverse of gravity, in s²/m.
     calm : float
         m, sway up to which nothing is done about it.
+    events : bool
+        Whether the last events are outputs.
     zones : bool
         Whether blocked and slow intervals of the travel are inputs.
     operations : int
@@ -140,6 +142,7 @@ class PlannerConstants:
     rates: Mapping[str, float]
     lowers: Mapping[str, float]
     calm: float
+    events: bool
     zones: bool
     operations: int
     periods: Sequence[float]
@@ -154,7 +157,7 @@ class PlannerConstants:
 
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
-    parts = {"followed": bool(constants.rates), "zones": constants.zones}
+    parts = {"followed": bool(constants.rates), "zones": constants.zones, "events": constants.events}
     text = WHERE.sub(lambda part: part[2] if parts[part[1]] else "", _part("block"))
     values = _values(constants)
     text = re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)

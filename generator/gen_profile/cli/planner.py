@@ -147,8 +147,14 @@ def write(
     required=True,
     help="CSV of the setpoints to write, one row per cycle.",
 )
+@click.option(
+    "--events",
+    "events_path",
+    type=OutputFile(),
+    help="CSV of the block's events to write, if it keeps them (planner.events).",
+)
 @output_options
-def play(block: Path, commands_path: Path, path: Path, as_json: bool) -> None:
+def play(block: Path, commands_path: Path, path: Path, events_path: Path | None, as_json: bool) -> None:
     """Execute a written planner block under a table of commands."""
     from gen_profile.artefacts.writing import deliver
     from gen_profile.cli.progress import progress
@@ -159,8 +165,10 @@ def play(block: Path, commands_path: Path, path: Path, as_json: bool) -> None:
     content, commands = read_block(block), _read(commands_path)
     with progress() as tell:
         tell("executing the block")
-        setpoints = run(content, commands)
+        setpoints = run(content, commands, with_events=events_path is not None)
     deliver(path, setpoints.table.encode("ascii"))
+    if events_path is not None:
+        deliver(events_path, setpoints.events.encode("ascii"))
     text = f"{path}: {setpoints.cycles} cycles"
     if setpoints.errors:
         ids = ", ".join(map(str, setpoints.errors))
@@ -176,13 +184,29 @@ def play(block: Path, commands_path: Path, path: Path, as_json: bool) -> None:
     print_outcome(document, text, as_json)
 
 
-def _read(path: Path) -> str:
+@planner.command(epilog="Example: gen-profile planner explain events.csv")
+@click.argument("events", type=InputFile())
+@output_options
+def explain(events: Path, as_json: bool) -> None:
+    """Say in words what a planner block's events mean: a CSV with time_s, code, value."""
+    from gen_profile.planner.events import read_events
+
+    found = read_events(_read(events, "events"))
+    document = {
+        "events": [
+            {"time_s": one.time, "code": one.code, "value": one.value, "words": one.words} for one in found
+        ]
+    }
+    print_outcome(document, "\n".join(one.words for one in found) or "No events.", as_json)
+
+
+def _read(path: Path, what: str = "commands") -> str:
     try:
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise OutputError(f"Cannot read the commands {path}: {error.strerror}.") from error
+        raise OutputError(f"Cannot read the {what} {path}: {error.strerror}.") from error
     except UnicodeDecodeError as error:
-        raise OutputError(f"Cannot read the commands {path}: it is no UTF-8 text.") from error
+        raise OutputError(f"Cannot read the {what} {path}: it is no UTF-8 text.") from error
 
 
 def planner_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from gen_profile.errors import SpecError
 from gen_profile.planner.chebyshev import Array
+from gen_profile.planner.events import COLUMNS, events_of
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import BlockAxis, live_inputs
 from gen_profile.suggestion import number_meant
@@ -142,15 +143,18 @@ class IssuedSetpoints:
         Error ids that it showed, in their order.
     unpromised : int
         Its nPromise at the end: 0 where no sway remains.
+    events : str
+        CSV of its events, if they were asked for.
     """
 
     table: str
     cycles: int
     errors: tuple[int, ...]
     unpromised: int
+    events: str = ""
 
 
-def play(text: str, commands_text: str) -> IssuedSetpoints:
+def play(text: str, commands_text: str, *, with_events: bool = False) -> IssuedSetpoints:
     """Execute a written block under a table of commands.
 
     Parameters
@@ -159,6 +163,8 @@ def play(text: str, commands_text: str) -> IssuedSetpoints:
         The block.
     commands_text : str
         Table of commands; each row holds until the next, and the last one until the axis stands still.
+    with_events : bool
+        Whether its events are wanted, too.
 
     Raises
     ------
@@ -174,7 +180,13 @@ def play(text: str, commands_text: str) -> IssuedSetpoints:
     places = {name: block.outputs.index(output) for name, output in columns.items()}
     lines, promise = ["time_s," + ",".join(columns)], block.outputs.index("nPromise")
     shown: dict[int, None] = {}  # as an ordered set
-    for number, row in enumerate(chain.from_iterable(_issued(block, commands, cycle))):
+    issued = list(_issued(block, commands, cycle))
+    events = (
+        [f"{e.time:.9g},{e.code},{e.value!r}" for e in events_of(block.outputs, np.concatenate(issued))]
+        if with_events
+        else []
+    )
+    for number, row in enumerate(chain.from_iterable(issued)):
         cells = (
             str(int(row[places[name]])) if output in WHOLE else repr(float(row[places[name]]))
             for name, output in columns.items()
@@ -187,6 +199,7 @@ def play(text: str, commands_text: str) -> IssuedSetpoints:
         cycles=len(lines) - 1,
         errors=errors,
         unpromised=int(row[promise]),
+        events="\n".join([",".join(COLUMNS), *events]) + "\n",
     )
 
 

@@ -95,6 +95,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         ),
         rates=spec.planner.live_rate,
         lowers=lowered(spec),
+        events=spec.planner.events,
         zones=spec.planner.zones,
         operations=spec.planner.operations
         or max(OPERATIONS, round(OPERATIONS * spec.export.cycle_time / 1e-3)),

@@ -364,6 +364,8 @@ class PlannerSpec(Checked, table="planner"):
         How fast some of them may change on the way, each in its unit per second.
     live_noise : mapping of str to float
         By how much what the controller is told of some may be off from cycle to cycle, each in its unit.
+    events : bool
+        Whether the last events are outputs of the block, for an operator's screen.
     zones : bool
         Whether blocked and slow intervals of the travel are inputs of the block.
     operations : int or None
@@ -377,6 +379,7 @@ class PlannerSpec(Checked, table="planner"):
     live: Annotated[Mapping[LiveParameter, Span], example("L1 = [3.0, 9.0]")] = NONE
     live_rate: Annotated[Mapping[LiveRate, Positive], example("NAME = 0.1")] = NONE
     live_noise: Annotated[Mapping[LiveRate, Positive], example("L1 = 0.003")] = NONE
+    events: bool = False
     zones: bool = False
     operations: Annotated[int, Bounds(least=3000, most=100_000)] | None = None
     quick_stop: Positive | None = None
