@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from command_line import run_here
 from driven_block import CYCLE, Driver, require_limits
+from generator.planned_machines import swing
 
 import gen_profile as gp
 from gen_profile.errors import SpecError
@@ -121,6 +122,24 @@ def test_a_promise_outlives_a_pause_in_which_nothing_moved(text):
     assert (last(driver, "bPromise"), last(driver, "nPromise")) == (0, 4)
     assert last(driver.hold(1.0, bEnable=1), "bPromise")
     assert last(driver.hold(1.0, bEnable=0, fActPosition=5.2).hold(1.0, bEnable=1), "nPromise") == 2
+
+
+@pytest.mark.parametrize(("seconds", "scale", "promise"), [(8.0, 1.0, 1), (3.0, 1.0, 1), (8.0, 1.2, 0)])
+def test_what_an_axis_does_by_hand_is_followed_and_calmed(hoisting, seconds, scale, promise):
+    """Where the load sways by half a metre, and the axis stands or still moves when it is taken over."""
+    driver = standing(hoisting, 5.0)
+    time = CYCLE * np.arange(round(seconds / CYCLE))
+    velocity = 0.25 * np.clip(np.minimum(time, 6.0 - time), 0.0, 2.0)
+    way = scale * CYCLE * np.concatenate([[0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2.0)])
+    for v, x in zip(velocity, 5.0 + way, strict=True):
+        driver.hold(CYCLE, bEnable=0, fActPosition=x, fActVelocity=v)
+    driver.hold(90.0, bEnable=1, fActPosition=x + CYCLE * v)
+    assert (last(driver, "bPromise"), last(driver, "bBusy")) == (promise, 0)
+    out = driver.outputs
+    times = CYCLE * np.arange(len(out["fAcceleration"]))
+    sway = swing(times, out["fAcceleration"], 350.0, 2000.0, 6.0, 1.5)
+    assert sway.max() > 0.5
+    assert (sway[:, -2500:].max() < 5e-3) == promise
 
 
 def test_the_same_target_again_and_again_changes_nothing(text):
