@@ -71,6 +71,7 @@ NEARER = 6.0  # slots at full speed, by which a new target is so much nearer tha
 STEP = 0.93  # share of the way to the nearest bound that it goes
 FRESH = 8  # cycles, for which the machine that is followed counts as constant
 AT_ONCE = 2.0  # of full speed, from a slot's pulse to the next: no bound
+AFTER_CUT = 0.1  # of full speed, by which pulses grow from slot to slot after one was cut
 RESERVE = 0.1  # share of the limits that only calming takes up, where live parameters change on the way
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
@@ -374,6 +375,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cMargin": c.axes[0].targets[0] - c.axes[0].travel[0],
         "cCalm": c.calm,
         "cAtOnce": AT_ONCE,
+        "cAfterCut": AFTER_CUT,
         "cDoubt": c.doubt,
         "cSpare": SPARE,
         "cMirrorDecay": MIRROR_DECAY,
