@@ -146,7 +146,6 @@ FAULTS = {
     "promise": with_output("bPromise", 300, 0.0),
     "lost": with_output("nPromise", slice(2000, 3000), 1.0),
     "kept": with_orders(REST, attrs.evolve(MOVE, end=300), told(300, CYCLES, QUICK_STOP)),
-    "no number": with_output("fVelocity", 300, np.nan),
 }
 
 
@@ -277,6 +276,14 @@ def test_a_block_that_disobeys_fails(bay, before, after, what):
     spec, text, histories, drawn, sound = bay
     found = dict(judged(spec, disobedient(text, before, after), histories, drawn))
     assert any(kind_of(WORDS[what]) in found[number] - shown for number, shown in enumerate(sound))
+
+
+@pytest.mark.parametrize("value", ["1.0E+300 * 1.0E+300", "0.0 * (1.0E+300 * 1.0E+300)", "1.0E+200"])
+def test_a_setpoint_that_is_no_number_is_a_verdict(bay, value):
+    spec, text, histories, drawn, _ = bay
+    wrong = disobedient(text, after=f"nSince := nSince + 1; IF nSince > 500 THEN fPosition := {value}; END_IF;")
+    (_, found), *_ = judged(spec, wrong, histories, drawn[:1])
+    assert found == {"a setpoint is no number"}
 
 
 def test_histories_hold_what_operators_and_controllers_do(bay):

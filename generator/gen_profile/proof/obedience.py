@@ -62,7 +62,6 @@ WORDS = {
     "promise": "bPromise and nPromise contradict each other",
     "lost": "nPromise tells a reason that is none",
     "kept": "bPromise is set though it cannot be known",
-    "no number": "an output is no number",
 }
 
 
@@ -90,9 +89,6 @@ def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterato
         without the order; None for none at all.
     """
     motion = Motion.of(followed)
-    if not np.isfinite(motion.position.sum() + motion.velocity.sum() + motion.acceleration.sum()):
-        yield Measured("no number", 0, 1.0, 0.0)
-        return
     for judge in (
         _arrivals,
         _directions,
