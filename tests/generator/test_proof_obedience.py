@@ -317,7 +317,9 @@ def test_a_block_that_disobeys_fails(bay, before, after, what):
 @pytest.mark.parametrize("value", ["1.0E+300 * 1.0E+300", "0.0 * (1.0E+300 * 1.0E+300)", "1.0E+200"])
 def test_a_setpoint_that_is_no_number_is_a_verdict(bay, value):
     spec, text, histories, drawn, _ = bay
-    wrong = disobedient(text, after=f"nSince := nSince + 1; IF nSince > 500 THEN fPosition := {value}; END_IF;")
+    wrong = disobedient(
+        text, after=f"nSince := nSince + 1; IF nSince > 500 THEN fPosition := {value}; END_IF;"
+    )
     (_, found), *_ = judged(spec, wrong, histories, drawn[:1])
     assert found == {"a setpoint is no number"}
 
