@@ -104,7 +104,7 @@ REST, MOVE, STICKS, STOPS = obedient().orders
 FAULTS = {
     POSITION: with_orders(REST, attrs.evolve(MOVE, values=(5.1,)), STICKS, STOPS),
     VELOCITY: with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.9,)), STOPS),
-    STOP: with_orders(REST, attrs.evolve(MOVE, end=200), told(200, CYCLES, STOP)),
+    STOP: with_orders(REST, attrs.evolve(MOVE, end=150), told(150, CYCLES, STOP)),
     "left": with_output("fPosition", slice(1500, 1600), 5.01),
     "against": with_orders(REST, attrs.evolve(MOVE, values=(-5.0,)), STICKS, STOPS),
     "idle": with_orders(
@@ -135,6 +135,8 @@ FAULTS = {
         REST, attrs.evolve(MOVE, end=300), told(300, STICK, POSITION, 5.0000001), STICKS, STOPS
     ),
     "error": with_output("bError", 300, 1.0),
+    "unanswered": with_orders(attrs.evolve(REST, denied=True), MOVE, STICKS, STOPS),
+    "not given back": attrs.evolve(with_output("nPromise", 50, 2.0), seen=[50]),
     "refused": with_orders(attrs.evolve(REST, refused=3), MOVE, STICKS, STOPS),
     "untold": with_output(("bError", "nErrorId"), slice(300, 400), 1.0),
     QUICK_STOP: with_orders(REST, attrs.evolve(MOVE, end=500), told(500, CYCLES, QUICK_STOP)),
@@ -146,7 +148,6 @@ FAULTS = {
     "promise": with_output("bPromise", 300, 0.0),
     "lost": with_output("nPromise", slice(2000, 3000), 1.0),
     "kept": with_orders(REST, attrs.evolve(MOVE, end=300), told(300, CYCLES, QUICK_STOP)),
-    "no number": with_output("fVelocity", 300, np.nan),
 }
 
 
@@ -161,9 +162,9 @@ def test_every_kind_of_fault_is_tried():
 
 def test_a_command_that_changes_nothing_for_too_long_is_obeyed_late():
     late = kind_of(WORDS["reaction"])
-    early = with_orders(REST, attrs.evolve(MOVE, end=200), told(200, CYCLES, STOP), reaction=0.5)
-    assert late not in kinds(early, {200: 49})
-    assert late in kinds(early, {200: 52})
+    early = with_orders(REST, attrs.evolve(MOVE, end=120), told(120, CYCLES, STOP), reaction=0.5)
+    assert late not in kinds(early, {120: 49})
+    assert late in kinds(early, {120: 52})
     assert kinds(obedient(), {TOLD: 152, STOPPED: 152}) == set()  # the way was the right one
     assert kinds(obedient(), {STOPPED: None}) == set()  # what came before ended anyway, and in time
 
@@ -185,13 +186,24 @@ NAMES = [
     "fVelocityLimit",
     "fL",
     "bReset",
+    "fCycleTime",
+    "fActPosition",
+    "fFollowingLimit",
 ]
-INPUTS = Inputs(names=NAMES, axes=[BlockAxis(name="")], limits=[LIMITS], live={"L": (1.0, 2.0)}, held=20)
+INPUTS = Inputs(
+    names=NAMES,
+    axes=[BlockAxis(name="")],
+    limits=[LIMITS],
+    live={"L": (1.0, 2.0)},
+    held=20,
+    cycle=CYCLE,
+)
 
 
 def read(*rows):
     """Orders from cycles and inputs that differ from those before."""
-    values, given = dict.fromkeys(NAMES, 0.0) | {"bEnable": 1.0, "rOverride": 1.0, "fL": 1.5}, []
+    begin = {"bEnable": 1.0, "rOverride": 1.0, "fL": 1.5, "fCycleTime": CYCLE}
+    values, given = dict.fromkeys(NAMES, 0.0) | begin, []
     for _, changes in rows:
         values |= changes
         given.append(list(values.values()))
@@ -222,6 +234,28 @@ def test_orders_are_read_from_inputs():
     assert [one.end for one in found] == [*(one.begin for one in found[1:]), 1000]
 
 
+def test_what_cannot_be_obeyed_is_read_from_inputs():
+    found = read(
+        (0, {"bStop": 1.0}),
+        (10, {"bExecute": 1.0}),
+        (20, {"bExecute": 0.0, "bStop": 0.0}),
+        (30, {"fCycleTime": 0.02, "bExecute": 1.0}),
+        (40, {"fCycleTime": CYCLE}),
+        (50, {"fActPosition": 1e6, "bExecute": 0.0}),
+        (60, {"fFollowingLimit": 0.1}),
+        (70, {"fFollowingLimit": 0.0}),
+        (80, {"bReset": 1.0}),
+    )
+    assert [(one.begin, one.kind, one.refused, one.denied) for one in found] == [
+        (0, STOP, 0, False),
+        (10, STOP, 0, True),
+        (30, STOP, 1, True),
+        (40, STOP, 0, False),
+        (60, QUICK_STOP, 7, False),
+        (80, STOP, 0, False),
+    ]
+
+
 def test_wrong_values_count_once_they_have_lasted():
     found = read(
         (0, {"bExecute": 1.0, "fTarget": 5.0}),
@@ -237,6 +271,7 @@ def test_wrong_values_count_once_they_have_lasted():
     assert [(one.begin, one.kind, one.refused) for one in found] == [
         (0, POSITION, 0),
         (60, STOP, 5),
+        (90, STOP, 5),  # a command that is denied
         (95, STOP, 0),
         (99, POSITION, 0),
     ]
@@ -279,6 +314,16 @@ def test_a_block_that_disobeys_fails(bay, before, after, what):
     assert any(kind_of(WORDS[what]) in found[number] - shown for number, shown in enumerate(sound))
 
 
+@pytest.mark.parametrize("value", ["1.0E+300 * 1.0E+300", "0.0 * (1.0E+300 * 1.0E+300)", "1.0E+200"])
+def test_a_setpoint_that_is_no_number_is_a_verdict(bay, value):
+    spec, text, histories, drawn, _ = bay
+    wrong = disobedient(
+        text, after=f"nSince := nSince + 1; IF nSince > 500 THEN fPosition := {value}; END_IF;"
+    )
+    (_, found), *_ = judged(spec, wrong, histories, drawn[:1])
+    assert found == {"a setpoint is no number"}
+
+
 def test_histories_hold_what_operators_and_controllers_do(bay):
     histories = Histories.of(bay[0])
     before = attrs.evolve(histories, habits=False)
@@ -290,7 +335,10 @@ def test_histories_hold_what_operators_and_controllers_do(bay):
         history.commands == tuple(sorted(history.commands, key=lambda one: one.time)) for history in drawn
     )
     inputs = {name for history in drawn for change in history.changes for name in change.inputs}
-    assert inputs == {"rOverride", "fVelocityLimit", "fL1", "fm2", "bReset"}
+    assert inputs == {
+        *("rOverride", "fVelocityLimit", "fL1", "fm2", "bReset", "bExecute", "bLoadAtRest"),
+        *("fCycleTime", "fFollowingLimit", "fActPosition"),
+    }
     assert any(history.errors for history in drawn)
     again = [sum(map(_same, history.commands, history.commands[1:])) for history in drawn]
     assert max(again) > 10

@@ -19,6 +19,8 @@ from gen_profile_fmu.model.variables import variable_name
 from gen_profile_fmu.running.called_fmu import CalledFmu, called, compiled_loops
 from gen_profile_fmu.running.instances import instance
 
+NO_NUMBER = -1  # a block's fault: a setpoint is none, or beyond all that a machine can follow
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class CalledBlock:
@@ -134,7 +136,7 @@ class BlockRun:
     error : int
         The last that the block showed; 0 for none.
     fault : int
-        What the block did that no block may do; 0 for nothing.
+        What the block did that no block may do: 0 for nothing, `NO_NUMBER`, or as its function returns.
     trace : (cycles, outputs + loads) array or None
     copies : (marks, bytes) array or None
         Of the block's instance, as they were before marked cycles.

@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 
 from gen_profile.planner.commands import Command
+from gen_profile.proof.orders import FOLLOWING
 
 REPEATED = 16  # commands
 CREEPING = 40
@@ -17,6 +18,7 @@ SOON = 100  # cycles, in which a mind is changed
 STOPS = 4
 WRONG = 0.5  # s, at least, in which values count that cannot be
 OUTSIDE = 10.0  # m (or rad) beyond the targets
+FAR = 1e6  # m (or rad)
 
 _MORE = 0.6180339887  # turns one choice into others
 
@@ -298,6 +300,61 @@ def _refused(command: Command, how: float, around: Surroundings) -> Manner:
     )
 
 
+def _denied(command: Command, how: float, around: Surroundings) -> Manner:
+    """Command a position while the axis is to stop."""
+    stop = _followed(command, around.period * (0.2 + _share(how, 3)), command="stop", values=())
+    edge = stop.time + around.period * _share(how, 4)
+    return Manner(
+        commands=(command, stop, _followed(stop, 1.5 * around.period)),
+        changes=(
+            Change(time=edge, lasts=_log(around.cycle, 0.3 * around.period, how), inputs={"bExecute": 1.0}),
+        ),
+    )
+
+
+def _mistimed(command: Command, how: float, around: Surroundings) -> Manner:
+    """Call the block in another task for a while."""
+    later, lasts = around.period * _share(how, 3), _log(around.cycle, 0.5 * around.period, how)
+    inputs = {"fCycleTime": around.cycle * (0.5 if how < 0.5 else 1.01)}
+    again = _followed(command, later + lasts + 10.0 * around.cycle, command="stop", values=())
+    return Manner(
+        commands=(command, again),
+        changes=(Change(time=command.time + later, lasts=lasts, inputs=inputs),),
+        errors=(1,),
+    )
+
+
+def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
+    """Let the last axis be where it cannot be: with a limit of that, and before without one."""
+    first, suffix = _towards(command, how, around), around.suffixes[-1]
+    begin = first.time + around.period * (0.2 + _share(how, 3))
+    away = {f"fActPosition{suffix}": (nan, -FAR, FAR)[int(3.0 * how) % 3]}
+    most, lasts = {f"fFollowingLimit{suffix}": 0.1 + how}, around.period * _share(how, 4)
+    within = around.period * (1.0 + _share(how, 5))
+    return Manner(
+        commands=(first, _followed(first, begin - first.time + within, command="stop", values=())),
+        changes=(
+            Change(time=begin - 0.1 * around.period, lasts=0.1 * around.period, inputs=away),
+            Change(time=begin, lasts=lasts, inputs=away | most),
+            Change(time=begin + within - 4.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0}),
+        ),
+        errors=(FOLLOWING,),
+    )
+
+
+def _braked(command: Command, how: float, around: Surroundings) -> Manner:
+    """Brake at once, and say that the load hangs still, true or not."""
+    first, wait = _towards(command, how, around), around.period * (0.3 + _share(how, 3))
+    return Manner(
+        commands=(
+            first,
+            _followed(first, wait, command="quick-stop", values=()),
+            _followed(first, 3.0 * wait, command="stop", values=()),
+        ),
+        changes=(Change(time=first.time + 2.5 * wait, lasts=0.0, inputs={"bLoadAtRest": 1.0}),),
+    )
+
+
 HABITS: tuple[Callable[[Command, float, Surroundings], Manner], ...] = (
     _again,
     _creeping,
@@ -311,4 +368,8 @@ HABITS: tuple[Callable[[Command, float, Surroundings], Manner], ...] = (
     _wrong,
     _correction,
     _refused,
+    _denied,
+    _mistimed,
+    _strayed,
+    _braked,
 )

@@ -28,6 +28,7 @@ from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
 from gen_profile.proof.habits import Change, Manner, Surroundings
 from gen_profile.proof.habits import manner as habit
+from gen_profile.proof.orders import FOLLOWING
 from gen_profile.spec.model import Spec
 
 COMMANDED = 40.0  # s in which commands come; slow machines take longer, see PERIODS
@@ -131,7 +132,12 @@ class History:
     @property
     def brakes(self) -> bool:
         """Whether it has a quick stop, after which nothing is promised."""
-        return any(command.command == "quick-stop" for command in self.commands)
+        return FOLLOWING in self.errors or any(one.command == "quick-stop" for one in self.commands)
+
+    @property
+    def reassured(self) -> bool:
+        """Whether the block is told that the load hangs still, true or not."""
+        return any("bLoadAtRest" in change.inputs for change in self.changes)
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -11,7 +11,7 @@ from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.verdict import JudgedHistory
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.st_to_c import FAULTS
-from gen_profile_fmu.running.block_run import AxisExtremes, BlockRun
+from gen_profile_fmu.running.block_run import NO_NUMBER, AxisExtremes, BlockRun
 
 ROUNDING = 1e-9  # by which setpoints may miss a limit, in m and s
 STEADY = 1e-9  # m, by which setpoints may move while the axis stands
@@ -53,7 +53,7 @@ def judge_run(
         history=history,
         cycles=run.cycles,
         rests_after=max(0.0, run.stands * cycle - last) if run.stands >= 0 else None,
-        promise=run.promise,
+        promise=run.promise and not history.reassured,
         residual=dict(zip(loads, run.residual.tolist(), strict=True)),
         on_the_way=dict(zip(loads, run.on_the_way.tolist(), strict=True)),
         limits=limits,
@@ -81,7 +81,7 @@ def _shares(spec: Spec, history: History, run: BlockRun) -> dict[str, float]:
 def _faults(history: History, run: BlockRun, limits: dict[str, float]) -> Iterator[str]:
     """Say what is wrong, each in words that end a sentence."""
     if run.fault:
-        yield f"the block {FAULTS[run.fault]}"
+        yield "a setpoint is no number" if run.fault == NO_NUMBER else f"the block {FAULTS[run.fault]}"
         return
     for named, axis in zip(history.axes.values(), run.axes, strict=True):
         yield from _axis_faults(history, named, axis, limits)

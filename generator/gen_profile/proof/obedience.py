@@ -51,6 +51,7 @@ WORDS = {
     "aborted": "bCommandAborted is set though no command was replaced",
     "not aborted": "bCommandAborted is not set though a command was replaced",
     "error": "bError and nErrorId contradict each other",
+    "unanswered": "a command that cannot be obeyed is not answered by bCommandAborted or bError",
     "refused": "nErrorId does not tell why a command is refused",
     "untold": "nErrorId tells an error without a cause by {needed:.0f}",
     "disabled": "bEnabled is not set",
@@ -61,8 +62,8 @@ WORDS = {
     "stop distance": "fStopDistance is not the greater distance to the stated ends by {needed:.3g} m",
     "promise": "bPromise and nPromise contradict each other",
     "lost": "nPromise tells a reason that is none",
+    "not given back": "nPromise does not change though the load was seen to hang still",
     "kept": "bPromise is set though it cannot be known",
-    "no number": "an output is no number",
 }
 
 
@@ -90,9 +91,6 @@ def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterato
         without the order; None for none at all.
     """
     motion = Motion.of(followed)
-    if not np.isfinite(motion.position.sum() + motion.velocity.sum() + motion.acceleration.sum()):
-        yield Measured("no number", 0, 1.0, 0.0)
-        return
     for judge in (
         _arrivals,
         _directions,

@@ -11,6 +11,9 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
 
 POSITION, VELOCITY, STOP, QUICK_STOP = "position", "velocity", "stop", "quick-stop"
+FOLLOWING = 7  # error
+FOLLOWED = ("fFollowingLimit", "fActPosition")
+ROOM = 100.0  # m (or rad) beyond the targets, where no setpoint is
 
 
 @attrs.frozen(kw_only=True)
@@ -29,6 +32,8 @@ class Order:
         Of each axis the greatest velocity, by limit, override and velocity limit; 0 holds.
     refused : int
         Error for which it is a stop.
+    denied : bool
+        Whether it begins with a rising edge of bExecute that cannot be obeyed.
     edge : int
         Cycle in which the command came; before `begin` where but the velocity limits have changed since.
     """
@@ -40,6 +45,7 @@ class Order:
     tops: tuple[float, ...]
     edge: int
     refused: int = 0
+    denied: bool = False
 
 
 @attrs.frozen(kw_only=True)
@@ -67,6 +73,8 @@ class Inputs:
         Ranges of the live parameters.
     held : int
         Cycles in which wrong values of them, of override and of velocity limit do not count.
+    cycle : float
+        s, of the task.
     """
 
     names: Sequence[str]
@@ -74,6 +82,7 @@ class Inputs:
     limits: Sequence[Ends]
     live: Mapping[str, tuple[float, float]] = attrs.field(factory=dict)
     held: int = 0
+    cycle: float = inf
 
 
 def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tuple[Order, ...]:
@@ -101,7 +110,7 @@ def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tup
 def _same(order: Order, before: Order) -> bool:
     """Whether nothing new is told; stops know no velocity limit."""
     again = (order.kind, order.values, order.refused) == (before.kind, before.values, before.refused)
-    return again and (order.kind in (STOP, QUICK_STOP) or order.tops == before.tops)
+    return again and not order.denied and (order.kind in (STOP, QUICK_STOP) or order.tops == before.tops)
 
 
 def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Order]:
@@ -121,18 +130,21 @@ def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Ord
         since = -1 if not wrong else begin if since < 0 else since
         if reset is None or row[reset]:
             latched = 0
+        if _strays(row, place, inputs):
+            latched = FOLLOWING
         if not wrong:
             tops = tuple(
                 min(row[place["rOverride"]] * most, limit or most)
                 for most, limit in zip(full, given, strict=True)
             )
         at_rest = not row[place["bVelocity"]] or not any(row[number] for number in sticks)
-        neutral = not latched and (neutral or at_rest)
-        was, rises, refused = (kind, values), bool(row[place["bExecute"]]) and not execute, latched
-        execute = bool(row[place["bExecute"]])
-        if row[place["bQuickStop"]]:
+        was, rises = (kind, values), bool(row[place["bExecute"]]) and not execute
+        execute, refused = bool(row[place["bExecute"]]), latched or _mistimed(row, place, inputs)
+        neutral = not refused and (neutral or at_rest)
+        denied = rises and bool(refused or row[place["bStop"]] or row[place["bQuickStop"]])
+        if row[place["bQuickStop"]] or latched == FOLLOWING:
             kind, values = QUICK_STOP, ()
-        elif latched or row[place["bStop"]] or not row[place["bEnable"]]:
+        elif refused or row[place["bStop"]] or not row[place["bEnable"]]:
             kind, values = STOP, ()
         elif row[place["bVelocity"]] and neutral:
             kind, values = VELOCITY, tuple(row[number] for number in sticks)
@@ -145,10 +157,35 @@ def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Ord
             kind, values = STOP, ()
         if was != (kind, values):
             edge = begin
-        yield Order(begin=begin, end=begin, kind=kind, values=values, tops=tops, edge=edge, refused=refused)
+        yield Order(
+            begin=begin,
+            end=begin,
+            kind=kind,
+            values=values,
+            tops=tops,
+            edge=edge,
+            refused=refused,
+            denied=denied,
+        )
         if wrong and not latched and end > since + inputs.held:
             kind, values, latched, edge, neutral = STOP, (), wrong, since + inputs.held, False
             yield Order(begin=edge, end=edge, kind=kind, values=values, tops=tops, edge=edge, refused=wrong)
+
+
+def _strays(row: Sequence[float], place: Mapping[str, int], inputs: Inputs) -> bool:
+    """Whether an axis is farther from wherever its setpoint may be than its limit allows."""
+    for axis, own in zip(inputs.axes, inputs.limits, strict=True):
+        most, now = (row[place[name]] if (name := axis.of(of)) in place else 0.0 for of in FOLLOWED)
+        low, high = own.targets
+        if most > 0.0 and not low - most - ROOM <= now <= high + most + ROOM:
+            return True
+    return False
+
+
+def _mistimed(row: Sequence[float], place: Mapping[str, int], inputs: Inputs) -> int:
+    """Give the error of a task that has another cycle time; 0 for none."""
+    cycle = row[place["fCycleTime"]] if "fCycleTime" in place else inputs.cycle
+    return int(inputs.cycle < inf and not abs(cycle - inputs.cycle) <= 1e-6 * inputs.cycle)
 
 
 def _wrong(

@@ -46,6 +46,10 @@ def truths(followed: Followed, motion: Motion) -> Iterator[Measured]:
         if order.refused:
             shown = followed.issued["nErrorId"][order.begin : order.end][:2]  # in that cycle or the next
             yield Measured("refused", order.begin, float((shown != order.refused).all()), 0.0)
+        if order.denied:
+            shown = aborted[order.begin] or error[order.begin]
+            yield Measured("unanswered", order.begin, float(not shown), 0.0)
+            may_be[order.begin :] = True
         if before and before.kind in (POSITION, VELOCITY):
             may_be[order.begin :] = True
             if before.kind == POSITION and order.edge == order.begin and not over:
@@ -159,7 +163,12 @@ def promises(followed: Followed, motion: Motion) -> Iterator[Measured]:
     ready = followed.after(ENABLED + followed.reaction)
     yield from never("lost", why[ready:] > 2.0, ready)
     yield from never("lost", why == 1.0)  # live parameters keep their stated rates, but for spikes
-    braked = next((order.begin for order in followed.orders if order.kind == QUICK_STOP), followed.cycles)
-    yield from never("lost", why[:braked] == 2.0)
-    if braked < followed.cycles and not motion.stands[max(0, braked - 1)]:
-        yield from never("kept", promise[braked:], braked)
+    braked = [order.begin for order in followed.orders if order.kind == QUICK_STOP]
+    yield from never("lost", why[: min(braked, default=followed.cycles)] == 2.0)
+    seen = [at for at in followed.seen if motion.stands[at] and not followed.issued["bBusy"][at - 1]]
+    for begin in braked:
+        if not motion.stands[max(0, begin - 1)]:
+            end = next((at for at in seen if at >= begin), followed.cycles)
+            yield from never("kept", promise[begin:end], begin)
+    for at in seen:
+        yield Measured("not given back", at, float(why[at] == 2.0), 0.0)

@@ -37,7 +37,7 @@ class JudgedHistory:
     rests_after : float or None
         Time in s from the last command to standstill.
     promise : bool
-        Whether the block promises at the end that no sway remains.
+        Whether the block promises at the end, by what it knows itself, that no sway remains.
     residual, on_the_way : mapping of str to float
         Greatest sway of every load in m: once the axes stand, and at any time.
     limits : mapping of str to float

@@ -70,6 +70,7 @@ class Watch:
                 limits=tuple(_ends(histories.spec, number) for number in histories.axes),
                 live=histories.spec.planner.live,
                 held=int(held[1]) if held else 0,
+                cycle=block.inputs["fCycleTime"],
             ),
             reaction=float(stated[1]) if stated else usual,
         )
@@ -143,6 +144,7 @@ class Watch:
             issued=dict(zip(self.outputs, run.trace.T, strict=False)),
             reserve=reserve,
             wander=WANDER * max(self.spec.check.residual_sway.values()) if reserve else 0.0,
+            seen=self._seen(script, run.cycles),
         )
         if run.copies is None:
             return followed, {}
@@ -154,6 +156,14 @@ class Watch:
             if mark in ends
         }
         return followed, reactions
+
+    def _seen(self, script: Script, cycles: int) -> list[int]:
+        """Tell when bLoadAtRest rises; blocks of earlier versions have none."""
+        if "bLoadAtRest" not in self.inputs:
+            return []
+        given = script.inputs[:, self.inputs.index("bLoadAtRest")]
+        rows = np.flatnonzero(np.diff(given, prepend=0.0) > 0.0).tolist()
+        return [begin for row in rows if (begin := script.begins[row]) < cycles]
 
     def _first_difference(
         self, script: Script, cycles: tuple[int, int], block: CalledBlock, memory: Any, issued: Array

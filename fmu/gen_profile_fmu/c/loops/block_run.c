@@ -8,6 +8,9 @@
 
 #include "called_fmu.h"
 
+#define NO_NUMBER (-1)                   /* a fault: beyond FARTHEST no machine's equations can be solved */
+#define FARTHEST 1e9                     /* m (or rad) */
+
 typedef int Play(void *block, const double *inputs, long cycles, double *outputs);
 
 typedef struct {
@@ -79,6 +82,13 @@ static void take_axis(const size_t *places, const double *before, const double *
     axis->gap = greater(axis->gap, way + cycle * cycle * change / 12.0);
 }
 
+static bool numbers(const Block *block, const double *outputs) {
+    for (size_t i = 0; i < 3 * block->n_axes; i++) {
+        if (!(fabs(outputs[block->axes[i]]) <= FARTHEST)) return false;
+    }
+    return true;
+}
+
 static bool standing(const Block *block, const double *outputs) {
     if (outputs[block->busy] != 0.0) return false;
     for (size_t i = 0; i < block->n_axes; i++) {
@@ -115,6 +125,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
             memcpy(found->copies + mark * block->size, block->instance, block->size);
         }
         found->fault = block->play(block->instance, inputs, 1, now);
+        if (found->fault == 0 && !numbers(block, now)) found->fault = NO_NUMBER;
         if (found->fault != 0) return;
         take_states(block, now, found);
         if (k >= last && found->stands < 0 && standing(block, now)) {
