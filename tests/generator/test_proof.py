@@ -138,7 +138,7 @@ def test_sway_on_the_way_is_told_where_it_is_limited(proof):
 def test_who_interrupts_a_proof_need_not_wait_for_the_rest(spec, text, monkeypatch):
     begun = []
 
-    def watched(self, history):
+    def watched(self, history, period):
         begun.append(history)
         sleep(0.01)
         return GOOD, ()
@@ -457,7 +457,10 @@ def test_a_block_that_sways_too_much_is_not_written(tmp_path, monkeypatch):
 def test_an_altered_file_is_told(deployed, tmp_path):
     for name in ("bay 3.st", "manifest.json"):
         (tmp_path / name).write_bytes((deployed[0] / name).read_bytes())
-    (tmp_path / "bay 3.st").write_text((tmp_path / "bay 3.st").read_text() + "(* altered *)\n")
+    text = (tmp_path / "bay 3.st").read_text()
+    (tmp_path / "bay 3.st").write_text(
+        text.replace("END_FUNCTION_BLOCK", "(* altered *)\nEND_FUNCTION_BLOCK")
+    )
     options = ("--histories", 4, "--json")
     altered = run_here("check", tmp_path / "bay 3.st", *options)
     assert altered.code == 4

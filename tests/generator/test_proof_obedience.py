@@ -1,5 +1,7 @@
 """Judging whether a block obeys: synthetic motions, each fault by itself, and blocks that disobey."""
 
+import re
+
 import attrs
 import numpy as np
 import pytest
@@ -287,10 +289,15 @@ def bay():
 
 
 def disobedient(text, before="", after=""):
-    """A block that does something more before and after all that it does."""
+    """A block that does something more before and after all that it does, inputs being those of its own."""
     head, _, body = text.rpartition("END_VAR\n")
+    declared, copied = "nSince : DINT; ", ""
+    for name in sorted(set(re.findall(r"([bfr][A-Z]\w+) :=", before))):
+        kind = "BOOL" if name[0] == "b" else "LREAL"
+        declared, copied = declared + f"{name}Own : {kind}; ", copied + f"{name}Own := {name}; "
+        before, body = (re.sub(rf"\b{name}\b", f"{name}Own", part) for part in (before, body))
     body = body.replace("END_FUNCTION_BLOCK", f"{after}\nEND_FUNCTION_BLOCK")
-    return head.replace("\nVAR\n", "\nVAR\n    nSince : DINT;\n", 1) + f"END_VAR\n{before}\n{body}"
+    return head.replace("\nVAR\n", f"\nVAR\n    {declared}\n", 1) + f"END_VAR\n{copied}{before}\n{body}"
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated e
 FAR = 1.1  # of the way's time at full speed
 FROM_REST = 1.5  # (1.24)
 ON_WAY = 4.2  # to a target: after changes of mind an axis turns to and fro (3.5; without them 1.9)
-TO_STICK = 3.1  # to its velocity: a motion to a target is stopped first (2.6)
+TO_STICK = 3.1  # to its velocity, as a motion to a target is stopped first (2.6)
 MORE_AXES = 1.3  # for each further axis, as they are planned one after the other (1.1)
 TO_STOP = 2.7  # (2.3)
 TO_SLOW = 2.5  # below a new velocity limit: a new target is planned, or a motion stopped, first (2.1)
@@ -161,9 +161,9 @@ def slowing(followed: Followed, before: Array, periods: float) -> float:
 
 
 def reaching(followed: Followed, before: Array, wanted: Sequence[float]) -> float:
-    """Tell the time in s in which axes come from some velocities to others, each (axes,)."""
+    """Tell the time in s in which axes come from some velocities, by a stop, to others, each (axes,)."""
     slowest = max(
-        abs(v - w) / own.acceleration + own.acceleration / own.jerk
+        (abs(v) + abs(w)) / own.acceleration + own.acceleration / own.jerk
         for v, w, own in zip(map(float, before), wanted, followed.limits, strict=True)
     )
     periods = TO_STICK + MORE_AXES * (len(followed.axes) - 1) + calmed(followed)

@@ -345,13 +345,14 @@ def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
 def _braked(command: Command, how: float, around: Surroundings) -> Manner:
     """Brake at once, and say that the load hangs still, true or not."""
     first, wait = _towards(command, how, around), around.period * (0.3 + _share(how, 3))
+    seen = Change(time=first.time + 2.5 * wait, lasts=0.0, inputs={"bLoadAtRest": 1.0})
     return Manner(
         commands=(
             first,
             _followed(first, wait, command="quick-stop", values=()),
             _followed(first, 3.0 * wait, command="stop", values=()),
         ),
-        changes=(Change(time=first.time + 2.5 * wait, lasts=0.0, inputs={"bLoadAtRest": 1.0}),),
+        changes=() if around.hoists else (seen,),  # one that calms by a model believes that
     )
 
 
