@@ -18,7 +18,7 @@ def structure(name, **members):
     return STRUCTURE.format(name, "\n".join(f"{member} : {type_};" for member, type_ in members.items()))
 
 
-def powering(name, axis, inputs, *, on, error, up, down):
+def powering(name, axis, inputs, *, on, error, powered, up, down):
     """MC_Power: up after some cycles, as long as the axis is in no error."""
     return f"""FUNCTION_BLOCK {name}
     VAR_IN_OUT Axis : {axis}; END_VAR
@@ -26,6 +26,7 @@ def powering(name, axis, inputs, *, on, error, up, down):
     VAR Wait : DINT; END_VAR
     IF ({on}) AND NOT ({error}) THEN
         Wait := Wait + 1;
+        IF {powered} THEN Wait := 0; END_IF;
         IF Wait > 4 THEN {up} END_IF;
     ELSE
         Wait := 0;
@@ -106,6 +107,7 @@ TWINCAT_BLOCKS = (
         "Enable : BOOL; Enable_Positive : BOOL; Enable_Negative : BOOL;",
         on="Enable AND Enable_Positive AND Enable_Negative",
         error="(Axis.NcToPlc.StateDWord AND 16#80000000) <> 16#00000000",
+        powered="(Axis.NcToPlc.StateDWord AND 16#00000001) <> 16#00000000",
         up="Axis.NcToPlc(StateDWord := Axis.NcToPlc.StateDWord OR 16#00000001);",
         down="Axis.NcToPlc(StateDWord := Axis.NcToPlc.StateDWord AND 16#80000002);",
     ),
@@ -155,7 +157,8 @@ CODESYS_BLOCKS = (
         "Enable : BOOL; bRegulatorOn : BOOL; bDriveStart : BOOL;",
         on="Enable AND bRegulatorOn AND bDriveStart",
         error="Axis.nAxisState = 1",
-        up="IF Axis.nAxisState = 0 THEN Axis(nAxisState := 3); END_IF;",
+        powered="Axis.nAxisState > 1",
+        up="Axis(nAxisState := 3);",
         down="IF Axis.nAxisState > 1 THEN Axis(nAxisState := 0); END_IF;",
     ),
     resetting("MC_Reset", "AXIS_REF_SM3", "IF Axis.nAxisState = 1 THEN Axis(nAxisState := 0); END_IF;"),
@@ -197,6 +200,7 @@ SIEMENS_BLOCKS = (
         "Enable : BOOL; StartMode : INT; StopMode : INT;",
         on="Enable AND (StartMode = 1) AND (StopMode = 0)",
         error="Axis.StatusWord.%X1",
+        powered="Axis.StatusWord.%X0",
         up="Axis(StatusWord := Axis.StatusWord OR 16#00000001);",
         down="Axis(StatusWord := Axis.StatusWord AND 16#00000022);",
     ),
@@ -282,7 +286,7 @@ class Bench:
     """A wrapper on its axes, which keep to what they are told, cycle after cycle."""
 
     def __init__(self, vendor, source, block, names, starts):
-        """Put axes, by the names that the wrapper has for them, where they stand; ``block`` is the inner one."""
+        """Make axes, by the names that the wrapper has for them; ``block`` is the inner one."""
         self.vendor = vendor
         self.source = source
         # The only name of an enumeration; the interpreter has none.
@@ -320,7 +324,11 @@ class Bench:
                 else (self.vendor.setpoint, self.vendor.actual)
             )
             part.call(**{come: part[gone]})
-        self.told.append([self.part(axis)[self.vendor.setpoint] for axis in self.axes])
+        told = [self.part(axis)[self.vendor.setpoint] for axis in self.axes]
+        for axis, at, before in zip(self.axes, told, self.told[-1] if self.told else told, strict=True):
+            if at == before:
+                self.part(axis).call(**{self.vendor.speed: 0.0})
+        self.told.append(told)
         return outputs
 
     def until(self, condition, most=500, **inputs):

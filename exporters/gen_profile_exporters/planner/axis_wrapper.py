@@ -88,12 +88,12 @@ IF nStage >= cGuiding THEN
         nFault := fbPlanner.nErrorId;
         nStage := cStopping;
     END_IF;
-    bRests := NOT fbPlanner.bBusy;
-    IF bQuickStop OR (nFault <> 0) THEN bRests := fbPlanner.fTimeToGo <= 0.0; END_IF;
-    IF (nStage = cStopping) AND bRests THEN nStage := cOff; END_IF;
 END_IF;
 
 {feed}
+bRests := NOT fbPlanner.bBusy;
+IF bQuickStop OR (nFault <> 0) THEN bRests := fbPlanner.fTimeToGo <= 0.0; END_IF;
+IF (nStage = cStopping) AND bRests THEN nStage := cOff; END_IF;
 
 {results}
 bBusy := fbPlanner.bBusy OR ((nStage <> cOff) AND (nStage <> cGuiding));
@@ -117,15 +117,16 @@ IF (nStage = cPowering) AND (nFault = 0) THEN
 END_IF;
 {let_go}
 bGuided := bGuided OR bTaken{n};
-(* Taken over where it goes in this cycle, then supervised where it is. *)
-fPlace{n} := ({setpoint} + fCycleTime * {speed}) / cUnits{n};
+(* Taken over where it is told to be, then supervised where it is. *)
+fPlace{n} := {setpoint} / cUnits{n};
 IF fbPlanner.bEnabled THEN fPlace{n} := {actual} / cUnits{n}; END_IF;"""
-# While it is not enabled, the block follows the axis.
+# Until it is enabled, the block follows the axis, which goes on as fast as it does.
 FEED = """\
-bFeed := bTaken{n} AND (nStage <> cOff);
+bFeed := bTaken{n};
 fPosition := cUnits{n} * fbPlanner.fPosition{n};
 fVelocity := cUnits{n} * fbPlanner.fVelocity{n};
 fAcceleration := cUnits{n} * fbPlanner.fAcceleration{n};
+IF nStage = cTaking THEN fPosition := fPosition + fCycleTime * fVelocity; END_IF;
 nCause := 0;
 {vendor}
 {let_go}"""

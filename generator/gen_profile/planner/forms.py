@@ -22,7 +22,10 @@ from gen_profile_exporters.registry import container_of, containers, find_contai
 
 PORTABLE = "plc"
 C = "c"
-_PLANNER = re.compile(r"^\s*FUNCTION_BLOCK\s+\w+_planner\s*$", re.MULTILINE | re.IGNORECASE)
+_PLANNER, _WRAPPER = (
+    re.compile(rf"^\s*FUNCTION_BLOCK\s+\w+_planner{end}\s*$", re.MULTILINE | re.IGNORECASE)
+    for end in ("", "_(Axis|Velocity)")
+)
 
 
 def require_forms(formats: Iterable[str]) -> None:
@@ -52,6 +55,19 @@ def refuse_c(path: Path) -> None:
     """
     if is_c(path.name):
         raise ExportError(f"{path}: C is not read back; name its block, in Structured Text or a form of it.")
+
+
+def refuse_wrapper(path: Path, text: str) -> None:
+    """Refuse a text that is the wrapper of a planner block.
+
+    Raises
+    ------
+    ExportError
+    """
+    if _WRAPPER.search(text):
+        raise ExportError(
+            f"{path} holds a planner block's wrapper; name the block's own file beside it."
+        )
 
 
 def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tuple[File, ...]:
@@ -121,6 +137,7 @@ def read_block(path: Path) -> str:
     refuse_c(path)
     text = block_in(path, content)
     if not is_planner(text):
+        refuse_wrapper(path, text)
         raise ExportError(f"{path} holds no planner block; name a file that gen-profile planner wrote.")
     return text
 
