@@ -14,7 +14,7 @@ from exporters.vendor_axes import VENDORS, Bench
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import parse_spec
 from gen_profile_exporters import motion_libraries
-from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.block_source import BlockVariable, parse_function_block
 from gen_profile_exporters.planner.axis_wrapper import planner_wrapper
 
 GANTRY = f"""
@@ -126,6 +126,7 @@ class TestOneAxis:
     def test_it_is_powered_then_taken_over_where_it_stands_then_guided(self, bench):
         bench.cycle()
         assert bench.cycle()["nstage"] == BLOCK_OFF
+        assert bench.cycle(**ON)["bbusy"]
         stages = []
         bench.until(lambda row: stages.append(row["nstage"]) or row["benabled"], most=40, **ON)
         assert sorted(set(stages)) == [POWERING, TAKING, GUIDING] and stages == sorted(stages)
@@ -185,7 +186,7 @@ class TestOneAxis:
 
     @pytest.mark.parametrize("dropped", ["bEnable", "bPower"])
     def test_a_controlled_disable_stops_without_sway_first(self, bench, bay, dropped):
-        under_way(bench)
+        under_way(bench, fTarget=30.0)
         left = ON | {dropped: False}
         moved = len(bench.told)
         outputs = bench.cycle(**left)
@@ -199,11 +200,15 @@ class TestOneAxis:
         alone = CountedBlock(compiled(bay.text()), bEnable=0.0, fActPosition=START)
         alone.hold(100)
         alone.hold(1, bEnable=1.0)
-        alone.hold(round(6.0 / CYCLE), bExecute=1.0, fTarget=12.0)
+        alone.hold(round(6.0 / CYCLE), bExecute=1.0, fTarget=30.0)
         stopped = alone.hold(len(bench.told) - moved, bStop=1.0)["fPosition"]
         np.testing.assert_allclose(bench.positions()[moved:, 0], stopped, rtol=0, atol=1e-9)
+        assert stopped[-1] < 20.0
         powered = bench.part(bench.axes[0])[bench.vendor.state] == bench.vendor.fit
         assert powered == (dropped == "bEnable")
+        bench.axes[0].call(bAway=True)  # somebody else may have it now
+        for _ in range(10):
+            assert not bench.cycle(**left)["berror"]
 
     def test_a_disable_with_a_quick_stop_takes_less_time_and_one_taken_back_goes_on(self, bench):
         under_way(bench)
@@ -229,6 +234,7 @@ class TestOneAxis:
         bench.until(quiet, most=9000, **ON, fL1=6.0)
         assert bench.cycle(**ON)["nerrorid"] == 2
         assert bench.cycle(**ON, bReset=True)["nerrorid"] == 0
+        assert not bench.wrapper["fbReset"]["Busy"]  # the drive has no error
 
     def test_a_block_that_cannot_take_over_is_let_go(self, bench):
         outputs = bench.until(lambda row: row["berror"], most=40, **ON, fCycleTime=0.01)
@@ -255,10 +261,9 @@ class TestOneAxis:
         bench.until(lambda row: row["nstage"] == BLOCK_OFF, bPower=True)
         speed = 0.3
         for number in range(60):
-            stood = bench.told[-1][0]
             outputs = bench.cycle(**(ON if number > 20 else {"bPower": True}))
-            if bench.told[-1][0] == stood:
-                at = stood + speed * UNITS * CYCLE
+            if not bench.wrapper["bFeed"] or (bench.vendor.part and not bench.axes[0]["bGenerator"]):
+                at = bench.told[-1][0] + speed * UNITS * CYCLE
                 places = dict.fromkeys((bench.vendor.setpoint, bench.vendor.actual), at)
                 bench.part(bench.axes[0]).call(**places, **{bench.vendor.speed: speed * UNITS})
                 bench.told[-1] = [at]
@@ -267,6 +272,16 @@ class TestOneAxis:
         steps = np.diff(bench.positions()[1:, 0]) / CYCLE
         assert steps.max() < speed * 1.0001 and abs(steps[-1]) < 1e-5
         assert np.abs(np.diff(steps)).max() < 1.01 * ACCELERATION * CYCLE
+
+    def test_an_axis_that_lags_is_taken_over_at_its_setpoint(self, bench):
+        for _ in range(20):
+            bench.cycle(bPower=True)
+        for _ in range(40):
+            lagging = {bench.vendor.actual: bench.told[-1][0] + 5.0}
+            bench.part(bench.axes[0]).call(**lagging)
+            outputs = bench.cycle(**ON)
+        assert outputs["benabled"]
+        assert {at for (at,) in bench.told} == {START * UNITS}
 
     def test_an_axis_that_is_not_homed_is_not_taken_and_can_be_homed_meanwhile(self, bench):
         bench.given |= dict.fromkeys(bench.homed, False)
@@ -280,6 +295,13 @@ class TestOneAxis:
         bench.cycle(bPower=True, bEnable=False, bReset=False)
         bench.given |= dict.fromkeys(bench.homed, True)
         assert not bench.guided()["berror"]
+
+    def test_one_that_is_no_longer_wanted_is_not_taken(self, bench):
+        for stage in (POWERING, TAKING):
+            bench.until(lambda row, stage=stage: row["nstage"] == stage, most=20, **ON)
+            for _ in range(20):
+                outputs = bench.cycle(bPower=True, bEnable=False)
+                assert (outputs["nstage"], outputs["benabled"]) == (BLOCK_OFF, False)
 
     def test_an_axis_in_error_is_refused_until_it_is_reset(self, bench):
         bench.put(bench.axes[0], bench.vendor.error)
@@ -464,3 +486,17 @@ def test_a_wrapper_takes_and_tells_all_but_places(request, library, axes):
     assert names.most_common(1)[0][1] == 1
     used = Counter(re.findall(r"\b\w+\b", wrapper.body))
     assert not [v.name for v in wrapper.variables if not used[v.name]]
+
+
+def test_arrays_are_handed_over_element_by_element(bay):
+    """As matiec takes no whole array for a parameter."""
+    extra = (
+        BlockVariable(section="VAR_INPUT", name="aPlaces", type="ARRAY [0..3] OF LREAL"),
+        BlockVariable(section="VAR_OUTPUT", name="aDoubled", type="ARRAY [0..3] OF LREAL"),
+    )
+    body = "".join(f"aDoubled[{k}] := 2.0 * aPlaces[{k}];\n" for k in range(4))
+    block = attrs.evolve(bay, variables=(*bay.variables, *extra), body=body)
+    wrapper = planner_wrapper(block, {"": 1.0}, motion_libraries.VELOCITY)
+    assert "aPlaces :=" not in wrapper.body
+    outputs = FunctionBlock(wrapper.text(), (block.text(),)).call(aPlaces=[1.0, 2.0, 3.0, 4.0])
+    assert outputs["adoubled"] == [2.0, 4.0, 6.0, 8.0]

@@ -19,7 +19,7 @@ def structure(name, **members):
 
 
 def powering(name, axis, inputs, *, on, error, powered, up, down):
-    """MC_Power: up after some cycles, as long as the axis is in no error."""
+    """Build MC_Power: up after some cycles, as long as the axis is in no error."""
     return f"""FUNCTION_BLOCK {name}
     VAR_IN_OUT Axis : {axis}; END_VAR
     VAR_INPUT {inputs} END_VAR
@@ -35,8 +35,8 @@ def powering(name, axis, inputs, *, on, error, powered, up, down):
     END_FUNCTION_BLOCK"""
 
 
-def resetting(name, axis, clear):
-    """MC_Reset: what it clears is gone after some cycles."""
+def lasting(name, axis, effect):
+    """Build a block whose effect comes some cycles after its edge."""
     return f"""FUNCTION_BLOCK {name}
     VAR_IN_OUT Axis : {axis}; END_VAR
     VAR_INPUT Execute : BOOL; END_VAR
@@ -49,7 +49,7 @@ def resetting(name, axis, clear):
     Before := Execute;
     Wait := Wait - 1;
     IF Busy AND (Wait = 0) THEN
-        {clear}
+        {effect}
         Busy := FALSE;
     END_IF;
     END_FUNCTION_BLOCK"""
@@ -80,22 +80,7 @@ TWINCAT_BLOCKS = (
     END_IF;
     Enabled := Axis.bGenerator;
     END_FUNCTION_BLOCK""",
-    """FUNCTION_BLOCK MC_ExtSetPointGenDisable
-    VAR_IN_OUT Axis : AXIS_REF; END_VAR
-    VAR_INPUT Execute : BOOL; END_VAR
-    VAR_OUTPUT Busy : BOOL; END_VAR
-    VAR Before : BOOL; Wait : DINT; END_VAR
-    IF Execute AND NOT Before THEN
-        Busy := TRUE;
-        Wait := 3;
-    END_IF;
-    Before := Execute;
-    Wait := Wait - 1;
-    IF Busy AND (Wait = 0) THEN
-        Axis(bGenerator := FALSE);
-        Busy := FALSE;
-    END_IF;
-    END_FUNCTION_BLOCK""",
+    lasting("MC_ExtSetPointGenDisable", "AXIS_REF", "Axis(bGenerator := FALSE);"),
     """FUNCTION_BLOCK MC_ExtSetPointGenFeed
     VAR_IN_OUT Axis : AXIS_REF; END_VAR
     VAR_INPUT Position : LREAL; Velocity : LREAL; Acceleration : LREAL; Direction : DINT; END_VAR
@@ -111,7 +96,7 @@ TWINCAT_BLOCKS = (
         up="Axis.NcToPlc(StateDWord := Axis.NcToPlc.StateDWord OR 16#00000001);",
         down="Axis.NcToPlc(StateDWord := Axis.NcToPlc.StateDWord AND 16#80000002);",
     ),
-    resetting("MC_Reset", "AXIS_REF", "Axis.NcToPlc(StateDWord := Axis.NcToPlc.StateDWord AND 16#00000003);"),
+    lasting("MC_Reset", "AXIS_REF", "Axis.NcToPlc(StateDWord := Axis.NcToPlc.StateDWord AND 16#00000003);"),
 )
 CODESYS_BLOCKS = (
     structure(
@@ -161,7 +146,7 @@ CODESYS_BLOCKS = (
         up="Axis(nAxisState := 3);",
         down="IF Axis.nAxisState > 1 THEN Axis(nAxisState := 0); END_IF;",
     ),
-    resetting("MC_Reset", "AXIS_REF_SM3", "IF Axis.nAxisState = 1 THEN Axis(nAxisState := 0); END_IF;"),
+    lasting("MC_Reset", "AXIS_REF_SM3", "IF Axis.nAxisState = 1 THEN Axis(nAxisState := 0); END_IF;"),
 )
 SIEMENS_BLOCKS = (
     structure(
@@ -204,7 +189,7 @@ SIEMENS_BLOCKS = (
         up="Axis(StatusWord := Axis.StatusWord OR 16#00000001);",
         down="Axis(StatusWord := Axis.StatusWord AND 16#00000022);",
     ),
-    resetting("MC_RESET", "TO_PositioningAxis", "Axis(StatusWord := Axis.StatusWord AND 16#00000021);"),
+    lasting("MC_RESET", "TO_PositioningAxis", "Axis(StatusWord := Axis.StatusWord AND 16#00000021);"),
 )
 
 

@@ -47,14 +47,14 @@ BODY = """\
 bWanted := bEnable AND bPower;
 IF nStage = cOff THEN
     IF bReset THEN nFault := 0; END_IF;
-    IF bWanted AND NOT bWantedBefore AND (nFault = 0) THEN
+    IF bWanted AND NOT bWantedBefore THEN
         nStage := cPowering;
         nWaited := 0;
     END_IF;
 ELSIF NOT bWanted THEN
     IF nStage = cGuiding THEN nStage := cStopping; END_IF;
     IF nStage < cGuiding THEN nStage := cOff; END_IF;
-ELSIF NOT bWantedBefore AND (nStage = cStopping) AND (nFault = 0) THEN
+ELSIF NOT bWantedBefore AND (nStage = cStopping) THEN
     nStage := cGuiding;
 END_IF;
 bWantedBefore := bWanted;
@@ -81,7 +81,7 @@ ELSIF (nStage = cPowering) OR (nStage = cTaking) THEN
     END_IF;
 END_IF;
 
-fbPlanner(
+{lists}fbPlanner(
     {arguments});
 IF nStage >= cGuiding THEN
     IF (nFault = 0) AND ((fbPlanner.nErrorId = 7) OR NOT fbPlanner.bEnabled) THEN
@@ -91,12 +91,9 @@ IF nStage >= cGuiding THEN
 END_IF;
 
 {feed}
-bRests := NOT fbPlanner.bBusy;
-IF bQuickStop OR (nFault <> 0) THEN bRests := fbPlanner.fTimeToGo <= 0.0; END_IF;
-IF (nStage = cStopping) AND bRests THEN nStage := cOff; END_IF;
+IF (nStage = cStopping) AND NOT fbPlanner.bBusy THEN nStage := cOff; END_IF;
 
-{results}
-bBusy := fbPlanner.bBusy OR ((nStage <> cOff) AND (nStage <> cGuiding));
+{results}bBusy := fbPlanner.bBusy OR ((nStage <> cOff) AND (nStage <> cGuiding));
 IF nFault <> 0 THEN nErrorId := nFault; END_IF;
 bError := nErrorId <> 0;
 """
@@ -130,6 +127,15 @@ IF nStage = cTaking THEN fPosition := fPosition + fCycleTime * fVelocity; END_IF
 nCause := 0;
 {vendor}
 {let_go}"""
+# Element by element, as matiec takes no whole array for a parameter.
+LIST = """\
+nIndex := {first};
+WHILE nIndex <= {last} DO
+    {to}[nIndex] := {of}[nIndex];
+    nIndex := nIndex + 1;
+END_WHILE;
+"""
+INTERFACE = ("VAR_INPUT", "VAR_OUTPUT")
 STAGES = ("cOff", "cPowering", "cTaking", "cGuiding", "cStopping")
 STAGE = BlockVariable(
     section="VAR_OUTPUT",
@@ -146,7 +152,7 @@ COMMENTS = {
 OWN = {
     "BOOL": (
         *("bWanted", "bWantedBefore", "bOn", "bAcknowledge", "bResets", "bPowered", "bReady"),
-        *("bGuided", "bRests", "bFeed"),
+        *("bGuided", "bFeed"),
     ),
     "DINT": ("nWaited", "nFault", "nCause"),
     "LREAL": ("fPosition", "fVelocity", "fAcceleration"),
@@ -177,7 +183,7 @@ def planner_wrappers(block: BlockSource, units: Mapping[str, float], format_: st
 def planner_wrapper(block: BlockSource, units: Mapping[str, float], library: MotionLibrary) -> BlockSource:
     """Write the block around a planner block, with the same inputs and outputs but the axes' own."""
     name = f"{block.name}_{'Axis' if library.axis_type else 'Velocity'}"
-    outer = [v for v in block.variables if v.section in ("VAR_INPUT", "VAR_OUTPUT")]
+    outer = [v for v in block.variables if v.section in INTERFACE]
     hidden = {f"{key}{n}" for n in units for key in (*SETPOINTS, *(PLACES if library.axis_type else ()))}
     told = [attrs.evolve(v, comment=COMMENTS.get(v.name, v.comment)) for v in outer if v.name not in hidden]
     return BlockSource(
@@ -208,6 +214,8 @@ def planner_wrapper(block: BlockSource, units: Mapping[str, float], library: Mot
 def _own(block: BlockSource, units: Mapping[str, float], library: MotionLibrary) -> list[BlockVariable]:
     """Declare what is the wrapper's own."""
     own = {"fbPlanner": block.name} | {name: type_ for type_, names in OWN.items() for name in names}
+    if any(v.array for v in block.variables if v.section in INTERFACE):
+        own["nIndex"] = "DINT"
     instances = library.power_instances | library.instances
     for n in units:
         own |= {f"bTaken{n}": "BOOL", f"fPlace{n}": "LREAL"}
@@ -231,10 +239,8 @@ def _body(block: BlockSource, units: Mapping[str, float], library: MotionLibrary
         each(around(template, statements, library), places)
         for template, statements in ((PREPARE, library.prepare), (FEED, library.feed))
     )
-    inputs, outputs = (
-        [v.name for v in block.variables if v.section == section] for section in ("VAR_INPUT", "VAR_OUTPUT")
-    )
-    given = {name: name for name in inputs} | {
+    inputs, outputs = ([v for v in block.variables if v.section == section] for section in INTERFACE)
+    given = {v.name: v.name for v in inputs if not v.array} | {
         "bEnable": "bGuided AND (nStage >= cGuiding)",
         "bStop": "bStop OR (nStage = cStopping)",
         "bQuickStop": "bQuickStop OR (nFault <> 0)",
@@ -243,10 +249,22 @@ def _body(block: BlockSource, units: Mapping[str, float], library: MotionLibrary
         for key, place in PLACES.items():
             given[f"{key}{n}"] = place.format(n=n, speed=library.speed.format(n=n))
     setpoints = {f"{key}{n}" for n in units for key in SETPOINTS}
+    told = [v for v in outputs if v.name not in setpoints]
     return BODY.format(
         prepare=prepare,
         take=each("    bTaken{n} := TRUE;", places),
+        lists="".join(_list(v, f"fbPlanner.{v.name}", v.name) for v in inputs if v.array),
         arguments=",\n    ".join(f"{name} := {value}" for name, value in given.items()),
         feed=feed,
-        results="\n".join(f"{name} := fbPlanner.{name};" for name in outputs if name not in setpoints),
+        results="".join(
+            _list(v, v.name, f"fbPlanner.{v.name}") if v.array else f"{v.name} := fbPlanner.{v.name};\n"
+            for v in told
+        ),
     )
+
+
+def _list(variable: BlockVariable, to: str, of: str) -> str:
+    """Hand an array over."""
+    assert variable.array is not None
+    first, last, _ = variable.array
+    return LIST.format(first=first, last=last, to=to, of=of)
