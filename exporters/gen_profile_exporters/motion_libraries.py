@@ -195,7 +195,8 @@ bRun{n} := bOn;
 bResetDrive{n} := bAcknowledge;""",
     homed="bHomed{n}",
     prepare="""\
-IF NOT (fGain{n} > 0.0) OR NOT (fCorrection{n} > 0.0) OR NOT (fFollowingLimit{n} > 0.0) THEN
+IF (nStage = cTaking)
+    AND (NOT (fGain{n} > 0.0) OR NOT (fCorrection{n} > 0.0) OR NOT (fFollowingLimit{n} > 0.0)) THEN
     nCause := 22;
 END_IF;
 IF NOT bRunning{n} THEN nCause := 21; END_IF;
