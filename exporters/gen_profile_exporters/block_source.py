@@ -14,7 +14,7 @@ SECTIONS = ("VAR_IN_OUT", "VAR_INPUT", "VAR_OUTPUT", "VAR", "VAR CONSTANT")
 _HEADER = re.compile(r"\s*(\(\*.*?\*\)\s*)*", re.DOTALL)
 _NAME = re.compile(r"\s*FUNCTION_BLOCK\s+(\S+)\s", re.IGNORECASE)
 _SECTION = re.compile(
-    r"\s*(VAR_INPUT|VAR_OUTPUT|VAR(?:\s+CONSTANT)?)\b(.*?)\bEND_VAR\b", re.DOTALL | re.IGNORECASE
+    r"\s*(VAR_IN_OUT|VAR_INPUT|VAR_OUTPUT|VAR(?:\s+CONSTANT)?)\b(.*?)\bEND_VAR\b", re.DOTALL | re.IGNORECASE
 )
 _VARIABLE = re.compile(
     r"\s*(?:\(\*[^*]*\*\)\s*)*(\w+)\s*:\s*([^:;]*?)\s*(?::=\s*([^;]*?))?\s*;(?:[ \t]*\(\*(.*?)\*\))?",

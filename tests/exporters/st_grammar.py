@@ -14,6 +14,7 @@ GRAMMAR = r"""
 
     body: statement*
     statement: variable ":=" expression ";" -> assign
+        | NAME "." NAME "[" expression "]" ":=" expression ";" -> hand
         | "IF"i branch ("ELSIF"i branch)* ["ELSE"i body] "END_IF"i ";" -> choose
         | "CASE"i expression "OF"i label+ ["ELSE"i body] "END_CASE"i ";" -> case
         | "FOR"i NAME ":=" expression "TO"i expression "DO"i body "END_FOR"i ";" -> count

@@ -307,6 +307,17 @@ class _Translator(Interpreter):
             code = f"_within({code}, {LIMITS[scalar][0]}, {LIMITS[scalar][1]}, '{name}')"
         return [f"{place} = {code}"]
 
+    def hand(self, tree):
+        """Write an element of an instance's input."""
+        instance, name, index, value = tree.children
+        (type_, _), code = self._path([instance])
+        declared, key = _declared(type_, self.library), name.lower()
+        _check(declared.sections.get(key) == "VAR_INPUT", f"{instance} has no input {name}")
+        expected, (first, last) = declared.types[key]
+        (at, index), (found, value) = self.visit(index), self.visit(value)
+        _check(at in INTEGERS and _fits(found, expected), f"{instance}: {name} mixes types")
+        return [f"{code}.alter('{key}', _within({index}, {first}, {last}, 'index') - {first}, {value})"]
+
     def body(self, tree):
         return [line for statement in tree.children for line in self.visit(statement)] or ["pass"]
 

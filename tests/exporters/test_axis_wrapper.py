@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from motions import quintic, target
-from vendor_axes import VENDORS, Bench
+from vendor_axes import VENDORS, PlaybackBench
 
 from gen_profile.motion.profile import sample
 from gen_profile_exporters.block_source import parse_function_block
@@ -20,7 +20,7 @@ ERROR, OFF, WORK, AWAY = 20, 21, 22, 23
 
 def bench_of(vendor, move=ONE):
     goal = target(*("bridge", "trolley")[: move.axes], cycle_time=CYCLE)
-    return Bench(VENDORS[vendor], parse_function_block(block_text(move, goal)), STARTS[: move.axes])
+    return PlaybackBench(VENDORS[vendor], parse_function_block(block_text(move, goal)), STARTS[: move.axes])
 
 
 def under_way(vendor, move=ONE, cycles=20):
@@ -219,5 +219,5 @@ def test_the_containers_carry_these_very_statements(move):
         "siemens": re.sub("#", "", siemens_scl.encode(move, goal)[0].content.decode()),
     }
     for name, text in texts.items():
-        wrapper = Bench(VENDORS[name], source, STARTS[: move.axes]).source
+        wrapper = PlaybackBench(VENDORS[name], source, STARTS[: move.axes]).source
         assert wrapper.body.strip() in text

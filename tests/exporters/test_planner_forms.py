@@ -21,6 +21,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import block_files, read_block, require_forms
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile_exporters.planner.axis_wrapper import LIBRARIES
 from gen_profile_exporters.registry import containers
 from gen_profile_exporters.st_to_c import translate
 
@@ -33,6 +34,7 @@ planner = { live = { L1 = [5.0, 7.0] } }
 export = { cycle_time = 0.004 }
 """
 SPEC = parse_spec(BAY)
+WRAPPERS = tuple(f"_{kind}{end}" for kind in ("axis", "velocity") for end in (".st", ".scl", ".codesys.xml"))
 TYPES = {"BOOL": ctypes.c_bool, "DINT": ctypes.c_int32, "LREAL": ctypes.c_double}
 
 
@@ -49,10 +51,15 @@ def program(block):
 @pytest.mark.parametrize("format_", containers())
 def test_every_container_reads_back_as_the_same_program(block, program, format_, tmp_path):
     """Compared as C, which leaves nothing of the text's layout, but variables in their order."""
-    (file,) = block_files(block, SPEC, [format_])
+    (file, *wrappers) = block_files(block, SPEC, [format_])
     path = tmp_path / file.filename
     path.write_bytes(file.content)
     assert translate(read_block(path)) == program
+    assert len(wrappers) == 1 + (format_ in LIBRARIES)
+    for wrapper in wrappers:
+        (tmp_path / wrapper.filename).write_bytes(wrapper.content)
+        with pytest.raises(ExportError, match="holds a planner block's wrapper; name the"):
+            read_block(tmp_path / wrapper.filename)
 
 
 def test_xml_is_valid(block, tc6_schema):
@@ -271,12 +278,17 @@ def test_the_command_line_plays_any_of_them(tmp_path, monkeypatch):
         assert (refused.code, words in refused.err) == (5, True)
     tables = []
     for file in written["files"]:
+        if file["path"].endswith(WRAPPERS):
+            continue
         run_here("planner", "play", file["path"], "--commands", "commands.csv", "--out", "out.csv", "--json")
         tables.append((tmp_path / "out.csv").read_text())
     assert len(tables) == 3
     assert tables[0].splitlines()[-1].split(",")[1] == "0.5"
     assert "C is not read back" in run_here("check", "bay.c").err
     assert "C is not read back" in run_here("report", "bay.c").err
+    for file in written["files"]:
+        if file["path"].endswith(WRAPPERS):
+            assert "holds a planner block's wrapper" in run_here("check", file["path"]).err
     (tmp_path / "hoisting.csv").write_text("time_s,command,value,L1\n0,position,9,5\n5,position,9,6\n")
     hoisting = ("planner", "play", block, "--commands", "hoisting.csv", "--out", "out.csv")
     assert "the load may sway, because a live parameter changed on the way" in run_here(*hoisting).out

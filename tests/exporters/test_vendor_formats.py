@@ -14,8 +14,9 @@ from playing import checked, column, play, start
 from gen_profile.errors import ExportError
 from gen_profile.motion.profile import sample
 from gen_profile_exporters.block_source import parse_function_block
+from gen_profile_exporters.motion_libraries import CODESYS, SIEMENS, TWINCAT
 from gen_profile_exporters.playback import structured_text
-from gen_profile_exporters.playback.axis_wrapper import CODESYS, SIEMENS, TWINCAT, axis_wrapper
+from gen_profile_exporters.playback.axis_wrapper import axis_wrapper
 from gen_profile_exporters.playback.structured_text import block_text
 from gen_profile_exporters.vendors import codesys, plcopen_xml, rockwell_l5x, siemens_scl, twincat
 from gen_profile_exporters.vendors.cam_points import quintic_points

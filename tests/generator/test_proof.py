@@ -367,7 +367,8 @@ def test_the_command_line_delivers_what_is_proved(deployed, text):
     assert (folder / "proof.svg").read_text().count("<path") > 20
     manifest = json.loads((folder / "manifest.json").read_text())
     assert manifest["check"] == document["proof"]
-    assert [artefact["format"] for artefact in manifest["artefacts"]] == ["planner"]
+    assert [artefact["format"] for artefact in manifest["artefacts"]] == ["planner", "planner"]
+    assert manifest["artefacts"][1]["path"] == "bay 3_velocity.st"
 
 
 def test_check_repeats_the_proof_from_the_file(deployed):

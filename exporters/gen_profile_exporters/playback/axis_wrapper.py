@@ -8,9 +8,8 @@ The calls follow the vendors' public manuals; they were not tried on a controlle
 
 from __future__ import annotations
 
-import attrs
-
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
+from gen_profile_exporters.motion_libraries import MotionLibrary, around, each
 
 HEADER = """\
 (*
@@ -97,118 +96,11 @@ END_IF;
 nCause := 0;
 {vendor}
 {let_go}"""
-LET_GO = """\
-IF bTaken{n} AND (nCause <> 0) THEN
-    bTaken{n} := FALSE;
-    IF nFault = 0 THEN nFault := nCause; END_IF;
-END_IF;"""
 STAGES = ("cIdle", "cTaking", "cPlaying", "cStopping")
 TRIGGERS = ("bExecute", "bContinue")  # inputs whose rising edge starts
 ACTUAL = "fActPosition"  # the only input of the playback block that comes from the axes
 SETPOINTS = {"fPosition", "fVelocity", "fAcceleration", "nPosition"}  # what goes to them
 STATES = {"bBusy", "bDone", "bAborted", "bError", "nErrorId"}  # outputs that depend on the axes, too
-
-
-@attrs.frozen(kw_only=True)
-class MotionLibrary:
-    """How a vendor's axis takes setpoints.
-
-    In the statements, ``{n}`` is the axis's number and ``{i}`` its index in the playback block's arrays, both
-    empty where there is one axis.
-
-    Attributes
-    ----------
-    axis_type : str
-    guide : str
-        Name of the block that guides the axis.
-    instances : dict of str to str
-        Library blocks, and other variables of each axis, by the beginning of their names.
-    setpoint, actual : str
-        Where the axis is told to be, and where it is.
-    prepare : str
-        Before the playback block is called: tells by ``nCause`` what is wrong with the axis, and clears
-        ``bReady`` as long as it is not guided.
-    feed : str
-        After it was called: gives ``fPosition``, ``fVelocity`` and ``fAcceleration`` to the axis if
-        ``bFeed``, and tells by ``nCause`` what went wrong.
-    """
-
-    axis_type: str
-    guide: str
-    instances: dict[str, str]
-    setpoint: str
-    actual: str
-    prepare: str
-    feed: str
-
-
-TWINCAT = MotionLibrary(
-    axis_type="AXIS_REF",
-    guide="MC_ExtSetPointGenEnable",
-    instances={
-        "fbEnable": "MC_ExtSetPointGenEnable",
-        "fbDisable": "MC_ExtSetPointGenDisable",
-        "bEnabled": "BOOL",
-        "nDirection": "DINT",
-    },
-    setpoint="Axis{n}.NcToPlc.SetPos",
-    actual="Axis{n}.NcToPlc.ActPos",
-    prepare="""\
-fbEnable{n}(Axis := Axis{n}, Execute := bTaken{n} AND NOT fbDisable{n}.Busy,
-    Position := Axis{n}.NcToPlc.SetPos, PositionType := POSITIONTYPE_ABSOLUTE);
-IF bTaken{n} THEN bEnabled{n} := fbEnable{n}.Enabled; END_IF;
-IF NOT fbEnable{n}.Enabled OR fbEnable{n}.Busy OR fbDisable{n}.Busy THEN bReady := FALSE; END_IF;
-IF NOT fbEnable{n}.Enabled AND (nStage <> cTaking) THEN nCause := 23; END_IF;
-IF fbEnable{n}.Error THEN nCause := 22; END_IF;
-(* Bit 0: operational; bit 31: in error. *)
-IF (Axis{n}.NcToPlc.StateDWord AND 16#00000001) = 16#00000000 THEN nCause := 21; END_IF;
-IF (Axis{n}.NcToPlc.StateDWord AND 16#80000000) <> 16#00000000 THEN nCause := 20; END_IF;""",
-    feed="""\
-nDirection{n} := 0;
-IF fVelocity > 0.0 THEN nDirection{n} := 1; END_IF;
-IF fVelocity < 0.0 THEN nDirection{n} := -1; END_IF;
-IF bFeed THEN
-    MC_ExtSetPointGenFeed(Position := fPosition, Velocity := fVelocity, Acceleration := fAcceleration,
-        Direction := nDirection{n}, Axis := Axis{n});
-END_IF;
-fbDisable{n}(Axis := Axis{n}, Execute := bEnabled{n} AND NOT bTaken{n});""",
-)
-CODESYS = MotionLibrary(
-    axis_type="AXIS_REF_SM3",
-    guide="SMC_FollowSetValues",
-    instances={"fbFollow": "SMC_FollowSetValues"},
-    setpoint="Axis{n}.fSetPosition",
-    actual="Axis{n}.fActPosition",
-    prepare="""\
-IF NOT fbFollow{n}.bBusy THEN bReady := FALSE; END_IF;
-(* SMC_AXIS_STATE: 0 power_off, 1 errorstop. *)
-IF Axis{n}.nAxisState = 0 THEN nCause := 21; END_IF;
-IF Axis{n}.nAxisState = 1 THEN nCause := 20; END_IF;""",
-    feed="""\
-fbFollow{n}(Axis := Axis{n}, bExecute := bFeed, bAbort := NOT bFeed, dwValueMask := 16#00000007,
-    fSetPosition := fPosition, fSetVelocity := fVelocity, fSetAcceleration := fAcceleration);
-IF bFeed AND (nStage <> cTaking) AND NOT fbFollow{n}.bBusy THEN nCause := 22; END_IF;
-IF bFeed AND fbFollow{n}.bError THEN nCause := 22; END_IF;
-IF bFeed AND fbFollow{n}.bCommandAborted THEN nCause := 23; END_IF;""",
-)
-SIEMENS = MotionLibrary(
-    axis_type="TO_PositioningAxis",
-    guide="MC_MOTIONINPOSITION",
-    instances={"fbInPosition": "MC_MOTIONINPOSITION"},
-    setpoint="Axis{n}.Position",
-    actual="Axis{n}.ActualPosition",
-    prepare="""\
-IF NOT fbInPosition{n}.Busy THEN bReady := FALSE; END_IF;
-(* Bit 0: enabled; bit 1: in error. *)
-IF NOT Axis{n}.StatusWord.%X0 THEN nCause := 21; END_IF;
-IF Axis{n}.StatusWord.%X1 THEN nCause := 20; END_IF;""",
-    feed="""\
-fbInPosition{n}(Axis := Axis{n}, Enable := bFeed, Position := fPosition, Velocity := fVelocity,
-    Acceleration := fAcceleration);
-IF bFeed AND (nStage <> cTaking) AND NOT fbInPosition{n}.Busy THEN nCause := 22; END_IF;
-IF bFeed AND fbInPosition{n}.Error THEN nCause := 22; END_IF;
-IF bFeed AND fbInPosition{n}.CommandAborted THEN nCause := 23; END_IF;""",
-)
 
 
 def axis_wrappers(block: BlockSource, axes: int, library: MotionLibrary) -> tuple[BlockSource, ...]:
@@ -221,37 +113,38 @@ def axis_wrapper(block: BlockSource, axes: int, library: MotionLibrary) -> Block
     """Write the block around a playback block, with the same inputs and outputs but the axes' own."""
     inputs = [v for v in block.variables if v.section == "VAR_INPUT" and v.name != ACTUAL]
     outputs = [v for v in block.variables if v.section == "VAR_OUTPUT" and v.name not in SETPOINTS]
-    numbers = [(str(n), f"[{n}]") for n in range(1, axes + 1)] if axes > 1 else [("", "")]
+    several = axes > 1
+    places = [{"n": f"{n}" * several, "i": f"[{n}]" * several} for n in range(1, axes + 1)]
     name = f"{block.name}_Axis"
     return BlockSource(
         header=HEADER.format(name=name, block=block.name, guide=library.guide),
         name=name,
         variables=(
             *(
-                BlockVariable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type)
-                for n, _ in numbers
+                BlockVariable(section="VAR_IN_OUT", name=f"Axis{place['n']}", type=library.axis_type)
+                for place in places
             ),
             *inputs,
             *outputs,
-            *_own(block.name, [v.name for v in inputs], numbers, library),
+            *_own(block.name, [v.name for v in inputs], places, library),
         ),
-        body=_body([v.name for v in inputs], [v.name for v in outputs], numbers, library),
+        body=_body([v.name for v in inputs], [v.name for v in outputs], places, library),
     )
 
 
 def _own(
-    block: str, inputs: list[str], numbers: list[tuple[str, str]], library: MotionLibrary
+    block: str, inputs: list[str], places: list[dict[str, str]], library: MotionLibrary
 ) -> list[BlockVariable]:
     """Declare what is the wrapper's own."""
     own = {"fbMotion": block, "nStage": "DINT", "nTrigger": "DINT", "nDue": "DINT"}
     own |= {f"{trigger}{end}": "BOOL" for trigger in _triggers(inputs) for end in ("Before", "Now")}
     own |= {"nFault": "INT", "nCause": "INT", "bReady": "BOOL", "bGuided": "BOOL", "bFeed": "BOOL"}
     own |= {"fPosition": "LREAL", "fVelocity": "LREAL", "fAcceleration": "LREAL"}
-    if len(numbers) > 1:
-        own["fStand"] = f"ARRAY [1..{len(numbers)}] OF LREAL"
+    if len(places) > 1:
+        own["fStand"] = f"ARRAY [1..{len(places)}] OF LREAL"
     own |= {
-        f"{key}{n}": type_
-        for n, _ in numbers
+        f"{key}{place['n']}": type_
+        for place in places
         for key, type_ in {"bTaken": "BOOL", **library.instances}.items()
     }
     return [
@@ -263,26 +156,14 @@ def _own(
     ]
 
 
-def _body(
-    inputs: list[str], outputs: list[str], numbers: list[tuple[str, str]], library: MotionLibrary
-) -> str:
+def _body(inputs: list[str], outputs: list[str], places: list[dict[str, str]], library: MotionLibrary) -> str:
     triggers = _triggers(inputs)
-
-    def each(template: str) -> str:
-        return "\n".join(template.format(n=n, i=i) for n, i in numbers)
-
-    def around(template: str, statements: str) -> str:
-        """Put the vendor's statements into ours, for every axis; both have its number in them."""
-        places = {
-            "setpoint": library.setpoint,
-            "actual": library.actual,
-            "let_go": LET_GO,
-            "vendor": statements,
-        }
-        return each(template.format(n="{n}", i="{i}", **places))
-
-    several = len(numbers) > 1
-    stand = each("fStand{i} := " + library.setpoint + ";") if several else ""
+    several = len(places) > 1
+    stand = each("fStand{i} := " + library.setpoint + ";", places) if several else ""
+    prepare, feed = (
+        each(around(template, statements, library), places)
+        for template, statements in ((PREPARE, library.prepare), (FEED, library.feed))
+    )
     given = {key: f"{key}Now" if key in triggers else key for key in inputs}
     given |= {
         "bAbort": "bAbort OR (nStage = cStopping)",
@@ -291,12 +172,12 @@ def _body(
     return BODY.format(
         edges="\n".join(EDGE.format(input=key, number=number) for number, key in enumerate(triggers, 1)),
         held=" OR ".join(triggers),
-        take=each("    bTaken{n} := TRUE;"),
-        prepare=f"{around(PREPARE, library.prepare)}\n{stand}".rstrip(),
+        take=each("    bTaken{n} := TRUE;", places),
+        prepare=f"{prepare}\n{stand}".rstrip(),
         levels="\n".join(f"{key}Now := (nStage = cPlaying) AND {key};" for key in triggers),
         starts="\n".join(f"    {key}Now := nTrigger = {number};" for number, key in enumerate(triggers, 1)),
         arguments=",\n    ".join(f"{key} := {value}" for key, value in given.items()),
-        feed=around(FEED, library.feed),
+        feed=feed,
         results="\n".join(f"{key} := fbMotion.{key};" for key in outputs if key not in STATES),
     )
 

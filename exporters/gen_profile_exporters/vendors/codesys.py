@@ -14,7 +14,8 @@ from lxml import etree
 from gen_profile.motion.profile import Profile
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, parse_function_block
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.playback.axis_wrapper import CODESYS, axis_wrappers
+from gen_profile_exporters.motion_libraries import CODESYS
+from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
 from gen_profile_exporters.playback.structured_text import block_text, literal
 from gen_profile_exporters.vendors import plcopen_xml
 from gen_profile_exporters.vendors.cam_points import QuinticPoints, quintic_points

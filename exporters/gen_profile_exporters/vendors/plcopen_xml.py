@@ -235,4 +235,5 @@ def _text(element: etree._Element) -> str:
 def _read_type(element: etree._Element) -> str:
     if not len(element):
         raise ExportError(f"line {element.sourceline}: a type is missing; export it again.")
-    return str(etree.QName(element[0]).localname)
+    name = str(etree.QName(element[0]).localname)
+    return attribute(element[0], "name") if name == "derived" else name

@@ -18,7 +18,8 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile, sample
 from gen_profile_exporters.block_source import BlockSource, BlockVariable, ordered, parse_function_block
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.playback.axis_wrapper import SIEMENS, axis_wrappers
+from gen_profile_exporters.motion_libraries import SIEMENS
+from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
 from gen_profile_exporters.playback.block import layout_of, variable_names
 from gen_profile_exporters.playback.structured_text import block_text, literal, read_block
 from gen_profile_exporters.setpoints import axis_table
@@ -95,8 +96,9 @@ def unwrap(content: bytes, target: Target) -> BlockSource:
         raise ExportError("There is no SCL block of this export; export it again.")
     header, name, declarations, body = found.groups()
     portable = _unmarked(body)
+    declarations = re.sub(r'"(FB_\w+)";', r"\1;", declarations.lstrip())
     source = parse_function_block(
-        f"{header}FUNCTION_BLOCK {name}\n{declarations.lstrip()}\n{portable.lstrip()}END_FUNCTION_BLOCK\n"
+        f"{header}FUNCTION_BLOCK {name}\n{declarations}\n{portable.lstrip()}END_FUNCTION_BLOCK\n"
     )
     tables = [variable for variable in source.variables if _is_table(variable)]
     others = [variable for variable in source.variables if not _is_table(variable)]

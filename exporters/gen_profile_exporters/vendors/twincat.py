@@ -15,7 +15,8 @@ from gen_profile.errors import ExportError
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile_exporters.block_source import BlockSource, parse_function_block
 from gen_profile_exporters.exporter import File, Target
-from gen_profile_exporters.playback.axis_wrapper import TWINCAT, axis_wrappers
+from gen_profile_exporters.motion_libraries import TWINCAT
+from gen_profile_exporters.playback.axis_wrapper import axis_wrappers
 from gen_profile_exporters.playback.structured_text import block_name, block_text, literal, read_block
 from gen_profile_exporters.vendors.cam_points import QuinticPoints, quintic_points
 from gen_profile_exporters.vendors.xml_documents import child, parse_xml, write_xml

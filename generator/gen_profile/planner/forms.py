@@ -6,19 +6,26 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+import attrs
+
 from gen_profile.errors import ExportError, OutputError, SpecError
 from gen_profile.planner.design import PlannerBlock
+from gen_profile.planner.machine import planned_axes
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import ExportSpec, Spec
 from gen_profile.suggestion import suggestion
 from gen_profile_exporters.block_source import parse_function_block
 from gen_profile_exporters.exporter import File, Target, target_of
+from gen_profile_exporters.planner.axis_wrapper import planner_wrappers
 from gen_profile_exporters.planner.c_source import c_files
 from gen_profile_exporters.registry import container_of, containers, find_container, format_named
 
 PORTABLE = "plc"
 C = "c"
-_PLANNER = re.compile(r"^\s*FUNCTION_BLOCK\s+\w+_planner\s*$", re.MULTILINE | re.IGNORECASE)
+_PLANNER, _WRAPPER = (
+    re.compile(rf"^\s*FUNCTION_BLOCK\s+\w+_planner{end}\s*$", re.MULTILINE | re.IGNORECASE)
+    for end in ("", "_(Axis|Velocity)")
+)
 
 
 def require_forms(formats: Iterable[str]) -> None:
@@ -50,8 +57,21 @@ def refuse_c(path: Path) -> None:
         raise ExportError(f"{path}: C is not read back; name its block, in Structured Text or a form of it.")
 
 
+def refuse_wrapper(path: Path, text: str) -> None:
+    """Refuse a text that is the wrapper of a planner block.
+
+    Raises
+    ------
+    ExportError
+    """
+    if _WRAPPER.search(text):
+        raise ExportError(
+            f"{path} holds a planner block's wrapper; name the block's own file beside it."
+        )
+
+
 def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tuple[File, ...]:
-    """Write a planner block in every form that is asked for, and read each back.
+    """Write a planner block and its wrappers in every form that is asked for, and read each back.
 
     Parameters
     ----------
@@ -73,16 +93,21 @@ def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tupl
 
 
 def _files(block: PlannerBlock, spec: Spec, format_: str) -> tuple[File, ...]:
-    if format_ == PORTABLE:
-        return (File(filename=block.filename, content=block.text.encode("ascii")),)
+    """Write the block, then its wrappers, each into files of its own."""
     if format_ == C:
         return c_files(block.text, spec.name)
     container, target = find_container(format_), target_of(spec)
+    units = {axis.suffix: target.axes[number].factor for number, axis in planned_axes(spec).items()}
     source = parse_function_block(block.text)
-    files = container.wrap(source, target)
-    if container.unwrap(files[0].content, target).program() != source.program():
-        raise ExportError(f"{format_}: what was written reads back as another block; export {PORTABLE}.")
-    return files
+    files = list[File]()
+    for ending, part in {"": source, **planner_wrappers(source, units, format_)}.items():
+        written = container.wrap(part, attrs.evolve(target, name=f"{target.name}{ending}"))
+        if container.unwrap(written[0].content, target).program() != part.program():
+            raise ExportError(f"{format_}: what was written reads back as another block; export {PORTABLE}.")
+        files += written
+    if format_ == PORTABLE:  # with its comments
+        files[0] = File(filename=block.filename, content=block.text.encode("ascii"))
+    return tuple(files)
 
 
 def is_planner(text: str) -> bool:
@@ -112,6 +137,7 @@ def read_block(path: Path) -> str:
     refuse_c(path)
     text = block_in(path, content)
     if not is_planner(text):
+        refuse_wrapper(path, text)
         raise ExportError(f"{path} holds no planner block; name a file that gen-profile planner wrote.")
     return text
 

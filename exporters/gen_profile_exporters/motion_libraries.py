@@ -1,0 +1,224 @@
+"""How vendors' axes are powered, taken and guided: their libraries' calls, for wrappers around our blocks.
+
+The calls follow the vendors' public manuals; they were not tried on a controller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import attrs
+
+from gen_profile_exporters.block_source import BlockVariable
+
+# What follows a vendor's statements: an axis that failed is told nothing any more.
+LET_GO = """\
+IF bTaken{n} AND (nCause <> 0) THEN
+    bTaken{n} := FALSE;
+    IF nFault = 0 THEN nFault := nCause; END_IF;
+END_IF;"""
+
+
+@attrs.frozen(kw_only=True)
+class MotionLibrary:
+    """How a vendor's axis takes setpoints.
+
+    In names and statements, ``{n}`` ends what is an axis's, and ``{i}`` is its index in the playback block's
+    arrays; both are empty where there is one axis.
+
+    Attributes
+    ----------
+    axis_type : str
+        Empty where the axis is inputs and outputs.
+    guide : str
+        Name of the block that guides the axis.
+    instances : dict of str to str
+        Library blocks, and other variables of each axis, by the beginning of their names.
+    power_instances : dict of str to str
+        Likewise, of what powers it.
+    setpoint, speed, actual : str
+        Where the axis is told to be, at which velocity, and where it is.
+    power : str
+        Powers the axis while ``bOn`` is set and resets it with ``bAcknowledge``; sets ``bResets`` as long as
+        that takes.
+    homed : str
+        Whether its position is known.
+    prepare : str
+        Before the block is called: tells by ``nCause`` what is wrong with the axis, and clears ``bReady`` as
+        long as it is not guided.
+    feed : str
+        After it was called: gives ``fPosition``, ``fVelocity`` and ``fAcceleration`` to the axis if
+        ``bFeed``, and tells by ``nCause`` what went wrong.
+    variables : tuple of BlockVariable
+        Inputs and outputs of the wrapper for each axis, beside those of the block.
+    """
+
+    axis_type: str
+    guide: str
+    instances: dict[str, str]
+    power_instances: dict[str, str]
+    setpoint: str
+    speed: str
+    actual: str
+    power: str
+    homed: str
+    prepare: str
+    feed: str
+    variables: tuple[BlockVariable, ...] = ()
+
+
+def each(template: str, places: Sequence[Mapping[str, str]]) -> str:
+    """Repeat statements for every axis, with its places put in."""
+    return "\n".join(template.format(**place) for place in places)
+
+
+def around(template: str, statements: str, library: MotionLibrary) -> str:
+    """Put a library's statements into a wrapper's, where ``{vendor}`` is; the axis's places stay open."""
+    return template.format(
+        n="{n}",
+        i="{i}",
+        setpoint=library.setpoint,
+        speed=library.speed,
+        actual=library.actual,
+        power=library.power,
+        homed=library.homed,
+        vendor=statements,
+        let_go=LET_GO,
+    )
+
+
+def _variable(section: str, name: str, type_: str, comment: str) -> BlockVariable:
+    return BlockVariable(section=section, name=name, type=type_, comment=comment)
+
+
+HOMED = _variable("VAR_INPUT", "bHomed{n}", "BOOL", "the axis's position is known")
+TWINCAT = MotionLibrary(
+    axis_type="AXIS_REF",
+    guide="MC_ExtSetPointGenEnable",
+    instances={
+        "fbEnable": "MC_ExtSetPointGenEnable",
+        "fbDisable": "MC_ExtSetPointGenDisable",
+        "bExternal": "BOOL",
+        "nDirection": "DINT",
+    },
+    power_instances={"fbPower": "MC_Power", "fbReset": "MC_Reset"},
+    setpoint="Axis{n}.NcToPlc.SetPos",
+    speed="Axis{n}.NcToPlc.SetVelo",
+    actual="Axis{n}.NcToPlc.ActPos",
+    power="""\
+fbPower{n}(Axis := Axis{n}, Enable := bOn, Enable_Positive := bOn, Enable_Negative := bOn);
+fbReset{n}(Axis := Axis{n}, Execute := bAcknowledge);
+IF fbReset{n}.Busy THEN bResets := TRUE; END_IF;""",
+    homed="(Axis{n}.NcToPlc.StateDWord AND 16#00000002) <> 16#00000000",
+    prepare="""\
+fbEnable{n}(Axis := Axis{n}, Execute := bTaken{n} AND NOT fbDisable{n}.Busy,
+    Position := Axis{n}.NcToPlc.SetPos, PositionType := POSITIONTYPE_ABSOLUTE);
+IF bTaken{n} THEN bExternal{n} := fbEnable{n}.Enabled; END_IF;
+IF NOT fbEnable{n}.Enabled OR fbEnable{n}.Busy OR fbDisable{n}.Busy THEN bReady := FALSE; END_IF;
+IF NOT fbEnable{n}.Enabled AND (nStage <> cTaking) THEN nCause := 23; END_IF;
+IF fbEnable{n}.Error THEN nCause := 22; END_IF;
+(* Bit 0: operational; bit 31: in error. *)
+IF (Axis{n}.NcToPlc.StateDWord AND 16#00000001) = 16#00000000 THEN nCause := 21; END_IF;
+IF (Axis{n}.NcToPlc.StateDWord AND 16#80000000) <> 16#00000000 THEN nCause := 20; END_IF;""",
+    feed="""\
+nDirection{n} := 0;
+IF fVelocity > 0.0 THEN nDirection{n} := 1; END_IF;
+IF fVelocity < 0.0 THEN nDirection{n} := -1; END_IF;
+IF bFeed THEN
+    MC_ExtSetPointGenFeed(Position := fPosition, Velocity := fVelocity, Acceleration := fAcceleration,
+        Direction := nDirection{n}, Axis := Axis{n});
+END_IF;
+fbDisable{n}(Axis := Axis{n}, Execute := bExternal{n} AND NOT bTaken{n});""",
+)
+CODESYS = MotionLibrary(
+    axis_type="AXIS_REF_SM3",
+    guide="SMC_FollowSetValues",
+    instances={"fbFollow": "SMC_FollowSetValues"},
+    power_instances={"fbPower": "MC_Power", "fbReset": "MC_Reset"},
+    setpoint="Axis{n}.fSetPosition",
+    speed="Axis{n}.fSetVelocity",
+    actual="Axis{n}.fActPosition",
+    power="""\
+fbPower{n}(Axis := Axis{n}, Enable := TRUE, bRegulatorOn := bOn, bDriveStart := bOn);
+fbReset{n}(Axis := Axis{n}, Execute := bAcknowledge);
+IF fbReset{n}.Busy THEN bResets := TRUE; END_IF;""",
+    homed="bHomed{n}",
+    variables=(HOMED,),
+    prepare="""\
+IF NOT fbFollow{n}.bBusy THEN bReady := FALSE; END_IF;
+(* SMC_AXIS_STATE: 0 power_off, 1 errorstop. *)
+IF Axis{n}.nAxisState = 0 THEN nCause := 21; END_IF;
+IF Axis{n}.nAxisState = 1 THEN nCause := 20; END_IF;""",
+    feed="""\
+fbFollow{n}(Axis := Axis{n}, bExecute := bFeed, bAbort := NOT bFeed, dwValueMask := 16#00000007,
+    fSetPosition := fPosition, fSetVelocity := fVelocity, fSetAcceleration := fAcceleration);
+IF bFeed AND (nStage <> cTaking) AND NOT fbFollow{n}.bBusy THEN nCause := 22; END_IF;
+IF bFeed AND fbFollow{n}.bError THEN nCause := 22; END_IF;
+IF bFeed AND fbFollow{n}.bCommandAborted THEN nCause := 23; END_IF;""",
+)
+SIEMENS = MotionLibrary(
+    axis_type="TO_PositioningAxis",
+    guide="MC_MOTIONINPOSITION",
+    instances={"fbInPosition": "MC_MOTIONINPOSITION"},
+    power_instances={"fbPower": "MC_POWER", "fbReset": "MC_RESET"},
+    setpoint="Axis{n}.Position",
+    speed="Axis{n}.Velocity",
+    actual="Axis{n}.ActualPosition",
+    power="""\
+fbPower{n}(Axis := Axis{n}, Enable := bOn, StartMode := 1, StopMode := 0);
+fbReset{n}(Axis := Axis{n}, Execute := bAcknowledge);
+IF fbReset{n}.Busy THEN bResets := TRUE; END_IF;""",
+    homed="Axis{n}.StatusWord.%X5",
+    prepare="""\
+IF NOT fbInPosition{n}.Busy THEN bReady := FALSE; END_IF;
+(* Bit 0: enabled; bit 1: in error. *)
+IF NOT Axis{n}.StatusWord.%X0 THEN nCause := 21; END_IF;
+IF Axis{n}.StatusWord.%X1 THEN nCause := 20; END_IF;""",
+    feed="""\
+fbInPosition{n}(Axis := Axis{n}, Enable := bFeed, Position := fPosition, Velocity := fVelocity,
+    Acceleration := fAcceleration);
+IF bFeed AND (nStage <> cTaking) AND NOT fbInPosition{n}.Busy THEN nCause := 22; END_IF;
+IF bFeed AND fbInPosition{n}.Error THEN nCause := 22; END_IF;
+IF bFeed AND fbInPosition{n}.CommandAborted THEN nCause := 23; END_IF;""",
+)
+# Velocity setpoints with a position control of our own; no library: the converter is inputs and outputs.
+VELOCITY = MotionLibrary(
+    axis_type="",
+    guide="the position control (fGain, fCorrection, fFollowingLimit > 0.0)",
+    instances={},
+    power_instances={},
+    setpoint="fActPosition{n}",
+    speed="fActVelocity{n}",
+    actual="fActPosition{n}",
+    power="""\
+bRun{n} := bOn;
+bResetDrive{n} := bAcknowledge;""",
+    homed="bHomed{n}",
+    prepare="""\
+IF (nStage = cTaking)
+    AND (NOT (fGain{n} > 0.0) OR NOT (fCorrection{n} > 0.0) OR NOT (fFollowingLimit{n} > 0.0)) THEN
+    nCause := 22;
+END_IF;
+IF NOT bRunning{n} THEN nCause := 21; END_IF;
+IF bDriveError{n} THEN nCause := 20; END_IF;""",
+    feed="""\
+fSpeed{n} := 0.0;
+IF bFeed THEN
+    fSpeed{n} := fGain{n} * (fPosition - fActPosition{n});
+    IF fSpeed{n} > fCorrection{n} THEN fSpeed{n} := fCorrection{n}; END_IF;
+    IF fSpeed{n} < -fCorrection{n} THEN fSpeed{n} := -fCorrection{n}; END_IF;
+    (* What was measured may be the fault: then brake without it. *)
+    IF (nFault <> 0) OR NOT (ABS(fSpeed{n}) <= fCorrection{n}) THEN fSpeed{n} := 0.0; END_IF;
+    fSpeed{n} := fSpeed{n} + fVelocity;
+END_IF;""",
+    variables=(
+        HOMED,
+        _variable("VAR_INPUT", "bRunning{n}", "BOOL", "the converter is on and follows fSpeed"),
+        _variable("VAR_INPUT", "bDriveError{n}", "BOOL", "it is in error"),
+        _variable("VAR_INPUT", "fGain{n}", "LREAL", "1/s: velocity for each distance from the setpoint"),
+        _variable("VAR_INPUT", "fCorrection{n}", "LREAL", "greatest velocity for it"),
+        _variable("VAR_OUTPUT", "bRun{n}", "BOOL", "switches the converter on"),
+        _variable("VAR_OUTPUT", "bResetDrive{n}", "BOOL", "acknowledges its error"),
+        _variable("VAR_OUTPUT", "fSpeed{n}", "LREAL", "velocity setpoint"),
+    ),
+)
