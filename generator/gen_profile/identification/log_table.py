@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import errno
 import math
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -12,12 +13,13 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from gen_profile.bounded_file import read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.motion.profile import Array
 from gen_profile.suggestion import suggestion
 
 SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
-MOST_BYTES = 200_000_000
+MOST_BYTES = 1 << 25
 GREATEST = 1e12  # ms since 1970, or counts: beyond it a logger wrote rubbish
 # what a file begins with that is no text, and what to do about it
 OTHERS = {
@@ -130,10 +132,12 @@ def read_text(path: Path, option: str) -> str:
         The file cannot be read, or is no text.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise OutputError(f"{option} {path}: more than {MOST_BYTES // 10**6} MB; cut the move out of it.")
-        content = path.read_bytes()
+        content = read_bounded(path, MOST_BYTES)
     except OSError as error:
+        if error.errno == errno.EFBIG:
+            raise OutputError(
+                f"{option} {path}: more than {MOST_BYTES >> 20} MiB; cut the move out of it."
+            ) from error
         raise OutputError(f"{option}: cannot read the log {path}: {error.strerror}.") from error
     return decoded(content, f"{option} {path}")
 

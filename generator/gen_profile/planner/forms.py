@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from gen_profile.bounded_file import read_bounded
 from gen_profile.errors import ExportError, OutputError, SpecError
 from gen_profile.planner.design import PlannerBlock
 from gen_profile.spec.can import CanSpec
@@ -106,7 +107,7 @@ def read_block(path: Path) -> str:
         It holds no planner block, or one in C.
     """
     try:
-        content = path.read_bytes()
+        content = read_bounded(path)
     except OSError as error:
         raise OutputError(f"Cannot read the block {path}: {error.strerror}.") from error
     refuse_c(path)

@@ -21,7 +21,9 @@ from typing import Any, Protocol
 import attrs
 from filelock import FileLock, Timeout
 
+from gen_profile.artefacts.reading import read_artefact
 from gen_profile.artefacts.writing import deliver, staged
+from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.sweep.archive import Archive, is_archive, read_archive, written_archive
 from gen_profile.sweep.case import CaseOutcome, Recipe
@@ -113,8 +115,8 @@ class Store:
     def _record(self, case: int) -> dict[str, Any] | None:
         """Read a case's record, if it is there and one of this case."""
         try:
-            record = json.loads((self.case_folder(case) / RECORD).read_bytes())
-        except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
+            record = json.loads(read_bounded(self.case_folder(case) / RECORD, DOCUMENT))
+        except (OSError, ValueError, RecursionError):
             return None
         own = {"case": case, "values": self.grid[case]}
         if not isinstance(record, dict) or any(record.get(key) != value for key, value in own.items()):
@@ -191,7 +193,7 @@ def opened(store: Store) -> Iterator[Keeper]:
     with _locked(store.folder):
         if not (store.folder / DESCRIPTION).exists():
             deliver(store.folder / DESCRIPTION, _json(asked))
-        _require_same(store.folder, asked, (store.folder / DESCRIPTION).read_bytes())
+        _require_same(store.folder, asked, read_artefact(store.folder / DESCRIPTION))
         yield store
 
 
@@ -236,7 +238,7 @@ def grid_of(path: Path) -> Grid:
             description: bytes | str = archive.description() or ""
     else:
         try:
-            description = (path / DESCRIPTION).read_bytes()
+            description = read_bounded(path / DESCRIPTION)
         except OSError as error:
             raise OutputError(
                 f"There is no sweep in {path}: cannot read {path / DESCRIPTION} ({error.strerror})."
