@@ -25,7 +25,9 @@ from gen_profile.identification.measurements import (
     SwingLog,
     parse_swing,
 )
+from gen_profile.identification.swing_model import shortened
 from gen_profile.identification.uncertainty import WIDEST
+from gen_profile.one_thread import one_thread
 from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
@@ -98,7 +100,9 @@ class Identification:
                 {
                     "load": log.load,
                     "quantity": log.quantity,
-                    "samples": len(log.times),
+                    "samples": log.logged,
+                    "averages": len(log.times) if len(log.times) < log.logged else None,
+                    "lasts_s": float(log.times[-1]),
                     "unit": log.unit,
                     "swing": float(np.ptp(log.values)) / 2.0,
                     "noise": noise,
@@ -213,7 +217,6 @@ def identify(
         The measurements do not determine the parameters, or not well enough to be of use.
     """
     plant = spec.machine()
-    logs = tuple(m for m in measurements if isinstance(m, SwingLog))
     readings = tuple(m for m in measurements if not isinstance(m, SwingLog))
     read = [reading.parameter for reading in readings if isinstance(reading, DirectReading)]
     asked = {*free, *read}
@@ -223,13 +226,19 @@ def identify(
         raise SpecError(f"at: must hold one position per axis ({len(plant.actuated)}), found {len(stood)}.")
     if not all(abs(place) <= GREATEST for place in stood):
         raise SpecError(f"at: must be places in m or rad, found {', '.join(f'{x:g}' for x in stood)}.")
-    found = estimate(
-        SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
-        [q.name for q in plant.parameters if q.name in asked],
-        readings,
-        logs,
-        progress,
+    logs = tuple(
+        shortened(log, plant, spec.plant.parameters, stood)
+        for log in measurements
+        if isinstance(log, SwingLog)
     )
+    with one_thread():
+        found = estimate(
+            SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
+            [q.name for q in plant.parameters if q.name in asked],
+            readings,
+            logs,
+            progress,
+        )
     return Identification(
         given=spec,
         spec=_identified(spec, found),
