@@ -7,13 +7,14 @@
     cases/0000/017/          case 17: its artefacts with their manifest, and case.json, its row
     .lock                    held by the one who sweeps
 
-A case is finished when its ``case.json`` is there, which is the last of its files to appear, whole.
+A case is finished when its ``case.json`` is there, which is the last of its files to appear, and the others
+are as it tells: the same sweep works out again what was damaged since.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,6 +22,7 @@ from typing import Any, Protocol
 import attrs
 from filelock import FileLock, Timeout
 
+from gen_profile.artefacts.manifest import FILENAME, parse_manifest, sha256
 from gen_profile.artefacts.reading import read_artefact
 from gen_profile.artefacts.writing import deliver, staged
 from gen_profile.bounded_file import DOCUMENT, read_bounded
@@ -72,8 +74,15 @@ class Store:
         return self.folder / case_path(case)
 
     def is_finished(self, case: int) -> bool:
-        """Whether a case's record is there, and whole: a power cut may leave a part."""
-        return self._record(case) is not None
+        """Whether a case's record is there, and all files are as it tells: a power cut may leave a part."""
+        record = self._record(case)
+        try:
+            return record is not None and _is_whole(
+                record.get("artefacts", []),
+                {file.name: read_bounded(file) for file in self.case_folder(case).iterdir()},
+            )
+        except OSError:
+            return False
 
     def keep(self, case: int, outcome: CaseOutcome) -> None:
         """Write a finished case.
@@ -163,7 +172,10 @@ class _ArchiveKeeper:
         self._finished = archive.finished()
 
     def is_finished(self, case: int) -> bool:
-        return case in self._finished
+        if case not in self._finished:
+            return False
+        ((artefacts,),) = self._archive.rows(["artefacts"], [case])
+        return _is_whole(json.loads(artefacts or "[]"), self._archive.files(str(case_path(case))))
 
     def keep(self, case: int, outcome: CaseOutcome) -> None:
         self._archive.keep(self._store.grid, outcome)
@@ -171,6 +183,16 @@ class _ArchiveKeeper:
 
     def gather(self) -> Path:
         return self._store.folder
+
+
+def _is_whole(artefacts: Sequence[Mapping[str, str]], files: Mapping[str, bytes]) -> bool:
+    """Whether a case's files are those that were written; one that failed has none."""
+    try:
+        if artefacts:
+            parse_manifest(files[FILENAME], FILENAME)
+        return all(sha256(files[one["path"]]) == one["sha256"] for one in artefacts)
+    except (KeyError, TypeError, OutputError):
+        return False
 
 
 @contextmanager
