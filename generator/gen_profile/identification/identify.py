@@ -31,6 +31,7 @@ from gen_profile.one_thread import one_thread
 from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
 
@@ -189,9 +190,9 @@ def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
 
 
 def identify(
-    spec: Spec,
+    spec: Spec | Path | str,
     measurements: Sequence[Measurement],
-    free: Sequence[str] = (),
+    free: Sequence[str] | str = (),
     q_a: Sequence[float] | None = None,
     progress: Progress = untold,
 ) -> Identification:
@@ -199,10 +200,10 @@ def identify(
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
         Its parameters are where the search starts; those that are not identified are taken as exact.
     measurements : sequence of Measurement
-    free : sequence of str
+    free : sequence of str, or str
         Parameters to identify, beside those that were read directly.
     q_a : (m,) sequence of float, optional
         Where the axes stood while periods and swings were measured; the target of the move by default.
@@ -216,10 +217,11 @@ def identify(
     InfeasibleProblem
         The measurements do not determine the parameters, or not well enough to be of use.
     """
+    spec = as_spec(spec)
     plant = spec.machine()
     readings = tuple(m for m in measurements if not isinstance(m, SwingLog))
     read = [reading.parameter for reading in readings if isinstance(reading, DirectReading)]
-    asked = {*free, *read}
+    asked = {*as_names(free), *read}
     _require_known(plant, readings, asked)
     stood = tuple(spec.move.target if q_a is None else q_a)
     if len(stood) != len(plant.actuated):

@@ -54,6 +54,16 @@ def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) ->
     return parse_spec(read_text(path), overrides, str(path), path.parent, **tables)
 
 
+def as_spec(spec: Spec | Path | str) -> Spec:
+    """Take a spec as it is, or read the file that is named; raises as `read_spec`."""
+    return spec if isinstance(spec, Spec) else read_spec(spec)
+
+
+def as_names(names: Sequence[str] | str) -> Sequence[str]:
+    """Take names as they are, or a single one, whose letters are no names."""
+    return (names,) if isinstance(names, str) else names
+
+
 def read_text(path: Path) -> str:
     """Read a TOML file's text, unparsed.
 
