@@ -16,9 +16,11 @@ _NAME = re.compile(r"\s*FUNCTION_BLOCK\s+(\S+)\s", re.IGNORECASE)
 _SECTION = re.compile(
     r"\s*(VAR_IN_OUT|VAR_INPUT|VAR_OUTPUT|VAR(?:\s+CONSTANT)?)\b(.*?)\bEND_VAR\b", re.DOTALL | re.IGNORECASE
 )
+# a comment, or a declaration with the comment behind it; no part looks beyond the next one, or a hostile
+# text would be read again and again
 _VARIABLE = re.compile(
-    r"\s*(?:\(\*[^*]*\*\)\s*)*(\w+)\s*:\s*([^:;]*?)\s*(?::=\s*([^;]*?))?\s*;(?:[ \t]*\(\*(.*?)\*\))?",
-    re.DOTALL,
+    r"\(\*[^*]*+\*\)|(?<!\w)(\w++)\s*+:([^:;]*+)(?::=([^:;]*+))?;"
+    r"(?:[ \t]*+\(\*((?:[^*(]|\*(?!\))|\((?!\*))*+)\*\))?"
 )
 _ARRAY = re.compile(r"ARRAY\s*\[\s*(\d+)\s*\.\.\s*(\d+)\s*\]\s*OF\s+(\w+)", re.IGNORECASE)
 _END = re.compile(r"END_FUNCTION_BLOCK\s*\Z", re.IGNORECASE)
@@ -135,6 +137,7 @@ def _variables(section: str, text: str) -> list[BlockVariable]:
             section=section, name=name, type=type_.strip(), initial=initial.strip(), comment=comment.strip()
         )
         for name, type_, initial, comment in _VARIABLE.findall(text)
+        if name
     ]
 
 

@@ -1,13 +1,16 @@
 """The picture of a comparison."""
 
 import os
+import subprocess
+import sys
 from itertools import combinations
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from command_line import run_here, run_process
-from matplotlib import image, pyplot
+from matplotlib import image
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pictures import colours
 
 import gen_profile as gp
@@ -79,6 +82,29 @@ def test_a_notebook_shows_what_a_file_holds_whenever_it_is_drawn(plain, tmp_path
     assert shown._repr_svg_() == (tmp_path / "picture.svg").read_text("utf-8")
 
 
+DRAWING = """
+import matplotlib
+matplotlib.use("svg")
+from matplotlib import pyplot
+pyplot.figure(7)
+from pathlib import Path
+from numpy import arange
+from gen_profile.charts.figure import Figure, Line, Panel
+from gen_profile.charts.picture import save
+line = Line(name="line", x=arange(2.0), y=arange(2.0))
+panel = Panel(title="panel", x_label="x", y_label="y", lines=[line])
+save([Figure(caption="caption", panels=[panel])], Path("picture.png"), "salt", "title")
+print(matplotlib.get_backend(), pyplot.get_fignums())
+"""
+
+
+def test_a_picture_leaves_what_the_caller_draws_with_as_it_is(tmp_path):
+    words = [sys.executable, "-c", DRAWING]
+    run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert run.stdout.split() == ["svg", "[7]"]
+    assert (tmp_path / "picture.png").stat().st_size > 1000
+
+
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_pictures_of_one_figure_are_alike_to_the_byte(tmp_path, suffix, monkeypatch):
     line = Line(name="line", x=np.arange(3.0), y=np.arange(3.0))
@@ -140,9 +166,8 @@ def test_what_cannot_be_written_is_refused_before_the_work(tmp_path, command, op
 def drawn(comparison):
     """The figure of a comparison, laid out as it would be in a file."""
     figure = draw_side_by_side([comparison_figure(comparison)], "title")
-    figure.canvas.draw()
-    yield comparison, figure
-    pyplot.close(figure)
+    FigureCanvasAgg(figure).draw()
+    return comparison, figure
 
 
 @pytest.mark.slow
@@ -179,7 +204,6 @@ def test_limits_are_drawn_where_curves_come_near():
     velocity = picture.axes[1]
     assert [line.get_ydata()[0] for line in velocity.get_lines() if line.get_color() == LIMIT] == [0.5]
     assert velocity.get_ylim()[1] > 0.5
-    pyplot.close(picture)
 
 
 def test_numerical_error_is_no_figure_of_a_bar(plain):

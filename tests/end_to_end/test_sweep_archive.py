@@ -3,12 +3,14 @@
 import shutil
 import sqlite3
 import subprocess
+from contextlib import closing
 
 import attrs
 import pytest
 from command_line import run_here
 from system_parts import program
 
+from gen_profile.artefacts.manifest import Manifest, sha256
 from gen_profile.errors import OutputError
 from gen_profile.spec.reading import preset_text
 from gen_profile.sweep.archive import read_archive
@@ -18,8 +20,12 @@ from gen_profile.sweep.plan import prepare
 from gen_profile.sweep.reading import swept_table, take_out
 from gen_profile.sweep.store import grid_of, opened
 
-ARTEFACT = {"format": "csv", "path": "paper.csv", "sha256": "", "bytes": 0, "payload_sha256": "p"}
-FILES = {"manifest.json": b"{}\n" * 50, "paper.csv": b"1;2\r\n\xb5"}
+TABLE = b"1;2\r\n\xb5"
+ARTEFACT = {"format": "csv", "path": "paper.csv", "sha256": sha256(TABLE), "bytes": 0, "payload_sha256": "p"}
+MANIFEST = Manifest(
+    name="paper", spec={}, spec_sha256="", profile_sha256="", versions={}, artefacts=(), check=None
+)
+FILES = {"manifest.json": MANIFEST.to_json(), "paper.csv": TABLE}
 
 
 def prepared(path, *axes):
@@ -124,11 +130,18 @@ def test_a_file_that_is_no_sweep_is_named(tmp_path, content):
             raise AssertionError
 
 
-def test_a_file_altered_in_it_is_refused(store, tmp_path):
+def test_a_file_altered_in_it_is_refused_and_worked_out_again(store, tmp_path):
+    with closing(sqlite3.connect(store.folder)) as connection, connection:
+        connection.execute("UPDATE sqlar SET data = 'x', sz = 1 WHERE name = 'cases/0000/002/paper.csv'")
     (row,) = swept_table(store.folder, store.grid, cases=[2]).to_pylist()
     with pytest.raises(OutputError, match=r"cases/0000/002/paper.csv is not the file that the sweep wrote"):
         take_out(store.folder, row, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+    with opened(store) as kept:
+        assert [kept.is_finished(case) for case in range(4)] == [True, True, False, True]
+        kept.keep(2, passed(store, 2))
+    take_out(store.folder, row, tmp_path / "out")
+    assert (tmp_path / "out" / "paper.csv").read_bytes() == TABLE
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path):

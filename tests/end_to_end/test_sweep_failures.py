@@ -317,3 +317,18 @@ def test_a_case_whose_record_is_damaged_is_not_finished(tmp_path, content):
     assert not store.is_finished(0) and store.is_finished(1)
     with pytest.raises(OutputError, match=r"000.case.json: missing or damaged; sweep again\."):
         list(store.records())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["paper.csv", "manifest.json"])
+@pytest.mark.parametrize("content", [None, b"garbage"])
+def test_a_damaged_case_is_worked_out_again(tmp_path, name, content):
+    words = ["sweep", "--preset", "paper", "--vary", "move.duration=3,4", "--out", tmp_path, "--json"]
+    first = run_here(*words)
+    file = tmp_path / "cases" / "0000" / "001" / name
+    before = file.read_bytes()
+    file.unlink() if content is None else file.write_bytes(content)
+    again = run_here(*words)
+    assert (first.code, again.code) == (0, 0)
+    assert file.read_bytes() == before
+    assert run_here("lookup", tmp_path, "--move.duration", "4").code == 0

@@ -12,6 +12,7 @@ from scipy.interpolate import BPoly, CubicSpline, PPoly
 import gen_profile as gp
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.motion.profile import Profile
+from gen_profile.spec.reading import preset_text
 
 
 def typed_names():
@@ -176,3 +177,31 @@ def test_what_is_said_of_all_axes_replaces_what_was_said_of_one():
 def test_curves_of_motions_that_users_bring_differ():
     styles = method_styles(["optimal", "mine", "yours", "theirs"])
     assert len({(style.colour, style.dash) for style in styles.values()}) == 4
+
+
+def test_a_single_time_is_one_sample():
+    motion = gp.plan(gp.preset_spec("paper")).motion
+    for time in (-1.0, 1.5, 3.0, 9.0):
+        one, many = motion(time), motion(np.array([time]))
+        assert np.array_equal(one.position, many.position) and one.jerk.shape == (1, 1)
+
+
+def test_a_spec_may_be_named_by_its_file(tmp_path):
+    path = tmp_path / "bay-3.toml"
+    path.write_text(preset_text("paper"), "utf-8")
+    assert gp.plan(str(path)).spec == gp.plan(path).spec == gp.read_spec(path)
+    (by_path,) = gp.robustness(path, "L1", methods="zvd", points=3).residual.values()
+    (by_spec,) = gp.robustness(gp.read_spec(path), ["L1"], methods=["zvd"], points=3).residual.values()
+    assert np.array_equal(by_path, by_spec)
+    with pytest.raises(gp.OutputError, match=r"Cannot read the spec none\.toml"):
+        gp.plan("none.toml")
+
+
+@pytest.mark.slow
+def test_a_plan_is_drawn(tmp_path):
+    plan = gp.plan(gp.preset_spec("paper"))
+    gp.plot(plan, tmp_path / "plan.svg")
+    gp.plot(gp.design(plan.spec, "csv", tmp_path / "out", check=False), tmp_path / "design.svg")
+    text = (tmp_path / "plan.svg").read_text("utf-8")
+    assert "<!-- Velocity of cart -->" in text and "<!-- Sway of the payload -->" in text
+    assert (tmp_path / "design.svg").read_text("utf-8") == text

@@ -278,7 +278,12 @@ def test_several_axes_are_proved_while_they_move_at_once():
     assert any(0.0 in one.values and any(one.values) for one in sticks)
     assert any(all(one.values) for one in sticks)
     followed = trace(spec, text, Histories.of(spec), proof.worst.history)
-    titles = [panel.title for panel in history_figure(spec, proof, followed).panels]
+    *_, sway = (panels := history_figure(spec, proof, followed).panels)
+    moving = np.flatnonzero(followed.issued["fVelocity"])
+    assert {level.between for level in sway.levels} == {
+        (followed.times[moving[-1]], sway.lines[0].x[-1])
+    }  # on the way a swing means nothing
+    titles = [panel.title for panel in panels]
     assert titles[0] == "Position of x"
     assert titles[4] == "Velocity of y"
 

@@ -26,7 +26,7 @@ _CHECKED = {  # how the value of a constant enters the checksum
     "BOOL": "IF {} THEN fValue := 1.0; END_IF;",
 }
 _DECLARED = {"LREAL~": "$reals", "BOOL~": "$switches"}
-_COMMENT = re.compile(r"\(\*.*?\*\)", re.DOTALL)
+_COMMENT = re.compile(r"\(\*.*?(?:\*\)|\Z)", re.DOTALL)  # one that is not closed takes the rest
 _HOLE = re.compile(r"@(\w+)")
 _LINES = re.compile(r"^\$(\w+)\n", re.MULTILINE)
 _PART = re.compile(r"\$(\w+)(?:\(([^()]*)\))?")

@@ -30,8 +30,10 @@ MOST_POINTS = 10_000  # TO_Cam_10k
 POINT_ERROR = 1e-6  # m (or rad)
 BYTES = {"LREAL": 8, "DINT": 4}
 
+_WITHIN = r"((?:(?!FUNCTION_BLOCK).)*?)"
 _BLOCK = re.compile(
-    r'((?:\(\*(?:(?!\*\)).)*\*\)\s*)?)FUNCTION_BLOCK\s+"(\w+)"\s*\{[^}]*\}\s*VERSION\s*:\s*[\d.]+(.*?)\bBEGIN\b(.*?)END_FUNCTION_BLOCK',
+    r"((?:\(\*(?:(?!\*\)|\(\*).)*+\*\)\s*+)?)FUNCTION_BLOCK\s++\"(\w++)\"\s*+\{[^{}]*+\}\s*+VERSION\s*+:\s*+[\d.]++"
+    rf"{_WITHIN}\bBEGIN\b{_WITHIN}END_FUNCTION_BLOCK",
     re.DOTALL,
 )
 _WORD = re.compile(r"[()]|(?<![.#\w])[A-Za-z]\w*(\s*:=)?")

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import lzma
 import stat
 import zipfile
+import zlib
 from pathlib import Path, PurePosixPath
 
 from gen_profile.errors import CosimulationError
 
 LARGEST = 1 << 30  # bytes, of all files unpacked
 MOST_FILES = 10_000
+DAMAGED = (
+    zipfile.BadZipFile,
+    zipfile.LargeZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    EOFError,
+    RuntimeError,
+    ValueError,
+)
 
 
 def unpack(path: Path, folder: Path) -> None:
@@ -31,7 +42,7 @@ def unpack(path: Path, folder: Path) -> None:
         with zipfile.ZipFile(path) as archive:
             _require_harmless(path, archive)
             _extract(path, archive, folder)
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, RuntimeError, ValueError) as error:
+    except DAMAGED as error:
         raise CosimulationError(f"{path.name}: not an FMU, or damaged ({error}); get it again.") from error
     except (OSError, NotImplementedError) as error:
         reason = getattr(error, "strerror", None) or error

@@ -147,7 +147,7 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
         if (document.pop("format"), document.pop("format_version")) != (FORMAT, FORMAT_VERSION):
             raise ValueError("another format")
         manifest = _from_dict(document)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise OutputError(
             f"{source}: not a manifest of this version of gen-profile; export again."
         ) from error

@@ -5,18 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from gen_profile.artefacts.manifest import FILENAME, Manifest, parse_manifest, sha256
+from gen_profile.bounded_file import DOCUMENT, MOST, read_bounded
 from gen_profile.errors import OutputError
 
 
-def read_artefact(path: Path) -> bytes:
-    """Read a file.
+def read_artefact(path: Path, most: int = MOST) -> bytes:
+    """Read a file of so many bytes at most.
 
     Raises
     ------
     OutputError
     """
     try:
-        return path.read_bytes()
+        return read_bounded(path, most)
     except OSError as error:
         raise OutputError(f"Cannot read {path}: {error.strerror or error}.") from error
 
@@ -41,7 +42,7 @@ def manifest_beside(path: Path, content: bytes, *, planner: bool = False) -> Man
         raise OutputError(
             f"There is no {FILENAME} beside {path}; put the one there that was written with it."
         )
-    found = parse_manifest(read_artefact(beside), str(beside))
+    found = parse_manifest(read_artefact(beside, DOCUMENT), str(beside))
     covering = found.covering(path.name, sha256(content), planner=planner)
     if covering is None:
         kind = "planner block" if planner else "motion"

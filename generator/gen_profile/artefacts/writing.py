@@ -7,6 +7,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Protocol
 
+from gen_profile.artefacts.reading import read_artefact
+from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import OutputError
 from gen_profile.private_folder import temporary_folder
 
@@ -62,7 +64,7 @@ class StagingFolder:
     def earlier(self, name: str) -> bytes | None:
         """Read a file of this name at the destination, if there is one."""
         path = self._destination / name
-        return path.read_bytes() if path.is_file() else None
+        return read_artefact(path, DOCUMENT) if path.is_file() else None
 
     def deliver(self) -> None:
         """Move the files to their destination, in the order in which they were written."""

@@ -199,6 +199,7 @@ def parse(content: bytes) -> Certificate:
         TypeError,
         AttributeError,
         OverflowError,
+        RecursionError,
         binascii.Error,
         zlib.error,
     ) as error:

@@ -21,7 +21,7 @@ from gen_profile.certificate.document import Certificate, certificate_path, dama
 from gen_profile.certificate.in_order import in_order
 from gen_profile.certificate.sway_limits import ProvedSway, limits_of
 from gen_profile.certificate.theorem import Theorem, ranges_of
-from gen_profile.errors import CertificateError, OutputError
+from gen_profile.errors import CertificateError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
 from gen_profile.verification.check import spec_and_manifest
@@ -109,10 +109,7 @@ def check_certificate(
         As of `gen_profile.check_artefact`.
     """
     artefact = _read(Path(path), spec)
-    try:
-        found = parse(Path(certificate).read_bytes())
-    except OSError as error:
-        raise OutputError(f"Cannot read {certificate}: {error.strerror}.") from error
+    found = parse(read_artefact(Path(certificate)))
     theorem = _require_about(found, artefact)
     bounds, stated = np.zeros(len(found.sways)), np.array([sway.bound for sway in found.sways])
     done = 0

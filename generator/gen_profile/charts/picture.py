@@ -70,28 +70,21 @@ def save(figures: Sequence[Figure], path: Path, salt: str, title: str) -> None:
     """
     import matplotlib  # noqa: PLC0415  # an extra
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot  # noqa: PLC0415
-
-    picture = drawn(figures, title)
-    try:
-        suffix, content = path.suffix.lower(), BytesIO()
-        with matplotlib.rc_context({"svg.hashsalt": salt}):
-            picture.savefig(content, format=suffix[1:], dpi=110, metadata=METADATA[suffix])
-    finally:
-        pyplot.close(picture)
+    suffix, content = path.suffix.lower(), BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": salt}):
+        drawn(figures, title).savefig(content, format=suffix[1:], dpi=110, metadata=METADATA[suffix])
     deliver(path, content.getvalue())
 
 
 def drawn(figures: Sequence[Figure], title: str) -> Any:
-    """Draw figures side by side, as a figure of Matplotlib's."""
-    from matplotlib import pyplot  # noqa: PLC0415
+    """Draw figures side by side, as a figure of Matplotlib's; its pyplot stays as the caller has it."""
+    from matplotlib.figure import Figure as Canvas  # noqa: PLC0415  # an extra
 
     columns = _columns(figures[0])
     rows = -(-len(figures[0].panels) // columns)
     widths = [columns * WIDE[columns - 1], *[BESIDE] * (len(figures) - 1)]
     height = max(6.0, 1.0 + rows * (2.4 if rows > 2 and columns == 1 else HIGH[columns - 1]))
-    picture = pyplot.figure(figsize=(sum(widths), height), layout="constrained")
+    picture = Canvas(figsize=(sum(widths), height), layout="constrained")
     parts = picture.subfigures(1, len(figures), width_ratios=widths, squeeze=False)[0]
     for part, figure, width in zip(parts, figures, widths, strict=True):
         _draw(part, figure, width)

@@ -8,12 +8,15 @@ from tempfile import TemporaryDirectory
 import attrs
 
 from gen_profile.charts.comparison import comparison_figure
+from gen_profile.charts.curves import motion_figure, select_machines, sway_figure
 from gen_profile.charts.identification import identification_figure
 from gen_profile.charts.picture import require_drawable, save
 from gen_profile.charts.proof import draw
 from gen_profile.charts.robustness import robustness_figure
 from gen_profile.comparison.compare import Comparison
 from gen_profile.comparison.robustness import Robustness
+from gen_profile.designs.design import Design
+from gen_profile.designs.plan import Plan
 from gen_profile.designs.planner import Deployment
 from gen_profile.errors import OutputError
 from gen_profile.identification.identify import Identification
@@ -30,13 +33,14 @@ class Picture:
 
 
 def plot(
-    result: Comparison | Robustness | Identification | Deployment, path: Path | str | None = None
+    result: Plan | Design | Comparison | Robustness | Identification | Deployment,
+    path: Path | str | None = None,
 ) -> Picture | None:
-    """Draw a comparison, robustness curves, a fitted swing, or the proof of a planner block.
+    """Draw a motion and its sway, a comparison, robustness curves, a fitted swing or a planner block's proof.
 
     Parameters
     ----------
-    result : Comparison, Robustness, Identification or Deployment
+    result : Plan, Design, Comparison, Robustness, Identification or Deployment
     path : Path or str, optional
         Of a PNG, SVG or PDF file. Without one the picture is returned, for a notebook to show.
 
@@ -53,6 +57,15 @@ def plot(
     path = Path(path)
     require_drawable(path)
     match result:
+        case Design(plan=made):
+            plot(made, path)
+            return None
+        case Plan(spec=spec, evaluation=evaluation):
+            arrival = evaluation.motion.duration
+            sway = sway_figure(spec, evaluation, select_machines(evaluation), arrival)
+            figures = [motion_figure(spec, evaluation), sway]
+            save(figures, path, spec.name, f"{spec.name}: {spec.plant.type}")
+            return None
         case Comparison(spec=spec):
             figure, title = comparison_figure(result), f"{spec.name}: {spec.plant.type}"
         case Robustness(spec=spec):

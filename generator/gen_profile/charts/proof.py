@@ -57,6 +57,7 @@ def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
     few = slice(None, None, -(-len(found.times) // SAMPLES))
     times, limit = found.times[few], 1e3 * list(proof.limit.values())[-1]
     signs = (1.0, -1.0) if spec.machine().directions == 1 else (1.0,)
+    arrival = _arrival(found)
     bands = [*_unpromised(found)]
     panels = [panel for place in range(len(found.history.axes)) for panel in _axis_panels(spec, found, place)]
     panels += [
@@ -80,7 +81,7 @@ def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
                 Line(name=name, x=times, y=1e3 * sway[few], style=style)
                 for (name, sway), style in zip(found.sway.items(), styles, strict=False)
             ],
-            levels=[Level(value=sign * limit) for sign in signs],
+            levels=[Level(value=sign * limit, between=(arrival, times[-1])) for sign in signs],
             bands=bands,
         )
     )
@@ -89,6 +90,12 @@ def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
         panels=panels,
         columns=1,
     )
+
+
+def _arrival(found: Trace) -> float:
+    """Say from when on no axis moves any more, so that what the load still does is what remains."""
+    axes = [np.abs(found.issued[axis.of("fVelocity")]) for axis in found.history.axes.values()]
+    return float(found.times[np.flatnonzero(np.max(axes, axis=0) > 0.0)[-1:]].sum())
 
 
 def _axis_panels(spec: Spec, found: Trace, place: int) -> Iterator[Panel]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
+from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.cli.commands import cli
 from gen_profile.cli.group import DefaultGroup
 from gen_profile.cli.options import (
@@ -202,7 +203,7 @@ def explain(events: Path, as_json: bool) -> None:
 
 def _read(path: Path, what: str = "commands") -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return read_bounded(path, DOCUMENT).decode("utf-8-sig")
     except OSError as error:
         raise OutputError(f"Cannot read the {what} {path}: {error.strerror}.") from error
     except UnicodeDecodeError as error:

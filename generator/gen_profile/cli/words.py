@@ -257,7 +257,9 @@ def identification(found: Identification, path: Path) -> str:
         rows.append((f"read {what}", f"{size}, {off:+.1f} σ off the model"))
     for row in document["logs"]:
         sizes = f"swing ±{row['swing']:.2g} {row['unit']}, noise {row['noise']:.2g} {row['unit']}"
-        rows.append((f"log of {row['load']}", f"{row['samples']} samples of its {row['quantity']}, {sizes}"))
+        taken = f" ({row['averages']} averages over {row['lasts_s']:.4g} s)" if row["averages"] else ""
+        samples = f"{row['samples']} samples of its {row['quantity']}{taken}"
+        rows.append((f"log of {row['load']}", f"{samples}, {sizes}"))
     rows += [("BEWARE", sentence) for sentence in found.warnings()]
     rows += [*_stated_ranges(found), *_rests(found)]
     rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -15,6 +16,7 @@ from gen_profile.evaluation.phrases import mm
 from gen_profile.motion.profile import Profile
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_spec
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -79,17 +81,20 @@ class Comparison:
         }
 
 
-def compare(spec: Spec, progress: Progress = untold, *, own: Sequence[Profile] = ()) -> Comparison:
+def compare(
+    spec: Spec | Path | str, progress: Progress = untold, *, own: Sequence[Profile] = ()
+) -> Comparison:
     """Try every shaper and variants of the optimal motion on the machines of a spec.
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
     progress : callable
         Told what is being done.
     own : sequence of Profile
         Further motions of the axes, each of a ``method`` of its own.
     """
+    spec = as_spec(spec)
     rows: list[ComparedMethod] = []
     left_out: dict[str, str] = {}
     impossible: dict[str, str] = {}

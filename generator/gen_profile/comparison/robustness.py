@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from io import StringIO
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -19,6 +20,7 @@ from gen_profile.motion.profile import Array, Profile, grid_length, grid_times, 
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
 
@@ -138,10 +140,10 @@ def _crossing(errors: Array, share: Array) -> float:
 
 
 def robustness(
-    spec: Spec,
-    parameters: Sequence[str] = (),
+    spec: Spec | Path | str,
+    parameters: Sequence[str] | str = (),
     *,
-    methods: Sequence[str] = (),
+    methods: Sequence[str] | str = (),
     own: Sequence[Profile] = (),
     points: int | None = None,
     half_range: float | None = None,
@@ -151,10 +153,10 @@ def robustness(
 
     Parameters
     ----------
-    spec : Spec
-    parameters : sequence of str
+    spec : Spec, or the path of one
+    parameters : sequence of str, or str
         One or two; the first uncertain one by default.
-    methods : sequence of str
+    methods : sequence of str, or str
         As `gen_profile.comparison.candidates` names them; all by default.
     own : sequence of Profile
         Further motions of the axes, each of a ``method`` of its own.
@@ -170,6 +172,7 @@ def robustness(
     SpecError
         A parameter or method is unknown.
     """
+    spec, parameters, methods = as_spec(spec), as_names(parameters), as_names(methods)
     errors = error_grid(spec, parameters, points, half_range)
     motions: dict[str, Profile] = {}
     left_out: dict[str, str] = {}

@@ -19,6 +19,7 @@ from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.verification.cosimulation import cosimulate, judge, judged_from, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import with_further
@@ -116,7 +117,7 @@ class Design:
 
 
 def design(
-    spec: Spec,
+    spec: Spec | Path | str,
     formats: Sequence[str] | str,
     folder: Path | str,
     *,
@@ -129,7 +130,7 @@ def design(
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
     formats : sequence of str, or str
         Names known to the exporters' registry.
     folder : Path or str
@@ -148,10 +149,11 @@ def design(
     GenProfileError
         Nothing was written.
     """
+    spec = as_spec(spec)
     folder = Path(folder)
     return _designed(
         spec,
-        [formats] if isinstance(formats, str) else formats,
+        as_names(formats),
         folder,
         staged(folder),
         check=check,

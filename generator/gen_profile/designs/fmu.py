@@ -19,6 +19,7 @@ from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_spec
 from gen_profile.suggestion import suggestion
 from gen_profile_fmu.building.build import build_fmu
 from gen_profile_fmu.building.platforms import PLATFORMS, host_platform
@@ -76,7 +77,7 @@ class Export:
 
 
 def export_fmu(
-    spec: Spec,
+    spec: Spec | Path | str,
     kind: str = "plant",
     path: Path | str | None = None,
     *,
@@ -90,7 +91,7 @@ def export_fmu(
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
     kind : str
         One of `KINDS`.
     path : Path or str, optional
@@ -110,6 +111,7 @@ def export_fmu(
     GenProfileError
         Nothing was written.
     """
+    spec = as_spec(spec)
     if kind not in KINDS:
         raise SpecError(f"There is no FMU of the kind {kind!r}{suggestion(kind, KINDS)}")
     systems = {"ssp": spec.name, "planned-ssp": f"{spec.name} planned"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 
 import attrs
 
@@ -19,6 +20,7 @@ from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_spec
 from gen_profile.work import OutOfWork, budget
 
 EXPLAINING = "looking for what would do"
@@ -63,18 +65,19 @@ def _is_calm(spec: Spec, solution: Solution) -> bool:
     return drafted(spec, solution).excess_sway <= 0.0
 
 
-def plan(spec: Spec, progress: Progress = untold) -> Plan:
+def plan(spec: Spec | Path | str, progress: Progress = untold) -> Plan:
     """Solve a spec, or shape a move for it, and try the motion on all machines.
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
     progress : Progress
 
     Raises
     ------
     InfeasibleProblem, SolverDiverged, LimitViolation
     """
+    spec = as_spec(spec)
     try:
         with budget(*choice.ANSWER):
             return judged(draft(spec, progress), progress)

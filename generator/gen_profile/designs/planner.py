@@ -21,6 +21,7 @@ from gen_profile.progress import Progress, untold
 from gen_profile.proof.prove import HISTORIES, prove
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_names, as_spec
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -72,8 +73,8 @@ class Deployment:
 
 
 def deploy_planner(
-    spec: Spec,
-    formats: Sequence[str],
+    spec: Spec | Path | str,
+    formats: Sequence[str] | str,
     folder: Path | str,
     *,
     histories: int = HISTORIES,
@@ -86,8 +87,8 @@ def deploy_planner(
 
     Parameters
     ----------
-    spec : Spec
-    formats : sequence of str
+    spec : Spec, or the path of one
+    formats : sequence of str, or str
         Names of formats that carry function blocks, or C. All hold the same program; one is executed.
     folder : Path or str
         Made if needed; files of the same names are replaced, others are left alone.
@@ -107,10 +108,11 @@ def deploy_planner(
     GenProfileError
         Nothing was written.
     """
+    spec = as_spec(spec)
     folder = Path(folder)
     progress("finding the modes over the live ranges")
     block = planner_block(spec)
-    files = block_files(block, spec, formats)
+    files = block_files(block, spec, as_names(formats))
     with staged(folder) as staging:
         written = {file.filename: staging.write(file.filename, file.content) for file in files}
         text = _executed(block, written)

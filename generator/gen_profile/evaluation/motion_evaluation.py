@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from pathlib import Path
 
 import attrs
 import numpy as np
@@ -20,6 +21,7 @@ from gen_profile.problem.limits import rounded_down
 from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import problem_of
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_spec
 
 COARSE_SAMPLES = 501  # of machines all over the ranges, between which the greatest is a parabola's
 ACCURACY = 1e-6  # of their integration, relative
@@ -68,12 +70,12 @@ class MotionEvaluation:
         return tuple(Sway(times=times, sway=sway) for swing in simulations for sway in swing.sway(times))
 
 
-def evaluate(spec: Spec, motion: Profile) -> MotionEvaluation:
+def evaluate(spec: Spec | Path | str, motion: Profile) -> MotionEvaluation:
     """Integrate every machine of a spec under a motion of its axes.
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
     motion : Profile
 
     Raises
@@ -83,6 +85,7 @@ def evaluate(spec: Spec, motion: Profile) -> MotionEvaluation:
     InfeasibleProblem
         It goes on to where the machine cannot be.
     """
+    spec = as_spec(spec)
     plant, until = spec.machine(), _watched_until(spec, motion)
     named = [machine.parameters for machine in scenarios(spec)]
     swing = PlantSimulation(plant, motion, named, until, spec.move.initial)

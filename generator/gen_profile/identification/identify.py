@@ -25,10 +25,13 @@ from gen_profile.identification.measurements import (
     SwingLog,
     parse_swing,
 )
+from gen_profile.identification.swing_model import shortened
 from gen_profile.identification.uncertainty import WIDEST
+from gen_profile.one_thread import one_thread
 from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
 
@@ -98,7 +101,9 @@ class Identification:
                 {
                     "load": log.load,
                     "quantity": log.quantity,
-                    "samples": len(log.times),
+                    "samples": log.logged,
+                    "averages": len(log.times) if len(log.times) < log.logged else None,
+                    "lasts_s": float(log.times[-1]),
                     "unit": log.unit,
                     "swing": float(np.ptp(log.values)) / 2.0,
                     "noise": noise,
@@ -185,9 +190,9 @@ def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
 
 
 def identify(
-    spec: Spec,
+    spec: Spec | Path | str,
     measurements: Sequence[Measurement],
-    free: Sequence[str] = (),
+    free: Sequence[str] | str = (),
     q_a: Sequence[float] | None = None,
     progress: Progress = untold,
 ) -> Identification:
@@ -195,10 +200,10 @@ def identify(
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
         Its parameters are where the search starts; those that are not identified are taken as exact.
     measurements : sequence of Measurement
-    free : sequence of str
+    free : sequence of str, or str
         Parameters to identify, beside those that were read directly.
     q_a : (m,) sequence of float, optional
         Where the axes stood while periods and swings were measured; the target of the move by default.
@@ -212,24 +217,30 @@ def identify(
     InfeasibleProblem
         The measurements do not determine the parameters, or not well enough to be of use.
     """
+    spec = as_spec(spec)
     plant = spec.machine()
-    logs = tuple(m for m in measurements if isinstance(m, SwingLog))
     readings = tuple(m for m in measurements if not isinstance(m, SwingLog))
     read = [reading.parameter for reading in readings if isinstance(reading, DirectReading)]
-    asked = {*free, *read}
+    asked = {*as_names(free), *read}
     _require_known(plant, readings, asked)
     stood = tuple(spec.move.target if q_a is None else q_a)
     if len(stood) != len(plant.actuated):
         raise SpecError(f"at: must hold one position per axis ({len(plant.actuated)}), found {len(stood)}.")
     if not all(abs(place) <= GREATEST for place in stood):
         raise SpecError(f"at: must be places in m or rad, found {', '.join(f'{x:g}' for x in stood)}.")
-    found = estimate(
-        SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
-        [q.name for q in plant.parameters if q.name in asked],
-        readings,
-        logs,
-        progress,
+    logs = tuple(
+        shortened(log, plant, spec.plant.parameters, stood)
+        for log in measurements
+        if isinstance(log, SwingLog)
     )
+    with one_thread():
+        found = estimate(
+            SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
+            [q.name for q in plant.parameters if q.name in asked],
+            readings,
+            logs,
+            progress,
+        )
     return Identification(
         given=spec,
         spec=_identified(spec, found),

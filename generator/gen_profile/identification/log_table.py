@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import codecs
 import csv
+import errno
 import math
+from array import array
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
 
+from gen_profile.bounded_file import read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.motion.profile import Array
 from gen_profile.suggestion import suggestion
 
 SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
-MOST_BYTES = 200_000_000
+MOST_BYTES = 1 << 25
 GREATEST = 1e12  # ms since 1970, or counts: beyond it a logger wrote rubbish
 # what a file begins with that is no text, and what to do about it
 OTHERS = {
@@ -100,23 +104,23 @@ class LogTable:
         OutputError
             A cell holds no number.
         """
-        time, rows = places[0], []
+        time, values = places[0], array("d")
         below = range(head + self.is_head(head), len(self.rows))
         first = next((row for row in below if not math.isnan(self.seconds(row, time))), below.start)
         for row in range(first, len(self.rows)):
             held = [self.cell(row, place) for place in places]
             if not all(held):
                 continue
-            values = [self.seconds(row, time), *(self.number(row, place) for place in places[1:])]
-            for place, text, value in zip(places, held, values, strict=True):
+            found = [self.seconds(row, time), *(self.number(row, place) for place in places[1:])]
+            for place, text, value in zip(places, held, found, strict=True):
                 if not abs(value) <= GREATEST:
                     name = self.cell(head, place) if self.is_head(head) else f"column {place + 1}"
                     raise OutputError(
                         f"{source}, row {row + 1}: {name} holds {text[:40]!r}, which is no number of a log."
                     )
-            rows.append(values)
-        table = np.array(rows).reshape(-1, len(places))
-        if rows and math.isnan(self.number(first, time)):  # a date
+            values.extend(found)
+        table = np.array(values).reshape(-1, len(places))
+        if len(table) and math.isnan(self.number(first, time)):  # a date
             table[:, 0] -= table[0, 0]
         return table
 
@@ -130,10 +134,12 @@ def read_text(path: Path, option: str) -> str:
         The file cannot be read, or is no text.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise OutputError(f"{option} {path}: more than {MOST_BYTES // 10**6} MB; cut the move out of it.")
-        content = path.read_bytes()
+        content = read_bounded(path, MOST_BYTES)
     except OSError as error:
+        if error.errno == errno.EFBIG:
+            raise OutputError(
+                f"{option} {path}: more than {MOST_BYTES >> 20} MiB; cut the move out of it."
+            ) from error
         raise OutputError(f"{option}: cannot read the log {path}: {error.strerror}.") from error
     return decoded(content, f"{option} {path}")
 
@@ -177,8 +183,24 @@ def read_table(text: str, source: str) -> LogTable:
     separator = next(
         (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines)), ","
     )
-    try:
-        rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)]
-    except csv.Error as error:
-        raise OutputError(f"{source}: it is no table ({error}).") from error
-    return LogTable(rows=rows, decimal_comma=separator != ",")
+    return LogTable(rows=_Rows(lines, separator, source), decimal_comma=separator != ",")
+
+
+class _Rows(Sequence[Sequence[str]]):
+    """Lines that are split when they are asked for: all cells at once take ten times the text's memory."""
+
+    def __init__(self, lines: Sequence[str], separator: str, source: str) -> None:
+        self._lines, self._separator, self._source = lines, separator, source
+        self._split: tuple[int, list[str]] = (-1, [])  # the row that was asked for last
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def __getitem__(self, row: Any) -> Any:
+        if row != self._split[0]:
+            try:
+                cells = next(csv.reader([self._lines[row]], delimiter=self._separator))
+            except csv.Error as error:
+                raise OutputError(f"{self._source}, row {row + 1}: it is no table ({error}).") from error
+            self._split = (row, [cell.strip() for cell in cells])
+        return self._split[1]

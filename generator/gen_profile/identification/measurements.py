@@ -61,22 +61,44 @@ class SwingLog:
     quantity : str
         ``"angle"`` or ``"sway"``, as `gen_profile.plants.plant.Outputs` defines them.
     load : str
+    resolution : float
+        Least step between different values as they were read, as of an encoder that counts; in rad or m.
+    logged : int
+        Samples that were read, of which `averaged` may have made fewer.
     """
 
     times: Array = attrs.field(converter=read_only)
     values: Array = attrs.field(converter=read_only)
     quantity: str
     load: str
+    resolution: float = attrs.field()
+    logged: int = attrs.field()
+
+    @resolution.default
+    def _resolution(self) -> float:
+        return float(np.diff(np.unique(self.values)).min(initial=np.inf))
+
+    @logged.default
+    def _logged(self) -> int:
+        return len(self.times)
 
     @property
     def unit(self) -> str:
         """Of the values."""
         return SI_UNITS[self.quantity]
 
-    @property
-    def resolution(self) -> float:
-        """Least step between different values, as of an encoder that counts; in rad or m."""
-        return float(np.diff(np.unique(self.values)).min(initial=np.inf))
+    def averaged(self, width: float, most: int) -> SwingLog:
+        """Take the means of what was logged within every so many seconds, so many of them at most.
+
+        Averages of a small swing are a swing of the same frequency and damping; noise they have less of, and
+        hum of the mains hardly any.
+        """
+        bins = (self.times / width).astype(np.int64)
+        _, first = np.unique(bins, return_index=True)
+        ends = np.append(first, len(bins))[: most + 1]
+        counts, last = np.diff(ends), int(ends[-1])
+        means = [np.add.reduceat(signal[:last], ends[:-1]) / counts for signal in (self.times, self.values)]
+        return attrs.evolve(self, times=means[0] - means[0][0], values=means[1])
 
 
 Measurement = DirectReading | Period | SwingLog

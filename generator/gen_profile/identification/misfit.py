@@ -17,13 +17,14 @@ from scipy.signal import lombscargle
 
 from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.identification.fit import Fit
-from gen_profile.identification.swing_model import SwingModel
+from gen_profile.identification.swing_model import SwingModel, shortened
 from gen_profile.identification.uncertainty import WIDEST, uncertainty
 from gen_profile.motion.profile import Array
 from gen_profile.problem.linearization import linearize
 
 HARMONICS = 4.0  # times the fastest natural frequency up to which lines are looked for
 MOST_LINES = 2000
+AT_ONCE = 1_000_000  # products of a frequency and a time: arrays of all take more than the log
 FEWEST = 64.0  # ordinates, which tell what noise is
 NEIGHBOURS = 33  # ordinates whose median is the noise around a line
 CHANCE = 1e-4  # how rarely noise may look like a line
@@ -32,6 +33,7 @@ ROUNDING = 0.35  # of a sensor's step: rounding errors repeat with the swing, an
 EXACT = 1e-5  # of the swing, which is the integrator's business
 ALIKE = 1.1  # times the least sum of squares, within which parameters explain the same
 STARTS = (1.0, 0.5, 0.7, 1.4, 2.0)  # times a parameter of the spec, where it is looked for
+ROUGHLY = 1200  # samples, four of each of the fastest swings, by which parameters are chosen
 TRIED = 2  # parameters at once that may explain what is left
 
 
@@ -92,7 +94,9 @@ def spectrum(times: Array, residuals: Array, fastest: float) -> Spectrum:
     highest = min(max(HARMONICS * fastest, FEWEST * apart), np.pi / float(np.median(np.diff(times))))
     count = min(max(int(highest / apart), 1), MOST_LINES)
     frequencies = np.linspace(1.0, highest / apart, count) * apart
-    power = np.asarray(lombscargle(np.array(times), residuals - residuals.mean(), frequencies))
+    swinging = residuals - residuals.mean()
+    parts = np.array_split(frequencies, max(count * len(times) // AT_ONCE, 1))
+    power = np.concatenate([lombscargle(np.array(times), swinging, part) for part in parts])
     around = median_filter(power, min(NEIGHBOURS, len(power)), mode="reflect")
     around = np.maximum(around, np.median(power)) / math.log(2.0)  # smooth noise may have deep valleys
     return Spectrum(frequencies=frequencies, power=power, background=around)
@@ -157,9 +161,14 @@ def explanation(fit: Fit, more: Sequence[str]) -> Explanation | None:
         Parameters that were taken as known.
     """
     freed: tuple[str, ...] = ()
+    machine = fit.machine
+    logs = [shortened(m.log, m.plant, machine.parameters, m.q_a, ROUGHLY) for m in fit.models]
+    rough = attrs.evolve(
+        fit, models=tuple(attrs.evolve(m, log=log) for m, log in zip(fit.models, logs, strict=True))
+    )
     for _ in range(min(TRIED, len(more))):
         tried = {
-            name: _of_small_swings(fit.freed((*freed, name)), name) for name in more if name not in freed
+            name: _of_small_swings(rough.freed((*freed, name)), name) for name in more if name not in freed
         }
         least = min(one.squares for one in tried.values())
         if not math.isfinite(least):
@@ -167,7 +176,7 @@ def explanation(fit: Fit, more: Sequence[str]) -> Explanation | None:
         alike = {name: one for name, one in tried.items() if one.squares <= ALIKE * least}
         best = min(alike, key=lambda name: alike[name].moved)
         freed = (*freed, best)
-        if (values := _nothing_left(alike[best].fit)) is not None:
+        if (values := _nothing_left(attrs.evolve(alike[best].fit, models=fit.models))) is not None:
             return Explanation(
                 freed=freed, instead=tuple(name for name in alike if name not in freed), values=values
             )

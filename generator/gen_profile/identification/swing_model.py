@@ -20,6 +20,7 @@ from gen_profile.problem.linearization import linearize
 STEP = 1e-6  # relative, of numerical slopes
 WIDEST_SWING = math.pi / 4.0  # rad, beyond which nobody lets a load swing
 STILL = 1e-9  # m or rad, which no sensor tells from rest
+MOST_SAMPLES, SWINGS = 6000, 300  # of a log that is fitted: twenty averages of each swing
 SHOWN = 1e-6  # relative size from which on a log shows a part of its start
 
 
@@ -109,10 +110,7 @@ class SwingModel:
             order = [q.name for q in self.plant.parameters]
             return np.stack(
                 [
-                    _linear_answers(
-                        self.plant, dict(zip(order, map(float, row), strict=True)), self.q_a, self.log, count
-                    )
-                    @ start
+                    self._small_swing(dict(zip(order, map(float, row), strict=True)), start, count)
                     for row, start in zip(machines, starts, strict=True)
                 ]
             )
@@ -121,6 +119,13 @@ class SwingModel:
         )
         load = self.plant.loads.index(self.log.load)
         return np.asarray((sway if self.log.quantity == "sway" else angle)[:, :, load])
+
+    def _small_swing(self, parameters: Mapping[str, float], start: Array, count: int) -> Array:
+        """Say what the log would show of a machine of small swings; of two conjugate rates one tells all."""
+        rates, gains, inverse = _linear_modes(self.plant, parameters, self.q_a, self.log)
+        shares = gains * (inverse @ start) * (1.0 + np.sign(rates.imag))
+        shown = rates.imag >= 0.0
+        return np.asarray((np.exp(self.log.times[:count, None] * rates[shown]) @ shares[shown]).real)
 
 
 def swing_model(
@@ -144,6 +149,23 @@ def swing_model(
     size = np.linalg.norm(_linear_answers(plant, parameters, q_a, log), axis=0)
     shown = np.flatnonzero(size > SHOWN * size.max())
     return SwingModel(plant=plant, q_a=q_a, log=log, shown=shown, period=period)
+
+
+def shortened(
+    log: SwingLog,
+    plant: Plant,
+    parameters: Mapping[str, float],
+    q_a: tuple[float, ...],
+    most: int = MOST_SAMPLES,
+) -> SwingLog:
+    """Average neighbouring samples of a log of more than so many, but no long stretches.
+
+    What is left out then is the log's end, after some three hundred swings of the fastest mode.
+    """
+    if len(log.times) <= most:
+        return log
+    fastest = 2.0 * np.pi / float(linearize(plant, parameters, q_a).frequencies[-1])
+    return log.averaged(min(float(log.times[-1]), SWINGS * fastest) / most, most)
 
 
 def _require_swing(
@@ -178,13 +200,20 @@ def _linear_answers(
 
     Of all of its samples, or of so many.
     """
+    rates, gains, inverse = _linear_modes(plant, parameters, q_a, log)
+    return np.asarray(((gains * np.exp(log.times[:count, None] * rates)) @ inverse).real)
+
+
+def _linear_modes(
+    plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog
+) -> tuple[Array, Array, Array]:
+    """Give the linear model's rates, what the log shows of each mode, and the modes in any state; complex."""
     linear = linearize(plant, parameters, q_a)
     n_u = len(linear.frequencies)
     system = np.block([[np.zeros((n_u, n_u)), np.eye(n_u)], [-linear.stiffness, -linear.damping]])
     rates, vectors = np.linalg.eig(system)
     seen = np.concatenate([_gain(plant, parameters, q_a, log), np.zeros(n_u)])
-    answers = (seen @ vectors) * np.exp(log.times[:count, None] * rates) @ np.linalg.inv(vectors)
-    return np.asarray(answers.real)
+    return rates, seen @ vectors, np.linalg.inv(vectors)
 
 
 def _gain(plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog) -> Array:

@@ -200,7 +200,8 @@ def _require_determined(names: Sequence[str], slopes: Array) -> None:
     size = np.linalg.norm(slopes, axis=0)
     blind = [name for name, length in zip(names, size, strict=True) if length == 0.0]
     if not blind:
-        _, singular, directions = np.linalg.svd(slopes / size)
+        # of the triangle alone: the left vectors of all rows would take the square of a log's length
+        _, singular, directions = np.linalg.svd(np.linalg.qr(slopes / size, mode="r"))
         if len(singular) == len(names) and singular[-1] > INDISTINCT:
             return
         worst = np.abs(directions[-1])

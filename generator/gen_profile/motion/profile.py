@@ -139,8 +139,8 @@ class Profile:
         """Evaluate a derivative by its order (0 = position), right-continuous, shape (times, axes)."""
         return self._evaluated(times, (order,))[0]
 
-    def _evaluated(self, times: Array, orders: Sequence[int]) -> list[Array]:
-        times = np.asarray(times, dtype=np.float64)
+    def _evaluated(self, times: Array | float, orders: Sequence[int]) -> list[Array]:
+        times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         beyond = (times - self.duration)[:, None]
         ahead = (self.target + beyond * self.final_velocity, self.final_velocity)
         moving = (times >= 0.0) & (beyond[:, 0] < 0.0)
@@ -155,8 +155,8 @@ class Profile:
             found.append(values)
         return found
 
-    def __call__(self, times: Array) -> Motion:
-        """Evaluate position, velocity, acceleration and jerk at times in s."""
+    def __call__(self, times: Array | float) -> Motion:
+        """Evaluate position, velocity, acceleration and jerk at times in s; a single one is one sample."""
         position, velocity, acceleration, jerk = self._evaluated(times, range(4))
         return Motion(position=position, velocity=velocity, acceleration=acceleration, jerk=jerk)
 

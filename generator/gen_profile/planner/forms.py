@@ -8,6 +8,7 @@ from pathlib import Path
 
 import attrs
 
+from gen_profile.bounded_file import read_bounded
 from gen_profile.errors import ExportError, OutputError, SpecError
 from gen_profile.planner.design import PlannerBlock
 from gen_profile.planner.machine import planned_axes
@@ -65,9 +66,7 @@ def refuse_wrapper(path: Path, text: str) -> None:
     ExportError
     """
     if _WRAPPER.search(text):
-        raise ExportError(
-            f"{path} holds a planner block's wrapper; name the block's own file beside it."
-        )
+        raise ExportError(f"{path} holds a planner block's wrapper; name the block's own file beside it.")
 
 
 def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tuple[File, ...]:
@@ -131,7 +130,7 @@ def read_block(path: Path) -> str:
         It holds no planner block, or one in C.
     """
     try:
-        content = path.read_bytes()
+        content = read_bounded(path)
     except OSError as error:
         raise OutputError(f"Cannot read the block {path}: {error.strerror}.") from error
     refuse_c(path)

@@ -11,6 +11,7 @@ from types import ModuleType
 
 import attrs
 
+from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import SpecError
 from gen_profile.plants.plant import Plant
 from gen_profile.plants.soundness import faults_of
@@ -49,7 +50,7 @@ def read_machine_file(path: Path, sha256: str | None = None) -> MachineFile:
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.py", path.name):
         raise SpecError(f"plant.file: {path.name!r} must be a Python file such as my_machine.py.")
     try:
-        file = MachineFile(name=path.name, content=path.read_bytes())
+        file = MachineFile(name=path.name, content=read_bounded(path, DOCUMENT))
     except OSError as error:
         raise SpecError(f"plant.file: cannot read {path}: {error.strerror}.") from error
     if sha256 is not None and file.sha256 != sha256:

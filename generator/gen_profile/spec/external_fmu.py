@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
+from gen_profile.bounded_file import read_bounded
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import ExternalFmu
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of
@@ -60,7 +61,7 @@ def external_fmu(
 
 def _sha256(path: Path, stated: Any, faults: Faults) -> str:
     try:
-        actual = hashlib.sha256(path.read_bytes()).hexdigest()
+        actual = hashlib.sha256(read_bounded(path)).hexdigest()
     except (OSError, ValueError) as error:
         faults.add("check.fmu", f"{path} cannot be read ({getattr(error, 'strerror', error)})")
         return ""

@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
+from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import refuse_implausible
@@ -19,6 +20,11 @@ from gen_profile.suggestion import listed, meant, number_meant, suggestion
 
 Document = TypeVar("Document", bound=dict[str, Any])
 HERE = Path()
+MOST_PARTS = 32  # of a key: its parser takes time and memory by their square
+LONG_KEY = re.compile(
+    r"(?<![\w-])(?:(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"
+    rf"{{{MOST_PARTS}}}"
+)
 SLIPS = {
     r"//|/\*|;|^\s*(%|!|--)": "; a comment begins with #",
     r"^\s*[\w.-]+\s*:": "; write = between a key and its value",
@@ -48,6 +54,16 @@ def read_spec(path: Path | str, overrides: Sequence[str] = (), **tables: Any) ->
     return parse_spec(read_text(path), overrides, str(path), path.parent, **tables)
 
 
+def as_spec(spec: Spec | Path | str) -> Spec:
+    """Take a spec as it is, or read the file that is named; raises as `read_spec`."""
+    return spec if isinstance(spec, Spec) else read_spec(spec)
+
+
+def as_names(names: Sequence[str] | str) -> Sequence[str]:
+    """Take names as they are, or a single one, whose letters are no names."""
+    return (names,) if isinstance(names, str) else names
+
+
 def read_text(path: Path) -> str:
     """Read a TOML file's text, unparsed.
 
@@ -59,7 +75,7 @@ def read_text(path: Path) -> str:
         It is no UTF-8 text.
     """
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return read_bounded(path, DOCUMENT).decode("utf-8-sig")
     except OSError as error:
         near = meant(path.name, [other.name for other in path.parent.glob("*.toml")])
         cure = f"; did you mean {listed(near)}?" if near and isinstance(error, FileNotFoundError) else "."
@@ -195,16 +211,33 @@ def spec_from_dict(document: Mapping[str, Any], folder: Path = HERE) -> Spec:
 def _document(text: str, source: str) -> Table:
     """Parse TOML, for others to copy; its parser tells where it stumbled, except at the end of the text."""
     try:
-        return tomllib.loads(text)
+        return parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         last = text.split("\n")
         end = f"(at the end: line {len(last)}, column {len(last[-1]) + 1})"
         problem = re.sub(r"[(]at end of document[)]", end, str(error))
         raise SpecError(f"{source}: not valid TOML: {problem}{_slip(text, problem)}.") from error
+
+
+def parse_toml(text: str) -> Table:
+    """Parse TOML that may mean harm.
+
+    Raises
+    ------
+    tomllib.TOMLDecodeError
+        It is none, or what no spec holds.
+    """
+    if long := LONG_KEY.search(text):
+        line = text.count("\n", 0, long.start()) + 1
+        raise tomllib.TOMLDecodeError(f"a key of more than {MOST_PARTS} parts (at line {line})")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
     except RecursionError as error:
-        raise SpecError(f"{source}: not valid TOML: arrays or tables nested too deeply.") from error
+        raise tomllib.TOMLDecodeError("arrays or tables nested too deeply") from error
     except ValueError as error:
-        raise SpecError(f"{source}: not valid TOML: a whole number of thousands of digits.") from error
+        raise tomllib.TOMLDecodeError("a whole number of thousands of digits") from error
 
 
 def _slip(text: str, problem: str) -> str:
@@ -271,7 +304,7 @@ def _fill(document: Table, tables: Mapping[str, Any]) -> None:
 
 def _override_value(text: str) -> Any:
     try:
-        parsed = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
+        parsed = parse_toml(f"value = {text}")
+    except tomllib.TOMLDecodeError:
         return text.strip()
     return parsed["value"] if parsed.keys() == {"value"} else text.strip()

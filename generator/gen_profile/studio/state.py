@@ -7,7 +7,6 @@ import json
 import math
 import re
 import shlex
-import tomllib
 import zlib
 from collections.abc import Mapping
 from functools import lru_cache
@@ -18,7 +17,7 @@ import attrs
 import tomlkit
 
 from gen_profile.errors import SpecError
-from gen_profile.spec.reading import overridden, preset_text
+from gen_profile.spec.reading import overridden, parse_toml, preset_text
 from gen_profile.spec.values import NONE
 
 MOST_EDITS = 200
@@ -33,7 +32,7 @@ FIXED = re.compile(r"(plant\.(type|file|file_sha256)|check\.(fmu|fmu_sha256|inpu
 
 @lru_cache(maxsize=8)  # asked for at every turn of a knob; nobody changes it
 def _parsed(text: str) -> dict[str, Any]:
-    return tomllib.loads(text)
+    return parse_toml(text)
 
 
 @attrs.frozen(kw_only=True)
@@ -65,7 +64,7 @@ class WrittenSpec:
         """
         try:
             return _parsed(self.text)
-        except (ValueError, RecursionError) as error:
+        except ValueError as error:
             raise SpecError(f"{' '.join(self.words)}: not valid TOML: {error}.") from error
 
     @property

@@ -81,7 +81,8 @@ class Archive:
                 self._columns.append(name)
             places = ", ".join(map(_quoted, row))
             self._connection.execute(
-                f"INSERT INTO cases ({places}) VALUES ({', '.join('?' * len(row))})", tuple(row.values())
+                f"INSERT OR REPLACE INTO cases ({places}) VALUES ({', '.join('?' * len(row))})",
+                tuple(row.values()),
             )
             self._connection.executemany("INSERT OR REPLACE INTO sqlar VALUES (?, ?, ?, ?, ?)", files)
 
@@ -98,7 +99,8 @@ class Archive:
     def files(self, folder: str) -> dict[str, bytes]:
         """Read all files of a folder by name."""
         found = self._connection.execute(
-            "SELECT name, sz, data FROM sqlar WHERE name BETWEEN ? AND ?", (f"{folder}/", f"{folder}0")
+            "SELECT name, sz, CAST(data AS BLOB) FROM sqlar WHERE name BETWEEN ? AND ? AND data IS NOT NULL",
+            (f"{folder}/", f"{folder}0"),
         )
         return {
             name.rpartition("/")[2]: data if len(data) == size else zlib.decompress(data)

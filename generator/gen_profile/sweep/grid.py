@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gen_profile.errors import SpecError
+from gen_profile.spec.reading import parse_toml
 from gen_profile.suggestion import number_meant
 
 MOST_CASES = 10_000_000
@@ -161,7 +162,7 @@ def _is_number(text: str) -> bool:
 def _listed(stated: str) -> list[Any]:
     """Read the values as TOML, and where they are none, as texts."""
     try:
-        values = tomllib.loads(f"values = [{stated}]")
-    except (ValueError, RecursionError):
+        values = parse_toml(f"values = [{stated}]")
+    except tomllib.TOMLDecodeError:
         return [part.strip() for part in stated.split(",")]
     return values["values"] if values.keys() == {"values"} else [stated]

@@ -10,7 +10,9 @@ from typing import Any
 import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, parse_manifest, sha256
+from gen_profile.artefacts.reading import read_artefact
 from gen_profile.artefacts.writing import staged
+from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.evaluation.phrases import named
 from gen_profile.progress import Progress, untold
@@ -148,7 +150,9 @@ def _gathered(
 def _target(folder: Path, row: Mapping[str, Any], name: str) -> Target:
     """Give what the profiles were made for, and the library's own name."""
     with case_folder(folder, row) as case:
-        manifest = parse_manifest((case / FILENAME).read_bytes(), str(folder / row["folder"] / FILENAME))
+        manifest = parse_manifest(
+            read_artefact(case / FILENAME, DOCUMENT), str(folder / row["folder"] / FILENAME)
+        )
         spec = spec_from_dict(manifest.spec, case)
     return attrs.evolve(target_of(spec), name=name)
 

@@ -12,6 +12,8 @@ import numpy as np
 from pyarrow import compute
 
 from gen_profile.artefacts.manifest import FILENAME, parse_manifest
+from gen_profile.artefacts.reading import read_artefact
+from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import CheckFailed, SpecError
 from gen_profile.evaluation.phrases import named
 from gen_profile.spec.model import Spec
@@ -249,7 +251,7 @@ def _judge(
 
 def _spec_there(folder: Path, row: Mapping[str, Any], case: Path, wanted: Mapping[str, Any]) -> Spec:
     """Put the machine asked for into the spec of a case, whose files lie in a folder."""
-    manifest = (case / FILENAME).read_bytes()
+    manifest = read_artefact(case / FILENAME, DOCUMENT)
     document = parse_manifest(manifest, str(folder / row["folder"] / FILENAME)).spec
     machine = {key: value for key, value in wanted.items() if key.startswith(MACHINE)}
     return spec_from_dict(overridden(dict(document), overrides(machine)), case)

@@ -14,6 +14,7 @@ from pyarrow import compute
 
 from gen_profile.artefacts.manifest import FILENAME, sha256
 from gen_profile.artefacts.writing import staged
+from gen_profile.bounded_file import read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.sweep.archive import is_archive, read_archive
 from gen_profile.sweep.grid import Grid
@@ -62,7 +63,7 @@ def case_files(path: Path, row: Mapping[str, Any]) -> dict[str, bytes]:
             with read_archive(path) as archive:
                 files = archive.files(row["folder"])
         else:
-            files = {file.name: file.read_bytes() for file in (path / row["folder"]).iterdir()}
+            files = {file.name: read_bounded(file) for file in (path / row["folder"]).iterdir()}
             files.pop(RECORD, None)
     except OSError as error:
         raise OutputError(f"Cannot read {path / row['folder']}: {error.strerror}; sweep again.") from error

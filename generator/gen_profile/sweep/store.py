@@ -7,13 +7,14 @@
     cases/0000/017/          case 17: its artefacts with their manifest, and case.json, its row
     .lock                    held by the one who sweeps
 
-A case is finished when its ``case.json`` is there, which is the last of its files to appear, whole.
+A case is finished when its ``case.json`` is there, which is the last of its files to appear, and the others
+are as it tells: the same sweep works out again what was damaged since.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,7 +22,10 @@ from typing import Any, Protocol
 import attrs
 from filelock import FileLock, Timeout
 
+from gen_profile.artefacts.manifest import FILENAME, parse_manifest, sha256
+from gen_profile.artefacts.reading import read_artefact
 from gen_profile.artefacts.writing import deliver, staged
+from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.sweep.archive import Archive, is_archive, read_archive, written_archive
 from gen_profile.sweep.case import CaseOutcome, Recipe
@@ -70,8 +74,15 @@ class Store:
         return self.folder / case_path(case)
 
     def is_finished(self, case: int) -> bool:
-        """Whether a case's record is there, and whole: a power cut may leave a part."""
-        return self._record(case) is not None
+        """Whether a case's record is there, and all files are as it tells: a power cut may leave a part."""
+        record = self._record(case)
+        try:
+            return record is not None and _is_whole(
+                record.get("artefacts", []),
+                {file.name: read_bounded(file) for file in self.case_folder(case).iterdir()},
+            )
+        except OSError:
+            return False
 
     def keep(self, case: int, outcome: CaseOutcome) -> None:
         """Write a finished case.
@@ -113,8 +124,8 @@ class Store:
     def _record(self, case: int) -> dict[str, Any] | None:
         """Read a case's record, if it is there and one of this case."""
         try:
-            record = json.loads((self.case_folder(case) / RECORD).read_bytes())
-        except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
+            record = json.loads(read_bounded(self.case_folder(case) / RECORD, DOCUMENT))
+        except (OSError, ValueError, RecursionError):
             return None
         own = {"case": case, "values": self.grid[case]}
         if not isinstance(record, dict) or any(record.get(key) != value for key, value in own.items()):
@@ -161,7 +172,10 @@ class _ArchiveKeeper:
         self._finished = archive.finished()
 
     def is_finished(self, case: int) -> bool:
-        return case in self._finished
+        if case not in self._finished:
+            return False
+        ((artefacts,),) = self._archive.rows(["artefacts"], [case])
+        return _is_whole(json.loads(artefacts or "[]"), self._archive.files(str(case_path(case))))
 
     def keep(self, case: int, outcome: CaseOutcome) -> None:
         self._archive.keep(self._store.grid, outcome)
@@ -169,6 +183,16 @@ class _ArchiveKeeper:
 
     def gather(self) -> Path:
         return self._store.folder
+
+
+def _is_whole(artefacts: Sequence[Mapping[str, str]], files: Mapping[str, bytes]) -> bool:
+    """Whether a case's files are those that were written; one that failed has none."""
+    try:
+        if artefacts:
+            parse_manifest(files[FILENAME], FILENAME)
+        return all(sha256(files[one["path"]]) == one["sha256"] for one in artefacts)
+    except (KeyError, TypeError, OutputError):
+        return False
 
 
 @contextmanager
@@ -191,7 +215,7 @@ def opened(store: Store) -> Iterator[Keeper]:
     with _locked(store.folder):
         if not (store.folder / DESCRIPTION).exists():
             deliver(store.folder / DESCRIPTION, _json(asked))
-        _require_same(store.folder, asked, (store.folder / DESCRIPTION).read_bytes())
+        _require_same(store.folder, asked, read_artefact(store.folder / DESCRIPTION))
         yield store
 
 
@@ -236,7 +260,7 @@ def grid_of(path: Path) -> Grid:
             description: bytes | str = archive.description() or ""
     else:
         try:
-            description = (path / DESCRIPTION).read_bytes()
+            description = read_bounded(path / DESCRIPTION)
         except OSError as error:
             raise OutputError(
                 f"There is no sweep in {path}: cannot read {path / DESCRIPTION} ({error.strerror})."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,7 @@ from gen_profile.evaluation.simulation import AT_REST, Response
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.problem.linearization import eigenvalues
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_spec
 from gen_profile.suggestion import suggestion
 from gen_profile.verification import cosimulation
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
@@ -20,12 +22,14 @@ from gen_profile.verification.monte_carlo import watched
 from gen_profile.verification.setpoint_path import followed_up
 
 
-def cosimulate(spec: Spec, setpoints: SampledProfile, parameters: Mapping[str, float] = AT_REST) -> Response:
+def cosimulate(
+    spec: Spec | Path | str, setpoints: SampledProfile, parameters: Mapping[str, float] = AT_REST
+) -> Response:
     """Let the machine's FMU follow setpoints, and watch what swings on.
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
     setpoints : SampledProfile
         Such as `gen_profile.sample` takes from a motion.
     parameters : mapping of str to float
@@ -38,6 +42,7 @@ def cosimulate(spec: Spec, setpoints: SampledProfile, parameters: Mapping[str, f
     CosimulationError
         The FMU cannot be built or run.
     """
+    spec = as_spec(spec)
     values, *others = _machines(spec, parameters).tolist()
     if others:
         raise SpecError("parameters: one value of each; residual_sways takes many machines.")
@@ -47,12 +52,14 @@ def cosimulate(spec: Spec, setpoints: SampledProfile, parameters: Mapping[str, f
     return found
 
 
-def residual_sways(spec: Spec, setpoints: SampledProfile, parameters: Mapping[str, npt.ArrayLike]) -> Array:
+def residual_sways(
+    spec: Spec | Path | str, setpoints: SampledProfile, parameters: Mapping[str, npt.ArrayLike]
+) -> Array:
     """Let the FMUs of many machines follow setpoints, and find the greatest sway of each afterwards.
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
     setpoints : SampledProfile
     parameters : mapping of str to (machines,) array
         Of the plant, where they are not those of the spec.
@@ -69,6 +76,7 @@ def residual_sways(spec: Spec, setpoints: SampledProfile, parameters: Mapping[st
     CosimulationError
         The FMU cannot be built or run.
     """
+    spec = as_spec(spec)
     plant, tau = spec.machine(), spec.actuator.tau or 0.0
     machines = _machines(spec, parameters)
     ends = (spec.move.start, spec.move.target)

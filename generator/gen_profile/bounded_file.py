@@ -1,0 +1,30 @@
+"""Files that a user names, read up to a size: one that is huge, or never ends, is refused."""
+
+from __future__ import annotations
+
+import errno
+from functools import partial
+from itertools import islice
+from os import fstat
+from pathlib import Path
+
+DOCUMENT = 1 << 24  # bytes of what is read as a whole before it is understood: a manifest, a machine's file
+MOST = 1 << 29  # bytes of anything else: a CAN log of an hour at 1 ms
+BLOCK = 1 << 20
+
+
+def read_bounded(path: Path, most: int = MOST) -> bytes:
+    """Read a file, or a pipe to its end.
+
+    Raises
+    ------
+    OSError
+        It cannot be read, or holds more than `most` bytes; what it is called does not count: a link may lead
+        to a device that never ends.
+    """
+    with path.open("rb") as file:
+        if fstat(file.fileno()).st_size <= most:
+            content = b"".join(islice(iter(partial(file.read, BLOCK), b""), most // BLOCK + 1))
+            if len(content) <= most:
+                return content
+    raise OSError(errno.EFBIG, f"it is larger than {most >> 20} MiB")
