@@ -65,9 +65,7 @@ def refuse_wrapper(path: Path, text: str) -> None:
     ExportError
     """
     if _WRAPPER.search(text):
-        raise ExportError(
-            f"{path} holds a planner block's wrapper; name the block's own file beside it."
-        )
+        raise ExportError(f"{path} holds a planner block's wrapper; name the block's own file beside it.")
 
 
 def block_files(block: PlannerBlock, spec: Spec, formats: Iterable[str]) -> tuple[File, ...]:
