@@ -46,10 +46,11 @@ DECIDED = re.compile(r"( *(?:ELS)?IF) (.*) THEN(.*)")
 NUMBER = re.compile(r"(?<![\w.])(\d+\.\d+(?:E[+-]?\d+)?)")
 AXIS = re.compile(r"\[(n(?:Plan)?Axis)\]")
 CONSTANT = re.compile(r"(?m)^ *(c\w+) : (ARRAY \[[^]]*\] OF )?(LREAL|DINT) := \[?([^;\]]*)\]?;")
-ROUNDING = 1e-5  # numbers that are as good half as great again
+ROUNDING, BEYOND = 1e-5, 1e6  # numbers that are as good half as great again: of rounding, and beyond all
 UNKNOWN = {"interface"}  # parts that hold no statements
 ALIKE = {  # lines, and why a block with another one is as good, or as good in a proof
-    r"\* \(1\.0 - fSquare / ": "the last terms of a series, below 1e-6",
+    r"^ +\* \(1\.0 [-+] f(Square|Half) / ": "the last terms of a series, below 1e-6",
+    r"aCalming\[.*\] :=": "a part of what sways is calmed in more pulses",
     r"nOther := 3\b|cSpare|nLeast|nLate": "how many slots more a plan gets: one that fails is planned again",
     r"bTakenOver|aActual|bEnable\b|nState = 0\b": "no history moves a disabled axis",
 }
@@ -126,7 +127,7 @@ def _changed(line: str) -> Iterator[tuple[str, str]]:
         if sign in line and "FOR " not in line:
             yield "sign", other.join(line.split(sign, maxsplit=1))
     for found in NUMBER.finditer(line):
-        if float(found[1]) > ROUNDING:
+        if ROUNDING < float(found[1]) < BEYOND:
             yield "number", f"{line[: found.start()]}{1.5 * float(found[1])!r}{line[found.end() :]}"
     for found in AXIS.finditer(line):
         yield "axes", f"{line[: found.start()]}[cAxes - 1 - {found[1]}]{line[found.end() :]}"

@@ -53,7 +53,8 @@ def test_nothing_is_named_that_does_not_help_or_cannot_be():
 
 @pytest.mark.slow
 def test_what_a_refusal_names_passes(tmp_path):
-    (tmp_path / "bay.toml").write_text(BAY.replace("residual_sway = 0.05", "residual_sway = 0.002"))
+    swaying = BAY.replace("residual_sway = 0.05", "residual_sway = 0.002").replace("L1 = 0.05", "L1 = 0.1")
+    (tmp_path / "bay.toml").write_text(swaying)
     options = ("planner", "write", tmp_path / "bay.toml", "--out", tmp_path / "out", "--histories", 20)
     failed = run_here(*options, "--json")
     assert failed.code == 4

@@ -106,7 +106,7 @@ REST, MOVE, STICKS, STOPS = obedient().orders
 FAULTS = {
     POSITION: with_orders(REST, attrs.evolve(MOVE, values=(5.1,)), STICKS, STOPS),
     VELOCITY: with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.9,)), STOPS),
-    STOP: with_orders(REST, attrs.evolve(MOVE, end=150), told(150, CYCLES, STOP)),
+    STOP: with_orders(REST, attrs.evolve(MOVE, end=150), told(150, CYCLES, STOP), period=1.0),
     "left": with_output("fPosition", slice(1500, 1600), 5.01),
     "against": with_orders(REST, attrs.evolve(MOVE, values=(-5.0,)), STICKS, STOPS),
     "idle": with_orders(
