@@ -28,6 +28,7 @@ from gen_profile_fmu.running.cosimulation import PlantCosimulation
 STEP_PHASE = 0.05  # rad of the fastest mode that an integration step may cover
 WATCHED = 2.2  # of the slowest periods in which the residual sway shows
 PATIENCE = 30.0  # of these periods that the axes have to come to rest, and the travel's time beside
+NOISY_ON = 6.0  # of these periods after the last command, in which live parameters go on being noisy
 HOIST_STARTS = 0.1  # of these periods, in which a hoist takes up its speed
 
 
@@ -202,7 +203,7 @@ class ClosedLoop:
         begins, inputs = self._hoisted(
             history, *input_rows(history.commands, [*axes.values()], values, self.cycle)
         )
-        begins, inputs = self._changed(history, begins, inputs)
+        begins, inputs = self._changed(history, *self._noisy(begins, inputs))
         period = self._histories.period
         patience = PATIENCE * period + max(map(self._crossing, axes))
         watch = max(SHORTEST_WATCH, WATCHED * period)
@@ -247,6 +248,18 @@ class ClosedLoop:
             inputs[:, list(self._block.inputs).index(f"f{name}")] = np.clip(rounded, low, high)
         true = [inputs[:, list(self._block.inputs).index(f"f{name}")] for name in history.hoisting]
         return range(len(cycles)), np.column_stack([inputs, *true])
+
+    def _noisy(self, begins: Sequence[int], inputs: Array) -> tuple[Sequence[int], Array]:
+        """Let what is told of live parameters be off by their noise, another one in every cycle."""
+        noise, random = self._spec.planner.live_noise, np.random.default_rng(0)
+        if not noise:
+            return begins, inputs
+        cycles = np.arange(begins[-1] + math.ceil(NOISY_ON * self._histories.period / self.cycle))
+        inputs = inputs[np.searchsorted(begins, cycles, side="right") - 1]
+        for name, most in noise.items():
+            told = inputs[:, list(self._block.inputs).index(f"f{name}")]
+            told[:] = np.clip(told + random.uniform(-most, most, len(cycles)), *self._spec.planner.live[name])
+        return range(len(cycles)), inputs
 
     def _changed(self, history: History, begins: Sequence[int], inputs: Array) -> tuple[Sequence[int], Array]:
         """Let inputs differ for some time."""
