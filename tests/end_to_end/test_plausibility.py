@@ -29,7 +29,7 @@ FORMS = {
     "plc samples": {"export": {"plc_layout": "samples"}},
     "plc counts": {"export": {"plc_layout": "counts"}},
     "can": {},
-    "can of velocities": {"can": {"mode": "csv", "following_error": 0.1}},
+    "can of velocities": {"can": {"mode": "csv", "following_error": 0.05}},
     "siemens-scl": {},
     "rockwell-l5x": {},
     "plcopen-xml": {},

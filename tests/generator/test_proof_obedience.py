@@ -14,7 +14,7 @@ from gen_profile.proof.followed import Followed
 from gen_profile.proof.habits import HABITS
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import WORDS, faults, measured
-from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, Ends, Inputs, Order, orders
+from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, Ends, Inputs, TimedOrder, orders
 from gen_profile.proof.verdict import kind_of
 from gen_profile.spec.reading import parse_spec
 
@@ -24,7 +24,7 @@ LIMITS = Ends(velocity=1.0, acceleration=0.5, jerk=5.0, targets=(-100.0, 100.0),
 
 
 def told(begin, end, kind, *values, top=1.0):
-    return Order(begin=begin, end=end, kind=kind, values=values, tops=(top,), edge=begin)
+    return TimedOrder(begin=begin, end=end, kind=kind, values=values, tops=(top,), edge=begin)
 
 
 def obedient():

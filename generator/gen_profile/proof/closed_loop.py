@@ -18,7 +18,7 @@ from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.planner.commands import input_rows
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.proof.histories import SLOWEST, Histories, History
-from gen_profile.proof.watching import Watch
+from gen_profile.proof.watching import BlockWatch
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
@@ -69,7 +69,7 @@ class ClosedLoop:
         self._block = BlockInstance(text)
         self.cycle = self._block.inputs["fCycleTime"]
         self.max_step = STEP_PHASE / histories.fastest
-        self._watch = Watch.of(text, self._block, histories)
+        self._watch = BlockWatch.of(text, self._block, histories)
         self._workers = workers
         self._open = ExitStack()
         self._followers: SimpleQueue[BlockFollower] = SimpleQueue()

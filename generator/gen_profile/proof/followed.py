@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.proof.orders import POSITION, Ends, Order
+from gen_profile.proof.orders import POSITION, Ends, TimedOrder
 
 Flags = NDArray[np.bool_]
 
@@ -44,7 +44,7 @@ class Followed:
     axes : sequence of BlockAxis
     limits : sequence of Ends
         Of the same axes.
-    orders : sequence of Order
+    orders : sequence of TimedOrder
     issued : mapping of str to (cycles,) array
         By names of the block's outputs.
     reserve : float
@@ -60,7 +60,7 @@ class Followed:
     reaction: float
     axes: Sequence[BlockAxis]
     limits: Sequence[Ends]
-    orders: Sequence[Order]
+    orders: Sequence[TimedOrder]
     issued: Mapping[str, Array]
     reserve: float = 0.0
     wander: float = 0.0
@@ -81,7 +81,7 @@ class Followed:
 
 
 @attrs.frozen(kw_only=True)
-class Motion:
+class IssuedMotion:
     """Setpoints, and what was told in each cycle.
 
     Attributes
@@ -106,7 +106,7 @@ class Motion:
     away: Array
 
     @classmethod
-    def of(cls, followed: Followed) -> Motion:
+    def of(cls, followed: Followed) -> IssuedMotion:
         """Take them from what was issued."""
         position, velocity, acceleration = (
             followed.of(f"f{name}") for name in ("Position", "Velocity", "Acceleration")
@@ -128,7 +128,7 @@ class Motion:
 
 
 @attrs.frozen
-class Measured:
+class Allowance:
     """What was needed of what is allowed: a fault where it is more.
 
     Attributes
@@ -145,10 +145,10 @@ class Measured:
     allowed: float
 
 
-def never(what: str, flags: Flags, begin: int = 0) -> Iterator[Measured]:
+def never(what: str, flags: Flags, begin: int = 0) -> Iterator[Allowance]:
     """Measure what must not be, from the first of these cycles on."""
     if flags.any():
-        yield Measured(what, begin + int(np.argmax(flags)), 1.0, 0.0)
+        yield Allowance(what, begin + int(np.argmax(flags)), 1.0, 0.0)
 
 
 def slowing(followed: Followed, before: Array, periods: float) -> float:
@@ -170,7 +170,7 @@ def reaching(followed: Followed, before: Array, wanted: Sequence[float]) -> floa
     return slowest + periods * followed.period
 
 
-def arriving(followed: Followed, place: Array, before: Array, order: Order) -> float:
+def arriving(followed: Followed, place: Array, before: Array, order: TimedOrder) -> float:
     """Tell the time in s in which axes come from places and velocities, (axes,), to an order's targets."""
     periods = (ON_WAY if before.any() else FROM_REST) + calmed(followed)
     share, ways = 1.0 - followed.reserve, map(float, np.abs(place - order.values))

@@ -16,16 +16,16 @@ from gen_profile.proof.followed import (
     TO_STICK,
     TO_STOP,
     TO_TURN,
+    Allowance,
     Flags,
     Followed,
-    Measured,
-    Motion,
+    IssuedMotion,
     arriving,
     calmed,
     reaching,
     slowing,
 )
-from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, Order
+from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, TimedOrder
 from gen_profile.proof.statements import numbers, promises, stops, truths, velocities
 
 STILL = 1e-6  # m, from a target that an axis need not leave for
@@ -69,7 +69,7 @@ WORDS = {
 
 def faults(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[str]:
     """Say what is wrong, each in words that end a sentence; each kind once, where it is worst."""
-    worst: dict[str, Measured] = {}
+    worst: dict[str, Allowance] = {}
     for met in measured(followed, reactions):
         if not met.needed <= met.allowed:
             known = worst.get(met.what)
@@ -80,7 +80,7 @@ def faults(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[
         yield f"{words}, at {met.cycle * followed.cycle:.2f} s"
 
 
-def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[Measured]:
+def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterator[Allowance]:
     """Measure all that is judged.
 
     Parameters
@@ -90,7 +90,7 @@ def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterato
         Of some orders' beginnings, how many cycles later the first setpoint came that would not have come
         without the order; None for none at all.
     """
-    motion = Motion.of(followed)
+    motion = IssuedMotion.of(followed)
     for judge in (
         _arrivals,
         _directions,
@@ -106,7 +106,7 @@ def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterato
     yield from _reactions(followed, motion, reactions)
 
 
-def _arrivals(followed: Followed, motion: Motion) -> Iterator[Measured]:
+def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge targets, velocities and stops at their latest times, of the orders that hold so long."""
     for order in followed.orders:
         begin, end = order.begin, order.end
@@ -135,14 +135,14 @@ def _arrivals(followed: Followed, motion: Motion) -> Iterator[Measured]:
         latest = begin + followed.after(allowed)
         first = begin + int(np.argmax(there)) if there.any() else end
         if first < end:
-            yield Measured(order.kind, begin, (first - begin) * followed.cycle, allowed)
+            yield Allowance(order.kind, begin, (first - begin) * followed.cycle, allowed)
         elif end > latest:
-            yield Measured(order.kind, begin, (end - begin) * followed.cycle, allowed)
+            yield Allowance(order.kind, begin, (end - begin) * followed.cycle, allowed)
         if first < end and order.kind == POSITION:
-            yield Measured("left", first, float(motion.away[first:end].max()), max(EXACT, followed.wander))
+            yield Allowance("left", first, float(motion.away[first:end].max()), max(EXACT, followed.wander))
 
 
-def _near(followed: Followed, motion: Motion, axis: int, wanted: float, own: slice) -> Flags:
+def _near(followed: Followed, motion: IssuedMotion, axis: int, wanted: float, own: slice) -> Flags:
     """Whether an axis has a velocity, or is at the end of its way."""
     limits = followed.limits[axis]
     reached = (
@@ -161,7 +161,7 @@ def _near(followed: Followed, motion: Motion, axis: int, wanted: float, own: sli
     )
 
 
-def _directions(followed: Followed, motion: Motion) -> Iterator[Measured]:
+def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge that axes go never the wrong way, nor at rest, for longer than it takes to turn round."""
     against, wants = np.zeros((2, followed.cycles), dtype=bool)
     near = max(STILL, followed.wander)
@@ -181,11 +181,11 @@ def _directions(followed: Followed, motion: Motion) -> Iterator[Measured]:
             against[order.begin : order.end] = wants[order.begin : order.end] = False
     for begin, end in _runs(against):
         allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_TURN)
-        yield Measured("against", begin, (end - begin) * followed.cycle, allowed)
+        yield Allowance("against", begin, (end - begin) * followed.cycle, allowed)
     for begin, end in _runs(wants & motion.stands):
         ready = ENABLED if begin < followed.after(ENABLED) else 0.0
         allowed = followed.reaction + ready + calmed(followed) * followed.period
-        yield Measured("idle", begin, (end - begin) * followed.cycle, allowed)
+        yield Allowance("idle", begin, (end - begin) * followed.cycle, allowed)
 
 
 def _runs(flags: Flags) -> list[tuple[int, int]]:
@@ -196,7 +196,7 @@ def _runs(flags: Flags) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _velocity_limits(followed: Followed, motion: Motion) -> Iterator[Measured]:
+def _velocity_limits(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge override and velocity limit from when they must be kept."""
     latest, before = 0, tuple(own.velocity for own in followed.limits)
     for order in followed.orders:
@@ -213,10 +213,10 @@ def _velocity_limits(followed: Followed, motion: Motion) -> Iterator[Measured]:
                 fastest = np.abs(motion.velocity[k, begin : order.end])
                 at = int(np.argmax(fastest))
                 slack = (EXACT + 1.5 * followed.reserve) * own.velocity
-                yield Measured("fast", begin + at, float(fastest[at]), top + slack)
+                yield Allowance("fast", begin + at, float(fastest[at]), top + slack)
 
 
-def _quick_stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
+def _quick_stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge quick stops: at once, on the straightest way."""
     for order in followed.orders:
         if order.kind != QUICK_STOP:
@@ -233,7 +233,7 @@ def _quick_stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
                 strict=True,
             )
         )
-        yield Measured(QUICK_STOP, order.begin, min(rests - begin, (end - begin)) * followed.cycle, allowed)
+        yield Allowance(QUICK_STOP, order.begin, min(rests - begin, (end - begin)) * followed.cycle, allowed)
         if rests == begin:
             continue
         for x, v, own in zip(motion.position, motion.velocity, followed.limits, strict=True):
@@ -243,10 +243,12 @@ def _quick_stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
             jump = np.abs(steps)
             if len(jump):
                 allowed = own.quick[1] * followed.cycle**3
-                yield Measured("jump", begin + int(np.argmax(jump)), float(jump.max()), EXACT + allowed)
+                yield Allowance("jump", begin + int(np.argmax(jump)), float(jump.max()), EXACT + allowed)
 
 
-def _reactions(followed: Followed, motion: Motion, reactions: Mapping[int, int | None]) -> Iterator[Measured]:
+def _reactions(
+    followed: Followed, motion: IssuedMotion, reactions: Mapping[int, int | None]
+) -> Iterator[Allowance]:
     """Judge setpoints that would not have come without the order, in time."""
     for order in followed.orders:
         if order.begin not in reactions:
@@ -258,10 +260,10 @@ def _reactions(followed: Followed, motion: Motion, reactions: Mapping[int, int |
         late = followed.after(allowed)
         if found is None or (found > late and _obeys_anyway(motion, order, order.begin + late)):
             continue  # what came before ends or goes on as the order asks
-        yield Measured("reaction", order.begin, found * followed.cycle, allowed)
+        yield Allowance("reaction", order.begin, found * followed.cycle, allowed)
 
 
-def _obeys_anyway(motion: Motion, order: Order, at: int) -> bool:
+def _obeys_anyway(motion: IssuedMotion, order: TimedOrder, at: int) -> bool:
     """Whether axes go on as before, and slow down or go the right way."""
     velocity = motion.velocity[:, at]
     right = velocity == 0.0

@@ -17,7 +17,7 @@ ROOM = 100.0  # m (or rad) beyond the targets, where no setpoint is
 
 
 @attrs.frozen(kw_only=True)
-class Order:
+class TimedOrder:
     """A command that holds, and how fast it may be followed.
 
     Attributes
@@ -85,7 +85,7 @@ class Inputs:
     cycle: float = inf
 
 
-def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tuple[Order, ...]:
+def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tuple[TimedOrder, ...]:
     """Read rows of inputs as the block's header tells.
 
     Parameters
@@ -97,7 +97,7 @@ def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tup
     last : int
         Cycle after the last one.
     """
-    found = list[Order]()
+    found = list[TimedOrder]()
     for order in sorted(_changes(begins, rows, inputs), key=lambda order: order.begin):
         if found and found[-1].begin == order.begin:
             found.pop()
@@ -107,13 +107,13 @@ def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tup
     return tuple(attrs.evolve(order, end=end) for order, end in zip(found, ends, strict=True))
 
 
-def _same(order: Order, before: Order) -> bool:
+def _same(order: TimedOrder, before: TimedOrder) -> bool:
     """Whether nothing new is told; stops know no velocity limit."""
     again = (order.kind, order.values, order.refused) == (before.kind, before.values, before.refused)
     return again and not order.denied and (order.kind in (STOP, QUICK_STOP) or order.tops == before.tops)
 
 
-def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Order]:
+def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[TimedOrder]:
     """Give an order for every row, and one where wrong values have lasted too long."""
     place = {name: number for number, name in enumerate(inputs.names)}
 
@@ -157,7 +157,7 @@ def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Ord
             kind, values = STOP, ()
         if was != (kind, values):
             edge = begin
-        yield Order(
+        yield TimedOrder(
             begin=begin,
             end=begin,
             kind=kind,
@@ -169,7 +169,9 @@ def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[Ord
         )
         if wrong and not latched and end > since + inputs.held:
             kind, values, latched, edge, neutral = STOP, (), wrong, since + inputs.held, False
-            yield Order(begin=edge, end=edge, kind=kind, values=values, tops=tops, edge=edge, refused=wrong)
+            yield TimedOrder(
+                begin=edge, end=edge, kind=kind, values=values, tops=tops, edge=edge, refused=wrong
+            )
 
 
 def _strays(row: Sequence[float], place: Mapping[str, int], inputs: Inputs) -> bool:

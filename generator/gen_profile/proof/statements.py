@@ -11,19 +11,19 @@ from gen_profile.proof.followed import (
     EXACT,
     IN_VELOCITY,
     TO_STOP,
+    Allowance,
     Followed,
-    Measured,
-    Motion,
+    IssuedMotion,
     never,
     slowing,
 )
-from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, Order
+from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, TimedOrder
 
 BARELY = 5e-7  # share of the greatest velocity, within which one certainly is reached
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 
 
-def truths(followed: Followed, motion: Motion) -> Iterator[Measured]:
+def truths(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge the outputs that are truth values."""
     done, busy, aborted, error, enabled = (
         followed.issued[name] != 0.0 for name in ("bDone", "bBusy", "bCommandAborted", "bError", "bEnabled")
@@ -45,22 +45,22 @@ def truths(followed: Followed, motion: Motion) -> Iterator[Measured]:
         wrong[own] = stands
         if order.refused:
             shown = followed.issued["nErrorId"][order.begin : order.end][:2]  # in that cycle or the next
-            yield Measured("refused", order.begin, float((shown != order.refused).all()), 0.0)
+            yield Allowance("refused", order.begin, float((shown != order.refused).all()), 0.0)
         if order.denied:
             shown = aborted[order.begin] or error[order.begin]
-            yield Measured("unanswered", order.begin, float(not shown), 0.0)
+            yield Allowance("unanswered", order.begin, float(not shown), 0.0)
             may_be[order.begin :] = True
         if before and before.kind in (POSITION, VELOCITY):
             may_be[order.begin :] = True
             if before.kind == POSITION and order.edge == order.begin and not over:
-                yield Measured("not aborted", order.begin, float(not aborted[order.begin]), 0.0)
+                yield Allowance("not aborted", order.begin, float(not aborted[order.begin]), 0.0)
         over, ended = over and order.edge < order.begin, (done | error)[own]
         if order.kind == POSITION and not over and quiet[own].any():
             until = int(np.argmax(ended)) if ended.any() else len(ended)
             yield from never("vanished", quiet[own][:until], order.begin)
         arrives = order.kind == POSITION and there[order.begin + 1 : order.end].any()
         if arrives and not (over or followed.reserve or done[own].any()):
-            yield Measured("not done", order.begin, 1.0, 0.0)
+            yield Allowance("not done", order.begin, 1.0, 0.0)
         over = over or bool(ended.any())
         if order.kind == STOP and not followed.reserve:
             latest = order.begin + followed.after(slowing(followed, motion.velocity[:, order.begin], TO_STOP))
@@ -73,7 +73,7 @@ def truths(followed: Followed, motion: Motion) -> Iterator[Measured]:
     yield from never("aborted", aborted & ~may_be & ~error)
 
 
-def velocities(followed: Followed, motion: Motion) -> Iterator[Measured]:
+def velocities(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """BInVelocity where the stick's velocity is issued, and nowhere else."""
     shown = followed.issued["bInVelocity"] != 0.0
     sticks = np.zeros(followed.cycles, dtype=bool)
@@ -86,7 +86,7 @@ def velocities(followed: Followed, motion: Motion) -> Iterator[Measured]:
     yield from never("in velocity", shown & ~(sticks & (apart <= IN_VELOCITY)))
 
 
-def stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
+def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge stops by the ends that were stated when they came."""
     stated = f"fStopLow{followed.axes[0].suffix}" in followed.issued
     if stated:
@@ -94,7 +94,7 @@ def stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
             followed.of("fStopHigh") - motion.position, motion.position - followed.of("fStopLow")
         )
         apart = np.abs(followed.of("fStopDistance") - ends).max(axis=0)
-        yield Measured("stop distance", int(np.argmax(apart)), float(apart.max()), EXACT)
+        yield Allowance("stop distance", int(np.argmax(apart)), float(apart.max()), EXACT)
     targets = list[tuple[float, ...]]()
     for order in followed.orders:
         if order.kind == POSITION:
@@ -115,18 +115,18 @@ def stops(followed: Followed, motion: Motion) -> Iterator[Measured]:
             else:
                 distance = float(followed.issued[axis.of("fStopDistance")][begin])
                 low, high = place[0] - distance, place[0] + distance
-            yield Measured("ends", begin, max(low - place.min(), place.max() - high), EXACT)
+            yield Allowance("ends", begin, max(low - place.min(), place.max() - high), EXACT)
             leads = (
                 known[k] + followed.limits[k].velocity * takes
             )  # a stop that is not planned yet may end there
-            yield Measured("loose", begin, max(place[0] - low, high - place[0]), leads)
+            yield Allowance("loose", begin, max(place[0] - low, high - place[0]), leads)
 
 
-def numbers(followed: Followed, motion: Motion) -> Iterator[Measured]:
+def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge the outputs that are distances and times."""
     wrong = np.abs(followed.of("fDistanceToGo") - motion.way).max(axis=0) * motion.goes
     at = int(np.argmax(wrong))
-    yield Measured("distance", at, float(wrong[at]), max(EXACT, followed.wander))
+    yield Allowance("distance", at, float(wrong[at]), max(EXACT, followed.wander))
     if followed.reserve:
         return  # calming goes on as long as it must
     time, slot = followed.issued["fTimeToGo"], 0.1 * followed.period + 2.0 * followed.cycle
@@ -139,24 +139,24 @@ def numbers(followed: Followed, motion: Motion) -> Iterator[Measured]:
             continue
         first = max(order.begin, rests - followed.after(0.5 * followed.period))
         error = np.abs(time[first:rests] - (rests - np.arange(first, rests)) * followed.cycle)
-        yield Measured("time", first + int(np.argmax(error)), float(error.max()), slot)
+        yield Allowance("time", first + int(np.argmax(error)), float(error.max()), slot)
         begun = order.begin + followed.after(followed.reaction + followed.period)
         if begun < rests:
             left = (rests - np.arange(begun, rests)) * followed.cycle
             over = np.abs(time[begun:rests] - left) - ROUGHLY * left
-            yield Measured("time", begun + int(np.argmax(over)), float(over.max()), followed.period)
+            yield Allowance("time", begun + int(np.argmax(over)), float(over.max()), followed.period)
         after = np.abs(time[rests + 1 : order.end])
-        yield Measured("time", rests + 1, float(after.max(initial=0.0)), EXACT)
+        yield Allowance("time", rests + 1, float(after.max(initial=0.0)), EXACT)
 
 
-def _is_end(motion: Motion, order: Order, at: int) -> bool:
+def _is_end(motion: IssuedMotion, order: TimedOrder, at: int) -> bool:
     """Whether an axis that stands has nowhere else to go."""
     if order.kind == POSITION:
         return bool(np.abs(motion.position[:, at] - order.values).max() <= EXACT)
     return not any(order.values)
 
 
-def promises(followed: Followed, motion: Motion) -> Iterator[Measured]:
+def promises(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge the promise, and why it is dropped."""
     promise, why = followed.issued["bPromise"] != 0.0, followed.issued["nPromise"]
     yield from never("promise", promise != (why == 0.0))
@@ -171,4 +171,4 @@ def promises(followed: Followed, motion: Motion) -> Iterator[Measured]:
             end = next((at for at in seen if at >= begin), followed.cycles)
             yield from never("kept", promise[begin:end], begin)
     for at in seen:
-        yield Measured("not given back", at, float(why[at] == 2.0), 0.0)
+        yield Allowance("not given back", at, float(why[at] == 2.0), 0.0)

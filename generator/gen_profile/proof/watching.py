@@ -16,7 +16,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import faults
-from gen_profile.proof.orders import QUICK_STOP, Ends, Inputs, Order, orders
+from gen_profile.proof.orders import QUICK_STOP, Ends, Inputs, TimedOrder, orders
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.block import RESERVE
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
@@ -30,7 +30,7 @@ _PLAY = CFUNCTYPE(c_int, c_void_p, POINTER(c_double), c_long, POINTER(c_double))
 
 
 @attrs.frozen(kw_only=True)
-class Watch:
+class BlockWatch:
     """What is known of a block and its machine.
 
     Attributes
@@ -55,7 +55,7 @@ class Watch:
     reaction: float
 
     @classmethod
-    def of(cls, text: str, block: BlockInstance, histories: Histories) -> Watch:
+    def of(cls, text: str, block: BlockInstance, histories: Histories) -> BlockWatch:
         """Look at a block's text."""
         stated, held = _STATED.search(text), _HELD.search(text)
         usual = LEAST_REACTION + REACTION * histories.period
@@ -80,7 +80,7 @@ class Watch:
         """Of the machine."""
         return self.histories.spec
 
-    def orders(self, script: Script) -> tuple[Order, ...]:
+    def orders(self, script: Script) -> tuple[TimedOrder, ...]:
         """Read what a script tells the block."""
         begins, rows = self._changes(script)
         last = script.begins[-1] + script.longest + script.settle + script.watch
@@ -96,7 +96,7 @@ class Watch:
         changed = np.flatnonzero(np.concatenate([[True], (kept[1:] != kept[:-1]).any(axis=1)]))
         return begins[changed].tolist(), kept[changed]
 
-    def marks(self, told: Sequence[Order]) -> list[int]:
+    def marks(self, told: Sequence[TimedOrder]) -> list[int]:
         """Tell before which cycles the block is to be copied: those of orders that hold long enough."""
         least = self.reaction / self.cycle
         return [
@@ -106,7 +106,7 @@ class Watch:
         ]
 
     def faults(
-        self, period: float, script: Script, told: Sequence[Order], block: CalledBlock, run: BlockRun
+        self, period: float, script: Script, told: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
     ) -> tuple[str, ...]:
         """Say what is wrong, each in words that end a sentence.
 
@@ -116,7 +116,7 @@ class Watch:
             s, of the slowest swing that the block is told of.
         script : Script
             Of a history.
-        told : sequence of Order
+        told : sequence of TimedOrder
             Of that script.
         block : CalledBlock
         run : BlockRun
@@ -125,7 +125,7 @@ class Watch:
         return tuple(faults(*self.followed(period, script, told, block, run)))
 
     def followed(
-        self, period: float, script: Script, told: Sequence[Order], block: CalledBlock, run: BlockRun
+        self, period: float, script: Script, told: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
     ) -> tuple[Followed, dict[int, int | None]]:
         """Give what is to be judged."""
         assert run.trace is not None
