@@ -18,6 +18,11 @@ COUNTS = "counts"
 AXIS_UNITS = (*UNITS, COUNTS)
 
 
+def units_of(si: str) -> dict[str, float]:
+    """List the units that measure what an SI unit does, and how many of them make one."""
+    return {unit: per for unit, (measured, per) in UNITS.items() if measured == si}
+
+
 @attrs.frozen(kw_only=True)
 class AxisScale:
     """How a controller counts one axis.

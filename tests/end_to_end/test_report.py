@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 
 import attrs
 import numpy as np
@@ -340,3 +341,19 @@ def test_the_report_is_named_after_the_spec_by_default(tmp_path, monkeypatch):
     outcome = run_here("report", *QUICK, "--set", "name=bay-3")
     assert outcome.code == 0 and [path.name for path in tmp_path.iterdir()] == ["bay-3.html"]
     assert outcome.out.splitlines()[0] == "bay-3" and "bay-3.html" in outcome.out
+
+
+@pytest.mark.slow
+def test_a_delivered_file_is_reported_on_by_its_manifest(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run_here("--preset", "paper", "--export", "plc", "--export", "csv", "--out", "deploy").code == 0
+    told = run_here("report", "deploy/paper.st", "--no-compare")
+    assert (told.code, told.errors) == (0, [])
+    text = " ".join(Reader(Path("paper.html").read_text("utf-8")).texts)
+    assert hashlib.sha256(Path("deploy/paper.st").read_bytes()).hexdigest() in text.replace(" ", "")
+    table = Path("deploy/paper.csv")
+    table.write_text(table.read_text("utf-8") + "\n", "utf-8")
+    altered = run_here("report", table, "--no-compare", "--out", "other.html")
+    assert altered.code == 2 and "paper.csv was altered after its export" in altered.errors[-1]
+    assert "--set: is for a spec" in run_here("report", "deploy/paper.st", "--set", "name=x").errors[-1]
+    assert not Path("other.html").exists()

@@ -1,6 +1,8 @@
 """Identification against simulated machines whose parameters are known."""
 
+import math
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -430,3 +432,37 @@ def test_decimal_commas_are_told(parse, text, cure):
     with pytest.raises(SpecError) as refused:
         parse(text)
     assert str(refused.value).endswith(cure)
+
+
+TURNED = [f"{index / 10:.1f}" for index in range(100)]
+
+
+def headed(time, value, below=()):
+    rows = [(seconds, f"{math.sin(float(seconds)) / 10:.6f}") for seconds in TURNED]
+    text = "\n".join(";".join(row) for row in [(time, value), *below, *rows])
+    places = {"columns": ("1", "2"), "after": 0.0, "quantity": "angle", "load": "payload"}
+    return partial(parse_swing, text, "log.csv", **places)
+
+
+@pytest.mark.parametrize(
+    ("heads", "below", "second", "radian"),
+    [
+        (("t", "angle"), [], 1.0, 1.0),
+        (("time_ms", "angle_deg"), [], 1e3, 180.0 / math.pi),
+        (("Zeit [ms]", "Winkel (°)"), [], 1e3, 180.0 / math.pi),
+        (("t", "angle"), [("[s]", "[deg]")], 1.0, 180.0 / math.pi),
+        (("t (from the stop)", "angle (filtered)"), [], 1.0, 1.0),
+    ],
+)
+def test_units_are_read_off_the_names(heads, below, second, radian):
+    read, as_said = (
+        headed(*heads, below)(per_second=a, per_unit=b) for a, b in ((None, None), (second, radian))
+    )
+    assert np.array_equal(read.times, as_said.times) and np.array_equal(read.values, as_said.values)
+
+
+@pytest.mark.parametrize("name", ["Gyroscope x (rad/s)", "ax [m/s²]", "U (mV)", "angle_mm"])
+def test_a_column_of_something_else_is_no_angle(name):
+    with pytest.raises(OutputError, match=rf"column '{re.escape(name)}' is in .*, which measures no angle"):
+        headed("t", name)(per_second=None, per_unit=None)
+    assert len(headed("t", name)(per_second=None, per_unit=1.0).times) == len(TURNED)

@@ -171,3 +171,15 @@ def test_counts_are_as_large_as_is_said():
 def test_columns_that_are_not_there(columns):
     with pytest.raises(OutputError, match=r"(MEANING=COLUMN|nothing of this machine|no column).*[.]$"):
         parse_log(table(["a", "b"], TIMES, TIMES), "log.csv", paper(), columns)
+
+
+def test_a_chosen_column_is_in_the_unit_that_its_name_states():
+    rows = "\n".join(f"{index},{index}" for index in range(20))
+    text = f"Zeit [ms],Gyroscope x (rad/s)\n{rows}"
+    chosen = "time=1,payload_angle=2"
+    with pytest.raises(OutputError, match="payload_angle is in rad/s, which measures no angle"):
+        parse_log(text, "log.csv", paper(), chosen)
+    log = parse_log(text.replace("rad/s", "deg"), "log.csv", paper(), chosen)
+    assert log.times[1] == pytest.approx(1e-3)
+    assert log.angles["payload"][1] == pytest.approx(np.radians(1.0))
+    assert parse_log(text, "log.csv", paper(), "time=1,payload_angle_rad=2").angles["payload"][1] == 1.0

@@ -55,10 +55,13 @@ if TYPE_CHECKING:
 @click.option(
     "--unit",
     metavar="UNIT",
-    help="Unit of the log's values: rad, deg, m, mm or um; for counts the size of one, as in '0.09 deg'.",
+    help="Unit of the log's values: rad, deg, m, mm or um; by default what their column's name says; for "
+    "counts the size of one, as in '0.09 deg'.",
 )
 @click.option(
-    "--time-unit", type=click.Choice(["s", "ms", "us"]), default="s", help="Unit of its times; s by default."
+    "--time-unit",
+    type=click.Choice(["s", "ms", "us"]),
+    help="Unit of its times; by default what their column's name says, or s.",
 )
 @click.option(
     "--after",
@@ -93,7 +96,7 @@ def identify(
     columns: str,
     signal: str,
     unit: str | None,
-    time_unit: str,
+    time_unit: str | None,
     after: float,
     free: tuple[str, ...],
     at: str | None,

@@ -80,18 +80,18 @@ def report(
     from gen_profile.cli.progress import progress
     from gen_profile.report.print import printed, require_browser
 
-    made_of = (
-        _of_block(chosen.path)
-        if chosen.path is not None and _holds_block(chosen.path)
-        else _of_design(
-            chosen.spec(),
-            formats,
-            log=log,
-            log_start=log_start,
-            log_columns=log_columns,
-            compared=not no_compare,
-        )
-    )
+    options = {
+        "log": log,
+        "log_start": log_start,
+        "log_columns": log_columns,
+        "compared": not no_compare,
+    }
+    if chosen.path is not None and _holds_block(chosen.path):
+        made_of = _of_block(chosen.path)
+    elif chosen.path is not None and _is_artefact(chosen.path):
+        made_of = _of_artefact(chosen.path, **options)
+    else:
+        made_of = _of_design(chosen.spec(), formats, **options)
     from pathlib import Path
 
     out = path or Path(f"{made_of.name}.html")
@@ -119,7 +119,7 @@ def report(
 
 for parameter in report.params:
     if parameter.name == "spec_path":
-        parameter.metavar = "[SPEC.toml|BLOCK]"
+        parameter.metavar = "[SPEC.toml|FILE]"
 
 
 class _Subject(NamedTuple):
@@ -142,12 +142,36 @@ def _of_block(path: Path) -> _Subject:
     from gen_profile.cli import words
     from gen_profile.report.planner import planner_report
 
-    context, taken = click.get_current_context(), {"spec_path", "path", "fields", "as_json", "debug"}
-    for parameter in context.command.params:
-        source = context.get_parameter_source(parameter.name or "")
-        if parameter.name not in taken and source is click.core.ParameterSource.COMMANDLINE:
+    taken = {"spec_path", "path", "fields", "as_json", "debug"}
+    for parameter in click.get_current_context().command.params:
+        if parameter.name not in taken and _given(parameter.name):
             raise SpecError(f"{parameter.opts[0]}: is for a design, and {path} holds a planner block.")
     return _Subject(name=path.stem, make=partial(planner_report, path), words=words.planner_report)
+
+
+def _of_artefact(path: Path, **options: Any) -> _Subject:
+    """Make a report of the design that a file comes from."""
+    from gen_profile.cli import words
+    from gen_profile.report.build import artefact_report
+
+    for name, option in {"preset": "--preset", "overrides": "--set", "formats": "--export"}.items():
+        if _given(name):
+            raise SpecError(f"{option}: is for a spec; {path} is of the one in its manifest.")
+    return _Subject(
+        name=path.name.partition(".")[0], make=partial(artefact_report, path, **options), words=words.report
+    )
+
+
+def _given(name: str | None) -> bool:
+    source = click.get_current_context().get_parameter_source(name or "")
+    return source is click.core.ParameterSource.COMMANDLINE
+
+
+def _is_artefact(path: Path) -> bool:
+    """Tell specs from exported files by their suffix."""
+    from gen_profile_exporters.registry import formats
+
+    return path.is_file() and any(path.name.endswith(known.suffix) for known in formats().values())
 
 
 def _holds_block(path: Path) -> bool:

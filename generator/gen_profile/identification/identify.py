@@ -19,6 +19,7 @@ from gen_profile.identification.log_table import read_text
 from gen_profile.identification.measurements import (
     GREATEST,
     SI_UNITS,
+    TIME_UNITS,
     DirectReading,
     Measurement,
     Period,
@@ -33,9 +34,8 @@ from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
-from gen_profile.units import UNITS
+from gen_profile.units import units_of
 
-TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}  # how many of them make a second
 NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
 
 
@@ -126,7 +126,7 @@ def read_swing(
     columns: tuple[str, str],
     signal: str = "angle",
     unit: str | None = None,
-    time_unit: str = "s",
+    time_unit: str | None = None,
     after: float = 0.0,
 ) -> SwingLog:
     """Read a logged swing of a spec's machine.
@@ -140,9 +140,10 @@ def read_swing(
     signal : str
         What the values are: ``angle`` or ``sway`` of the first load, or of a named one, ``angle:hook``.
     unit : str or None
-        Of the values; rad or m by default. A number before it is the size of one count, ``0.09 deg``.
-    time_unit : str
-        One of `TIME_UNITS`.
+        Of the values; by default what their column's name says, or rad or m. A number before it is the size
+        of one count, ``0.09 deg``.
+    time_unit : str or None
+        One of `TIME_UNITS`; by default what the column's name says, or s.
     after : float
         Time in s from which on the axes stood still.
 
@@ -160,12 +161,12 @@ def read_swing(
         raise SpecError(f"signal: unknown signal {quantity!r}{suggestion(quantity, SI_UNITS)}")
     if load not in loads:
         raise SpecError(f"signal: unknown load {load!r}{suggestion(load, loads)}")
-    per_unit = _per_unit(unit or SI_UNITS[quantity], quantity, SI_UNITS[quantity])
+    per_unit = None if unit is None else _per_unit(unit, quantity, SI_UNITS[quantity])
     return parse_swing(
         read_text(Path(path), "swing"),
         str(path),
         columns=columns,
-        per_second=TIME_UNITS[time_unit],
+        per_second=None if time_unit is None else TIME_UNITS[time_unit],
         per_unit=per_unit,
         after=after,
         quantity=quantity,
@@ -177,7 +178,7 @@ def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
     """Say how many of a log's steps make a radian or metre."""
     name = unit.lstrip("0123456789. ").rstrip()
     size = unit.rstrip().removesuffix(name).strip()
-    fitting = [known for known, (si, _) in UNITS.items() if si == si_unit]
+    fitting = units_of(si_unit)
     if name not in fitting:
         raise SpecError(f"unit: {unit!r} does not measure {quantity}{suggestion(name, fitting)}")
     try:
@@ -186,7 +187,7 @@ def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
         step = 0.0
     if step <= 0.0:
         raise SpecError(f"unit: {unit!r} shall begin with the size of a count, as in 0.0879 {name}.")
-    return UNITS[name][1] / step
+    return fitting[name] / step
 
 
 def identify(

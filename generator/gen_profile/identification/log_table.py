@@ -6,6 +6,7 @@ import codecs
 import csv
 import errno
 import math
+import re
 from array import array
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -22,6 +23,13 @@ from gen_profile.suggestion import suggestion
 
 SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
 MOST_BYTES = 1 << 25
+# units as loggers write them, in brackets or behind a name, and what they are called here
+SPELLINGS = {"°": "deg", "degree": "deg", "degrees": "deg", "grad": "deg", "radian": "rad", "radians": "rad"}
+SPELLINGS |= {"sec": "s", "seconds": "s", "sek": "s", "µs": "us", "μs": "us", "µm": "um", "μm": "um"}
+_BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")
+_BEHIND = re.compile(r".+[_ ](ms|us|s|rad|deg|mm|um)", re.IGNORECASE)
+# what is a unit, and no remark, though it may be one that nothing here is measured in
+_UNIT = re.compile(r".*[/^²³·].*|[kmµ]?[VAWNg]|kg|t|%|k?Hz|m?bar|°C|K|min|h|ms|us|s|rad|deg|m|mm|um")
 GREATEST = 1e12  # ms since 1970, or counts: beyond it a logger wrote rubbish
 # what a file begins with that is no text, and what to do about it
 OTHERS = {
@@ -88,6 +96,17 @@ class LogTable:
             return int(column) - 1
         known = suggestion(column, names) if names else f"; there are {len(self.rows[head])}, without names."
         raise OutputError(f"{source}: there is no column {column!r}{known}")
+
+    def unit(self, head: int, place: int) -> str:
+        """Read a column's unit off its name or off the cell below that; empty where neither tells one."""
+        if not self.is_head(head):
+            return ""
+        below = self.cell(head + 1, place).strip("[]() ") if head + 1 < len(self.rows) else ""
+        name = self.cell(head, place)
+        found = _BRACKETED.fullmatch(name) or _BEHIND.fullmatch(name)
+        unit = found[1] if found else below
+        unit = SPELLINGS.get(unit.lower(), unit)
+        return unit if _UNIT.fullmatch(unit) else ""
 
     def is_head(self, row: int) -> bool:
         """Tell whether a row holds more than numbers."""

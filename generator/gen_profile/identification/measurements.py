@@ -6,6 +6,7 @@ Every uncertainty is one standard deviation.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 import attrs
 import numpy as np
@@ -13,12 +14,14 @@ import numpy as np
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.identification.log_table import read_table
 from gen_profile.motion.profile import Array, read_only
+from gen_profile.units import units_of
 
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
 _VALUE = rf"({_NUMBER})\s*(?:±|\+-|\+/-)\s*({_NUMBER})"
 LEAST_SAMPLES = 16
 GREATEST = 1e9  # s, swings or SI units of any reading
 FINEST = 1e-9  # of a value, to which no instrument reads it
+TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}  # how many of them make a second
 SI_UNITS = {"angle": "rad", "sway": "m"}  # of what may be logged of a load
 
 
@@ -159,8 +162,8 @@ def parse_swing(
     source: str,
     *,
     columns: tuple[str, str],
-    per_second: float,
-    per_unit: float,
+    per_second: float | None,
+    per_unit: float | None,
     after: float,
     quantity: str,
     load: str,
@@ -176,10 +179,10 @@ def parse_swing(
         Where it comes from, for errors.
     columns : (str, str)
         Of time, and of the value: names, or numbers from 1. Dates and times are told in s from the first.
-    per_second : float
-        How many of the time's unit make a second.
-    per_unit : float
-        How many of the value's unit make a radian or metre.
+    per_second : float or None
+        How many of the time's unit make a second; None for what the column's name says, or s.
+    per_unit : float or None
+        How many of the value's unit make a radian or metre; None for what the column's name says, or one.
     after : float
         Time in s from which on the axes stood still; earlier rows are left out.
     quantity, load : str
@@ -194,8 +197,23 @@ def parse_swing(
     named = {column for column in columns if not column.isdecimal()}
     head = next((row for row in range(len(cells.rows)) if named & set(cells.rows[row])), 0)
     places = [cells.place(head, column, source) for column in columns]
-    table = cells.numbers(head, places, source) / (per_second, per_unit)
+    known = ((per_second, "time", TIME_UNITS), (per_unit, quantity, units_of(SI_UNITS[quantity])))
+    scales = [
+        per or _per_stated(cells.cell(head, place), cells.unit(head, place), source, measured, units)
+        for place, (per, measured, units) in zip(places, known, strict=True)
+    ]
+    table = cells.numbers(head, places, source) / scales
     return cut_swing(table[:, 0], table[:, 1], source, after=after, quantity=quantity, load=load)
+
+
+def _per_stated(name: str, unit: str, source: str, measured: str, units: Mapping[str, float]) -> float:
+    """Say how many of the unit that a column states, if it does, make an SI unit."""
+    if unit and unit not in units:
+        raise OutputError(
+            f"{source}: column {name!r} is in {unit}, which measures no {measured}; name another column, or "
+            "state the unit if the name is wrong."
+        )
+    return units[unit] if unit else 1.0
 
 
 def cut_swing(

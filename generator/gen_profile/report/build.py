@@ -10,8 +10,10 @@ from typing import Any
 import attrs
 
 from gen_profile.artefacts.manifest import sha256, versions
+from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.designs.design import Design, design
+from gen_profile.errors import OutputError
 from gen_profile.evaluation.phrases import move, uncertain
 from gen_profile.progress import Progress, untold
 from gen_profile.report.content import Page
@@ -21,7 +23,9 @@ from gen_profile.report.measured_section import measured_verdict
 from gen_profile.report.page import render, require_pages
 from gen_profile.report.sections import facts, sections, verdict
 from gen_profile.spec.model import Spec
+from gen_profile.verification.check import provenance, spec_of
 from gen_profile.verification.verdict import Check
+from gen_profile_exporters.registry import format_of
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -117,6 +121,33 @@ def report(
     progress("writing the report")
     page = _page(outcome, comparison, measured).with_fields(fields)
     return Report(design=outcome, comparison=comparison, measured=measured, content=render(page))
+
+
+def artefact_report(path: Path, **options: Any) -> Report:
+    """Report on a delivered file: on the design that its manifest tells, which makes the same bytes again.
+
+    Parameters
+    ----------
+    path : Path
+    options
+        As `report` takes them.
+
+    Raises
+    ------
+    GenProfileError
+        As of `report`; or the file is not what its manifest says, or this version writes another one.
+    """
+    content = read_artefact(path)
+    manifest = manifest_beside(path, content)
+    spec = spec_of(manifest, path)
+    if provenance(manifest, content, spec) != "matches":
+        raise OutputError(f"{path} was altered after its export: gen-profile check judges it as it is now.")
+    made = report(spec, [format_of(path)], **options)
+    if sha256(content) not in {artefact.sha256 for artefact in made.design.artefacts}:
+        raise OutputError(
+            f"{path} comes from another version of gen-profile, and is another file now; export again."
+        )
+    return made
 
 
 def _page(outcome: Design, comparison: Comparison | None, measured: Measured | None) -> Page:

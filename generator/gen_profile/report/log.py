@@ -166,7 +166,24 @@ def _known_columns(
     _require(known, names, spec, where)
     if columns is not None:
         places = [table.place(head, column, where) for column in chosen.values()]
+        known = {
+            meaning: _required(_in_stated_unit(meaning, table.unit(head, place), where), spec, where)
+            for meaning, place in zip(chosen, places, strict=True)
+        }
     return head, list(zip(places, known.values(), strict=True))
+
+
+def _in_stated_unit(meaning: str, unit: str, where: str) -> str:
+    """Put the unit that a column's name states behind what it is chosen for, where that tells none."""
+    found = _COLUMN.fullmatch(meaning)
+    if found is None or found["unit"] or not unit:
+        return meaning
+    if not _COLUMN.fullmatch(f"time_{unit}"):
+        raise OutputError(
+            f"{where}: the column of {meaning} is in {unit}, which measures no {found['quantity']}; choose "
+            "another one, or say the unit behind the meaning if the name is wrong."
+        )
+    return f"{meaning}_{unit}"
 
 
 def column_meanings(text: str, source: str, spec: Spec) -> list[tuple[str, str]]:
