@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 
 from gen_profile.artefacts.manifest import sha256, versions
-from gen_profile.artefacts.reading import manifest_beside, read_artefact
+from gen_profile.artefacts.reading import read_artefact
 from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.designs.design import Design, design
 from gen_profile.errors import OutputError
@@ -23,7 +23,7 @@ from gen_profile.report.measured_section import measured_verdict
 from gen_profile.report.page import render, require_pages
 from gen_profile.report.sections import facts, sections, verdict
 from gen_profile.spec.model import Spec
-from gen_profile.verification.check import provenance, spec_of
+from gen_profile.verification.check import provenance, spec_and_manifest
 from gen_profile.verification.verdict import Check
 from gen_profile_exporters.registry import format_of
 
@@ -138,8 +138,7 @@ def artefact_report(path: Path, **options: Any) -> Report:
         As of `report`; or the file is not what its manifest says, or this version writes another one.
     """
     content = read_artefact(path)
-    manifest = manifest_beside(path, content)
-    spec = spec_of(manifest, path)
+    spec, manifest = spec_and_manifest(path, content, None)
     if provenance(manifest, content, spec) != "matches":
         raise OutputError(f"{path} was altered after its export: gen-profile check judges it as it is now.")
     made = report(spec, [format_of(path)], **options)
