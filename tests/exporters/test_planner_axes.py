@@ -94,7 +94,7 @@ def test_all_axes_arrive_together_as_soon_as_the_slowest_can(block, target):
     shorter, rate = CYCLE * ends[0] / 1.10, np.sqrt([G / ROPE])
     reached = [farthest(shorter, rate, limits[:3]) for limits in LIMITS.values()]
     assert any(reach < place for reach, place in zip(reached, target, strict=True))
-    assert np.argmax(out["fVelocity_x"] != 0.0) <= 20  # though two are planned
+    assert np.argmax(out["fVelocity_x"] != 0.0) <= 21  # though two are planned
 
 
 @pytest.mark.parametrize(("cycles", "x"), [(6000, 12.0), (8000, 4.0)])

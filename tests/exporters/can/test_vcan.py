@@ -185,5 +185,5 @@ def assert_quick_stop(scenario):
 @on("bus-down")
 def test_a_bus_that_goes_down_ends_the_stream(scenario):
     assert scenario.codes[0] == 6
-    assert "own time-outs" in scenario.stream["reason"]
+    assert "to stop by itself" in scenario.stream["reason"]
     assert scenario.codes == (6, 6)
