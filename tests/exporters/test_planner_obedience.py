@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from command_line import run_here
+from counted_block import CountedBlock, compile_counting
 from driven_block import CYCLE, Driver, require_limits
 from generator.planned_machines import swing
 
@@ -352,9 +353,26 @@ class TestZones:
         assert planner.hold(30.0, target=30.0).done[-1]
         assert planner.hold(30.0, target=19.0).error_id[-1] == 8
 
+    def test_they_keep_to_the_operations_of_a_cycle(self):
+        """All of them in use, where a cycle may spend least."""
+        changes = ["planner.zones=true", "planner.events=true", "export.cycle_time=0.001"]
+        block = CountedBlock(compile_counting(planner_block(preset_spec("bay-crane", changes)).text))
+        for k in range(8):
+            block.inputs |= {f"aBlockedLow[{k}]": 30.0 + k, f"aBlockedHigh[{k}]": 30.5 + k}
+            slow = {"Low": 1.0 + 3.0 * k, "High": 2.0 + 3.0 * k, "Limit": 0.3}
+            block.inputs |= {f"aSlow{name}[{k}]": value for name, value in slow.items()}
+        parts = [block.hold(3000)]
+        parts += [block.hold(9000, bExecute=1.0, fTarget=target) for target in (19.0, 3.0, 25.0, 10.0)]
+        parts += [block.hold(6000, bVelocity=1.0, fVelocityCommand=speed) for speed in (1.1, -1.1)]
+        assert max(part["operations"].max() for part in parts) <= 5000
+        with pytest.raises(SpecError, match=r"planner\.operations: at least 5000 with zones"):
+            planner_block(preset_spec("bay-crane", ["planner.zones=true", "planner.operations=3000"]))
+
     def test_more_of_them_than_the_block_takes_are_refused(self, planner):
         with pytest.raises(SpecError, match="takes 8 such intervals, found 9"):
             planner.restrict(blocked=[(1.0, 2.0)] * 9)
+        with pytest.raises(SpecError, match="slow: must be rows of 3 numbers"):
+            planner.restrict(slow=[(1.0, 2.0)])
         with pytest.raises(SpecError, match=r"state planner\.zones = true"):
             gp.Planner(SPEC).restrict(slow=[(1.0, 2.0, 0.1)])
 

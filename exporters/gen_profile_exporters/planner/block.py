@@ -203,7 +203,7 @@ def _with_while_loops(text: str) -> str:
 
 
 def _narrow(text: str) -> str:
-    """Indent by tabs, as a block shall be no longer than 100 kB."""
+    """Indent by tabs, which keeps the text short."""
     return re.sub("(?m)^ +", lambda margin: "\t" * (len(margin[0]) // 4), text)
 
 

@@ -32,7 +32,10 @@ from gen_profile_exporters.planner.block import (
 DECLARED = re.compile(r"(?m)^\s+(\w+) : ")  # in Structured Text
 FEWEST_CYCLES = 4  # in a slot
 STEADY = 1e-3  # change of a live parameter on the way, relative to the end of its range, that counts as none
-OPERATIONS = 3000  # that a cycle of a millisecond may spend, if the spec states none
+OPERATIONS, ZONED_OPERATIONS = (
+    3000,
+    5000,
+)  # least ones; a cycle may spend so many for each ms, if the spec states none
 CALM = 0.1  # of the allowed sway, which the block leaves as it is
 MARGIN = 2.0  # between targets and the travel's ends, relative to the allowed sway, for calming
 HALF_A_SLOT = 0.05  # of the allowed sway: where stated errors leave so much, it is worth that time
@@ -80,6 +83,9 @@ def planner_block(spec: Spec) -> PlannerBlock:
     if period / (SLOTS_PER_PERIOD * spec.export.cycle_time) < FEWEST_CYCLES:
         most = period / (SLOTS_PER_PERIOD * FEWEST_CYCLES)
         raise SpecError(f"export.cycle_time: at most {most:.2g} s for a machine that swings this fast.")
+    least = ZONED_OPERATIONS if spec.planner.zones else OPERATIONS
+    if spec.planner.operations and spec.planner.operations < least:
+        raise SpecError(f"planner.operations: at least {least} with zones, found {spec.planner.operations}.")
     interpolant = found.interpolant
     constants = PlannerConstants(
         name=spec.name,
@@ -97,8 +103,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
         lowers=lowered(spec),
         events=spec.planner.events,
         zones=spec.planner.zones,
-        operations=spec.planner.operations
-        or max(OPERATIONS, round(OPERATIONS * spec.export.cycle_time / 1e-3)),
+        operations=spec.planner.operations or max(least, round(least * spec.export.cycle_time / 1e-3)),
         periods=tuple(2.0 * np.pi / _rates(found, point)[0][0] for point in corners(found.live)),
         calm=CALM * min(spec.check.residual_sway.values()),
         doubt=float(frequency_errors(spec).max(initial=0.0)),

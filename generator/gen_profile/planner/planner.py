@@ -182,17 +182,21 @@ class Planner:
         SpecError
             The block has no zones (``planner.zones``), or not so many.
         """
-        columns = dict(zip(ZONES, (*zip(*blocked, strict=True),) or ((), ()), strict=False))
-        columns |= dict(zip(ZONES[2:], (*zip(*slow, strict=True),) or ((), (), ()), strict=True))
+        columns: dict[str, list[float]] = {}
+        for what, rows, names in (("blocked", blocked, ZONES[:2]), ("slow", slow, ZONES[2:])):
+            found = [[float(_column(what, value, 1)[0]) for value in row] for row in rows]
+            if any(len(row) != len(names) for row in found):
+                raise SpecError(f"{what}: must be rows of {len(names)} numbers, found {list(rows)!r}.")
+            columns |= {name: [row[k] for row in found] for k, name in enumerate(names)}
         suffix = self._axes[axis].suffix
         for name, values in columns.items():
-            names = [known for known in self._inputs if known.startswith(f"{name}{suffix}[")]
-            if len(values) > len(names):
+            places = [known for known in self._inputs if known.startswith(f"{name}{suffix}[")]
+            if len(values) > len(places):
                 raise SpecError(
-                    f"Planner: the block takes {len(names)} such intervals, found {len(values)}"
-                    + ("." if names else "; state planner.zones = true.")
+                    f"Planner: the block takes {len(places)} such intervals, found {len(values)}"
+                    + ("." if places else "; state planner.zones = true.")
                 )
-            self._inputs |= dict.fromkeys(names, 0.0) | dict(zip(names, values, strict=False))
+            self._inputs |= dict.fromkeys(places, 0.0) | dict(zip(places, values, strict=False))
 
     def step(
         self,
