@@ -274,7 +274,8 @@ class TestOneAxis:
 
     @pytest.mark.parametrize(
         ("of", "sound", "broken", "number"),
-        [*((of, "Wait > 4", "FALSE", OFF) for of in VENDORS), ("codesys", "bBusy := TRUE", "bBusy := FALSE", WORK),
+        [*((of, "Wait > 4", "FALSE", OFF) for of in VENDORS),
+         ("codesys", "bBusy := TRUE", "bBusy := FALSE", WORK),
          ("siemens", "IF Enable AND NOT Before THEN Busy := TRUE", "IF FALSE THEN Busy := TRUE", WORK)],
     )  # fmt: skip
     def test_power_and_guidance_that_do_not_come_are_errors(self, bay, of, sound, broken, number):
