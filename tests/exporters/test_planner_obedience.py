@@ -393,8 +393,10 @@ def test_events_tell_what_was_commanded_and_what_came_of_it(tmp_path):
     assert "the target is reached, at 2" in run_here("planner", "explain", events).out
     plain = run_here("planner", "play", *write_plain(tmp_path), "--events", events)
     assert (plain.code, "state planner.events = true" in plain.err) == (2, True)
-    events.write_text("time_s,code,value\n1,21,here\n")
-    assert "line 2: three numbers are wanted" in run_here("planner", "explain", events).err
+    for wrong in ("1,21,here", "1,inf,0", "1,21"):
+        events.write_text(f"time_s,code,value\n{wrong}\n")
+        refused = run_here("planner", "explain", events)
+        assert (refused.code, "line 2: three numbers are wanted" in refused.err) == (2, True)
 
 
 def write_plain(folder):

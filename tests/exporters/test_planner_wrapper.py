@@ -12,6 +12,7 @@ from exporters.planner_benches import ON, START, UNITS, Converter, PlannerBench
 from exporters.st_interpreter import FunctionBlock
 from exporters.vendor_axes import VENDORS
 
+from gen_profile.errors import ExportError
 from gen_profile.planner.design import planner_block
 from gen_profile.spec.reading import parse_spec
 from gen_profile_exporters import motion_libraries
@@ -433,3 +434,10 @@ def test_arrays_are_handed_over_element_by_element(bay):
     assert "aPlaces :=" not in wrapper.body
     outputs = FunctionBlock(wrapper.text(), (block.text(),)).call(aPlaces=[1.0, 2.0, 3.0, 4.0])
     assert outputs["adoubled"] == [2.0, 4.0, 6.0, 8.0]
+
+
+def test_a_live_parameter_that_meets_a_variable_of_the_wrapper_is_refused(bay):
+    (rope,) = (v for v in bay.variables if v.name == "fL1")
+    gain = attrs.evolve(bay, variables=(*bay.variables, attrs.evolve(rope, name="fgain")))
+    with pytest.raises(ExportError, match="name the live parameter otherwise"):
+        planner_wrapper(gain, {"": 1.0}, motion_libraries.VELOCITY)

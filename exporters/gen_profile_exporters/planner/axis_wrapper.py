@@ -7,10 +7,12 @@ rising edge: the block then takes the axes over where they stand.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 
 import attrs
 
+from gen_profile.errors import ExportError
 from gen_profile_exporters.block_source import BlockSource, BlockVariable
 from gen_profile_exporters.motion_libraries import (
     CODESYS,
@@ -181,11 +183,32 @@ def planner_wrappers(block: BlockSource, units: Mapping[str, float], format_: st
 
 
 def planner_wrapper(block: BlockSource, units: Mapping[str, float], library: MotionLibrary) -> BlockSource:
-    """Write the block around a planner block, with the same inputs and outputs but the axes' own."""
+    """Write the block around a planner block, with the same inputs and outputs but the axes' own.
+
+    Raises
+    ------
+    ExportError
+        A live parameter's input has the name of a variable of the wrapper.
+    """
     name = f"{block.name}_{'Axis' if library.axis_type else 'Velocity'}"
     outer = [v for v in block.variables if v.section in INTERFACE]
     hidden = {f"{key}{n}" for n in units for key in (*SETPOINTS, *(PLACES if library.axis_type else ()))}
     told = [attrs.evolve(v, comment=COMMENTS.get(v.name, v.comment)) for v in outer if v.name not in hidden]
+    variables = (
+        *(
+            BlockVariable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type)
+            for n in units
+            if library.axis_type
+        ),
+        POWER,
+        *told,
+        *(attrs.evolve(v, name=v.name.format(n=n)) for n in units for v in library.variables),
+        STAGE,
+        *_own(block, units, library),
+    )
+    counted = Counter(v.name.lower() for v in variables)  # the language has one case only
+    if twice := [v.name for v in variables if counted[v.name.lower()] > 1]:
+        raise ExportError(f"{name} has a variable {twice[0]} of its own; name the live parameter otherwise.")
     return BlockSource(
         header=HEADER.format(
             name=name,
@@ -195,18 +218,7 @@ def planner_wrapper(block: BlockSource, units: Mapping[str, float], library: Mot
             patience=PATIENCE,
         ),
         name=name,
-        variables=(
-            *(
-                BlockVariable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type)
-                for n in units
-                if library.axis_type
-            ),
-            POWER,
-            *told,
-            *(attrs.evolve(v, name=v.name.format(n=n)) for n in units for v in library.variables),
-            STAGE,
-            *_own(block, units, library),
-        ),
+        variables=variables,
         body=_body(block, units, library),
     )
 

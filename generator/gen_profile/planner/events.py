@@ -111,7 +111,7 @@ def read_events(text: str) -> list[Event]:
         try:
             time, code, value = (float(row[name] or "") for name in COLUMNS)
             found.append(Event(time, int(code), value))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             line = ",".join(str(cell) for cell in row.values())
             raise SpecError(
                 f"events, line {rows.line_num}: three numbers are wanted, found {line!r}."
