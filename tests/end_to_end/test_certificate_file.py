@@ -247,3 +247,40 @@ def test_options_that_do_not_go_together_are_refused(copied):
     scaled = run_here("check", artefact, "--certify", "--scale", "cart=0.5")
     assert scaled.code == 2 and "--certify" in scaled.errors[0]
     assert issubclass(SpecError, gp.GenProfileError)
+
+
+def test_the_main_job_certifies_the_file_of_each_format_as_the_check_does(tmp_path):
+    made = run_here(*BARE, "--export", "csv", "--export", "plc", "--certify", "--out", tmp_path, "--json")
+    assert made.code == 0, made.err
+    stated = {}
+    for name in ("single-pendulum-crane.csv", "single-pendulum-crane.st"):
+        beside = tmp_path / f"{name}.certificate.json"
+        again = run_here("check", tmp_path / name, "--certificate", beside, "--json")
+        assert again.code == 0, again.err
+        stated[name] = again.document["certificate"]
+    said = made.document["certificate"]
+    assert said == max(stated.values(), key=lambda one: one["bounds_m"]["payload"]) and said["proved"]
+    text = run_here(*BARE, "--certify", "--out", tmp_path)
+    assert text.code == 0 and "all with L0 from 2.7 to 3.3" in text.out
+    assert text.out.count("certificate.json") == 1 and "payload" in text.out.split("proved", 1)[1]
+
+
+def test_the_main_job_says_what_is_not_proved_and_writes_no_certificate(tmp_path, certified):
+    check = certified[1].document["check"]
+    limit = max(row["residual_peaks_m"]["payload"] for row in check["scenarios"]) * 1.004
+    tight = ("--set", f"check.residual_sway={limit}")
+    made = run_here(*SPEC, *tight, "--certify", "--out", tmp_path, "--json")
+    assert made.code == 4 and made.document["check"]["passed"] and not made.document["certificate"]["proved"]
+    assert made.errors[0].startswith("Not proved: The payload is proved to sway by at most")
+    assert [path.suffix for path in tmp_path.iterdir() if "certificate" in path.name] == []
+    wide = ("--set", "check.uncertain={L0=0.1, m=0.9, g=0.1, c=0.9}", "--set", "check.residual_sway=9")
+    refused = run_here(*BARE, *wide, "--certify", "--out", tmp_path, "--json")
+    assert refused.code == 4 and refused.document["certificate"] is None
+    assert "too wide" in refused.errors[-2] and (tmp_path / "single-pendulum-crane.csv").exists()
+    failed = run_here(*BARE, "--set", "check.residual_sway=0.001", "--certify", "--out", tmp_path, "--json")
+    assert failed.code == 4 and failed.document["certificate"] is None
+
+
+def test_a_proof_without_a_check_is_refused_before_anything_is_designed(tmp_path):
+    refused = run_here(*BARE, "--certify", "--no-check", "--out", tmp_path / "none")
+    assert refused.code == 2 and "--no-check" in refused.errors[0] and not (tmp_path / "none").exists()

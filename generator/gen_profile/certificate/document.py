@@ -6,6 +6,7 @@ import binascii
 import json
 import zlib
 from collections.abc import Iterator, Mapping
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,15 @@ class Certificate:
                 "or differ too much: narrow the ranges (check.uncertain), or take more time.",
             )
         return tuple(sway.reason for sway in self.sways if sway.reason is not None)
+
+    @property
+    def demand(self) -> float:
+        """Share of its limit that the worst sway is proved to take up at most; infinite without a bound."""
+        whole = self.share == 1.0
+        return max(
+            sway.bound / sway.limit.allowed if whole and sway.bound is not None else inf
+            for sway in self.sways
+        )
 
     @property
     def after(self) -> tuple[ProvedSway, ...]:

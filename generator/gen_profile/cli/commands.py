@@ -16,6 +16,7 @@ from gen_profile.cli.options import (
     PathType,
     SpecChoice,
     block_plot_option,
+    certify_option,
     complete_presets,
     export_option,
     folder_option,
@@ -26,12 +27,13 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
-from gen_profile.errors import OutputError, SpecError
+from gen_profile.errors import CertificateError, OutputError, SpecError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from gen_profile.certificate.document import Certificate
+    from gen_profile.designs.design import Design
     from gen_profile.proof.check import BlockJudgement
     from gen_profile.spec.model import Spec
     from gen_profile.verification.check import Judgement
@@ -59,6 +61,7 @@ def cli() -> None:
 @click.option("--method", metavar="NAME", help="Solver (auto, indirect or direct), or a shaper such as zvd.")
 @click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
+@certify_option
 @output_options
 def design(
     chosen: SpecChoice,
@@ -71,9 +74,12 @@ def design(
     method: str | None,
     no_check: bool,
     keep_failed: bool,
+    certify: bool,
     as_json: bool,
 ) -> None:
     """Design, export and verify (the default)."""
+    if certify and no_check:
+        raise SpecError("--certify: proves what the check has passed; leave --no-check out.")
     columns = None if csv_columns is None else [name.strip() for name in csv_columns.split(",")]
     stated = {
         "export.cycle_time": cycle_time,
@@ -92,12 +98,33 @@ def design(
 
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
-    print_outcome(outcome.to_dict(), words.design(outcome), as_json)
+    certificates, refusals = _certificates(outcome) if certify and outcome.passed else ({}, [])
+    worst = max(certificates.values(), key=lambda found: found.demand, default=None)
+    document = outcome.to_dict() | {"certificate": None if worst is None else worst.to_dict()}
+    print_outcome(document, words.design(outcome, certificates), as_json)
     warn(outcome.check)
     if not outcome.passed and outcome.check is not None:
         before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
         kept = "The files were kept." if outcome.artefacts else f"Nothing was written{before}."
         fail(outcome.check.reasons(), kept)
+    if refusals:
+        leave_unproved(refusals)
+
+
+def _certificates(outcome: Design) -> tuple[dict[Path, Certificate], list[str]]:
+    """Prove the first file of each format, which is the one that holds the motion; say what is not proved."""
+    firsts = {artefact.format: artefact.path for artefact in reversed(outcome.artefacts)}
+    found: dict[Path, Certificate] = {}
+    reasons: dict[str, None] = {}  # each once, in order
+    for name in reversed(firsts.values()):
+        path = outcome.folder / name
+        try:
+            found[path] = _certified(path, outcome.spec)
+        except CertificateError as error:
+            reasons[str(error)] = None
+        else:
+            reasons |= dict.fromkeys(found[path].reasons())
+    return found, list(reasons)
 
 
 @cli.command(epilog="Example: gen-profile compare --preset paper --plot comparison.png")
@@ -156,9 +183,7 @@ def compare(
     help="Judge the motion begun elsewhere along an axis, in m or rad. Repeatable.",
 )
 @click.option("--csv", "table_path", type=OutputFile(), help="Write all scenarios as a table, one row each.")
-@click.option(
-    "--certify", is_flag=True, help="Prove it for all machines in the ranges, and write a certificate."
-)
+@certify_option
 @click.option("--certificate", type=InputFile(), help="Check a certificate again, and nothing else.")
 @click.option(
     "--histories",
@@ -199,7 +224,7 @@ def check(
     else:
         _require_only(options, (*MOTION_OPTIONS, "certify"), "a planner block, and this is none")
         judgement = _check_motion(artefact, spec, **{name: options[name] for name in MOTION_OPTIONS})
-        certificate = _certified(judgement, spec) if options["certify"] else None
+        certificate = _certified(judgement.path, spec) if _to_certify(judgement, options) else None
         text, document = words.judgement(judgement, certificate), judgement.to_dict()
         document["certificate"] = None if certificate is None else certificate.to_dict()
         unproved = () if certificate is None else certificate.reasons()
@@ -246,20 +271,20 @@ def _check_motion(
     return judgement
 
 
-def _certified(judgement: Judgement, spec: Spec | None) -> Certificate | None:
-    """Prove what a check has found, unless it failed."""
+def _to_certify(judgement: Judgement, options: Mapping[str, Any]) -> bool:
+    """Tell whether to prove what a check has found; not where it failed."""
+    if options["certify"] and judgement.variant is not None:
+        raise SpecError("--certify: is for the motion as planned, without --scale, --mirror and --offset.")
+    return options["certify"] and judgement.check.passed
+
+
+def _certified(path: Path, spec: Spec | None) -> Certificate:
     from gen_profile.certificate.from_file import certify_artefact
     from gen_profile.cli.progress import progress
 
-    if judgement.variant is not None:
-        raise SpecError("--certify: is for the motion as planned, without --scale, --mirror and --offset.")
-    if not judgement.check.passed:
-        return None
     with progress() as tell:
         return certify_artefact(
-            judgement.path,
-            spec,
-            progress=lambda done, total: tell("proving it for boxes of machines", done, total),
+            path, spec, progress=lambda done, total: tell("proving it for boxes of machines", done, total)
         )
 
 

@@ -244,6 +244,9 @@ block_plot_option = click.option(
     type=PictureFile(),
     help="Draw a planner block's worst history (or --history), and the worst over the live parameters.",
 )
+certify_option = click.option(
+    "--certify", is_flag=True, help="Prove it for all machines in the ranges, and write a certificate."
+)
 
 
 def output_options(command: Command) -> Command:

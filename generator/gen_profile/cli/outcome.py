@@ -63,7 +63,7 @@ def leave_unproved(reasons: Sequence[str]) -> NoReturn:
     """Say why there is no certificate, though the check passed, and end the program."""
     for sentence in reasons:
         click.echo(f"Not proved: {sentence}", err=True)
-    click.echo("The check by co-simulation passed; no certificate was written.", err=True)
+    click.echo("The check by co-simulation passed; what is not proved has no certificate.", err=True)
     sys.exit(CertificateError.exit_code)
 
 

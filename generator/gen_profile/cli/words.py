@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from io import StringIO
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -54,8 +55,8 @@ COLUMNS = {
 }
 
 
-def design(outcome: Design) -> str:
-    """Tell what was designed, how it was judged and where it lies."""
+def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingProxyType({})) -> str:
+    """Tell what was designed, how it was judged, what is proved of each file, and where they lie."""
     solution, figures = outcome.plan.solution, outcome.figures
     found = f"{outcome.spec.solver.method} shaper, fed with a {outcome.spec.solver.base} move"
     if solution is not None:
@@ -72,6 +73,7 @@ def design(outcome: Design) -> str:
         ("residual sway", residual),
         *([] if outcome.check is None else _groups(outcome.check)),
         ("check", _verdict(outcome.check)),
+        *(row for found in certificates.values() for row in _proved(found)),
         *_cost_of_lag(figures, outcome.spec.cost.effort),
     ]
     if outcome.spec.plant.defaults:
@@ -80,6 +82,7 @@ def design(outcome: Design) -> str:
         names = ", ".join(solution.redundant)
         rows.append(("left out", f"sensitivity to {names}: {solution.redundancy}"))
     rows += [("wrote", str(outcome.folder / artefact.path)) for artefact in outcome.artefacts]
+    rows += [row for path, found in certificates.items() for row in _written(path, found)]
     return _block(outcome.spec.name, rows)
 
 
@@ -98,8 +101,7 @@ def judgement(found: Judgement, certificate: Certificate | None = None) -> str:
         *findings,
         *_groups(check),
         ("check", _verdict(check)),
-        *([] if certificate is None else _proved(certificate)),
-        *([("wrote", str(certificate_path(found.path)))] if certificate and certificate.proved else []),
+        *([] if certificate is None else (*_proved(certificate), *_written(found.path, certificate))),
     ]
     return _block(str(found.path), rows)
 
@@ -107,6 +109,10 @@ def judgement(found: Judgement, certificate: Certificate | None = None) -> str:
 def certificate(path: Path, found: Certificate) -> str:
     """Tell what a certificate proves."""
     return _block(str(path), list(_proved(found)))
+
+
+def _written(path: Path, found: Certificate) -> list[tuple[str, str]]:
+    return [("wrote", str(certificate_path(path)))] if found.proved else []
 
 
 def _proved(found: Certificate) -> Iterator[tuple[str, str]]:
