@@ -6,9 +6,11 @@ from generator.free_swings import inside, swing
 
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.estimation import estimate
-from gen_profile.identification.fit import SwingingMachine
+from gen_profile.identification.fit import SwingingMachine, fit_of
 from gen_profile.identification.measurements import Period, SwingLog
-from gen_profile.identification.misfit import spectrum
+from gen_profile.identification.misfit import Explanation, likeliest, spectrum
+from gen_profile.identification.swing_model import swing_model
+from gen_profile.identification.uncertainty import uncertainty
 from gen_profile.plants.registry import find_plant
 
 CRANE, HOIST = find_plant("double-pendulum-crane"), find_plant("single-pendulum-crane")
@@ -43,6 +45,27 @@ def test_a_damping_that_is_wrong_is_named():
     exact = swing(HOIST.nominal() | {"c": 1500.0}, TIMES, [0.15, 0.0])
     with pytest.raises(InfeasibleProblem, match=r"with another c than the spec's .*; free c, too"):
         estimate(hoist(c=0.0), ["L0"], [], [log_of(exact + NOISE)])
+
+
+@pytest.mark.parametrize(("c", "spec"), [(1500.0, 200.0), (1500.0, 500.0)])
+def test_of_parameters_that_explain_a_log_alike_none_is_advised(c, spec):
+    """A swing tells c/m and nothing else of both, so m must not be blamed where c is another one."""
+    exact = swing(HOIST.nominal() | {"c": c}, TIMES, [0.15, 0.0])
+    with pytest.raises(InfeasibleProblem, match="measure one of them directly") as told:
+        estimate(hoist(c=spec), ["L0"], [], [log_of(exact + NOISE)])
+    assert "another m than" in str(told.value) and "another c than" in str(told.value)
+    assert "free m" not in str(told.value) and "such as" not in str(told.value)
+
+
+def test_what_explains_a_log_worse_beyond_chance_is_not_named():
+    """The same rope, once by a search that was stopped many standard deviations beside its end."""
+    log = log_of(swing(HOIST.nominal(), TIMES, [0.15, 0.0]) + NOISE)
+    fit = fit_of(hoist(), ["L0"], [], [swing_model(HOIST, HOIST.nominal(), (0.0, 4.0), log)])
+    unknowns, noise = fit.solve()
+    wide = uncertainty(fit, unknowns, noise).standard[0]
+    off = [unknowns + beside * wide * np.eye(len(unknowns))[0] for beside in (0.0, 1.0, 40.0)]
+    best, near, far = (Explanation(freed=("L0",), fit=fit, unknowns=place, noise=noise) for place in off)
+    assert likeliest([far, near, best]) == (near, best)
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from scipy.stats import norm
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.fit import Fit, SwingingMachine, fit_of
 from gen_profile.identification.measurements import DirectReading, Period, SwingLog
-from gen_profile.identification.misfit import Misfit, explanation, misfits
+from gen_profile.identification.misfit import Misfit, explanations, misfits
 from gen_profile.identification.swing_model import swing_model
 from gen_profile.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.motion.profile import Array
@@ -154,25 +154,24 @@ def _require_unexplained(fit: Fit, found: Sequence[Misfit | None]) -> None:
 
     The range of a wrong model holds nothing.
     """
-    explained = explanation(fit, _taken_as_exact(fit))
-    if explained is None:
+    explained = explanations(fit, _taken_as_exact(fit))
+    if not explained:
         return
     model, left = next((m, one) for m, one in zip(fit.models, found, strict=True) if one is not None)
     units = {q.name: q.unit for q in fit.machine.plant.parameters}
-    values = ", ".join(f"{name} {value:.4g} {units[name]}" for name, value in explained.values.items())
-    freed = " and ".join(explained.freed)
-    cure = f"free {freed}, too, or measure {'it' if len(explained.freed) == 1 else 'them'} directly"
-    if explained.instead:
-        others = " or ".join(explained.instead)
-        cure = (
-            f"another {others} would do as well: measure one of them directly, or free the one that is "
-            f"known least, such as {freed}"
-        )
+    others = [
+        f"another {' and '.join(one.freed)} than the spec's "
+        f"({', '.join(f'{name} {value:.4g} {units[name]}' for name, value in one.values.items())})"
+        for one in explained
+    ]
+    freed = " and ".join(explained[0].freed)
+    cure = f"free {freed}, too, or measure {'it' if len(explained[0].freed) == 1 else 'them'} directly"
+    if len(others) > 1:
+        cure = "the log cannot tell which: measure one of them directly, or free one that is not certain"
     raise InfeasibleProblem(
         f"The log of {model.log.load} is not of this machine: a swing of {left.rms:.2g} {model.log.unit} "
         f"RMS, {left.rms / left.noise:.2g} times the noise, is left of it, strongest at "
-        f"{left.frequency:.3g} rad/s. Nothing is left with another {freed} than the "
-        f"spec's ({values}); {cure}."
+        f"{left.frequency:.3g} rad/s. Nothing is left with {', or with '.join(others)}; {cure}."
     )
 
 

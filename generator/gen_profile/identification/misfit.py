@@ -31,7 +31,8 @@ CHANCE = 1e-4  # how rarely noise may look like a line
 DOUBT = 1.5  # by which a median of so few may be off
 ROUNDING = 0.35  # of a sensor's step: rounding errors repeat with the swing, and are seen to elsewhere
 EXACT = 1e-5  # of the swing, which is the integrator's business
-ALIKE = 1.1  # times the least sum of squares, within which parameters explain the same
+ALIKE = 1.1  # times the least sum of squares, within which parameters may explain the same
+DISTINCT = 12.0  # by which the squares of an explanation are more by chance once in 2000 times
 STARTS = (1.0, 0.5, 0.7, 1.4, 2.0)  # times a parameter of the spec, where it is looked for
 ROUGHLY = 1200  # samples, four of each of the fastest swings, by which parameters are chosen
 TRIED = 2  # parameters at once that may explain what is left
@@ -129,7 +130,7 @@ def misfits(fit: Fit, unknowns: Array) -> tuple[Misfit | None, ...]:
     return tuple(misfit(m, parameters, residuals) for m, residuals in zip(fit.models, left, strict=True))
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(kw_only=True, eq=False)
 class Explanation:
     """Parameters whose other values leave nothing but noise.
 
@@ -137,22 +138,37 @@ class Explanation:
     ----------
     freed : tuple of str
         That were taken as known.
-    instead : tuple of str
-        That would do as well as the last of them.
-    values : dict of str to float
-        Of all that are then identified.
+    fit : Fit
+        That identifies them, too.
+    unknowns : (u,) array
+        At its best.
+    noise : (logs,) array
+        Standard deviation of every log's samples then, in rad or m.
     """
 
     freed: tuple[str, ...]
-    instead: tuple[str, ...]
-    values: dict[str, float]
+    fit: Fit
+    unknowns: Array
+    noise: Array
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All parameters that are then identified."""
+        found = self.fit.parameters(self.unknowns)
+        return {name: found[name] for name in self.fit.names}
+
+    def squares(self, noise: Array) -> float:
+        """Sum up the squares of what is left, in variances of some noise."""
+        residuals, _ = self.fit.residuals(self.unknowns, noise)
+        return float(residuals @ residuals)
 
 
-def explanation(fit: Fit, more: Sequence[str]) -> Explanation | None:
+def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
     """Find which parameters, identified as well, leave nothing but noise of every log.
 
-    They are taken up one by one, first the one with which small swings fit best, which is fast to find out.
-    Of those that fit as well the one is taken that has to leave the spec least.
+    As few as will do are taken up, first those with which small swings fit best, which is fast to find out.
+    Each is tried on the whole logs then. Where logs tell some apart beyond chance (by the likelihood ratio;
+    S. S. Wilks, 1938), those that explain less are left out; what remains explains them alike.
 
     Parameters
     ----------
@@ -160,27 +176,36 @@ def explanation(fit: Fit, more: Sequence[str]) -> Explanation | None:
     more : sequence of str
         Parameters that were taken as known.
     """
-    freed: tuple[str, ...] = ()
     machine = fit.machine
     logs = [shortened(m.log, m.plant, machine.parameters, m.q_a, ROUGHLY) for m in fit.models]
     rough = attrs.evolve(
         fit, models=tuple(attrs.evolve(m, log=log) for m, log in zip(fit.models, logs, strict=True))
     )
+    begun: list[tuple[str, ...]] = [()]
     for _ in range(min(TRIED, len(more))):
-        tried = {
-            name: _of_small_swings(rough.freed((*freed, name)), name) for name in more if name not in freed
+        sets = {
+            frozenset((*freed, name)): (*freed, name) for freed in begun for name in more if name not in freed
         }
+        tried = {freed: _of_small_swings(rough.freed(freed), freed[-1]) for freed in sets.values()}
         least = min(one.squares for one in tried.values())
-        if not math.isfinite(least):
-            return None
-        alike = {name: one for name, one in tried.items() if one.squares <= ALIKE * least}
-        best = min(alike, key=lambda name: alike[name].moved)
-        freed = (*freed, best)
-        if (values := _nothing_left(attrs.evolve(alike[best].fit, models=fit.models))) is not None:
-            return Explanation(
-                freed=freed, instead=tuple(name for name in alike if name not in freed), values=values
-            )
-    return None
+        alike = {freed: one for freed, one in tried.items() if one.squares <= ALIKE * least < math.inf}
+        found = [
+            explained
+            for freed, one in alike.items()
+            if (explained := _nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
+        ]
+        if found:
+            return likeliest(found)
+        begun = list(alike)
+    return ()
+
+
+def likeliest(found: Sequence[Explanation]) -> tuple[Explanation, ...]:
+    """Leave out explanations that another one surpasses beyond chance."""
+    noise = np.min([one.noise for one in found], axis=0)
+    squares = [one.squares(noise) for one in found]
+    enough = min(squares) + DISTINCT
+    return tuple(one for one, left in zip(found, squares, strict=True) if left <= enough)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -193,13 +218,10 @@ class _SmallSwings:
         That begins where it is.
     squares : float
         Left of all logs; infinite where they do not tell the parameters.
-    moved : float
-        How far a parameter had to leave the spec for that, relative.
     """
 
     fit: Fit
     squares: float = math.inf
-    moved: float = math.inf
 
 
 def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
@@ -215,12 +237,11 @@ def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
         except (InfeasibleProblem, np.linalg.LinAlgError):
             continue
         squares = float(sum(residuals @ residuals for residuals in small.left(unknowns)))
-        moved = float(np.abs(unknowns[: len(fit.names)] - fit.expected).max())
-        found.append(_SmallSwings(fit=fit.beginning(fit.parameters(unknowns)), squares=squares, moved=moved))
+        found.append(_SmallSwings(fit=fit.beginning(fit.parameters(unknowns)), squares=squares))
     return min(found, key=lambda one: one.squares)
 
 
-def _nothing_left(fit: Fit) -> dict[str, float] | None:
+def _nothing_left(fit: Fit, freed: tuple[str, ...]) -> Explanation | None:
     """Identify the parameters; None where lines are left even so, or a range is of no use."""
     try:
         unknowns, noise = fit.solve()
@@ -230,4 +251,4 @@ def _nothing_left(fit: Fit) -> dict[str, float] | None:
     values = unknowns[: len(fit.names)]
     if any(misfits(fit, unknowns)) or (around.standard > WIDEST * np.abs(values)).any():
         return None
-    return dict(zip(fit.names, map(float, values * fit.scale), strict=True))
+    return Explanation(freed=freed, fit=fit, unknowns=unknowns, noise=noise)
