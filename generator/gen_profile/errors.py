@@ -52,9 +52,20 @@ class OutputError(GenProfileError):
 
 
 class InfeasibleProblem(GenProfileError):
-    """No motion meets the requirements."""
+    """No motion meets the requirements.
+
+    Parameters
+    ----------
+    sentences : str
+    duration : float, optional
+        s, which the move takes at least, where that alone is in the way.
+    """
 
     exit_code = 3
+
+    def __init__(self, sentences: str, *, duration: float | None = None) -> None:
+        super().__init__(sentences)
+        self.duration = duration
 
 
 class SolverDiverged(GenProfileError):

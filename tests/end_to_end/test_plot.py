@@ -270,7 +270,7 @@ def test_where_matplotlib_is_not_installed_the_program_says_so_too(tmp_path):
 
 def test_where_no_method_has_a_motion_there_is_nothing_to_draw(tmp_path):
     nothing = Comparison(
-        spec=preset_spec("paper"), rows=(), left_out={}, efficient=frozenset(), recommended={}
+        spec=preset_spec("paper"), rows=(), left_out={}, too_slow={}, efficient=frozenset(), recommended={}
     )
     with pytest.raises(OutputError, match="no method has a motion for this move"):
         gp.plot(nothing, tmp_path / "picture.png")

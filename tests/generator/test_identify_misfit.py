@@ -47,12 +47,11 @@ def test_a_damping_that_is_wrong_is_named():
         estimate(hoist(c=0.0), ["L0"], [], [log_of(exact + NOISE)])
 
 
-@pytest.mark.parametrize(("c", "spec"), [(1500.0, 200.0), (1500.0, 500.0)])
-def test_of_parameters_that_explain_a_log_alike_none_is_advised(c, spec):
+def test_of_parameters_that_explain_a_log_alike_none_is_advised():
     """A swing tells c/m and nothing else of both, so m must not be blamed where c is another one."""
-    exact = swing(HOIST.nominal() | {"c": c}, TIMES, [0.15, 0.0])
+    exact = swing(HOIST.nominal() | {"c": 1500.0}, TIMES, [0.15, 0.0])
     with pytest.raises(InfeasibleProblem, match="measure one of them directly") as told:
-        estimate(hoist(c=spec), ["L0"], [], [log_of(exact + NOISE)])
+        estimate(hoist(c=200.0), ["L0"], [], [log_of(exact + NOISE)])
     assert "another m than" in str(told.value) and "another c than" in str(told.value)
     assert "free m" not in str(told.value) and "such as" not in str(told.value)
 

@@ -53,6 +53,11 @@ COLUMNS = {
     "perturbed": ("mm", "sway_residual_peak_perturbed_m", 1e3),
     "worst": ("mm", "sway_residual_worst_m", 1e3),
 }
+# what the names of a comparison are
+METHODS = (
+    "optimal-betaN: the optimal motion with cost.sway_weight = N; -orderN, -range: with another robustness.\n"
+    "All others are input shapers, which --method NAME takes."
+)
 
 
 def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingProxyType({})) -> str:
@@ -202,7 +207,7 @@ def _group(group: Mapping[str, Any]) -> str:
 
 
 def comparison(found: Comparison) -> str:
-    """Lay the methods out side by side, with the recommendation below."""
+    """Lay the methods out side by side, below the recommendation."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("method\n")
     first = found.spec.machine().actuated[0].unit
@@ -214,11 +219,8 @@ def comparison(found: Comparison) -> str:
         cells = (number(factor * row.figures[key]) for _, key, factor in COLUMNS.values())
         marks = ("●" if mark else "" for mark in (row.safe, row.method in found.efficient))
         table.add_row(row.method, *cells, *marks)
-    left_out = [f"{method}: {reason}" for method, reason in found.left_out.items()]
-    advice = [
-        f"{kind}: {advice.method or 'none'}. {advice.reason}" for kind, advice in found.recommended.items()
-    ]
-    return "\n".join([f"{found.spec.name}: {_move(found.spec)}", _text(table), *left_out, *advice])
+    title = f"{found.spec.name}: {_move(found.spec)}"
+    return "\n".join([title, "", *found.advice(), _text(table), METHODS, *found.missing()])
 
 
 def robustness(found: Robustness) -> str:

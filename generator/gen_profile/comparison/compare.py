@@ -48,6 +48,8 @@ class Comparison:
     rows : tuple of ComparedMethod
     left_out : dict of str to str
         Methods without a motion for the move, and why.
+    too_slow : dict of str to float
+        Of these the ones that would have a motion in more time: how much in s.
     efficient : frozenset of str
         Methods on the Pareto front.
     recommended : dict of str to Recommendation
@@ -57,8 +59,31 @@ class Comparison:
     spec: Spec
     rows: tuple[ComparedMethod, ...]
     left_out: dict[str, str]
+    too_slow: dict[str, float]
     efficient: frozenset[str]
     recommended: dict[str, Recommendation]
+
+    def advice(self) -> tuple[str, ...]:
+        """Say which methods to take, in short; or that none will do."""
+        given = self.recommended.values()
+        named = [f"{one.aim.capitalize()}: {one.method} ({one.figures})" for one in given if one.method]
+        if not named:
+            return tuple(dict.fromkeys(one.reason for one in given))
+        limit = _limit_in_words(self.spec)
+        return (f"Recommended, of those that keep the residual sway below {limit} on all machines:", *named)
+
+    def missing(self) -> tuple[str, ...]:
+        """Say which methods have no motion: those that want more time together, others with the reason."""
+        by_time: dict[float, list[str]] = {}
+        for method, least in self.too_slow.items():
+            by_time.setdefault(least, []).append(method)
+        slow = "; ".join(f"{', '.join(methods)} (at least {s:g} s)" for s, methods in by_time.items())
+        others = [
+            f"{name}: {' '.join(reason.splitlines())}"
+            for name, reason in self.left_out.items()
+            if name not in self.too_slow
+        ]
+        return (*([f"Need more than {self.spec.move.duration:g} s: {slow}"] if slow else []), *others)
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
@@ -97,6 +122,7 @@ def compare(
     spec = as_spec(spec)
     rows: list[ComparedMethod] = []
     left_out: dict[str, str] = {}
+    too_slow: dict[str, float] = {}
     impossible: dict[str, str] = {}
     listed = tuple(candidates(spec, own))
     for done, candidate in enumerate(listed):
@@ -108,13 +134,16 @@ def compare(
                 rows.append(_row(spec, candidate))
         except GenProfileError as error:
             left_out[candidate.method] = str(error)
-            if candidate.requirements and isinstance(error, InfeasibleProblem):
+            if isinstance(error, InfeasibleProblem) and error.duration is not None:
+                too_slow[candidate.method] = error.duration
+            elif isinstance(error, InfeasibleProblem) and candidate.requirements:
                 impossible[candidate.requirements] = str(error)
     found = {row.method: row.figures for row in rows}
     return Comparison(
         spec=spec,
         rows=tuple(rows),
         left_out=left_out,
+        too_slow=too_slow,
         efficient=efficient(found),
         recommended=recommend(
             {row.method: row.figures for row in rows if row.safe},

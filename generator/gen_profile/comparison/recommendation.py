@@ -17,6 +17,13 @@ OBJECTIVES = (
     "sway_residual_worst_m",
 )
 
+# what a method may be best at: objective, how many of the unit make one of it, unit, what it does
+AIMS = {
+    "least time": ("duration_s", 1.0, "s", "takes the least time"),
+    "least acceleration": ("acceleration_max_m_per_s2", 1.0, "{}/s²", "asks for the least acceleration"),
+    "least sway on the way": ("sway_transient_peak_m", 1e3, "mm", "swings the load least on the way"),
+}
+
 Figures = Mapping[str, float]
 
 
@@ -29,11 +36,17 @@ class Recommendation:
     method : str or None
         None where no method will do.
     reason : str
-        One or more sentences.
+        A sentence.
+    aim : str
+        What it is best at: ``least time``, ``least acceleration`` or ``least sway on the way``.
+    figures : str
+        What it takes there, and the best method of the other kind.
     """
 
     method: str | None
     reason: str
+    aim: str = ""
+    figures: str = ""
 
 
 def efficient(rows: Mapping[str, Figures]) -> frozenset[str]:
@@ -62,43 +75,35 @@ def recommend(
         nothing = f"No method keeps the residual sway below {limit} on all machines."
         return dict.fromkeys(("fastest", "gentlest"), Recommendation(method=None, reason=nothing))
     durations = [row["duration_s"] for row in safe.values()]
-    together = f"Of the methods that keep the residual sway below {limit} on all machines, it "
-    if max(durations) - min(durations) > SAME * min(durations):
-        fastest = _least(safe, "duration_s", 1.0, "s", optimal)
-        speed = Recommendation(method=fastest[0], reason=f"{together}takes the least time {fastest[1]}.")
-    else:
-        fastest = _least(safe, "acceleration_max_m_per_s2", 1.0, f"{unit}/s²", optimal)
-        speed = Recommendation(
-            method=fastest[0],
-            reason=f"{together}asks for the least acceleration {fastest[1]}: "
-            "it leaves the drive the most room to make the move in less time "
-            '(with move.duration = "minimum" each method takes its own shortest time).',
-        )
-    gentlest = _least(safe, "sway_transient_peak_m", 1e3, "mm", optimal)
-    calm = Recommendation(
-        method=gentlest[0], reason=f"{together}swings the load least on the way {gentlest[1]}."
-    )
-    return {"fastest": speed, "gentlest": calm}
+    timed = max(durations) - min(durations) > SAME * min(durations)
+    chosen = {"fastest": "least time" if timed else "least acceleration", "gentlest": "least sway on the way"}
+    return {kind: _least(safe, aim, unit, optimal, limit) for kind, aim in chosen.items()}
 
 
 def _least(
-    rows: Mapping[str, Figures], objective: str, factor: float, unit: str, optimal: Sequence[str]
-) -> tuple[str, str]:
-    """Name the method of the least figure, and tell it beside that of the best method of the other kind."""
+    rows: Mapping[str, Figures], aim: str, unit: str, optimal: Sequence[str], limit: str
+) -> Recommendation:
+    """Take the method of the least figure, and tell it beside that of the best method of the other kind."""
+    objective, factor, of, does = AIMS[aim]
 
     def best(among: list[str]) -> str:
         least = min(rows[method][objective] for method in among)
         alike = [method for method in among if rows[method][objective] <= least * (1.0 + SAME)]
         return min(alike, key=lambda method: rows[method]["sway_residual_worst_m"])
 
+    def figure(method: str) -> str:
+        return f"{number(factor * rows[method][objective])} {of.format(unit)}"
+
     winner = best(list(rows))
-    words = f"({number(factor * rows[winner][objective])} {unit}"
+    words = figure(winner)
     others = [method for method in rows if (method in optimal) != (winner in optimal)]
     if others:
         second = best(others)
-        kind = "optimal motion" if second in optimal else "shaper"
-        words += f"; the best {kind}, {second}: {number(factor * rows[second][objective])} {unit}"
-    return winner, words + ")"
+        words += (
+            f"; the best {'optimal motion' if second in optimal else 'shaper'}, {second}: {figure(second)}"
+        )
+    kept = f"Of the methods that keep the residual sway below {limit} on all machines, it"
+    return Recommendation(method=winner, reason=f"{kept} {does} ({words}).", aim=aim, figures=words)
 
 
 def _dominates(one: Figures, other: Figures) -> bool:

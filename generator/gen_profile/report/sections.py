@@ -244,23 +244,17 @@ def _methods(comparison: Comparison) -> Section:
             for row in comparison.rows
         ],
     )
-    left_out = Terms(rows=list(comparison.left_out.items()))
-    advice = [
-        f"{kind.capitalize()}: {advised.method or 'none'}. {advised.reason}"
-        for kind, advised in comparison.recommended.items()
-    ]
     blocks: list[Block] = [table]
     if comparison.rows:
         figure = comparison_figure(comparison)
         more = " Click on a method's name to show or hide its curves."
         blocks.append(attrs.evolve(figure, caption=figure.caption + more))
-    if comparison.left_out:
-        blocks.append(left_out)
     return Section(
         title="Beside other methods",
         words=(
             "The same move by optimal motions and input shapers on the same machines; this design's is bold.",
-            *advice,
+            *comparison.advice(),
+            *comparison.missing(),
         ),
         blocks=blocks,
     )

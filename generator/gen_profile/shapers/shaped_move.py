@@ -60,10 +60,12 @@ class ShapedMove:
         delay = self.shaper.delay
         stretch = duration - delay
         if stretch < duration * SHORTEST_BASE:
+            least = rounded_up(delay, digits=4)
             raise InfeasibleProblem(
                 f"move.duration: the {self.name} shaper's delay is {delay:.4g} s for this machine, so "
-                f"{duration:g} s leaves no time to move; state at least {rounded_up(delay, digits=4)} s, "
-                "or choose another method."
+                f"{duration:g} s leaves no time to move; state at least {least} s, "
+                "or choose another method.",
+                duration=float(least),
             )
         knots = _knots(self.shaper, self.base, stretch, duration)
         first, last = np.asarray(self.start, dtype=np.float64), np.asarray(self.target, dtype=np.float64)
