@@ -48,9 +48,136 @@ def page(browser):
         assert browser.complaints() == []
 
 
+def look_at(page, view):
+    """Go to a view by its link, as a reader does."""
+    page.find(f"#places a[data-view={view}]").click()
+    page.wait(f"return document.body.dataset.show === '{view}'")
+
+
 @pytest.fixture(autouse=True)
 def _at_a_desk(page):
     page.size(1400, 900)
+    look_at(page, "design")
+
+
+VIEWS = ("design", "compare", "drive", "measure", "take")
+
+
+def test_every_view_has_a_place_in_the_address_and_fits_it(page):
+    heads = """
+        const heads = [...document.querySelectorAll('main h2')].filter((head) => head.checkVisibility());
+        return heads.map((head) => head.textContent)"""
+    seen = {}
+    for view in VIEWS:
+        look_at(page, view)
+        seen[view] = page.run(heads)
+        shown = page.run("return [location.hash.split('/')[0], document.title]")
+        assert shown[0] == ("" if view == "design" else f"#{view}") and len(shown[1].split(" · ")) == 3
+        assert page.run("return document.querySelectorAll('#places [aria-current=page]').length") == 1
+    assert seen["drive"] == ["Drive it yourself"] and seen["measure"] == ["Measured on the machine"]
+    assert seen["take"] == ["Take it away"] and seen["design"][0] == "The machine"
+    assert seen["compare"] == ["Designs", "Robustness", "Spectrum"]
+    page.run("history.back()")
+    page.wait("return document.body.dataset.show === 'measure'")
+    page.run("location.reload()")
+    page.wait("return document.body.dataset?.show === 'measure'")
+    page.wait(SETTLED.format("passed"))
+
+
+def test_a_view_is_shared_with_its_state(page):
+    field = page.find('input[type=number][aria-label="Duration"]')
+    field.send_keys(Keys.CONTROL, "a", Keys.NULL, "2.95\n")
+    page.wait("return location.hash.length > 9")
+    look_at(page, "compare")
+    name, _, told = page.run("return location.hash").partition("/")
+    assert name == "#compare" and told
+    assert page.run("return document.querySelector('#places a[data-view=drive]').hash") == f"#drive/{told}"
+    assert page.run("return document.querySelector('#places a[data-view=design]').hash") == f"#{told}"
+    page.run("location.reload()")
+    page.wait("return document.querySelector('#command')?.textContent.endsWith('move.duration=2.95')")
+    assert page.run("return document.body.dataset.show") == "compare"
+    look_at(page, "design")
+    page.find('input[type=number][aria-label="Duration"]').send_keys(Keys.CONTROL, "a", Keys.NULL, "3\n")
+    page.wait("return document.querySelector('#command').textContent.endsWith('move.duration=3')")
+    page.wait(SETTLED.format("passed"))
+    page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
+
+
+def test_sliders_stop_at_round_values_and_always_move(page):
+    slider, field = page.find(DURATION), page.find('input[type=number][aria-label="Duration"]')
+    for key in (Keys.ARROW_RIGHT, Keys.ARROW_LEFT):
+        for _ in range(4):
+            before = field.get_attribute("value")
+            slider.send_keys(key)
+            page.wait("return arguments[0].value !== arguments[1]", field, before)
+            value = float(field.get_attribute("value"))
+            assert value == float(f"{value:.3g}") and (value > float(before)) == (key == Keys.ARROW_RIGHT)
+    stops = page.run("""
+        const mine = {least: 0, span: [-24.144, 24.144], factor: 1000};
+        return [...Array(30).keys()].map((at) => knobs.scale(mine).value(at * 37) * 1000);""")
+    assert all(round(stop, 6) % 100 == 0 for stop in stops)
+
+
+def test_numbers_are_told_as_they_are_read(page):
+    told = page.run("""
+        const speak = (language, act) => { document.documentElement.lang = language; return act(); };
+        const all = () => [numbers.millimetres(7.995e-8), numbers.millimetres(1.61549), numbers.short(0.0272),
+            numbers.sentence('needs 1.142 (jerk = 4.5, travel = [0.1, 2.5])'), numbers.ticks(2.76, 3.24)];
+        const told = [speak('en', all), speak('de', all)];
+        document.documentElement.lang = 'en';
+        return told;""")
+    assert told[0] == [
+        "< 0.001",
+        "1.615",
+        "0.0272",
+        "needs 1.142 (jerk = 4.5, travel = [0.1, 2.5])",
+        [2.8, 2.9, 3, 3.1, 3.2],
+    ]
+    assert told[1][:4] == ["< 0,001", "1,615", "0,0272", "needs 1,142 (jerk = 4.5, travel = [0.1, 2.5])"]
+
+
+def test_designs_have_names_that_lie_on_nothing_and_an_axis_with_several_places(page):
+    look_at(page, "compare")
+    page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
+    for over in ("acceleration", "duration", "sway"):
+        page.run(
+            """
+            const over = document.querySelector('#over');
+            over.value = arguments[0];
+            over.dispatchEvent(new Event('change'))""",
+            over,
+        )
+        boxes = page.run("""
+            const boxes = [...document.querySelectorAll('.point text')].map((text) => text.getBBox());
+            return boxes.map(({x, y, width, height}) => [x, y + 2, x + width, y + height - 3]);""")
+        assert len(boxes) >= 5
+        for place, (left, top, right, bottom) in enumerate(boxes):
+            for other in boxes[:place]:
+                assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
+        ticks = page.run("return document.querySelectorAll('#pareto svg > text').length")
+        assert ticks >= 2 + 3 + 3  # both names, and places of both axes
+    badges = page.run("return [...document.querySelectorAll('.badge')].map((badge) => badge.textContent)")
+    assert badges == ["least sway on the way", "least acceleration"]  # all take as long
+
+
+def test_cards_that_wait_say_so(page):
+    page.run("sessionStorage.setItem('seen', '[]')")
+    page.run("location.reload()")
+    page.wait("return document.querySelector('.waiting')?.textContent")
+    assert page.run("return document.querySelectorAll('.waiting').length") == 6
+    page.wait(SETTLED.format("passed"))
+    page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
+    look_at(page, "compare")
+    left = "return [...document.querySelectorAll('.waiting')].filter((one) => one.checkVisibility()).length"
+    page.wait(f"{left} === 0")
+
+
+def test_on_a_phone_nothing_of_the_plan_covers_a_drive(page):
+    page.size(390, 844, mobile=True)
+    look_at(page, "drive")
+    assert not page.run("return document.querySelector('.machine').checkVisibility()")
+    assert not page.run("return document.querySelector('#panel').checkVisibility()")
+    assert page.run("return document.querySelector('#drive').getBoundingClientRect().top") < 120
 
 
 def state(page):
@@ -104,6 +231,7 @@ def test_the_end_of_the_move_is_dragged_and_undone_in_one_step(page):
 
 
 def test_a_limit_beyond_all_designs_is_not_drawn_at_the_edge(page):
+    look_at(page, "compare")
     page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
     found = page.run("""
         return [0.001, 0.004].map((residual) => {
@@ -116,6 +244,7 @@ def test_a_limit_beyond_all_designs_is_not_drawn_at_the_edge(page):
 
 
 def test_designs_are_pinned_and_taken(page):
+    look_at(page, "compare")
     page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
     page.find("#pin").click()
     page.wait("return document.querySelector('.point.pinned') !== null")
@@ -128,28 +257,46 @@ def test_designs_are_pinned_and_taken(page):
 
 
 @pytest.mark.parametrize("width", [1400, 820, 390])
-def test_nothing_is_wider_than_the_screen(page, width):
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_nothing_is_wider_than_the_screen(page, width, language):
     page.size(width, 844, mobile=width < 500)
-    page.wait(f"return document.documentElement.scrollWidth <= {width}")
+    if language == "de":
+        page.find("#language").click()
+    for view in VIEWS:
+        look_at(page, view)
+        page.wait(f"return document.documentElement.scrollWidth <= {width}")
+    if language == "de":
+        page.find("#language").click()
 
 
 def violations(page):
     path = os.environ.get("AXE_CORE") or missing("AXE_CORE, the path of axe-core's axe.min.js")
     page.run(Path(path).read_text("utf-8"))
     page.run("for (const part of document.querySelectorAll('details')) part.open = true")
-    found = page.run_async("axe.run().then((found) => arguments[0](found.violations))")
+    rules = "{rules: {'target-size': {enabled: true}}}"
+    found = page.run_async(f"axe.run({rules}).then((found) => arguments[0](found.violations))")
     return [(one["id"], [node["html"][:200] for node in one["nodes"]][:3]) for one in found]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_is_accessible(page, scheme):
     """By the rules of axe-core, which look at names, roles, contrast and order."""
-    page.size(1400, 900)
+    page.wait("return document.querySelectorAll('#designs tbody tr').length > 5")
     with page.emulated(scheme):
+        for view in VIEWS:
+            look_at(page, view)
+            assert violations(page) == []
+
+
+def test_it_is_accessible_on_a_phone(page):
+    page.size(390, 844, mobile=True)
+    for view in VIEWS:
+        look_at(page, view)
         assert violations(page) == []
 
 
 def test_a_log_that_is_chosen_tells_parameters_that_are_taken(page, tmp_path):
+    look_at(page, "measure")
     times = np.arange(0.0, 6.0, 0.03)
     spec = preset_spec("paper")
     longer = parameter_column(spec.machine(), {**spec.plant.parameters, "L1": 0.52})
@@ -224,6 +371,7 @@ def test_the_question_whether_a_program_may_run_is_accessible(page):
 
 
 def test_a_planner_block_is_driven_by_hand(page):
+    look_at(page, "drive")
     page.find("#begin").click()
     page.wait("return document.querySelector('#undriven.bad') !== null")
     assert "limits.velocity" in page.find("#undriven").text
@@ -245,6 +393,13 @@ def test_a_planner_block_is_driven_by_hand(page):
     page.drag((x, y), (x + 0.25 * width, y))
     page.wait("return Number(document.querySelectorAll('#helm input')[1].value) > 0.3")
     page.wait("return parseFloat(document.querySelector('#driven dd').textContent) > 0.3")
+    assert page.run("return document.querySelectorAll('#minute canvas').length") == 3
+    low, high = page.run("return document.querySelectorAll('#driven dd')[2].textContent").split(" … ")
+    assert -1.0 <= float(low) <= float(high.removesuffix(" m")) <= 1.0
+    assert page.run("return document.querySelector('#drive .envelope').getAttribute('d')").startswith("M")
+    look_at(page, "design")  # meanwhile time stands still
+    page.run("document.querySelector('#driven dd').dataset.of = 'before'")
+    look_at(page, "drive")
     assert violations(page) == []
     page.find("#halt").click()
     page.wait("return document.querySelectorAll('#driven dd')[1].textContent.startsWith('0.000')")
@@ -271,6 +426,7 @@ def test_it_speaks_german_of_what_is_shown(page):
 
 
 def test_the_full_check_gives_the_files_that_the_command_line_makes(page, tmp_path):
+    look_at(page, "take")
     page.run("document.querySelector('#formats').scrollIntoView()")
     page.find("#formats input[value=plc]").click()
     page.find("#make").click()

@@ -48,10 +48,27 @@ def test_a_stick_is_followed_and_a_stop_leaves_no_sway():
     moments(10, drive=3)
     pulled = moments(15, drive=3, command="velocity", values=(0.3,))
     assert pulled[-1]["axes"][0]["velocity"] > 0.1
-    reached = pulled[-1]["axes"][0]["position"] + pulled[-1]["axes"][0]["stop_distance"]
-    stopped = moments(40, drive=3, command="stop")[-1]
-    assert stopped["axes"][0]["position"] <= reached + 1e-6 and not stopped["busy"]
+    before = pulled[-1]["axes"][0]
+    stopping = moments(40, drive=3, command="stop")
+    stopped = stopping[-1]
+    places = [place for part in stopping for place in part["trace"]["position"][0]]
+    assert before["stop_low"] - 1e-6 <= min(places) and max(places) <= before["stop_high"] + 1e-6
+    assert before["position"] < stopped["axes"][0]["position"] and not stopped["busy"]
     assert max(map(abs, stopped["animation"]["actors"][0]["sway_mm"])) < 0.3
+
+
+def test_a_moment_tells_what_curves_of_the_last_minute_show():
+    moments(3, drive=8)
+    (part,) = moments(1, drive=8, command="velocity", values=(0.3,))
+    trace, axis = part["trace"], part["axes"][0]
+    assert (
+        trace["times"] == pytest.approx([0.03, 0.05, 0.08, 0.1], abs=0.011) and trace["times"][-1] == MOMENT
+    )
+    assert trace["position"][0][-1] == axis["position"] and trace["velocity"][0][-1] == axis["velocity"]
+    assert (trace["low"][0][-1], trace["high"][0][-1]) == (axis["stop_low"], axis["stop_high"])
+    assert all(len(actor["sway_mm"]) >= len(trace["times"]) for actor in part["animation"]["actors"])
+    low, high = (ends[0] for ends in part["stops"])  # places of the load in the first picture
+    assert low[0] == pytest.approx(axis["stop_low"]) and high[0] == pytest.approx(axis["stop_high"])
 
 
 def test_machines_swing_by_the_equations():

@@ -60,8 +60,8 @@ def _comparison(found: Comparison, own: str) -> Part:
             }
             for row in found.rows
         ],
-        "left_out": found.left_out,
-        "recommended": {kind: advice.method for kind, advice in found.recommended.items()},
+        "missing": found.missing(),
+        "recommended": {advice.aim: advice.method for advice in found.recommended.values() if advice.method},
     }
 
 

@@ -100,6 +100,7 @@ class Drive:
             np.reshape(values, (-1, len(self._columns)))
             for values in (issued.position, issued.velocity, issued.acceleration)
         )
+        ends = [self._stated(issued, name) for name in ("fStopLow", "fStopHigh")]
         axes = self._at(position, np.stack([velocity, acceleration]))
         states = self._swing(axes)
         shown = np.linspace(0, len(axes), FRAMES + 1).round().astype(int)
@@ -109,14 +110,27 @@ class Drive:
             "part": "driven",
             "animation": frames.to_json(self._bounds),
             "seconds": MOMENT,
-            "axes": self._told(issued, position[-1], velocity[-1]),
+            "axes": self._told(position[-1], velocity[-1], [end[-1] for end in ends]),
             "live": [self._ranges(name, value) for name, value in self._live.items()],
             "target": None if self._target is None else self._target.tolist(),
             "marks": [] if self._target is None else self._marks(self._target).tolist(),
+            "stops": [self._marks(end[-1]).tolist() for end in ends],
+            "trace": {
+                "times": (self._planner.cycle_time * shown[1:]).tolist(),
+                "position": position[shown[1:] - 1].T.tolist(),
+                "velocity": velocity[shown[1:] - 1].T.tolist(),
+                "low": ends[0][shown[1:] - 1].T.tolist(),
+                "high": ends[1][shown[1:] - 1].T.tolist(),
+            },
             "busy": bool(issued.busy[-1]),
             "promise": bool(issued.promise[-1]),
             "error": int(issued.error_id[-1]),
         }
+
+    def _stated(self, issued: SetpointHistory, output: str) -> Array:
+        """Give an output of every planned axis, shape (cycles, axes)."""
+        names = [name for name in issued.outputs if name == output or name.startswith(f"{output}_")]
+        return np.stack([issued.outputs[name] for name in names], axis=1)
 
     def _orders(self, asked: DriveQuestion) -> dict[str, Any]:
         """Write a command as the planner takes it."""
@@ -239,9 +253,8 @@ class Drive:
         views: list[list[float]] = [view["bounds"] for view in frames["views"]]
         return views
 
-    def _told(self, issued: SetpointHistory, position: Array, velocity: Array) -> list[Part]:
-        """Tell of every planned axis where it is, in its controller's unit, and what it may do."""
-        stops = np.reshape(issued.stop_distance, (-1, len(self._columns)))[-1]
+    def _told(self, position: Array, velocity: Array, stops: Sequence[Array]) -> list[Part]:
+        """Tell of every planned axis where it is, where a stop would lead, and what it may do."""
         told = []
         for index, column in enumerate(self._columns):
             axis, limits = self._plant.actuated[column], self._spec.limits.of(column)
@@ -254,7 +267,8 @@ class Drive:
                     "si": axis.unit,
                     "position": float(position[index]),
                     "velocity": float(velocity[index]),
-                    "stop_distance": float(stops[index]),
+                    "stop_low": float(stops[0][index]),
+                    "stop_high": float(stops[1][index]),
                     "fastest": limits.velocity,
                     "travel": limits.travel,
                 }

@@ -3,7 +3,7 @@
 "use strict";
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
-  const WORDS = { play: "Play", pause: "Pause", of: "of", arrived: "arrived" };
+  const WORDS = { play: "Play", pause: "Pause", of: "of", arrived: "arrived", number: String };
   const LOOKS = {
     rail: { stroke: "#8a949d", "stroke-width": 2 },
     plumb: { stroke: "#9aa4ad", "stroke-width": 1, "stroke-dasharray": "4 3" },
@@ -92,7 +92,7 @@
     return (time) => cursor.setAttribute("d", `M${x(time)} 0V100`);
   }
 
-  function cast(stage, animation) {
+  function cast(stage, animation, number = String) {
     stage.style.gridTemplateColumns = `repeat(${animation.actors.length}, 1fr)`;
     stage.style.setProperty("--views", animation.views.length); // all of them shall fit a screen
     return animation.actors.map((actor) => {
@@ -109,7 +109,7 @@
       });
       return (frame, factor, moving = actor) => {
         const sway = moving.sway_mm[Math.round(frame)];
-        value.textContent = `${animation.load} ${sway < 0 ? "−" : "+"}${Math.abs(sway).toFixed(2)} mm`;
+        value.textContent = `${animation.load} ${sway < 0 ? "−" : "+"}${number(Math.abs(sway).toFixed(2))} mm`;
         pictures.forEach((show, index) => show(frame, factor, moving.views[index]));
       };
     });
@@ -129,7 +129,7 @@
       duration = animation.step * (animation.frames - 1);
       find("stage").replaceChildren();
       find("strip").replaceChildren();
-      actors = cast(find("stage"), animation);
+      actors = cast(find("stage"), animation, words.number);
       moveCursor = strip(find("strip"), animation);
       slider.max = duration;
       time = Math.min(time, duration);
@@ -141,7 +141,7 @@
       moveCursor(time);
       slider.value = time;
       const arrived = time >= animation.arrival ? `, ${words.arrived}` : "";
-      clock.textContent = `${time.toFixed(2)} s ${words.of} ${duration.toFixed(1)} s${arrived}`;
+      clock.textContent = words.number(`${time.toFixed(2)} s ${words.of} ${duration.toFixed(1)} s${arrived}`);
       play.textContent = request === null ? words.play : words.pause;
     }
     function tick(now) {

@@ -6,10 +6,7 @@ const curves = (() => {
   const cursor = uPlot.sync("time");
   const hosts = new Map(); // element → its charts
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const short = (value) => {
-    const rounded = Number(value.toPrecision(3));
-    return (rounded !== 0 && Math.abs(rounded) < 1e-4 ? rounded.toExponential() : String(rounded)).replaceAll("-", "−");
-  };
+  const { short } = numbers;
 
   /** Ends of the vertical axis: those of the curves and of the limits beside them, with some room. */
   function ends(chart, panel) {
@@ -130,14 +127,15 @@ const curves = (() => {
       legend: { show: series.length > 1, live: false, markers: { width: 2 } },
       cursor: { sync: timed ? { key: cursor.key, scales: ["x", null] } : undefined, drag: { x: false, y: false }, points: { size: 5 } },
       scales: {
-        x: { time: false, range: (_, low, high) => holder.frozen?.x ?? [low, high] },
+        x: { time: false, range: (_, low, high) => holder.frozen?.x ?? holder.panel.window ?? [low, high] },
         y: { range: (self) => holder.frozen?.y ?? (self.data?.[1]?.length ? ends(self, holder.panel) : [0, 1]), distr: panel.decades ? 3 : 1 },
       },
       axes: [
-        axis(options.phrase(panel.x_label), { size: 30, space: 60 }),
+        axis(options.phrase(panel.x_label), { size: 30, space: 60, values: (_, ticks) => ticks.map(short) }),
         axis(options.phrase(panel.y_label), { size: 48, values: (_, ticks) => ticks.map((tick) => (tick === null ? "" : short(tick))) }),
       ],
       series: [{}, ...series],
+      bands: panel.area ? [{ series: panel.area.map((place) => place + 1), fill: () => colour("--band") }] : [],
       hooks: {
         drawAxes: [(self) => behind(self, holder.panel)],
         draw: [(self) => inFront(self, holder.panel)],
@@ -216,5 +214,5 @@ const curves = (() => {
     if (width && width !== chart.width) chart.setSize({ width, height: HEIGHT });
   });
   new ResizeObserver(fit).observe(document.getElementById("view"));
-  return { draw, redraw: () => everyChart(({ chart }) => chart.redraw(false, true)), short };
+  return { draw, fit, redraw: () => everyChart(({ chart }) => chart.redraw(false, true)) };
 })();

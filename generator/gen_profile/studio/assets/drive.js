@@ -3,12 +3,15 @@
 const driving = (() => {
   const { draw, element } = knobs;
   const ENDS = 2; // frames before those to be shown, at the ends of the travel
+  const MINUTE = 60, FIRST = 10; // s that the curves show at most, and at first
   const $ = (id) => document.getElementById(id);
   let page = null; // what the page lends: words, its state, its socket
   let drive = 0, number = 0;
-  let running = false, pointing = false, order = null, live = {};
+  let running = false, pointing = false, order = null, sent = null, live = {};
   let helm = null; // the controls, once it is known what there is to control
   let actors = null, playing = null, next = null, told = null;
+  let history = null; // of the last minute: times, and what every curve was at them
+  let still = false; // while another view is looked at, time stands still
 
   function begin() {
     park();
@@ -16,6 +19,7 @@ const driving = (() => {
     running = true;
     order = { command: "", values: [] };
     live = {};
+    history = null;
     $("undriven").textContent = page.phrase("drive.preparing");
     $("undriven").className = "";
     ask();
@@ -28,12 +32,14 @@ const driving = (() => {
     playing = next = actors = helm = told = null;
     $("undriven").textContent = "";
     for (const name of ["helm", "driven"]) $(name).replaceChildren();
+    curves.draw($("minute"), [], {});
     document.querySelector("#drive .stage").replaceChildren();
     page.say({ say: "park" });
     buttons();
   }
 
   function ask() {
+    sent = order;
     page.say({ say: "drive", number: ++number, state: page.state(), drive, ...order, live });
   }
 
@@ -45,6 +51,7 @@ const driving = (() => {
 
   const parts = {
     driven(part) {
+      part.answers = sent; // no later one was sent yet
       if (!actors) build(part);
       if (playing) next = part;
       else play(part);
@@ -71,8 +78,10 @@ const driving = (() => {
   /** Show a moment while the next one is asked for. */
   function play(part) {
     const began = performance.now(), last = part.animation.frames - 1;
-    ask();
+    still = views.current() !== "drive";
+    if (!still) ask();
     tell(part);
+    remember(part);
     const tick = (now) => {
       const share = Math.min(Math.max((now - began) / (1000 * part.seconds), 0), 1);
       actors.forEach((actor, index) => actor(ENDS + share * (last - ENDS), 1, part.animation.actors[index]));
@@ -86,8 +95,52 @@ const driving = (() => {
     playing = requestAnimationFrame(tick);
   }
 
+  /** Add a moment to the curves of the last minute, and draw them. */
+  function remember(part) {
+    const { axes, animation, trace } = part;
+    const rows = axes.flatMap((_, axis) => [trace.position[axis], trace.low[axis], trace.high[axis], trace.position[axis].map(() => part.target?.[axis] ?? null), trace.velocity[axis]]);
+    const all = [...rows, ...animation.actors.map((actor) => actor.sway_mm.slice(-trace.times.length))];
+    history ??= { times: [], rows: all.map(() => []), now: 0, rested: 0 };
+    if (part.busy || !part.promise) history.rested = history.now + part.seconds; // before, nothing is promised of the sway
+    history.times.push(...trace.times.map((time) => history.now + time));
+    all.forEach((row, place) => history.rows[place].push(...row));
+    history.now += part.seconds;
+    const old = history.times.findIndex((time) => time > history.now - MINUTE);
+    for (const row of [history.times, ...history.rows]) row.splice(0, old);
+    if (!still) drawMinute(part);
+  }
+
+  function drawMinute({ axes, animation }) {
+    const of = 5, end = Math.max(history.now, FIRST); // rows of an axis; end of the time that is shown
+    const curve = (name, colour, y, more = {}) => ({ name, colour, dash: "solid", width: 1.6, y, ...more });
+    const faint = { width: 0.8, colour: "ghost" };
+    const panel = (title, unit, list, more = {}) => ({
+      title, x_label: page.phrase("drive.time"), y_label: unit, x: history.times, curves: list, levels: [], bands: [],
+      window: [Math.max(0, end - MINUTE), end], ...more,
+    });
+    const titled = (key, axis) => [page.phrase(key), axes.length > 1 ? page.phrase(axis.name) : ""].filter(Boolean).join(", ");
+    const scaled = (axis, row) => row.map((value) => (value === null ? null : value * axis.factor));
+    const panels = axes.flatMap((axis, index) => {
+      const [position, low, high, target, velocity] = history.rows.slice(of * index, of * index + of);
+      return [
+        panel(titled("drive.position", axis), axis.unit, [
+          curve("drive.position", "#0072b2", scaled(axis, position)),
+          curve("drive.high", "", scaled(axis, high), faint),
+          curve("drive.low", "", scaled(axis, low), faint),
+          curve("drive.target", "#d55e00", scaled(axis, target), { dash: "dash" }),
+        ], { area: [1, 2] }),
+        panel(titled("drive.velocity", axis), `${axis.si}/s`, [curve("drive.velocity", "#0072b2", velocity)]),
+      ];
+    });
+    const sways = animation.actors.map((actor, index) => curve(actor.name, actor.colour, history.rows[of * axes.length + index]));
+    const limits = [animation.limit_mm, -animation.limit_mm].map((value) => ({ value, between: [history.rested, end] }));
+    panels.push(panel(page.phrase("drive.sway"), "mm", sways, { levels: limits }));
+    curves.draw($("minute"), panels, { phrase: page.phrase, language: words.language(), alone: true });
+  }
+
   /** Write a place in the unit of the controller, to the millimetre or so. */
-  const place = (axis, value) => `${(axis.factor * value).toFixed(Math.max(0, 3 - Math.round(Math.log10(axis.factor))))} ${axis.unit}`;
+  const bare = (axis, value) => numbers.local((axis.factor * value).toFixed(Math.max(0, 3 - Math.round(Math.log10(axis.factor)))));
+  const place = (axis, value) => `${bare(axis, value)} ${axis.unit}`;
 
   function tell(part) {
     told = part;
@@ -95,8 +148,8 @@ const driving = (() => {
       const name = part.axes.length > 1 ? `${page.phrase(axis.name)}: ` : "";
       return [
         [`${name}${page.phrase("position")}`, place(axis, axis.position)],
-        [`${name}${page.phrase("velocity")}`, `${axis.velocity.toFixed(3)} ${axis.si}/s`],
-        [`${name}${page.phrase("drive.stops")}`, place(axis, axis.stop_distance)],
+        [`${name}${page.phrase("velocity")}`, `${numbers.local(axis.velocity.toFixed(3))} ${axis.si}/s`],
+        [`${name}${page.phrase("drive.stops")}`, `${bare(axis, axis.stop_low)} … ${place(axis, axis.stop_high)}`],
       ];
     });
     $("driven").replaceChildren(...lines.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, value))));
@@ -108,11 +161,13 @@ const driving = (() => {
     }
     $("undriven").textContent = part.error ? page.filled("drive.error", { error: part.error }) : "";
     for (const slider of helm.live) slider.disabled = part.busy;
-    for (const { mark, at, view } of helm.views) {
+    for (const { mark, envelope, at, view } of helm.views) {
       mark.toggleAttribute("hidden", !part.target);
-      if (part.target) mark.setAttribute("transform", at(part.marks[view]));
+      if (part.target) mark.setAttribute("transform", at.put(part.marks[view]));
+      const [from, to] = part.stops.map((ends) => at.screen(ends[view]));
+      envelope.setAttribute("d", `M${from.join()}L${to.join()}`);
     }
-    if (part.target && order.command === "point") {
+    if (part.target && order.command === "point" && part.answers === order) {
       helm.targets.forEach(({ range, put }, index) => { range.value = String(part.target[index]); put(); });
       if (!pointing) command("target", part.target);
     }
@@ -141,9 +196,10 @@ const driving = (() => {
   }
 
   function build(part) {
-    actors = castAnimation(document.querySelector("#drive .stage"), { ...part.animation, load: page.phrase(part.animation.load), actors: part.animation.actors.map((actor) => ({ ...actor, name: page.phrase(actor.name) })), views: part.animation.views.map((view) => ({ ...view, title: page.phrase(view.title) })) });
+    document.querySelector("#drive .stage").replaceChildren();
+    actors = castAnimation(document.querySelector("#drive .stage"), { ...part.animation, load: page.phrase(part.animation.load), actors: part.animation.actors.map((actor) => ({ ...actor, name: page.phrase(actor.name) })), views: part.animation.views.map((view) => ({ ...view, title: page.phrase(view.title) })) }, numbers.local);
     const named = (key, axis) => [page.phrase(key), part.axes.length > 1 ? page.phrase(axis.name) : ""].filter(Boolean).join(", ");
-    const sticks = part.axes.map((axis) => slider(named("drive.stick", axis), { least: -axis.fastest, most: axis.fastest, value: 0 }, (value) => `${value.toFixed(2)} ${axis.si}/s`, steer));
+    const sticks = part.axes.map((axis) => slider(named("drive.stick", axis), { least: -axis.fastest, most: axis.fastest, value: 0 }, (value) => `${numbers.local(value.toFixed(2))} ${axis.si}/s`, steer));
     const targets = part.axes.map((axis) => slider(named("move.target", axis), { least: axis.travel[0], most: axis.travel[1], value: axis.position }, (value) => place(axis, value), aim));
     function steer() { command("velocity", sticks.map(({ range }) => Number(range.value))); }
     function aim() { command("target", targets.map(({ range }) => Number(range.value))); }
@@ -154,7 +210,7 @@ const driving = (() => {
         steer();
       });
     }
-    const ropes = part.live.map(({ name, value, least, most, unit }) => slider(name, { least, most, value }, (now) => `${now.toFixed(2)} ${unit}`, () => {
+    const ropes = part.live.map(({ name, value, least, most, unit }) => slider(name, { least, most, value }, (now) => `${numbers.local(now.toFixed(2))} ${unit}`, () => {
       live = Object.fromEntries(ropes.map(({ range }, index) => [part.live[index].name, Number(range.value)]));
     }));
     const views = [...document.querySelectorAll("#drive .stage svg")].map((svg, place) => pictured(svg, part.animation.views, place % part.animation.views.length));
@@ -165,6 +221,7 @@ const driving = (() => {
   /** Let the target be dragged in a picture, and mark where the load will hang. */
   function pictured(svg, views, view) {
     const [left, bottom, width, height] = views[view].bounds, scale = 1000 / width;
+    const envelope = draw(svg, "path", { class: "envelope" });
     const mark = draw(svg, "path", { class: "target", d: "M-8 0H8M0-8V8M-5 0a5 5 0 1 0 10 0a5 5 0 1 0-10 0" });
     const point = (event) => {
       const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
@@ -177,8 +234,9 @@ const driving = (() => {
     });
     svg.addEventListener("pointermove", (event) => { if (pointing) point(event); });
     for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, () => { pointing = false; });
-    const at = ([x, y]) => `translate(${(x - left) * scale} ${(bottom + height - y) * scale}) scale(${1 / svg.getScreenCTM().a})`;
-    return { mark, view, at };
+    const screen = ([x, y]) => [(x - left) * scale, (bottom + height - y) * scale];
+    const put = (at) => `translate(${screen(at).join(" ")}) scale(${1 / svg.getScreenCTM().a})`;
+    return { mark, envelope, view, at: { screen, put } };
   }
 
   function stop(name) {
@@ -192,8 +250,11 @@ const driving = (() => {
   /** Show the same in another language. */
   function speak() {
     delete $("promise").dataset.kept;
-    document.querySelector("#drive .stage").replaceChildren();
-    if (told) build(told);
+    if (told) {
+      build(told);
+      tell(told);
+      drawMinute(told);
+    }
     buttons();
   }
 
@@ -203,6 +264,12 @@ const driving = (() => {
     $("halt").addEventListener("click", () => stop("stop"));
     $("brake").addEventListener("click", () => stop("quick_stop"));
     $("leave").addEventListener("click", park);
+    views.watch((name) => {
+      if (running && still && name === "drive") {
+        still = false;
+        ask();
+      }
+    });
     buttons();
   }
 

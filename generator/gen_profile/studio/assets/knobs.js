@@ -1,14 +1,15 @@
 // The knobs: native controls for every value of the spec, built from what the spec itself says of them.
 "use strict";
 const knobs = (() => {
-  const STEPS = 1000;
+  const DECADE = 900; // steps of a logarithmic slider: all numbers of three digits
+  const STEPS = 200; // of another slider, at least
   const SVG = "http://www.w3.org/2000/svg";
   const OPEN = new Set(["move", "plant", "robustness"]);
   const panel = document.getElementById("knobs");
   let rows = [];
   let shape = "";
 
-  const digits = (value) => Number(Number(value).toPrecision(5));
+  const { digits, local } = numbers;
   const element = (name, attributes = {}, ...children) => {
     const made = document.createElement(name);
     for (const [key, value] of Object.entries(attributes)) {
@@ -27,20 +28,31 @@ const knobs = (() => {
     return made;
   };
 
-  /** Positions of a slider, and the values that they stand for. */
-  function scale({ span: [low, high], logarithmic, whole }) {
-    const log = logarithmic && low > 0;
-    const round = whole ? Math.round : digits;
-    return {
-      value: (at) => round(log ? low * (high / low) ** (at / STEPS) : low + ((high - low) * at) / STEPS),
-      place: (value) => Math.round(STEPS * (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low || 1))),
-    };
+  /** Positions of a slider, which stand for round values in the unit that is shown, and its ends. */
+  function scale({ span, logarithmic, whole, factor = 1 }) {
+    const [low, high] = span.map((end) => end * factor);
+    const made = (value, index) => ({
+      least: index(low, Math.ceil), most: index(high, Math.floor),
+      value: (at) => (whole ? Math.round : digits)(value(at) / factor),
+      place: (known) => index(known * factor, Math.round),
+    });
+    if (logarithmic && low > 0) {
+      return made(
+        (at) => (at - DECADE * Math.floor(at / DECADE) + 100) * 10 ** (Math.floor(at / DECADE) - 2),
+        (value, round) => {
+          const power = Math.floor(Math.log10(value) + 1e-9);
+          return DECADE * power - 100 + round(digits(value / 10 ** (power - 2), 9));
+        },
+      );
+    }
+    const step = whole ? 1 : 10 ** Math.floor(Math.log10((high - low) / STEPS || 1));
+    return made((at) => at * step, (value, round) => round(digits(value / step, 9)));
   }
 
   /** A number's field and its slider, which tell a value in SI units. */
   function number(knob, label, tell) {
     const field = element("input", { type: "number", step: "any", inputmode: "decimal", "aria-label": label });
-    const slider = element("input", { type: "range", min: "0", max: String(STEPS), step: "1", "aria-label": label });
+    const slider = element("input", { type: "range", step: "1", "aria-label": label });
     const factor = knob.factor ?? 1;
     field.addEventListener("change", () => field.value !== "" && tell(Number(field.value) / factor, true));
     const slid = (done) => tell(scale(row.knob).value(Number(slider.value)), done);
@@ -54,8 +66,10 @@ const knobs = (() => {
         if (document.activeElement !== field) field.value = known ? digits(value * factor) : "";
         slider.hidden = !next.span || !known;
         if (slider.hidden) return;
-        if (document.activeElement !== slider || !slider.matches(":active")) slider.value = scale(next).place(value);
-        slider.setAttribute("aria-valuetext", `${digits(value * factor)} ${next.unit ?? ""}`);
+        const { least, most, place } = scale(next);
+        Object.assign(slider, { min: least, max: most });
+        if (document.activeElement !== slider || !slider.matches(":active")) slider.value = place(value);
+        slider.setAttribute("aria-valuetext", `${local(digits(value * factor))} ${next.unit ?? ""}`);
       },
     };
     return row;
@@ -100,7 +114,7 @@ const knobs = (() => {
           ends.forEach((end, which) => end.show(next, next.value?.[which]));
           if (!next.value) return;
           const [low, high] = next.value;
-          share.textContent = `± ${digits((100 * (high - low)) / (high + low)).toPrecision(3)} %`;
+          share.textContent = local(`± ${digits((100 * (high - low)) / (high + low), 3)} %`);
         },
       };
     },
@@ -202,5 +216,5 @@ const knobs = (() => {
     return left;
   }
 
-  return { show, blame, element, draw, digits };
+  return { show, blame, element, draw, scale };
 })();

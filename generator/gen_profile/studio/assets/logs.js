@@ -16,9 +16,9 @@ const logs = (() => {
     if (file.size > most) return page.notice(page.filled("field.large", { name: file.name, most: Math.floor(most / 1e6) }));
     page.send(new Blob([JSON.stringify({ say: "drop", name: file.name }), "\n", file]));
     if (/\.toml$/i.test(file.name)) return;
+    views.go("measure");
     reading = { source: file.name, use: "", columns: null, after: 0, at: [], free: [] };
     ask();
-    $("field").scrollIntoView({ block: "start" });
   }
 
   function ask() {
@@ -122,7 +122,7 @@ const logs = (() => {
   function stood() {
     const fields = reading.at.map((place, axis) => {
       const { name, unit } = reading.axes[axis];
-      const field = element("input", { type: "number", step: "any", value: String(knobs.digits(place)) });
+      const field = element("input", { type: "number", step: "any", value: String(numbers.digits(place)) });
       field.addEventListener("change", () => { reading.at[axis] = Number(field.value) || 0; ask(); });
       return element("label", {}, page.phrase(name), field, unit);
     });
@@ -155,7 +155,7 @@ const logs = (() => {
     const heads = ["field.parameter", "field.found", "field.range", "field.before"].map((key) => element("th", { scope: "col" }, page.phrase(key)));
     const rows = parameters.map(({ name, value, half_range: half, given, unit }) => element("tr", {},
       element("th", { scope: "row" }, name),
-      ...[`${knobs.digits(value)} ${unit}`, `± ${Number(half.toPrecision(2))} ${unit}`, `${knobs.digits(given)} ${unit}`].map((text) => element("td", {}, text))));
+      ...[`${numbers.digits(value)} ${unit}`, `± ${numbers.digits(half, 2)} ${unit}`, `${numbers.digits(given)} ${unit}`].map(numbers.local).map((text) => element("td", {}, text))));
     return [
       element("table", { class: "found" }, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)),
       element("p", { class: "hint" }, page.filled("field.confidence", { share: Math.round(100 * confidence) })),

@@ -21,12 +21,12 @@ const maps = (() => {
       if (value === null) return;
       const [from, to] = ends(x, h).map(right), [low, high] = ends(y, v).map(up);
       const cell = draw(svg, "rect", { x: from, y: high, width: to - from + 0.3, height: low - high + 0.3, class: value > 100 ? "beyond" : "within", "fill-opacity": value > 100 ? Math.min(0.35 + value / 600, 1) : 0.08 + (0.8 * value) / 100 });
-      draw(cell, "title", {}, `${curves.short(x[h])} %, ${curves.short(y[v])} %: ${curves.short(value)} %`);
+      draw(cell, "title", {}, `${numbers.short(x[h])} %, ${numbers.short(y[v])} %: ${numbers.short(value)} %`);
     }));
     host.append(element("p", { class: "hint" }, phrase("map.hint")));
     if (frame) draw(svg, "rect", { x: right(-frame[0]), y: up(frame[1]), width: right(frame[0]) - right(-frame[0]), height: up(-frame[1]) - up(frame[1]), class: "frame" });
-    for (const value of [x[0], 0, x.at(-1)]) draw(svg, "text", { x: right(value), y: HEIGHT - BOTTOM + 14, "text-anchor": value === 0 ? "middle" : value < 0 ? "start" : "end" }, curves.short(value));
-    for (const value of [y[0], 0, y.at(-1)]) draw(svg, "text", { x: LEFT - 5, y: up(value) + (value === 0 ? 4 : value < 0 ? 0 : 9), "text-anchor": "end" }, curves.short(value));
+    for (const value of [x[0], 0, x.at(-1)]) draw(svg, "text", { x: right(value), y: HEIGHT - BOTTOM + 14, "text-anchor": value === 0 ? "middle" : value < 0 ? "start" : "end" }, numbers.short(value));
+    for (const value of [y[0], 0, y.at(-1)]) draw(svg, "text", { x: LEFT - 5, y: up(value) + (value === 0 ? 4 : value < 0 ? 0 : 9), "text-anchor": "end" }, numbers.short(value));
     draw(svg, "text", { x: (LEFT + WIDTH) / 2, y: HEIGHT - 4, "text-anchor": "middle" }, phrase(across));
     draw(svg, "text", { x: 10, y: (HEIGHT - BOTTOM) / 2, "text-anchor": "middle", transform: `rotate(-90 10 ${(HEIGHT - BOTTOM) / 2})` }, phrase(upwards));
     return host;

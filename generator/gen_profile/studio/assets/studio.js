@@ -3,11 +3,10 @@
 (async () => {
   const $ = (id) => document.getElementById(id);
   const { element } = knobs;
-  const WORDS = await (await fetch("words.json")).json();
-  const LANGUAGES = ["en", "de"];
+  const { phrase, filled, placed, loaded, reason } = words;
+  await words.load();
   const COME_BACK = 2000; // ms between looks whether the studio is there again
   const ONCE = new Set(["hello", "state", "opened", "consent"]); // parts that do something: no other language shows them again
-  let language = localStorage.getItem("language") ?? (navigator.language.startsWith("de") ? "de" : "en");
   let state = { preset: "", edits: {} };
   let kept = JSON.stringify(state); // the state that undo leads back from
   const undone = [], done = [];
@@ -19,38 +18,30 @@
 
   // words ---------------------------------------------------------------------------------------------------
 
-  /** A text by its key, or a text that was written in English, in the reader's language. */
-  function phrase(key, otherwise = key) {
-    const column = LANGUAGES.indexOf(language);
-    if (WORDS.texts[key]) return WORDS.texts[key][column];
-    if (column === 0) return otherwise;
-    for (const [pattern, translated] of WORDS.patterns) {
-      const found = key.match(new RegExp(`^${pattern}$`));
-      if (found) return translated.replace(/\$(\d)/g, (_, group) => phrase(found[group]));
-    }
-    return otherwise;
-  }
-  const filled = (key, values) => phrase(key).replace(/\{(\w+)\}/g, (_, name) => values[name]);
-  const placed = ({ place, sentence }) => [place, phrase(sentence)].filter(Boolean).join(": ");
-  const mm = (metres) => `${knobs.digits((1e3 * metres).toPrecision(4))} mm`;
+  const mm = (metres) => `${numbers.millimetres(1e3 * metres)} mm`;
 
   function speak() {
-    document.documentElement.lang = language;
     for (const part of document.querySelectorAll("[data-text]")) part.textContent = phrase(part.dataset.text);
     for (const part of document.querySelectorAll("[data-words]")) {
       part.setAttribute("aria-label", phrase(part.dataset.words));
       if (part.matches("button")) part.title = phrase(part.dataset.words);
     }
-    $("language").textContent = LANGUAGES.find((one) => one !== language).toUpperCase();
+    $("language").textContent = words.other().toUpperCase();
+    cards.wait(phrase("waiting"));
     player = null;
     logs.speak();
     driving.speak();
     for (const part of Object.values(latest)) if (!ONCE.has(part.part)) take(part);
   }
 
+  /** Name the page by the spec and the view, for the browser's list of what is open. */
+  function titled() {
+    document.title = [latest.setting?.name, phrase(`view.${views.current()}`), "gen-profile studio"].filter(Boolean).join(" · ");
+  }
+
   // state ---------------------------------------------------------------------------------------------------
 
-  const setting = () => ({ phrase, turn, begin, language });
+  const setting = () => ({ phrase, turn, begin, language: words.language() });
 
   /** Take a knob's new value into the state; the end of a gesture is what undo steps over. */
   function turn(knob, value, end) {
@@ -67,8 +58,8 @@
       if (!value) return { [knob.path]: null, ...(others ? {} : { "robustness.method": "none" }) };
       const [low, high] = value;
       return {
-        [`plant.${name}`]: knobs.digits((low + high) / 2),
-        [knob.path]: Math.min(knobs.digits((high - low) / (high + low)), 0.9),
+        [`plant.${name}`]: numbers.digits((low + high) / 2),
+        [knob.path]: Math.min(numbers.digits((high - low) / (high + low)), 0.9),
         ...(known("robustness.method") === "none" ? { "robustness.method": "sensitivity" } : {}),
       };
     }
@@ -86,14 +77,14 @@
     const taken = (latest.curves?.margins ?? []).filter((one) => [one.place, `limits.${one.quantity}`].includes(knob.path)).map((one) => one.takes);
     if (knob.kind === "interval" || (knob.kind === "pair" && knob.about)) {
       const nominal = at(`plant.${knob.name}`).value;
-      return nominal ? [knobs.digits(0.9 * nominal), knobs.digits(1.1 * nominal)] : [0, 0.1];
+      return nominal ? [numbers.digits(0.9 * nominal), numbers.digits(1.1 * nominal)] : [0, 0.1];
     }
     if (knob.kind === "pair") {
       const ends = latest.setting.knobs.filter((one) => /^move\.(distance|target|start)$/.test(one.path) && (!knob.name || one.name === knob.name));
       return [Math.min(0, ...ends.map((one) => one.value)), Math.max(0, ...ends.map((one) => one.value))];
     }
-    if (taken.length) return knobs.digits((1.05 * Math.max(...taken)).toPrecision(3));
-    if (knob.path === "limits.sway") return knobs.digits((1.05 * (latest.verdict?.sway_worst ?? 0.1)).toPrecision(3));
+    if (taken.length) return numbers.digits((1.05 * Math.max(...taken)).toPrecision(3));
+    if (knob.path === "limits.sway") return numbers.digits((1.05 * (latest.verdict?.sway_worst ?? 0.1)).toPrecision(3));
     return knob.usual ?? knob.span?.[0] ?? 1;
   }
 
@@ -117,7 +108,7 @@
   /** Put the state into the address at the end of a gesture: browsers refuse one that changes all the time. */
   function tellAddress() {
     const { address, serial: of } = latest.setting ?? {};
-    if (of === serial && kept === JSON.stringify(state)) history.replaceState(null, "", address ? `#${address}` : location.pathname);
+    if (of === serial && kept === JSON.stringify(state)) views.keep(address);
   }
 
   function arrows() {
@@ -156,12 +147,13 @@
       document.body.classList.add("busy");
       document.body.classList.toggle("stale", pictured !== serial);
       judge("open", phrase("overdue"), [], []);
+      cards.wait(phrase("waiting"), latest);
     }, 250);
   }
 
   // parts ---------------------------------------------------------------------------------------------------
 
-  const drawing = (more = {}) => ({ phrase, language, drag: (path, value) => edit({ [path]: value }, false), dropped: keep, ...more });
+  const drawing = (more = {}) => ({ phrase, language: words.language(), drag: (path, value) => edit({ [path]: value }, false), dropped: keep, ...more });
 
   /** Give the limits' places to the panels that show them, so that they can be dragged. */
   function withLimits(panels, margins) {
@@ -191,7 +183,7 @@
 
   const parts = {
     hello({ presets, opened, start, formats }) {
-      $("preset").replaceChildren(element("option", { value: "" }, start.replace("--preset ", "")), ...Object.entries(presets).filter(([name]) => start !== `--preset ${name}`).map(([name]) => element("option", { value: name }, name)));
+      $("preset").replaceChildren(started("", start.replace("--preset ", "")), ...Object.entries(presets).filter(([name]) => start !== `--preset ${name}`).map(([name]) => element("option", { value: name }, name)));
       opened.forEach(offer);
       const boxes = Object.entries(formats).map(([name, about]) => element("label", { title: about }, element("input", { type: "checkbox", value: name, checked: name === "csv" }), name));
       if (!$("formats").querySelector("input")) $("formats").append(...boxes);
@@ -211,12 +203,13 @@
       const { motion, sway, margins, duration } = part;
       handles = draggable();
       const [path, limit] = handles;
+      cards.come("curves", phrase);
       const loads = sway.map((panel) => ({ ...panel, end: { at: duration, path }, limit: limit && { path: limit, factor: 1e3 } }));
       const options = drawing({ ghosts, seek: (time) => player?.seek(time) });
       const answered = performance.now();
       curves.draw($("sway"), loads, options);
       curves.draw($("motion"), withLimits(motion, margins), options);
-      shares(margins);
+      cards.margins(margins, phrase);
       pictured = part.serial;
       if (pictured === serial) document.body.classList.remove("stale");
       paint(part.serial, answered);
@@ -228,12 +221,12 @@
       const actors = animation.actors.map((actor) => ({ ...actor, name: phrase(actor.name) }));
       const shown = { ...animation, views, actors, load: phrase(animation.load) };
       if (player) player.take(shown);
-      else player = playAnimation(host, shown, { play: phrase("play"), pause: phrase("pause"), of: phrase("of"), arrived: phrase("arrived") });
+      else player = playAnimation(host, shown, { play: phrase("play"), pause: phrase("pause"), of: phrase("of"), arrived: phrase("arrived"), number: numbers.local });
     },
     setting(part) {
       $("name").textContent = part.name;
       $("summary").textContent = phrase(part.summary);
-      document.title = `${part.name} · gen-profile studio`;
+      titled();
       knobs.show(part.knobs, setting());
       knobs.blame([]);
       showCommand();
@@ -246,10 +239,10 @@
       if (part.serial === serial) settled(false);
       else expect();
       logs.planned();
-      judge(word, filled(word, { load: phrase(part.load), residual: mm(part.residual), allowed: mm(part.allowed), machine: phrase(part.machine) }), [], []);
+      judge(word, filled(word, { load: loaded(part.load), residual: mm(part.residual), allowed: mm(part.allowed), machine: phrase(part.machine) }), [], []);
       const facts = [
-        ["over.duration", `${knobs.digits(part.duration)} s`],
-        ["over.acceleration", `${curves.short(part.point.acceleration)} ${latest.curves.margins[0].unit.replace("/s", "/s²")}`],
+        ["over.duration", `${numbers.local(numbers.digits(part.duration))} s`],
+        ["over.acceleration", `${numbers.short(part.point.acceleration)} ${latest.curves.margins[0].unit.replace("/s", "/s²")}`],
         ["sway", mm(part.sway)],
         ["sway.worst", mm(part.sway_worst)],
         ["residual", mm(part.residual)],
@@ -259,18 +252,31 @@
       listDesigns();
     },
     faults({ faults }) {
+      cards.wait(phrase("none"), latest);
       const others = knobs.blame(faults.map((one) => ({ ...one, sentence: phrase(one.sentence) })));
       judge("failed", phrase("faulty"), (others.length ? others : faults).map(placed), []);
       settled(true);
     },
     failure({ answer, sentences, cures }) {
+      cards.wait(phrase(answer), latest);
       judge("failed", phrase(answer), sentences.map((one) => phrase(one)), cures);
       settled(true);
     },
-    spectrum: ({ panels }) => curves.draw($("spectrum"), panels, drawing()),
-    robustness: ({ panels }) => curves.draw($("robustness"), panels, drawing()),
+    spectrum({ panels }) {
+      cards.come("spectrum", phrase);
+      curves.draw($("spectrum"), panels, drawing());
+    },
+    robustness({ panels }) {
+      cards.come("robustness", phrase);
+      curves.draw($("robustness"), panels, drawing());
+    },
     maps: (part) => maps.show($("maps"), part.maps, drawing()),
-    comparison: () => listDesigns(),
+    comparison({ missing }) {
+      cards.come("comparison", phrase);
+      $("missing").hidden = !missing.length;
+      $("missing").querySelector("ul").replaceChildren(...missing.map((one) => element("li", {}, reason(one))));
+      listDesigns();
+    },
     consent({ files, changed }) {
       $("programs").replaceChildren(...files.map((path) => element("li", {}, element("code", {}, path))));
       $("changed").hidden = !changed;
@@ -299,9 +305,12 @@
     parts[part.part]?.(part);
   }
 
+  /** A start to choose: of a path the file's name, which a list has room for. */
+  const started = (value, path) => element("option", { value, title: path }, path.split(/[\\/]/).at(-1));
+
   /** Offer a spec that was opened as a start. */
   function offer(name) {
-    if (![...$("preset").options].some((one) => one.value === name)) $("preset").append(element("option", { value: name }, name));
+    if (![...$("preset").options].some((one) => one.value === name)) $("preset").append(started(name, name));
   }
 
   function restart(preset) {
@@ -346,16 +355,6 @@
     }));
   }
 
-  function shares(margins) {
-    const rows = margins.map(({ quantity, axis, unit, takes, allowed }) => {
-      const share = allowed === null ? null : takes / allowed;
-      const name = [phrase(`limits.${quantity}`), phrase(axis)].filter(Boolean).join(", ");
-      const bar = element("meter", { min: "0", max: "1", value: String(Math.min(share ?? 0, 1)), "aria-label": name });
-      return element("div", { class: share !== null && share > 1 ? "share bad" : "share" }, element("span", {}, name), element("span", { class: "amount" }, `${curves.short(takes)} ${unit}`), share === null ? element("span", { class: "hint" }, phrase("unlimited")) : bar, element("span", { class: "amount" }, share === null ? "" : `${(100 * share).toFixed(0)} %`));
-    });
-    $("margins").replaceChildren(...rows);
-  }
-
   const formats = () => [...$("formats").querySelectorAll("input:checked")].map((box) => box.value);
 
   /** Write the command line that makes the files that are ticked; it writes a CSV where none is named. */
@@ -387,7 +386,7 @@
   function connect() {
     socket = new WebSocket(`ws://${location.host}/live`);
     socket.addEventListener("open", () => {
-      if (asked === null) return say({ say: "open", address: location.hash.slice(1) });
+      if (asked === null) return say({ say: "open", address: views.state() });
       asked = null;
       notice("");
       logs.forget();
@@ -453,8 +452,7 @@
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", curves.redraw);
   $("language").addEventListener("click", () => {
-    language = LANGUAGES.find((one) => one !== language);
-    localStorage.setItem("language", language);
+    words.speak(words.other());
     speak();
   });
   const order = (report) => say({ say: "make", state, report, formats: formats() });
@@ -478,6 +476,10 @@
   $("consent").addEventListener("close", () => {
     if (!$("consent").returnValue) hear({ part: "failure", answer: "refused", sentences: [], cures: [], serial });
     $("consent").returnValue = "";
+  });
+  views.watch(() => {
+    titled();
+    curves.fit();
   });
   driving.lend({ phrase, filled, placed, say, edit, begin, knob: at, state: () => state });
   logs.begin({

@@ -1,0 +1,32 @@
+// Numbers as a reader's language writes them; what is typed, and what a spec states, keeps its decimal point.
+"use strict";
+const numbers = (() => {
+  const german = () => document.documentElement.lang === "de";
+  const SMALLEST = 1e-3; // of a length in mm, below which there is nothing to be seen
+
+  /** Write a number's decimal sign. */
+  const local = (text) => (german() ? String(text).replace(/(\d)\.(?=\d)/g, "$1,") : String(text));
+
+  /** Write the decimal signs in a sentence; values of a spec (= 1.5, [0.1, 2.5]) stay as they are typed. */
+  const sentence = (text) => (german() ? text.replace(/\[[^\]]*\]|(?<![\w.])(?<!= ?-?)\d+\.\d+/g, (found) => (found[0] === "[" ? found : found.replace(".", ","))) : text);
+
+  const digits = (value, count = 5) => Number(Number(value).toPrecision(count));
+
+  /** Three digits of any size, as an axis of a picture needs them. */
+  function short(value) {
+    const rounded = digits(value, 3);
+    return local((rounded !== 0 && Math.abs(rounded) < 1e-4 ? rounded.toExponential() : String(rounded)).replaceAll("-", "−"));
+  }
+
+  /** A length in mm with four digits at most; what nobody could measure is not told by its powers of ten. */
+  const millimetres = (value) => (value !== 0 && Math.abs(value) < SMALLEST ? `< ${local(SMALLEST)}` : local(digits(value, 4)));
+
+  /** Places of a few round numbers from one end to another. */
+  function ticks(low, high, most = 6) {
+    const step = 10 ** Math.floor(Math.log10((high - low) / most)), times = [1, 2, 5, 10].find((k) => (high - low) / (k * step) <= most);
+    const first = Math.ceil(low / (times * step) - 1e-9), last = Math.floor(high / (times * step) + 1e-9);
+    return Array.from({ length: last - first + 1 }, (_, k) => digits((first + k) * times * step, 12));
+  }
+
+  return { local, sentence, digits, short, millimetres, ticks };
+})();
