@@ -14,7 +14,7 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.wait import WebDriverWait
-from system_parts import program
+from system_parts import missing, program
 
 ARGUMENTS = (
     "--headless=new",
@@ -85,6 +85,15 @@ class Browser:
     def complaints(self) -> list[str]:
         """What the console said since the last call: errors, warnings, what the page's policy refused."""
         return [entry["message"] for entry in self._driver.get_log("browser")]
+
+    def violations(self) -> list[tuple[str, list[str]]]:
+        """What axe-core finds wrong, sizes of touch targets included: rules, and elements that break them."""
+        path = os.environ.get("AXE_CORE") or missing("AXE_CORE, the path of axe-core's axe.min.js")
+        self.run(Path(path).read_text("utf-8"))
+        self.run("for (const part of document.querySelectorAll('details')) part.open = true")
+        rules = "{rules: {'target-size': {enabled: true}}}"
+        found = self.run_async(f"axe.run({rules}).then((found) => arguments[0](found.violations))")
+        return [(one["id"], [node["html"][:200] for node in one["nodes"]][:3]) for one in found]
 
     @contextmanager
     def on_paper(self) -> Iterator[None]:

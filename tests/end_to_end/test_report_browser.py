@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 DRAWN = "path.js-line[d], .barlayer .point path"
 CURVES = f"""
     return [...document.querySelectorAll('.plot')].map((plot) => plot.querySelectorAll('{DRAWN}').length)"""
-TITLES = "return [...document.querySelectorAll('.panel h4')].map((title) => title.textContent)"
+TITLES = "return [...document.querySelectorAll('.panel h3')].map((title) => title.textContent)"
 LOADS = """
     return [...document.querySelectorAll('.actor svg')].map(
         (svg) => [...svg.children].map((shape) => shape.outerHTML).join())"""
@@ -53,7 +53,7 @@ def curves(browser, panel):
     """What a panel's curves show, by name: x and y as Plotly holds them."""
     found = browser.run(
         """
-        const titles = [...document.querySelectorAll('.panel h4')].map((title) => title.textContent);
+        const titles = [...document.querySelectorAll('.panel h3')].map((title) => title.textContent);
         const plot = document.querySelectorAll('.plot')[titles.indexOf(arguments[0])];
         return plot.calcdata.map((points) => [points[0].trace.meta, points.map((p) => [p.x, p.y])]);""",
         panel,
@@ -75,6 +75,15 @@ def test_the_verdict_comes_first(browser, paper):
     assert words[2].startswith("PASSED. After the move the hook sways by 2.193 mm at most (L1 −20 %)")
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 390])
+def test_it_is_accessible(browser, paper, scheme, width):
+    """By the rules of axe-core; all that is folded is open, and curves are hidden by their buttons."""
+    with browser.emulated(scheme):
+        browser.open(paper, width=width, mobile=width < 500)
+        assert browser.violations() == []
+
+
 def test_it_shows_the_paper_s_figures_2_to_5(browser, paper):
     """Their four methods in each; peaks as in the paper's tables 1 and 2 (docs/paper.md)."""
     browser.open(paper)
@@ -89,7 +98,7 @@ def test_it_shows_the_paper_s_figures_2_to_5(browser, paper):
     shown = browser.run(
         """
         return Object.fromEntries([...document.querySelectorAll('.panel')].slice(-10).map((panel) => [
-            panel.querySelector('h4').textContent,
+            panel.querySelector('h3').textContent,
             panel.querySelector('.plot').data.filter((curve) => curve.visible).map((curve) => curve.meta),
         ]))"""
     )

@@ -2,7 +2,6 @@
 
 import io
 import json
-import os
 import shlex
 import subprocess
 import zipfile
@@ -14,7 +13,6 @@ from command_line import PROGRAM
 from end_to_end.studios import studio
 from headless import browser as start
 from selenium.webdriver.common.keys import Keys
-from system_parts import missing
 
 from gen_profile.evaluation.simulation import free_swing
 from gen_profile.problem.dynamics import parameter_column
@@ -269,15 +267,6 @@ def test_nothing_is_wider_than_the_screen(page, width, language):
         page.find("#language").click()
 
 
-def violations(page):
-    path = os.environ.get("AXE_CORE") or missing("AXE_CORE, the path of axe-core's axe.min.js")
-    page.run(Path(path).read_text("utf-8"))
-    page.run("for (const part of document.querySelectorAll('details')) part.open = true")
-    rules = "{rules: {'target-size': {enabled: true}}}"
-    found = page.run_async(f"axe.run({rules}).then((found) => arguments[0](found.violations))")
-    return [(one["id"], [node["html"][:200] for node in one["nodes"]][:3]) for one in found]
-
-
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_is_accessible(page, scheme):
     """By the rules of axe-core, which look at names, roles, contrast and order."""
@@ -285,14 +274,14 @@ def test_it_is_accessible(page, scheme):
     with page.emulated(scheme):
         for view in VIEWS:
             look_at(page, view)
-            assert violations(page) == []
+            assert page.violations() == []
 
 
 def test_it_is_accessible_on_a_phone(page):
     page.size(390, 844, mobile=True)
     for view in VIEWS:
         look_at(page, view)
-        assert violations(page) == []
+        assert page.violations() == []
 
 
 def test_a_log_that_is_chosen_tells_parameters_that_are_taken(page, tmp_path):
@@ -308,7 +297,7 @@ def test_a_log_that_is_chosen_tells_parameters_that_are_taken(page, tmp_path):
     np.savetxt(tmp_path / "stop.csv", table, delimiter=",", header="time_s,hook_angle_deg", comments="")
     page.find("#file").send_keys(str(tmp_path / "stop.csv"))
     page.wait("return document.querySelector('#tells button, #tells .bad') !== null")
-    assert violations(page) == []
+    assert page.violations() == []
     page.run("document.querySelector('#field').scrollIntoView({block: 'start'})")
     assert page.run("""
         const field = document.querySelector('#field');
@@ -363,7 +352,7 @@ def test_the_question_whether_a_program_may_run_is_accessible(page):
     page.run(DROP, "plant.file = '/machine.py'\nmove = {distance = 1.0, duration = 6.0}\n")
     page.wait("return document.querySelector('#consent').open")
     try:
-        assert violations(page) == []
+        assert page.violations() == []
     finally:
         page.find("#refuse").click()
         page.find("#undo").click()
@@ -400,7 +389,7 @@ def test_a_planner_block_is_driven_by_hand(page):
     look_at(page, "design")  # meanwhile time stands still
     page.run("document.querySelector('#driven dd').dataset.of = 'before'")
     look_at(page, "drive")
-    assert violations(page) == []
+    assert page.violations() == []
     page.find("#halt").click()
     page.wait("return document.querySelectorAll('#driven dd')[1].textContent.startsWith('0.000')")
     page.find("#leave").click()
