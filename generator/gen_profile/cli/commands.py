@@ -27,6 +27,7 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
+from gen_profile.cli.signing import require_signature, sign, sign_option, signed_by_option, signing_key
 from gen_profile.errors import CertificateError, OutputError, SpecError
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ def cli() -> None:
 @click.option("--no-check", is_flag=True, help="Skip the co-simulation; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the artefacts even where the check fails.")
 @certify_option
+@sign_option
 @output_options
 def design(
     chosen: SpecChoice,
@@ -75,6 +77,7 @@ def design(
     no_check: bool,
     keep_failed: bool,
     certify: bool,
+    key_path: Path | None,
     as_json: bool,
 ) -> None:
     """Design, export and verify (the default)."""
@@ -91,6 +94,7 @@ def design(
     }
     spec = chosen.changed(stated).spec()
     require_formats(formats)
+    key = signing_key(key_path)
     from gen_profile.artefacts.manifest import FILENAME
     from gen_profile.cli import words
     from gen_profile.cli.progress import progress
@@ -98,6 +102,8 @@ def design(
 
     with progress() as tell:
         outcome = run(spec, formats, folder, check=not no_check, keep_failed=keep_failed, progress=tell)
+    if outcome.passed:
+        sign(folder, key)
     certificates, refusals = _certificates(outcome) if certify and outcome.passed else ({}, [])
     worst = max(certificates.values(), key=lambda found: found.demand, default=None)
     document = outcome.to_dict() | {"certificate": None if worst is None else worst.to_dict()}
@@ -193,11 +199,13 @@ def compare(
 @click.option("--history", metavar="N", type=int, help="Run only this history of a planner block's proof.")
 @scheduler_option("run a planner block's histories")
 @block_plot_option
+@signed_by_option
 @output_options
 def check(
     artefact: Path,
     chosen: SpecChoice,
     *,
+    public_path: Path | None,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -207,6 +215,7 @@ def check(
     """
     if chosen.overrides and not chosen.stated:
         raise SpecError("--set: changes a spec that is named; the manifest's own stays as it is.")
+    require_signature(artefact, public_path)
     spec = chosen.spec() if chosen.stated else None
     from gen_profile.cli import words
     from gen_profile.proof.check import is_planner_block

@@ -26,6 +26,7 @@ from gen_profile.cli.options import (
     spec_options,
 )
 from gen_profile.cli.outcome import beware, fail, print_outcome, warn
+from gen_profile.cli.signing import sign, sign_option, signing_key
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
@@ -77,6 +78,7 @@ def planner() -> None:
 @click.option("--no-check", is_flag=True, help="Skip the proof; the manifest then says unverified.")
 @click.option("--keep-failed", is_flag=True, help="Write the block even where the proof fails.")
 @block_plot_option
+@sign_option
 @output_options
 def write(
     chosen: SpecChoice,
@@ -87,6 +89,7 @@ def write(
     no_check: bool,
     keep_failed: bool,
     picture: Path | None,
+    key_path: Path | None,
     as_json: bool,
 ) -> None:
     """Write the planner block of a machine, proved by co-simulation."""
@@ -101,6 +104,7 @@ def write(
     from gen_profile.proof.prove import HISTORIES
 
     require_forms(formats)
+    key = signing_key(key_path)
     with progress() as tell:
         outcome = deploy_planner(
             spec,
@@ -116,6 +120,8 @@ def write(
             from gen_profile.charts.proof import draw
 
             draw(spec, outcome.block.text, outcome.proof, picture, tell)
+    if outcome.proof is None or outcome.proof.passed:
+        sign(folder, key)
     print_outcome(outcome.to_dict(), words.deployment(outcome), as_json)
     warn(outcome.proof)
     beware(outcome.warnings)

@@ -1,0 +1,63 @@
+"""Options that sign manifests, and ask for signed ones.
+
+The key is named by the user alone: a spec may be a stranger's.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+import click
+
+from gen_profile.cli.options import InputFile
+from gen_profile.errors import OutputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from gen_profile.artefacts.signature import Key
+
+sign_option = click.option(
+    "--sign",
+    "key_path",
+    type=InputFile(),
+    help="Sign the manifest with this secret key, made by minisign -GW.",
+)
+signed_by_option = click.option(
+    "--signed-by", "public_path", type=InputFile(), help="Refuse what this public key has not signed."
+)
+
+
+def signing_key(path: Path | None) -> Key | None:
+    """Read the key before there is any work to lose."""
+    if path is None:
+        return None
+    _require_package()
+    from gen_profile.artefacts.signature import secret_key
+
+    return secret_key(path)
+
+
+def sign(folder: Path, key: Key | None) -> None:
+    """Sign what was delivered, and say so."""
+    if key is not None:
+        from gen_profile.artefacts.signature import sign_manifest
+
+        click.echo(f"Signed by {key.identity}: {sign_manifest(folder, key)}", err=True)
+
+
+def require_signature(artefact: Path, public_path: Path | None) -> None:
+    """Refuse an artefact that no manifest vouches for which the key has signed."""
+    if public_path is not None:
+        _require_package()
+        from gen_profile.artefacts.signature import public_key, require_signed
+
+        key = public_key(public_path)
+        require_signed(artefact, key)
+        click.echo(f"Signed by {key.identity}.", err=True)
+
+
+def _require_package() -> None:
+    if find_spec("cryptography") is None:
+        raise OutputError("Signatures need the package cryptography: pip install 'gen-profile[sign]'.")
