@@ -101,7 +101,7 @@ const driving = (() => {
     const rows = axes.flatMap((_, axis) => [trace.position[axis], trace.low[axis], trace.high[axis], trace.position[axis].map(() => part.target?.[axis] ?? null), trace.velocity[axis]]);
     const all = [...rows, ...animation.actors.map((actor) => actor.sway_mm.slice(-trace.times.length))];
     history ??= { times: [], rows: all.map(() => []), now: 0, rested: 0 };
-    if (part.busy || !part.promise) history.rested = history.now + part.seconds; // before, nothing is promised of the sway
+    if (part.busy || !part.promise) history.rested = history.now + part.seconds; // until then the load may swing
     history.times.push(...trace.times.map((time) => history.now + time));
     all.forEach((row, place) => history.rows[place].push(...row));
     history.now += part.seconds;
@@ -133,7 +133,8 @@ const driving = (() => {
       ];
     });
     const sways = animation.actors.map((actor, index) => curve(actor.name, actor.colour, history.rows[of * axes.length + index]));
-    const limits = [animation.limit_mm, -animation.limit_mm].map((value) => ({ value, between: [history.rested, end] }));
+    const kept = history.rested < history.now ? [animation.limit_mm, -animation.limit_mm] : [];
+    const limits = kept.map((value) => ({ value, between: [history.rested, end] }));
     panels.push(panel(page.phrase("drive.sway"), "mm", sways, { levels: limits }));
     curves.draw($("minute"), panels, { phrase: page.phrase, language: words.language(), alone: true });
   }
