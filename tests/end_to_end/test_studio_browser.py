@@ -159,7 +159,6 @@ def test_designs_have_names_that_lie_on_nothing_and_an_axis_with_several_places(
 
 
 def test_cards_that_wait_say_so(page):
-    page.run("sessionStorage.setItem('seen', '[]')")
     page.run("location.reload()")
     page.wait("return document.querySelector('.waiting')?.textContent")
     assert page.run("return document.querySelectorAll('.waiting').length") == 6
@@ -387,7 +386,6 @@ def test_a_planner_block_is_driven_by_hand(page):
     assert -1.0 <= float(low) <= float(high.removesuffix(" m")) <= 1.0
     assert page.run("return document.querySelector('#drive .envelope').getAttribute('d')").startswith("M")
     look_at(page, "design")  # meanwhile time stands still
-    page.run("document.querySelector('#driven dd').dataset.of = 'before'")
     look_at(page, "drive")
     assert page.violations() == []
     page.find("#halt").click()
