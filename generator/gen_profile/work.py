@@ -9,13 +9,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import TypeVar
 
 import attrs
 
 LOOK = 0.05  # s of work between looks at the clock, which take time themselves
+
+
+Found = TypeVar("Found")
 
 
 class OutOfWork(Exception):
@@ -75,10 +79,25 @@ def spend(seconds: float) -> None:
     Raises
     ------
     OutOfWork
-        No budget is left for it. Whoever catches that spends nothing once more, to end as well where a budget
-        around its own is used up.
+        No budget is left for it. Call ``spend(0.0)`` to raise it again where a budget around is used up, too.
     """
     own = _current.get()
     while own is not None:
         own.take(seconds)
         own = own.outer
+
+
+def afford(find: Callable[[], Found], seconds: float) -> Found | None:
+    """Find something for so much work in s; None where that is not enough.
+
+    Raises
+    ------
+    OutOfWork
+        A budget around this one is used up, too.
+    """
+    try:
+        with budget(seconds):
+            return find()
+    except OutOfWork:
+        spend(0.0)
+        return None

@@ -18,7 +18,7 @@ from gen_profile.problem.pontryagin import optimality_system
 from gen_profile.problem.problem import Problem
 from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.indirect import homotopy
+from gen_profile.solvers.indirect import full_newton
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.indirect.boundary_value_problem import canonical_problem
 
@@ -132,7 +132,7 @@ def test_beside_general_tools():
 @pytest.mark.parametrize("intervals", [20, 60, 200, 600, 2000])
 def test_growth_with_intervals(intervals, monkeypatch):
     problem = crane_problem()
-    for module, meshes in ((indirect, homotopy), (direct, set_up)):
+    for module, meshes in ((indirect, full_newton), (direct, set_up)):
         monkeypatch.setattr(meshes, "INTERVALS", intervals)
         monkeypatch.setattr(meshes, "MAX_INTERVALS", max(480, intervals))
         monkeypatch.setattr(indirect, "LONG_INTERVALS", intervals)  # so many that short ones are taken

@@ -100,7 +100,7 @@ def test_the_spec_s_own_motion_is_designed_once(monkeypatch):
         calls.append(spec)
         raise InfeasibleProblem("limits.velocity: too little.")
 
-    monkeypatch.setattr("gen_profile.comparison.candidates.transient_sway.solve", solve)
+    monkeypatch.setattr("gen_profile.comparison.candidates.suggestions.solve", solve)
     loads = CheckSpec(residual_sway={"hook": 0.01, "payload": 0.003})
     found = compare(attrs.evolve(PAPER, robustness=RobustnessSpec(), check=loads))
     assert len(calls) == 1  # what is impossible for β = 0 is so for any β

@@ -40,7 +40,7 @@ def test_efforts_that_do_not_see_the_highest_derivative_have_programs_that_can_b
     problem = problem_of(spec_from_dict(random_spec("fresh-33")))
     assert problem.effort == "reference"
     easiest = Relaxation(problem).least(tuple(problem.limits.stated()))
-    assert easiest.share == pytest.approx(0.4685, abs=1e-3)
+    assert easiest.wider == pytest.approx(0.4685, abs=1e-3)
 
 
 @pytest.mark.slow

@@ -108,7 +108,7 @@ def test_an_axis_moves_for_a_swing_across_the_way(method):
         ["move.distance=[12.0, 0.0]", "move.initial={theta_y=0.05}", f"solver.method={method}"],
     )
     problem = problem_of(spec)
-    motion = optimal_profile(choice.solve(problem, spec.solver.solver))
+    motion = optimal_profile(choice.attempt(problem, spec.solver.solver))
     across = motion(np.linspace(0.0, 12.0, 601)).position[:, 1]
     assert 0.05 < np.abs(across).max() < 1.0
     assert across[-1] == pytest.approx(0.0, abs=1e-12)
@@ -120,7 +120,7 @@ def test_the_worst_machine_of_a_range_swings_at_the_start_too():
     problem = crane_problem(
         initial={"theta1": 0.03}, sway_weight=0.0, worst_case=box, limits=LimitsSpec(acceleration=0.6)
     )
-    solution = choice.solve(problem)
+    solution = choice.attempt(problem)
     motion = optimal_profile(solution)
     lengths = problem.parameters["L1"] * (1.0 + np.linspace(-0.2, 0.2, 3))
     found = max(
@@ -133,7 +133,7 @@ def test_the_worst_machine_of_a_range_swings_at_the_start_too():
 def test_limits_bind_a_motion_that_ends_at_speed():
     limits = LimitsSpec(acceleration=0.3, velocity=0.16)
     problem = crane_problem(final_velocity=(0.15,), initial={"theta1": 0.01}, limits=limits, sway_weight=0.0)
-    motion = optimal_profile(choice.solve(problem))
+    motion = optimal_profile(choice.attempt(problem))
     assert np.abs(motion.within_segments(33, 1)[1]).max() <= 0.16
     assert np.abs(motion.within_segments(33, 2)[1]).max() <= 0.3
     assert np.abs(sways(motion, problem.parameters, problem.initial)).max() < 1e-7

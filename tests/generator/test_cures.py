@@ -2,12 +2,14 @@
 
 import re
 from itertools import pairwise
+from types import SimpleNamespace
 
 import attrs
 import numpy as np
 import pytest
 
-from gen_profile.designs import transient_sway
+from gen_profile.designs import suggestions, transient_sway
+from gen_profile.designs.draft import lasting
 from gen_profile.designs.plan import plan
 from gen_profile.designs.shortest import timed
 from gen_profile.errors import InfeasibleProblem, LimitViolation
@@ -15,7 +17,6 @@ from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import relaxation
 from gen_profile.solvers.direct import solver as direct
-from gen_profile.solvers.infeasibility import CandidateTest, cures
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.reading import preset_spec
 from gen_profile.work import OutOfWork, budget, spend
@@ -29,7 +30,7 @@ SETTING = r"[a-z_.0-9]+ = (?:\[[^]]*\]|\"[a-z]+\"|[\d.]+\d)"
 
 def refused(preset, *overrides):
     """Solve what cannot be solved; the changes that are named then, each a list of settings."""
-    solution = choice.solve(problem_of(preset_spec(preset, overrides)))
+    solution = suggestions.solve(preset_spec(preset, overrides))
     assert solution.optimum is None
     longer = re.findall(r"duration of ([\d.]+) s will do \(move\.duration\)", solution.cure)
     changes = [[f"move.duration={duration}"] for duration in longer]
@@ -39,7 +40,9 @@ def refused(preset, *overrides):
 
 
 def works(preset, *overrides):
-    return choice.keeps_limits(choice.attempt(problem_of(preset_spec(preset, overrides))))
+    spec = preset_spec(preset, overrides)
+    solution = transient_sway.attempt(spec)
+    return choice.keeps_limits(solution) and transient_sway.keeps_sway(spec, solution, 1.01)
 
 
 def nearer(preset, overrides, change, share):
@@ -109,25 +112,25 @@ def test_limits_that_no_single_one_is_to_blame_for_are_widened_together():
     assert all(works("paper", *overrides, *change) for change in changes)
 
 
-def test_what_was_found_before_the_work_is_used_up_is_told():
-    problem = problem_of(preset_spec("paper", ["limits.sway=0.01"]))
-    told = []
+def test_what_was_found_before_the_work_is_used_up_is_told(monkeypatch):
+    spec, told = preset_spec("paper", ["limits.sway=0.01"]), []
 
-    def solve(other):
+    def tried(other, **how):
         if told:
             raise OutOfWork
-        told.append(choice.directly(other))
+        told.append(choice.attempt(problem_of(other), "direct"))
         return told[0]
 
-    trial = CandidateTest(solve=solve, keeps=choice.keeps_limits, welcome=lambda _: False)
-    named = cures(problem, trial)
+    monkeypatch.setattr(suggestions, "least_factor", lambda changed, *_: tried(changed(1.5)) and 1.5)
+    named = suggestions.suggestions(spec)
     assert named == f"With these limits a duration of {told[0].problem.duration:g} s will do (move.duration)."
 
 
-def test_where_nothing_that_was_tried_will_do_it_is_told_how_long_it_would_take():
-    problem = problem_of(preset_spec("paper", ["limits.acceleration=0.01"]))
-    trial = CandidateTest(solve=choice.given_up, keeps=choice.keeps_limits, welcome=lambda _: True)
-    (told,) = re.findall(r"With these limits it would take some ([\d.]+) s\.", cures(problem, trial))
+def test_where_nothing_that_was_tried_will_do_it_is_told_how_long_it_would_take(monkeypatch):
+    given_up = lambda spec, **_: choice.given_up(problem_of(spec))  # noqa: E731
+    monkeypatch.setattr(suggestions, "tried", given_up)
+    named = suggestions.suggestions(preset_spec("paper", ["limits.acceleration=0.01"]))
+    (told,) = re.findall(r"With these limits it would take some ([\d.]+) s\.", named)
     assert works("paper", "limits.acceleration=0.01", f"move.duration={1.1 * float(told)}")
     assert not works("paper", "limits.acceleration=0.01", f"move.duration={0.9 * float(told)}")
 
@@ -153,15 +156,15 @@ def test_a_limit_is_kept_by_machines_whose_sway_hardly_follows_the_nominal_one_s
 
 
 @pytest.mark.parametrize(("order", "less"), [(1, 'robustness.method = "none"'), (2, "robustness.order = 1")])
-def test_robustness_is_to_blame_where_nothing_else_is(order, less):
-    problem = problem_of(preset_spec("paper", [f"robustness.order={order}"]))
+def test_robustness_is_to_blame_where_nothing_else_is(monkeypatch, order, less):
+    spec = preset_spec("paper", [f"robustness.order={order}", "check.residual_sway=0.1"])
 
-    def solve(other):
-        hard = bool(other.desensitized) and other.order == order
-        return choice.directly(attrs.evolve(other, duration=0.3) if hard else other)
+    def tried(other, **_):
+        hard = other.robustness.method == "sensitivity" and other.robustness.order == order
+        return choice.attempt(problem_of(lasting(other, 0.3) if hard else other), "direct")
 
-    trial = CandidateTest(solve=solve, keeps=choice.keeps_limits, welcome=lambda _: True)
-    assert cures(problem, trial) == f"In 3 s it would do with {less}."
+    monkeypatch.setattr(suggestions, "tried", tried)
+    assert suggestions.suggestions(spec) == f"In 3 s it would do with {less}."
 
 
 def test_too_short_a_move_with_limits_is_told_a_duration_that_keeps_them():
@@ -191,7 +194,7 @@ def test_the_share_falls_with_the_duration():
         ).least(("limits.sway",))
         for t in (2.5, 3.0, 4.0, 6.0)
     ]
-    assert all(later.share < earlier.share for earlier, later in pairwise(shares))
+    assert all(later.wider < earlier.wider for earlier, later in pairwise(shares))
 
 
 def test_the_indirect_method_which_knows_no_limits_is_told_how_to_keep_them():
@@ -206,57 +209,58 @@ def test_the_indirect_method_which_knows_no_limits_is_told_how_to_keep_them():
 
 def test_no_hint_of_the_indirect_method_is_told_where_there_are_limits(monkeypatch):
     """It knows none: its duration would break them."""
-    problem = problem_of(preset_spec("paper", ["limits.acceleration=0.2"]))
-    unlimited = attrs.evolve(
-        choice.given_up(problem), method="indirect", cure="Allow about 1.42 s (move.duration)."
-    )
-
-    def tried(other, *, coarse=False):
-        return choice.given_up(other)
-
-    assert choice.diagnosed(unlimited, "auto", tried=tried).cure == choice.IN_VAIN
-    monkeypatch.setattr(choice, "cures", lambda *_: "It takes 4 s.")
+    monkeypatch.setattr(suggestions, "tried", lambda other, **_: choice.given_up(problem_of(other)))
     for method, told in (("auto", ""), ("indirect", 'Set solver.method = "auto". ')):
-        assert choice.diagnosed(unlimited, method, tried=tried).cure == f"{told}It takes 4 s."
+        spec = preset_spec("paper", ["limits.acceleration=0.2", f"solver.method={method}"])
+        unlimited = attrs.evolve(
+            choice.given_up(problem_of(spec)), method="indirect", cure="Allow about 1.42 s (move.duration)."
+        )
+        monkeypatch.setattr(suggestions, "suggestions", lambda *_: "It takes 4 s.")
+        assert suggestions.explained(spec, unlimited).cure == f"{told}It takes 4 s."
+        monkeypatch.setattr(suggestions, "suggestions", lambda *_: "")
+        assert suggestions.explained(spec, unlimited).cure == suggestions.IN_VAIN
 
 
 def test_a_limit_that_the_next_run_refuses_as_implausible_is_not_named():
     spec = preset_spec("single-pendulum-crane", ["limits.sway=0.2"])
-    problem = attrs.evolve(problem_of(spec), limits=spec.limits.changed({"limits.sway": 40.0}))
-    assert choice.keeps_limits(choice.directly(problem))
-    assert not choice.keeps_limits(transient_sway.as_asked_next(spec, problem))
+    wide = attrs.evolve(spec, limits=spec.limits.changed({"limits.sway": 40.0}))
+    assert choice.keeps_limits(choice.attempt(problem_of(wide), "direct"))
+    assert not choice.keeps_limits(suggestions.tried(wide))
 
 
-def test_values_are_skipped_that_leave_no_room_for_the_sway_of_the_worst_machine():
-    problem = problem_of(preset_spec("paper", ["limits.sway=0.01"]))
-    asked = []
+def test_values_are_skipped_that_leave_no_room_for_the_sway_of_the_worst_machine(monkeypatch):
+    spec, asked = preset_spec("paper", ["limits.sway=0.01"]), []
 
-    def solve(other):
-        asked.append(other.duration)
-        return choice.given_up(attrs.evolve(other, sway_spread=1.2))
+    def tried(other, **_):
+        asked.append(other.move.duration)
+        failed = attrs.evolve(problem_of(other), sway_spread=1.2)
+        return attrs.evolve(choice.given_up(failed), status=Status.INFEASIBLE)
 
-    trial = CandidateTest(solve=solve, keeps=choice.keeps_limits, welcome=lambda _: True)
-    assert trial.least(lambda factor: attrs.evolve(problem, duration=factor)) is None
-    assert asked == [1.03, 1.3, 1.7, 2.5, 4.0]
+    monkeypatch.setattr(suggestions, "tried", tried)
+    assert suggestions.least_factor(lambda factor: lasting(spec, factor)) is None
+    assert asked[:2] == pytest.approx([1.03, 1.2 * 1.03])
+    assert all(later > 1.19 * earlier for earlier, later in pairwise(asked))
 
 
-def test_a_value_that_takes_too_much_work_leaves_enough_for_an_ample_one():
-    problem = problem_of(preset_spec("paper", ["limits.sway=0.01"]))
-    smooth = choice.attempt(problem_of(preset_spec("paper")), "indirect")
+def test_a_value_that_takes_too_much_work_leaves_enough_for_an_ample_one(monkeypatch):
+    spec = preset_spec("paper")
+    smooth = choice.attempt(problem_of(spec), "indirect")
 
-    def solve(other):
-        spend(1.0 if other.duration >= 1.3 else 9.0)
+    def tried(other, **_):
+        spend(1.0 if other.move.duration >= 1.3 else 9.0)
         return smooth
 
-    trial = CandidateTest(solve=solve, keeps=lambda solution: True, welcome=lambda _: True)
+    monkeypatch.setattr(suggestions, "tried", tried)
+    monkeypatch.setattr(suggestions, "drafted", lambda *_: SimpleNamespace(excess_sway=0.0))
     with budget(16.0):
-        assert trial.least(lambda factor: attrs.evolve(problem, duration=factor), 0.5) == 1.3
+        found = suggestions.least_factor(lambda factor: lasting(spec, factor), fraction=0.5)
+    assert 1.3 <= found < 1.4
 
 
 def test_a_longer_move_is_tried_without_binding_limits_first(monkeypatch):
     spec = preset_spec("paper", ["limits.sway=0.02"])
     monkeypatch.setattr(transient_sway, "kept_by_all", lambda *_, **__: pytest.fail("limits do not bind"))
-    found = transient_sway.as_asked_next(spec, attrs.evolve(problem_of(spec), duration=8.0))
+    found = suggestions.tried(lasting(spec, 8.0))
     assert found.method == "indirect"
     assert choice.keeps_limits(found)
 
@@ -277,24 +281,12 @@ def test_the_least_duration_is_found_in_few_steps_however_far_it_is(monkeypatch,
 
         def least(self, _):
             tried.append(self.problem.duration)
-            return relaxation.Relaxed(share=(needed / self.problem.duration) ** 2, found=None)
+            return relaxation.Relaxed(wider=(needed / self.problem.duration) ** 2, found=None)
 
     monkeypatch.setattr(relaxation, "Relaxation", Quadratic)
     problem = problem_of(preset_spec("paper", ["limits.sway=0.01", "move.duration=3"]))
     assert needed < relaxation.least_duration(Quadratic(problem)) < 1.05 * needed
     assert len(tried) <= 5
-
-
-def test_a_trial_begins_with_what_the_next_run_knows(monkeypatch):
-    spec, begun = preset_spec("paper", ["limits.sway=0.02"]), []
-
-    def kept_by_all(_, problem, *__, **___):
-        begun.append(problem)
-        return choice.given_up(problem)
-
-    monkeypatch.setattr(transient_sway, "kept_by_all", kept_by_all)
-    transient_sway.as_asked_next(spec, attrs.evolve(problem_of(spec), sway_spread=1.2))
-    assert begun[0].sway_spread == 1.0
 
 
 def test_a_speed_that_leads_out_of_an_axis_range_is_told_one_that_does_not():
@@ -320,9 +312,7 @@ def test_where_no_duration_will_do_the_limit_to_blame_is_named():
 @pytest.mark.parametrize("others", [[], ["limits.velocity=0.05"]])
 def test_cures_leave_room_for_the_machine_that_sways_most_whatever_else_is_infeasible(others):
     spec = preset_spec("paper", ["limits.sway=0.02", *others])
-    assert transient_sway.with_usual_spread(spec, problem_of(spec)).sway_spread == pytest.approx(
-        1.18, abs=0.03
-    )
+    assert suggestions.usual_spread(spec) == pytest.approx(1.18, abs=0.03)
 
 
 def test_a_limit_of_the_sway_that_is_named_is_kept_by_every_machine():
@@ -341,7 +331,7 @@ def test_a_duration_is_guessed_where_programs_settle_for_shorter_ones_only(monke
 
         def least(self, _):
             duration = self.problem.duration
-            return None if duration > 20.0 else relaxation.Relaxed(share=900.0 / duration**2, found=None)
+            return None if duration > 20.0 else relaxation.Relaxed(wider=900.0 / duration**2, found=None)
 
     monkeypatch.setattr(relaxation, "Relaxation", Settling)
     problem = problem_of(preset_spec("paper", ["limits.sway=0.01"]))
@@ -354,7 +344,7 @@ def test_redundant_sensitivities_are_left_out_here_too():
     problem = problem_of(preset_spec("paper", [*uncertain, "limits.sway=0.016"]))
     easiest = relaxation.Relaxation(problem).least(("limits.sway",))
     alone = relaxation.Relaxation(attrs.evolve(problem, desensitized=("L1",))).least(("limits.sway",))
-    assert easiest.share == pytest.approx(alone.share, rel=1e-6)
+    assert easiest.wider == pytest.approx(alone.wider, rel=1e-6)
     begun_there = direct.solve(problem, easiest.start(problem))
     assert begun_there.redundant == ("L2",)
     assert begun_there.raise_for_status().cost == pytest.approx(

@@ -6,6 +6,7 @@ import pytest
 from generator.crane_problems import CRANE, EFFORTS, crane_problem
 from generator.oracles.crane_optimal_control import CraneOptimalControl, direct_cost
 
+from gen_profile.designs import suggestions
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.metrics import greatest
 from gen_profile.problem.problem import problem_of
@@ -85,16 +86,16 @@ def test_a_limit_costs():
 
 
 def test_auto_takes_the_indirect_method_where_no_limit_binds():
-    assert choice.solve(limited(acceleration=1.0)).method == indirect.METHOD
-    assert choice.solve(limited(acceleration=0.5)).method == direct.METHOD
-    assert choice.solve(limited(acceleration=0.5), "indirect").method == indirect.METHOD
-    assert choice.solve(limited(), "direct").method == direct.METHOD
+    assert choice.attempt(limited(acceleration=1.0)).method == indirect.METHOD
+    assert choice.attempt(limited(acceleration=0.5)).method == direct.METHOD
+    assert choice.attempt(limited(acceleration=0.5), "indirect").method == indirect.METHOD
+    assert choice.attempt(limited(), "direct").method == direct.METHOD
 
 
 def test_an_infeasible_problem_says_what_would_do():
-    solution = choice.solve(limited(acceleration=0.2, velocity=0.2))
+    solution = suggestions.solve(preset_spec("paper", ["limits={acceleration=0.2, velocity=0.2}"]))
     assert solution.status is Status.INFEASIBLE
-    assert "a duration of 3.18 s will do" in solution.cure
+    assert "a duration of 3.16 s will do" in solution.cure
     assert "In 3 s it would do with limits.acceleration = 0.233." in solution.cure
     assert "limits.velocity" not in solution.cure
 
@@ -123,7 +124,7 @@ def test_programs_that_overshoot_back_and_forth_settle(weight):
 
 def test_a_bisected_mesh_holds_the_same_motion():
     (setup, _), cost = set_up.set_up(limited(acceleration=0.3)), SwayCost(beta=50.0, gamma=50.0)
-    goal = direct.CostProgram(setup=setup, sway_cost=cost, sway_limit=None)
+    goal = direct.Goal(setup=setup, sway_cost=cost, sway_limit=None)
     found = direct.sequence(setup.transcription.rest(), goal)
     where = switching(setup, found.iterate, None)
     finer, motion = bisected(setup, found.iterate, where)

@@ -14,7 +14,8 @@ from gen_profile.designs.plan import draft
 from gen_profile.errors import CosimulationError
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.minimum_time import EXACTLY, PRECISION, least, least_corrected
+from gen_profile.solvers.direct import relaxation
+from gen_profile.solvers.search import least
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.spec.reading import preset_spec
 from gen_profile.work import OutOfWork, budget, spend
@@ -138,102 +139,70 @@ def in_cycles(duration):
     return math.ceil(1e3 * duration - 1e-6) / 1e3
 
 
-class Search:
-    """Look for the least duration whose excess, rough and exact, is not positive, and list what was tried."""
+def searched(excess, start=10.0, most=100.0, search=searching.EXACT):
+    """Look for the least duration whose excess is not positive; also list what was tried."""
+    tried = []
 
-    def __init__(self, roughly, exactly, start=10.0, most=100.0):
-        self.rough, self.exact = [], []
+    def listed(duration):
+        tried.append(duration)
+        return excess(duration)
 
-        def rough(duration):
-            self.rough.append(duration)
-            return roughly(duration)
-
-        def exact(duration):
-            self.exact.append(duration)
-            return exactly(duration), duration
-
-        self.found = least_corrected(rough, exact, start, most, in_cycles)
-        for tried in (self.rough, self.exact):
-            assert len(set(tried)) == len(tried)
+    found = least(listed, start, search, most, in_cycles)
+    assert len(set(tried)) == len(tried)
+    return found, tried
 
 
-@pytest.mark.parametrize(("enough", "tries"), [(10.001, 6), (10.03, 8), (10.5, 18), (13.0, 19)])
+@pytest.mark.parametrize(("enough", "tries"), [(10.001, 3), (10.03, 7), (10.5, 13), (13.0, 15)])
 def test_a_duration_of_which_only_is_known_whether_it_will_do_is_found_by_bisection(enough, tries):
     """Every try is a design of seconds."""
-
-    def excess(duration):
-        return -math.inf if duration >= enough else math.inf
-
-    search = Search(excess, excess)
-    assert enough <= search.found <= enough * (1.0 + PRECISION) + 0.01
-    assert len(search.rough) + len(search.exact) <= tries
+    found, tried = searched(lambda duration: -math.inf if duration >= enough else math.inf)
+    assert enough <= found <= enough * math.exp(searching.EXACT.precision) + 0.001
+    assert len(tried) <= tries
 
 
 def test_no_duration_is_looked_for_without_end():
-    assert Search(lambda _: math.inf, lambda _: math.inf).found is None
+    assert searched(lambda _: math.inf)[0] is None
 
 
-@pytest.mark.parametrize("enough", [10.001, 10.03, 10.5, 13.0])
+def test_where_the_excess_falls_no_more_no_duration_is_looked_for():
+    found, tried = searched(lambda duration: 0.3 + 0.1 / duration, 1.0, 1e9, relaxation.LEAST)
+    assert found is None
+    assert len(tried) <= 12
+
+
+@pytest.mark.parametrize("enough", [8.0, 9.99, 10.001, 10.03, 10.5, 13.0])
 @pytest.mark.parametrize("power", [1.0, 4.0, 30.0])
-def test_an_excess_that_is_known_leads_to_the_duration_in_fewer_tries(enough, power):
+def test_an_excess_that_is_known_leads_to_the_duration_in_few_tries(enough, power):
     def excess(duration):
         return power * math.log(enough / duration)
 
-    search = Search(excess, excess)
-    assert enough <= search.found
-    assert excess(search.found) >= EXACTLY.low or search.found <= enough * (1.0 + PRECISION)
-    assert len(search.rough) + len(search.exact) <= 9 and len(search.exact) <= 3
+    found, tried = searched(excess)
+    assert enough <= found
+    assert excess(found) >= -searching.EXACT.close or found <= enough * math.exp(searching.EXACT.precision)
+    assert len(tried) <= 5
+
+
+def test_an_excess_that_falls_ever_more_slowly_is_followed_with_few_tries():
+    """They take half a second each."""
+    found, tried = searched(lambda d: (3.0 - d) + 0.5 * (3.0 - d) ** 2, 2.7, 30.0)
+    assert 3.0 <= found < 3.01
+    assert len(tried) <= 5
 
 
 def test_the_least_value_found_before_the_work_is_used_up_is_taken():
-    def feasible(value):
+    def excess(value):
         spend(1.0)
-        return value >= 12.0
+        return -math.inf if value >= 12.0 else math.inf
 
+    search = attrs.evolve(searching.EXACT, stride=math.log(1.5), growth=1.0)
     with budget(4.5):
-        assert 12.0 <= least(feasible, 10.0, 100.0) <= 16.0
+        assert 12.0 <= least(excess, 10.0, search) <= 16.0
     with pytest.raises(OutOfWork), budget(0.5):
-        least(feasible, 10.0, 100.0)
+        least(excess, 10.0, search)
 
 
 def test_no_motion_is_designed_twice_for_durations_that_end_on_the_same_cycle():
-    search = Search(
-        lambda duration: -math.inf if duration > 0.049 else math.inf,
-        lambda duration: -math.inf if duration > 0.05 else math.inf,
-        0.048,
-        1.0,
-    )
-    assert search.found == 0.051
-
-
-@pytest.mark.parametrize("coarser", [-0.05, 0.0, 0.05])
-def test_what_few_intervals_leave_besides_is_learned_from_few_motions_on_many(coarser):
-    """They take half a second each."""
-
-    def rest(duration):
-        return (3.0 - duration) + 0.5 * (3.0 - duration) ** 2
-
-    search = Search(lambda duration: rest(duration) + coarser, rest, 2.7, 30.0)
-    assert 3.0 <= search.found < 3.01
-    assert len(search.exact) <= 3
-
-
-@pytest.mark.parametrize("coarser", [-0.5, 0.5])
-def test_what_few_intervals_say_of_the_duration_to_begin_with_is_not_taken_for_granted(coarser):
-    def rest(duration):
-        return 10.0 * (2.72 - duration)
-
-    assert 2.72 <= Search(lambda duration: rest(duration) + coarser, rest, 2.7, 30.0).found < 2.723
-    calm = Search(lambda duration: rest(duration) + 0.3, lambda _: -1.0, 2.7, 30.0)
-    assert calm.found <= 2.7 * (1.0 + PRECISION)
-
-
-def test_what_few_intervals_allow_and_many_do_not_is_found_beyond():
-    search = Search(
-        lambda duration: 3.0 - duration, lambda duration: -1.0 if duration > 3.2 else math.inf, 2.7
-    )
-    assert 3.2 < search.found < 3.21
-    assert Search(lambda _: -1.0, lambda _: math.inf, 2.7, 30.0).found is None
+    assert searched(lambda duration: -math.inf if duration > 0.05 else math.inf, 0.048, 1.0)[0] == 0.051
 
 
 def test_a_motion_that_no_machine_can_follow_is_passed_over(monkeypatch):

@@ -446,7 +446,7 @@ def test_what_only_a_design_has_is_refused_in_a_report(deployed):
 
 @pytest.mark.usefixtures("designed")
 def test_a_block_that_sways_too_much_is_not_written(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.designs.planner.cures", lambda *_: ())
+    monkeypatch.setattr("gen_profile.designs.planner.planner_suggestions", lambda *_: ())
     (tmp_path / "bay.toml").write_text(BAY.replace("residual_sway = 0.05", "residual_sway = 0.00001"))
     options = ("--out", tmp_path / "out", "--histories", 4, "--json")
     failed = run_here("planner", "write", tmp_path / "bay.toml", *options)

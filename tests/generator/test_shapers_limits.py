@@ -1,17 +1,20 @@
 """Base moves, and the shortest shaped moves within limits."""
 
+import attrs
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import polynomial
 
-from gen_profile.errors import SpecError
+from gen_profile.designs.shape import shaped_motion, shortest_duration
+from gen_profile.errors import InfeasibleProblem, SpecError
 from gen_profile.motion.metrics import greatest
 from gen_profile.shapers.base_moves import BASES, QUINTIC, SEPTIC, jerk_limited
 from gen_profile.shapers.impulses import SHAPERS
 from gen_profile.shapers.shaped_move import shaped_move
 from gen_profile.spec.model import AxisLimitsSpec, LimitsSpec
+from gen_profile.spec.reading import preset_spec
 
 FREQUENCIES = (3.64, 9.017)
 LIMITS = (0.3, 1.0, 4.0)
@@ -93,15 +96,21 @@ def test_the_shortest_move_keeps_all_limits_and_a_shorter_one_does_not(name, bas
     move = shaped_move(
         name, start=[0.0], target=[0.3], frequencies=FREQUENCIES, base=BASES[base](limits, [0.3])
     )
-    shortest = move.shortest(keeps)
+    spec = preset_spec(
+        "paper", [f"limits={{velocity={LIMITS[0]}, acceleration={LIMITS[1]}, jerk={LIMITS[2]}}}"]
+    )
+    spec = attrs.evolve(preset_spec("paper"), limits=limits)
+    shortest = shortest_duration(spec, move)
     assert shortest > move.shaper.delay
     assert keeps(move.profile(shortest))
-    assert not keeps(move.profile(shortest * (1.0 - 2e-4)))
+    assert not keeps(move.profile(shortest * (1.0 - 2e-4) - 2.0 * spec.export.cycle_time))
 
 
-def test_limits_that_no_duration_keeps():
-    move = shaped_move("zvd", start=[0.0], target=[0.3], frequencies=FREQUENCIES)
-    assert move.shortest(lambda _: False) is None
+def test_limits_that_no_duration_keeps(monkeypatch):
+    monkeypatch.setattr("gen_profile.designs.shape._breaches", lambda *_: ("whatever",))
+    spec = preset_spec("paper", ["move.duration=minimum", "limits.velocity=0.3"])
+    with pytest.raises(InfeasibleProblem, match=r"^move\.duration: no duration keeps the limits"):
+        shaped_motion(spec, "zvd")
 
 
 @given(name=st.sampled_from(["zvd", "ei", "zvdd", "mzv"]), order=st.integers(1, 3), spare=st.floats(0.3, 3.0))

@@ -12,7 +12,7 @@ from gen_profile.solvers.collocation import LONG_GAUSS
 from gen_profile.solvers.indirect import simplified_newton
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.indirect.boundary_value_problem import canonical_problem, independence, quintic
-from gen_profile.solvers.indirect.homotopy import solve_by_homotopy
+from gen_profile.solvers.indirect.full_newton import solve_fully
 from gen_profile.solvers.indirect.simplified_newton import solve_simplified
 
 
@@ -24,7 +24,7 @@ def posed(problem):
 
 
 def solve_surely(problem):
-    return solve_by_homotopy(problem, posed(problem))
+    return solve_fully(problem, posed(problem))
 
 
 def is_quick(solution):

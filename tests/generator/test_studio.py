@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gen_profile.designs.plan import plan
+from gen_profile.designs.suggestions import OTHERWISE
 from gen_profile.errors import SpecError
-from gen_profile.solvers.method_selection import OTHERWISE
 from gen_profile.spec.reading import parse_spec, preset_spec, preset_text, presets, spec_from_dict
 from gen_profile.studio.depth import depth
 from gen_profile.studio.knobs import knobs

@@ -6,8 +6,8 @@ from importlib.resources import files
 
 import pytest
 
+from gen_profile.designs.suggestions import IN_VAIN, OTHERWISE
 from gen_profile.errors import SpecError
-from gen_profile.solvers.method_selection import IN_VAIN, OTHERWISE
 from gen_profile.solvers.solution import WIDER, Status
 from gen_profile.spec.plausibility import doubts
 from gen_profile.spec.reading import preset_spec, presets, spec_from_dict

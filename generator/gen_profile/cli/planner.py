@@ -128,9 +128,9 @@ def write(
     if outcome.proof is not None and not outcome.proof.passed:
         before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
         kept = "The block was kept." if outcome.files else f"Nothing was written{before}."
-        if outcome.cures:
+        if outcome.suggestions:
             tried = "; or with ".join(
-                f"{cure} ({100.0 * cure.share:.0f} % of the limit)" for cure in outcome.cures
+                f"{one} ({100.0 * one.share:.0f} % of the limit)" for one in outcome.suggestions
             )
             kept = f"It would pass with {tried}.\n{kept}"
         fail(outcome.proof.reasons(), kept)

@@ -8,7 +8,7 @@ from typing import Any
 
 import attrs
 
-from gen_profile.designs import transient_sway
+from gen_profile.designs import suggestions, transient_sway
 from gen_profile.designs.shape import shaped_motion
 from gen_profile.designs.shortest import timed
 from gen_profile.errors import GenProfileError, InfeasibleProblem, SpecError
@@ -110,7 +110,7 @@ def _other_robustness(spec: Spec) -> dict[str, Mapping[str, Any]]:
 
 
 def _optimal(spec: Spec) -> Profile:
-    return optimal_profile(transient_sway.solve(spec))
+    return optimal_profile(suggestions.solve(spec))
 
 
 def _weighed(timed_spec: Callable[[], Spec], sway_weight: float) -> Profile:

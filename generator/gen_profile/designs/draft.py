@@ -12,7 +12,7 @@ from gen_profile.designs import transient_sway
 from gen_profile.designs.shape import shaped_motion
 from gen_profile.errors import CosimulationError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, share_of_residual_sway
-from gen_profile.motion.profile import Profile
+from gen_profile.motion.profile import Profile, grid_duration
 from gen_profile.problem.limits import SWAY_TOLERANCE
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers.direct.relaxation import Relaxed
@@ -20,7 +20,7 @@ from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
 
-CALM = 0.99  # share of the limits of residual sway, which leaves room for the setpoints' own errors
+WITHIN = 0.99  # fraction of the limits of residual sway, which leaves room for the setpoints' own errors
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -64,8 +64,8 @@ class Draft:
             return math.inf
         if limit is not None and evaluation.figures["sway_transient_worst_m"] > SWAY_TOLERANCE * limit:
             return math.inf
-        share = share_of_residual_sway(self.spec, evaluation)
-        return math.log(share / CALM) if share > 0.0 else -math.inf
+        taken = share_of_residual_sway(self.spec, evaluation)
+        return math.log(taken / WITHIN) if taken > 0.0 else -math.inf
 
 
 def drafted(spec: Spec, solution: Solution, solver_time: float = 0.0) -> Draft:
@@ -83,3 +83,13 @@ def solved(
     began = time.perf_counter()
     solution = transient_sway.attempt(spec, progress, spread, near)
     return drafted(spec, solution, time.perf_counter() - began)
+
+
+def lasting(spec: Spec, duration: float) -> Spec:
+    """Give a spec a duration in s."""
+    return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=duration, shortest=False))
+
+
+def in_cycles(spec: Spec, duration: float) -> float:
+    """Round a duration in s up to a cycle of a spec's controller."""
+    return grid_duration(duration, spec.export.cycle_time)

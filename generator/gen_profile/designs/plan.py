@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import attrs
 
-from gen_profile.designs import transient_sway
-from gen_profile.designs.draft import Draft, drafted, solved
+from gen_profile.designs.draft import Draft, solved
 from gen_profile.designs.shortest import shortest
+from gen_profile.designs.suggestions import explained, remedy
 from gen_profile.errors import LimitViolation
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.motion.profile import Profile
@@ -60,11 +59,6 @@ class Plan:
         return self.evaluation.command
 
 
-def _is_calm(spec: Spec, solution: Solution) -> bool:
-    """Whether a solution leaves every machine of a spec little enough sway, and no more on the way."""
-    return drafted(spec, solution).excess_sway <= 0.0
-
-
 def plan(spec: Spec | Path | str, progress: Progress = untold) -> Plan:
     """Solve a spec, or shape a move for it, and try the motion on all machines.
 
@@ -112,20 +106,17 @@ def judged(found: Draft, progress: Progress = untold) -> Plan:
         Nothing is left of a budget.
     """
     spec = found.spec
-    asked_next = spec.solver.solver, partial(_is_calm, spec), partial(transient_sway.as_asked_next, spec)
     if found.motion is None:
         assert found.solution is not None  # a shaper has a motion, or raises
         progress(EXPLAINING)
-        solution = choice.diagnosed(found.solution, *asked_next)
-        found = attrs.evolve(found, motion=optimal_profile(solution))
+        found = attrs.evolve(found, motion=optimal_profile(explained(spec, found.solution)))
     evaluation, figures = found.evaluation, found.evaluation.figures
     swing = max(figures["sway_transient_peak_m"], figures["sway_transient_worst_m"] / SWAY_TOLERANCE)
     broken = breaches(spec.limits, evaluation.command, swing)
     if broken:
         sentences = [breach.sentence() for breach in broken]
         progress(EXPLAINING)
-        cure = choice.remedy(problem_of(spec), *asked_next)
-        raise LimitViolation("\n".join([*sentences, cure]).strip())
+        raise LimitViolation("\n".join([*sentences, remedy(spec)]).strip())
     return Plan(
         spec=spec,
         solution=found.solution,

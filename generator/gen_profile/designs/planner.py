@@ -13,7 +13,7 @@ import attrs
 from gen_profile.artefacts.manifest import PLANNER, Artefact, sha256
 from gen_profile.artefacts.writing import staged
 from gen_profile.designs.design import deliver_judged
-from gen_profile.designs.planner_cures import Cure, cures
+from gen_profile.designs.planner_suggestions import PlannerSuggestion, planner_suggestions
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
 from gen_profile.planner.full_speed import slow_axes
@@ -37,7 +37,7 @@ class Deployment:
     folder : Path
     files : tuple of Artefact
         What was delivered; empty when the proof failed.
-    cures : tuple of Cure
+    suggestions : tuple of PlannerSuggestion
         Changes of a refused spec with which its block passes.
     warnings : tuple of str
         Sentences on axes that never reach the velocity of their limits; none where nothing was proved.
@@ -48,7 +48,7 @@ class Deployment:
     proof: Proof | None
     folder: Path
     files: tuple[Artefact, ...]
-    cures: tuple[Cure, ...] = ()
+    suggestions: tuple[PlannerSuggestion, ...] = ()
     warnings: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
@@ -67,7 +67,7 @@ class Deployment:
             "live": {name: list(ends) for name, ends in self.spec.planner.live.items()},
             "frequency_error": self.block.frequency_error,
             "proof": None if self.proof is None else self.proof.to_dict(),
-            "cures": [{"values": dict(cure.values), "share": cure.share} for cure in self.cures],
+            "cures": [{"values": dict(one.values), "share": one.share} for one in self.suggestions],
             "warnings": list(self.warnings),
         }
 
@@ -125,17 +125,19 @@ def deploy_planner(
             for name, content in written.items()
         )
         kept = deliver_judged(staging, spec, artefacts, proof, profile_sha256="", keep_failed=keep_failed)
-    found: tuple[Cure, ...] = ()
+    found: tuple[PlannerSuggestion, ...] = ()
     if proof is not None and not proof.passed and not keep_failed:
         progress("looking for what would pass")
-        found = cures(spec, proof, lambda changed: prove_on(changed, planner_block(changed).text))
+        found = planner_suggestions(
+            spec, proof, lambda changed: prove_on(changed, planner_block(changed).text)
+        )
     return Deployment(
         spec=spec,
         block=block,
         proof=proof,
         folder=folder,
         files=kept,
-        cures=found,
+        suggestions=found,
         warnings=warnings,
     )
 

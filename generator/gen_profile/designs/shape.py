@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import math
+from functools import partial
+
 import attrs
 
 from gen_profile.designs.transient_sway import sways
 from gen_profile.errors import InfeasibleProblem
 from gen_profile.motion.actuator import lag_compensated
-from gen_profile.motion.profile import Profile, grid_length, grid_times
+from gen_profile.motion.profile import Profile, grid_duration
 from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches, rounded_up
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.base_moves import BASES
 from gen_profile.shapers.shaped_move import ShapedMove, shaped_move
+from gen_profile.solvers.search import Search, least
 from gen_profile.spec.model import Spec
+
+# peaks of a shaped motion fall with the base move's duration, not quite evenly where delayed parts overlap
+SHORTEST = Search(precision=1e-4, close=0.0, stride=math.log(2.0), growth=1.0, downward=True)
+LONGEST = 1e6  # times the shaper's delay, after which a duration is not looked for
 
 
 def shaped_motion(spec: Spec, name: str) -> Profile:
@@ -49,28 +57,29 @@ def shaped_motion(spec: Spec, name: str) -> Profile:
         base=BASES[spec.solver.base](spec.limits, move.distance),
     )
     if move.shortest:
-        return _shortest(spec, shaped)
+        shortest = shortest_duration(spec, shaped)
+        if shortest is None:
+            raise InfeasibleProblem("move.duration: no duration keeps the limits; widen them.")
+        return shaped.profile(shortest)
     motion = shaped.profile(move.duration)
-    broken = _breaches(spec, motion)
-    if broken:
-        shortest = shaped.shortest(lambda trial: not _breaches(spec, trial))
-        sentences = [breach.sentence() for breach in broken]
+    sentences = [breach.sentence() for breach in _breaches(spec, motion)]
+    if sentences:
+        shortest = shortest_duration(spec, shaped)
         if shortest is not None:
             sentences.append(f"With this shaper the move takes at least {rounded_up(shortest, digits=4)} s.")
         raise InfeasibleProblem(" ".join(sentences))
     return motion
 
 
-def _shortest(spec: Spec, shaped: ShapedMove) -> Profile:
-    """Make a shaped motion as short as the limits permit; it ends on a cycle of the controller."""
-    shortest = shaped.shortest(lambda trial: not _breaches(spec, trial))
-    if shortest is None:
-        raise InfeasibleProblem("move.duration: no duration keeps the limits; widen them.")
-    cycle = spec.export.cycle_time
-    count = grid_length(shortest, cycle)
-    while _breaches(spec, motion := shaped.profile(float(grid_times(count, cycle)[-1]))):
-        count += 1
-    return motion
+def shortest_duration(spec: Spec, shaped: ShapedMove) -> float | None:
+    """Find the shortest duration in s that keeps the limits and ends on a cycle of the controller, if any."""
+    delay, in_cycles = shaped.shaper.delay, partial(grid_duration, cycle_time=spec.export.cycle_time)
+
+    def excess(duration: float) -> float:
+        keeps = duration > in_cycles(delay) and not _breaches(spec, shaped.profile(duration))
+        return -math.inf if keeps else math.inf
+
+    return least(excess, 2.0 * delay, SHORTEST, LONGEST * delay, in_cycles)
 
 
 def _breaches(spec: Spec, motion: Profile) -> tuple[Breach, ...]:

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from functools import cache, partial
 
 import attrs
 
 from gen_profile.designs import transient_sway
-from gen_profile.designs.draft import Draft, drafted, solved
+from gen_profile.designs.draft import Draft, drafted, in_cycles, lasting, solved
 from gen_profile.designs.shape import shaped_motion
+from gen_profile.designs.suggestions import sufficient_duration, suggestions
 from gen_profile.errors import InfeasibleProblem, SolverDiverged
-from gen_profile.motion.profile import grid_length, grid_times
 from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct.relaxation import Relaxed
-from gen_profile.solvers.minimum_time import least_corrected
+from gen_profile.solvers.direct.relaxation import ROUGHLY, SHORTEST, Relaxed
+from gen_profile.solvers.search import Search, least, slope_of
 from gen_profile.spec.model import Spec
 from gen_profile.work import OutOfWork, budget, left, spend
 
@@ -27,6 +26,11 @@ SEARCHING = 8.0  # s of work to find the shortest duration
 SPREADING = 0.6  # of the work that is left for it to find the shortest duration, all machines considered
 SPREADS = 3  # times that it is measured how much more than the nominal machine others sway on the way
 NEARLY = 2e-3  # relative, by which it may be another than was supposed
+# residual sway falls steeply with the duration, as far as nothing more is known of it
+COARSE = Search(
+    precision=5e-3, close=0.06, aim=-0.03, slope=15.0, believed=(1.0, math.inf), growth=8.0, longest=1.0
+)
+EXACT = attrs.evolve(COARSE, precision=1e-3, close=4e-3, aim=-1.5e-3, stride=1e-3, downward=True)
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
@@ -56,21 +60,18 @@ def shortest(spec: Spec, progress: Progress = untold) -> Draft:
     """
     if spec.solver.shaper is not None:
         motion = shaped_motion(spec, spec.solver.shaper)
-        return Draft(spec=_lasting(spec, motion.duration), solution=None, motion=motion)
-    calm = dict[str, Draft]()
+        return Draft(spec=lasting(spec, motion.duration), solution=None, motion=motion)
     try:
         with budget(SEARCHING):
-            found = _calm(spec, *_within_limits(spec, progress), progress, calm)
+            found = _within_sway(spec, *_within_limits(spec, progress), progress)
     except OutOfWork as error:
         spend(0.0)
-        found = calm.get("exactly") or calm.get("roughly")
-        if found is None:
-            enough = choice.sufficient_duration(_slow(spec), partial(transient_sway.as_asked_next, spec))
-            cure = f"Allow about {enough} s (move.duration)" if enough else "State a duration in s"
-            raise SolverDiverged(
-                "move.duration: the search for the shortest duration was given up, for it took too long. "
-                f"{cure}, or fewer limits."
-            ) from error
+        duration = sufficient_duration(_slow(spec))
+        cure = f"Allow about {duration} s (move.duration)" if duration else "State a duration in s"
+        raise SolverDiverged(
+            "move.duration: the search for the shortest duration was given up, for it took too long. "
+            f"{cure}, or fewer limits."
+        ) from error
     if found is None:
         raise InfeasibleProblem(
             "check.residual_sway: no duration leaves so little sway on every machine of "
@@ -83,7 +84,7 @@ def _within_limits(spec: Spec, progress: Progress) -> tuple[Problem, Relaxed]:
     """Find the shortest motion within the limits, and the problem with the spread that machines have then."""
     problem = problem_of(spec)
     swayed = transient_sway.limited(spec, problem)
-    found = choice.minimum_time(problem, progress, roughly=swayed)
+    found = choice.minimum_time(problem, progress, search=ROUGHLY if swayed else SHORTEST)
     with suppress(OutOfWork), budget(SPREADING * left()):
         for _ in range(SPREADS):
             if found is None or not swayed:
@@ -94,7 +95,7 @@ def _within_limits(spec: Spec, progress: Progress) -> tuple[Problem, Relaxed]:
             found = choice.minimum_time(problem, progress, found)
     if found is None:
         cure = (
-            choice.requirements(_slow(spec), partial(transient_sway.as_asked_next, spec))
+            suggestions(_slow(spec), in_time=True)
             or "Widen the limits, or see whether all numbers of the spec are in its units."
         )
         raise InfeasibleProblem(
@@ -103,55 +104,45 @@ def _within_limits(spec: Spec, progress: Progress) -> tuple[Problem, Relaxed]:
     return problem, found
 
 
-def _calm(
-    spec: Spec, problem: Problem, easiest: Relaxed, progress: Progress, calm: dict[str, Draft]
-) -> Draft | None:
-    """Find the shortest motion of least cost with little sway, beyond the one most easily within the limits.
+def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress: Progress) -> Draft | None:
+    """Find the shortest motion of least cost with little sway, no shorter than the one within the limits.
 
-    The last motions that do, found on few intervals or many, are put into a dictionary.
+    Motions on few intervals lead near to it; where the work ends before one on many is found, one of those is
+    taken.
     """
-    first = drafted(_lasting(spec, easiest.duration), easiest.solution)
+    most, start = LONGEST * shortest_kept.duration, in_cycles(spec, shortest_kept.duration)
+    first = drafted(lasting(spec, start), shortest_kept.solution)
     # an axis without limits may fling a load about
-    near = easiest if first.excess_sway < math.inf else None
-
-    def tried(how: str, found: Draft) -> float:
-        if found.excess_sway <= 0.0:
-            calm[how] = found
-        return found.excess_sway
-
-    @cache
-    def exactly(duration: float) -> tuple[float, Draft]:
-        progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
-        found = solved(_lasting(spec, duration), spread=problem.sway_spread, near=near)
-        return tried("exactly", found), found
+    near = shortest_kept if first.excess_sway < math.inf else None
+    rough, exact = {start: first}, dict[float, Draft]()
 
     def roughly(duration: float) -> float:
-        if problem.worst_case is not None:
-            return exactly(duration)[0]
-        if duration == first.spec.move.duration:
-            return first.excess_sway
-        lasting = attrs.evolve(problem, duration=duration)
-        solution = choice.attempt(lasting, "direct", coarse=True, near=near)
-        return tried("roughly", drafted(_lasting(spec, duration), solution))
+        if duration != start:
+            asked = attrs.evolve(problem, duration=duration)
+            solution = choice.attempt(asked, "direct", coarse=True, near=near)
+            rough[duration] = drafted(lasting(spec, duration), solution)
+        return rough[duration].excess_sway
 
-    most = LONGEST * easiest.duration
-    return least_corrected(roughly, exactly, easiest.duration, most, partial(_in_cycles, spec))
+    def exactly(duration: float) -> float:
+        progress("looking for the shortest duration with little sway", remark=f"trying {duration:.3g} s")
+        exact[duration] = solved(lasting(spec, duration), spread=problem.sway_spread, near=near)
+        return exact[duration].excess_sway
+
+    def rounded(duration: float) -> float:
+        return max(start, in_cycles(spec, duration))
+
+    guess = least(roughly, start, COARSE, most, rounded) if problem.worst_case is None else None
+    slope = slope_of({duration: draft.excess_sway for duration, draft in rough.items()}) or 0.0
+    search = attrs.evolve(EXACT, slope=slope) if slope > EXACT.believed[0] else EXACT
+    try:
+        duration = least(exactly, guess or start, search, most, rounded)
+    except OutOfWork:
+        if guess is None:
+            raise
+        return rough[guess]
+    return None if duration is None else exact[duration]
 
 
-def _slow(spec: Spec) -> Problem:
-    """Give a problem so much time that it is not the time that it lacks, and the machines' usual spread."""
-    problem = problem_of(spec)
-    slow = attrs.evolve(problem, duration=float(rounded_up(SLOW * choice.usual_duration(problem))))
-    return transient_sway.with_usual_spread(spec, slow)
-
-
-def _in_cycles(spec: Spec, duration: float) -> float:
-    """Round a duration up to a cycle of a spec's controller."""
-    cycle = spec.export.cycle_time
-    return float(grid_times(grid_length(duration, cycle), cycle)[-1])
-
-
-def _lasting(spec: Spec, duration: float) -> Spec:
-    """Give a spec a duration, rounded up to a cycle of its controller."""
-    whole = _in_cycles(spec, duration)
-    return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=whole, shortest=False))
+def _slow(spec: Spec) -> Spec:
+    """Give a spec so much time that it is not the time that it lacks."""
+    return lasting(spec, float(rounded_up(SLOW * choice.usual_duration(problem_of(spec)))))

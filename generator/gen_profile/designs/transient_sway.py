@@ -1,54 +1,40 @@
 """The limit of sway on the way, which holds for every machine of a check's ranges.
 
 Solvers know the nominal machine, so it is allowed so much less as the worst machine sways more. How much that
-is hardly depends on the motion: it is measured on one, and tried on the next; where it does depend on it, two
-motions tell by how much.
+is, the spread, hardly depends on the motion: it is measured on one, and tried on the next; where it does
+depend on it, two motions tell by how much.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 
 import attrs
 
-from gen_profile.errors import SpecError
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.evaluation.simulation import greatest_sway
 from gen_profile.motion.profile import Profile
-from gen_profile.problem.limits import SWAY_TOLERANCE
 from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct.relaxation import Relaxation, Relaxed
+from gen_profile.solvers.direct.relaxation import Relaxed
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import Solution, Status
 from gen_profile.spec.model import Spec
-from gen_profile.spec.plausibility import refuse_implausible
 from gen_profile.spec.values import SolverName
-from gen_profile.work import OutOfWork, budget
 
-ROUNDS = 4  # of measuring and solving again
 ENOUGH = 1.005  # times the limit that the worst machine may sway
 NEARLY_ENOUGH = 1.008  # likewise where solving again takes long
-MARGIN = 1.002  # for what lies between the machines and the times looked at
-STEEPNESS = 0.1  # least share of its own sway, by which the worst machine's falls with the nominal one's
-AT_ONCE = 1.0  # s of work, in which a motion without limits is found, or is not worth the while
+# the first spread that will do is taken; aimed at is a little more, for what lies between machines and times
+# looked at, and the worst machine's sway falls by at least a tenth as much as the nominal one's
+SPREAD = Search(precision=1e-3, aim=-2e-3, believed=(0.1, 10.0), tries=5)
 ACCURACY = 1e-6  # of the machines' integration, relative
 SAMPLES = 1001
-
-
-def solve(spec: Spec) -> Solution:
-    """Solve a spec so that all machines keep its limits; where that fails, find out what would help."""
-    try:
-        with budget(*choice.ANSWER):
-            return choice.diagnosed(attempt(spec), spec.solver.solver, tried=partial(as_asked_next, spec))
-    except OutOfWork:
-        return choice.given_up(problem_of(spec))
 
 
 def attempt(
@@ -74,34 +60,8 @@ def attempt(
     problem = attrs.evolve(problem_of(spec), sway_spread=spread)
     if near is not None and spec.solver.solver != "indirect":
         begun = partial(choice.attempt, method="direct", near=near)
-        solution = _kept(spec, problem, begun, NEARLY_ENOUGH, progress)
-    else:
-        solution = kept_by_all(spec, problem, spec.solver.solver, progress)
-    if solution.optimum is None and solution.problem.sway_spread == 1.0:
-        return attrs.evolve(solution, problem=with_usual_spread(spec, problem))
-    return solution
-
-
-def as_asked_next(spec: Spec, problem: Problem, /, *, coarse: bool = False) -> Solution:
-    """Solve a problem as if a spec had its duration and limits, which may not be plausible."""
-    move = attrs.evolve(spec.move, duration=problem.duration, shortest=False)
-    try:
-        refuse_implausible(attrs.evolve(spec, move=move, limits=problem.limits))
-    except SpecError:
-        return choice.given_up(problem)
-    problem = attrs.evolve(problem, sway_spread=1.0)
-    if spec.solver.solver != "direct" and problem.worst_case is None:
-        with suppress(OutOfWork), budget(AT_ONCE):
-            smooth = choice.attempt(problem, "indirect")
-            found = choice.keeps_limits(smooth) and _too_much(spec, smooth, ENOUGH) is None
-            if found or smooth.status is Status.INFEASIBLE:
-                return smooth
-    if coarse:  # whether there is a motion does not depend on what it costs
-        problem = attrs.evolve(problem, sway_weight=0.0)
-    solution = kept_by_all(spec, problem, "direct", coarse=coarse)
-    if solution.optimum is None or _too_much(spec, solution, SWAY_TOLERANCE) is None:
-        return solution
-    return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
+        return _kept(spec, problem, begun, NEARLY_ENOUGH, progress)
+    return kept_by_all(spec, problem, spec.solver.solver, progress)
 
 
 def kept_by_all(
@@ -126,16 +86,15 @@ def kept_by_all(
     coarse : bool
         On few intervals only.
     """
-    if not limited(spec, problem):
-        return choice.attempt(problem, method, coarse=coarse)
-    if method == "indirect" and problem.worst_case is None:  # which knows no limits
-        return choice.attempt(problem, method)
+    if not limited(spec, problem) or (method == "indirect" and problem.worst_case is None):
+        return choice.attempt(problem, method, coarse=coarse)  # the indirect method knows no limits
     if coarse or problem.worst_case is None:
         found = _kept(spec, problem, partial(choice.attempt, method=method, coarse=True))
         if coarse or found.optimum is None or found.method == indirect.METHOD:
             return found
         problem = attrs.evolve(problem, sway_spread=found.problem.sway_spread)
-    return _kept(spec, problem, choice.directly, NEARLY_ENOUGH, progress)
+    # where it finds a motion, so does "auto", and it is the quicker to fail
+    return _kept(spec, problem, partial(choice.attempt, method="direct"), NEARLY_ENOUGH, progress)
 
 
 def limited(spec: Spec, problem: Problem) -> bool:
@@ -150,55 +109,39 @@ def _kept(
     enough: float = ENOUGH,
     progress: Progress = untold,
 ) -> Solution:
-    """Solve a problem again until the worst machine sways no more than enough times its limit."""
-    solution, before = solve(problem), (0.0, 0.0)
-    for _ in range(ROUNDS):
-        if solution.optimum is None:
-            break
-        found = _too_much(spec, solution, enough)
-        if found is None:
-            break
-        if found[1] == math.inf:
-            return attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None)
-        spread = _spread(problem.limits.sway or 0.0, before, found)
-        progress("solving", remark=f"for the machine that sways {spread:.3g} times as much on the way")
-        solution, before = solve(attrs.evolve(problem, sway_spread=spread)), found
-    return solution
+    """Find the least spread with which the worst machine sways no more than enough times its limit."""
+    solutions: list[Solution] = []
+
+    def excess(spread: float) -> float:
+        if solutions:
+            progress("solving", remark=f"for the machine that sways {spread:.3g} times as much on the way")
+        solution = solve(attrs.evolve(problem, sway_spread=spread))
+        solutions.append(solution)
+        if solution.optimum is None or not limited(spec, problem):
+            return -math.inf  # where no motion sways so little, none sways less
+        nominal, worst = sways(spec, problem, optimal_profile(solution))
+        if _enough(problem, nominal, worst, enough):
+            return -math.inf
+        if worst == math.inf:
+            solutions.append(attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None))
+            return -math.inf
+        return max(math.log(worst / nominal / spread), SPREAD.precision)
+
+    least(excess, problem.sway_spread, SPREAD)
+    return solutions[-1]
 
 
-def _too_much(spec: Spec, solution: Solution, enough: float) -> tuple[float, float] | None:
-    """Tell how much the nominal machine and the worst one sway in m, where that is too much."""
-    if not limited(spec, solution.problem):
-        return None
-    nominal, worst = sways(spec, solution.problem, optimal_profile(solution))
-    if worst <= max(enough * (solution.problem.limits.sway or 0.0), nominal) < math.inf:
-        return None
-    return nominal, worst
+def _enough(problem: Problem, nominal: float, worst: float, enough: float) -> bool:
+    """Whether the worst machine sways no more than so many times the limit, or than the nominal one."""
+    return worst <= max(enough * (problem.limits.sway or 0.0), nominal) < math.inf
 
 
-def _spread(limit: float, before: tuple[float, float], found: tuple[float, float]) -> float:
-    """Extrapolate how many times as much as the nominal machine the worst one sways at the limit.
-
-    Parameters
-    ----------
-    limit : float
-        m, of the worst machine's sway.
-    before, found : (float, float)
-        m, of the nominal machine and the worst one; in two motions, or nothing and one.
-    """
-    nominal, worst = found
-    slope = worst / nominal
-    if nominal < before[0]:
-        slope = min(slope, max((before[1] - worst) / (before[0] - nominal), STEEPNESS * slope))
-    return MARGIN * limit / max(nominal - (worst - limit) / slope, nominal / 2.0)
-
-
-def with_usual_spread(spec: Spec, problem: Problem) -> Problem:
-    """Tell a problem without a motion what spread one with wider limits has, for what is named to help."""
-    if not limited(spec, problem):
-        return problem
-    easiest = Relaxation(problem).least(tuple(problem.limits.stated()))
-    return problem if easiest is None else attrs.evolve(problem, sway_spread=spread(spec, easiest.solution))
+def keeps_sway(spec: Spec, solution: Solution, enough: float) -> bool:
+    """Whether no machine of a spec's ranges sways more on the way than so many times the limit."""
+    problem = solution.problem
+    return not limited(spec, problem) or _enough(
+        problem, *sways(spec, problem, optimal_profile(solution)), enough
+    )
 
 
 def spread(spec: Spec, solution: Solution) -> float:

@@ -208,6 +208,12 @@ def grid_times(cycles: int, cycle_time: float) -> Array:
     return read_only([k * numerator / denominator for k in range(cycles + 1)])
 
 
+def grid_duration(duration: float, cycle_time: float) -> float:
+    """Round a duration up to whole cycles, as `grid_times` has them."""
+    numerator, denominator = Decimal(repr(float(cycle_time))).as_integer_ratio()
+    return grid_length(duration, cycle_time) * numerator / denominator
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class SampledProfile:
     """What a controller issues each cycle: one setpoint per cycle and axis, the first at time 0.

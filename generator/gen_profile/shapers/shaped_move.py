@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
@@ -17,8 +17,6 @@ from gen_profile.shapers.impulses import SHAPERS, Impulses, convolve
 
 SAME_TIME = 1e-13  # knots closer than this share of the duration are one
 SHORTEST_BASE = 1e-6  # a base move of a smaller share of the duration would drown in the knots' rounding
-LONGEST_BASE = 1e6  # a base move of more than so many times the first one tried is not looked for
-PRECISION = 1e-4  # relative, of the shortest duration
 BLOCK = 1_000_000  # polynomials evaluated at once
 
 
@@ -72,26 +70,6 @@ class ShapedMove:
         coefficients = _shaped(self.shaper, self.base, stretch, knots)[:, :, None] * (last - first)
         coefficients[:, 0] += first
         return Profile(knots=knots, coefficients=coefficients, target=last, method=self.name)
-
-    def shortest(self, keeps: Callable[[Profile], bool]) -> float | None:
-        """Find the shortest duration in s at which the motion keeps what it must; None where there is none.
-
-        Peaks of the shaped motion fall with powers of the base move's duration, though not quite evenly where
-        delayed parts overlap: the duration is bisected between one that does and one that does not.
-        """
-        delay = self.shaper.delay
-        short, enough = 0.0, delay
-        while not keeps(self.profile(delay + enough)):
-            short, enough = enough, 2.0 * enough
-            if enough > LONGEST_BASE * delay:
-                return None
-        while enough - short > PRECISION * (delay + enough):
-            middle = (enough + short) / 2.0
-            if keeps(self.profile(delay + middle)):
-                enough = middle
-            else:
-                short = middle
-        return delay + enough
 
 
 def shaped_move(

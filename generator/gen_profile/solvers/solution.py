@@ -10,6 +10,7 @@ from gen_profile.errors import GenProfileError, InfeasibleProblem, SolverDiverge
 from gen_profile.motion.profile import Array
 from gen_profile.problem.problem import Problem
 
+LONGER = "Allow more time (move.duration), or shorten the move."
 WIDER = "Allow more time (move.duration), or wider limits."
 
 
@@ -108,9 +109,9 @@ class Solution:
     status: Status
     method: str
     problem: Problem
-    optimum: Optimum | None
-    iterations: int
-    residual: float
+    optimum: Optimum | None = None
+    iterations: int = 0
+    residual: float = float("inf")
     redundant: tuple[str, ...] = ()
     worst_case_bound: float | None = None
     cure: str = ""

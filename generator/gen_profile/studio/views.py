@@ -17,13 +17,14 @@ import numpy as np
 from gen_profile.charts.curves import motion_figure, select_machines, sway_figure
 from gen_profile.comparison.candidates import own_method
 from gen_profile.designs.plan import Plan, draft, judged
+from gen_profile.designs.suggestions import OTHERWISE
 from gen_profile.errors import GenProfileError, InfeasibleProblem, LimitViolation, SolverDiverged, SpecError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
 from gen_profile.evaluation.phrases import machine, move, place_unit
 from gen_profile.motion.metrics import extremes, greatest, peak
 from gen_profile.problem.limits import ROUNDING
 from gen_profile.report.actors import animation
-from gen_profile.solvers.method_selection import ANSWER, OTHERWISE
+from gen_profile.solvers.method_selection import ANSWER
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import doubts

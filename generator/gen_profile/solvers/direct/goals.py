@@ -172,18 +172,18 @@ def axis_limits(problem: Problem, transcription: Transcription) -> Iterator[Axis
 
 
 def keep_limits(
-    program: ConicProgram, problem: Problem, transcription: Transcription, loosened: Container[str] = ()
+    program: ConicProgram, problem: Problem, transcription: Transcription, widened: Container[str] = ()
 ) -> None:
     """Bound the command of every axis, and its travel, at every instant.
 
     Parameters
     ----------
-    loosened : container of str
+    widened : container of str
         Places of limits that the program's last variable widens so many times, such as ``limits.jerk``;
         travel at either end by so many times its width, less one.
     """
     for limit in axis_limits(problem, transcription):
-        give = limit.give if limit.place in loosened else 0.0
+        give = limit.give if limit.place in widened else 0.0
         transcription.bound(program, limit.rows, (limit.low, limit.high), limit.axis, give)
 
 
@@ -194,7 +194,7 @@ def keep_sway(
     iterate: Iterate,
     maps: IntervalMaps,
     *,
-    loosened: bool = False,
+    widened: bool = False,
 ) -> None:
     """Bound the end load's sway of the nominal machine at the collocation points.
 
@@ -202,12 +202,12 @@ def keep_sway(
     ----------
     limit : float
         m.
-    loosened : bool
-        Let the program's last variable widen it so many times.
+    widened : bool
+        Whether the program's last variable widens it so many times.
     """
     sway, matrix, offset = transcription.end_sway(iterate, maps, program.variables)
     points, directions = sway.shape
-    give = float(loosened)
+    give = float(widened)
     if directions == 1:
         program.at_most(matrix / limit, 1.0 - offset / limit, give)
         program.at_most(-matrix / limit, 1.0 + offset / limit, give)

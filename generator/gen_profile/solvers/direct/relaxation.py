@@ -1,111 +1,50 @@
 """By how much a problem's limits would have to be wider, or its move longer, for a motion to keep them.
 
-One variable more, the share, widens some of the limits; the least one is the optimum of convex programs like
-those that find motions (see `solvers.direct`). There is one whether or not the problem can be solved, and it
-falls smoothly with the duration: where it is 1, the limits can just be kept.
+One variable more widens some of the limits so many times; the least one is the optimum of convex programs
+like those that find motions (see `solvers.direct`). There is one whether or not the problem can be solved,
+and it falls smoothly with the duration: where it is 1, the limits can just be kept.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 
 import attrs
-import numpy as np
 
-from gen_profile.motion.profile import Array
 from gen_profile.problem.problem import Problem
-from gen_profile.problem.sway_cost import SwayCost
 from gen_profile.progress import Progress, untold
-from gen_profile.solvers.direct import goals
-from gen_profile.solvers.direct.condensing import IntervalMaps
-from gen_profile.solvers.direct.conic import ConicProgram, ConicSolution, ConicStatus, Matrix
+from gen_profile.solvers.direct.conic import ConicStatus
 from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.solver import (
     MAX_ITERATIONS,
     ROUGH,
-    STEP_TOLERANCE,
-    CostProgram,
+    Goal,
     ProgramSequence,
     conclude,
     sequence,
 )
 from gen_profile.solvers.direct.transcription import Iterate
+from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import LimitsSpec
-from gen_profile.work import OutOfWork, budget, left
+from gen_profile.work import budget, left
 
 PRICES = (1e-5, 1e-3, 1e-1)  # of the effort without limits: ever less sway would take ever more of it
-CHANGE = 1e-4  # of the share, relative, that is worth another program
-FAR = 1e-2  # likewise of how far the share is from 1
-ENOUGH = 5e-3  # by which the share's logarithm may exceed 0
-CLOSE = 0.05  # by which it may fall short of 0: the duration found is then tried
-KEPT, CLOSEST = 2e-4, 1e-3  # likewise of the shortest duration: by how much it must, and may besides
-RESTS = 0.985  # share of a load's limit that the worst machine may take after the move
-POWER = 1.8  # with which shares fall over the duration, more or less
-POWERS = (1.0, 4.0)  # between which what two durations tell of it is believed
-STEPS = (math.log(1.1), math.log(2.0))  # of the duration's logarithm
-KNOWN_STEPS = (1e-3, math.log(30.0))  # likewise where two durations tell the power
-LITTLE = 0.01  # by which the share's logarithm must fall within the longer of them
-ROUNDS = 12
-CLOSER = 8  # rounds at most, once a duration is long enough
+ENOUGH = 5e-3  # by which the logarithm of how much wider limits must be may exceed 0
+KEPT = 2e-4  # by how much it must fall short of it in the shortest motion
+RESTS = 0.985  # fraction of a load's limit that the worst machine may take after the move
 NEARBY = math.log(1.2)  # to a duration's logarithm, from where a motion is a start for the next one
-SEARCHING = 0.6  # share of the work that is left, to find the shortest duration
-UNSETTLED = math.log(1e6)  # in place of the logarithm of a share that was not found
-TINY = 1e-6  # share below which how small it is does not matter
+SEARCHING = 0.6  # fraction of the work that is left, to find the shortest duration
+TINY = 1e-6  # below which how little of the limits is taken does not matter
 
-
-@attrs.frozen(kw_only=True, eq=False)
-class LeastShare:
-    """Minimise how many times as wide some limits must be.
-
-    Attributes
-    ----------
-    setup : Setup
-        Its machines tried keep their loads' limits after the move.
-    loosened : tuple of str
-        Places of the limits that are widened; travel by so many times its width, less one, at either end.
-    price : float
-        Of a unit of effort.
-    """
-
-    setup: Setup
-    loosened: tuple[str, ...]
-    price: float
-
-    @property
-    def extra(self) -> int:
-        """Number of variables of its own: the share is the last one."""
-        return self.setup.extra + 1
-
-    def pose(
-        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
-    ) -> tuple[Matrix, Array]:
-        """Add the limits to a program: P and q."""
-        problem, transcription = self.setup.problem, self.setup.transcription
-        goals.keep_limits(program, problem, transcription, self.loosened)
-        if problem.nominal_sway is not None:
-            loose = "limits.sway" in self.loosened
-            goals.keep_sway(program, transcription, problem.nominal_sway, iterate, maps[0], loosened=loose)
-        if self.setup.tried:
-            goals.bound_worst(program, transcription, self.setup.tried, maps, most=RESTS)
-        linear = np.zeros(program.variables)
-        linear[-1] = 1.0
-        program.at_most(-linear[None], np.zeros(1))
-        return self.price * transcription.effort(self.setup.forms, program.variables), linear
-
-    def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
-        """Measure by how much the share changed last, in units of what would be noticed."""
-        share, before = float(solutions[-1].x[-1]), float("inf")
-        if len(solutions) > 1:
-            before = float(solutions[-2].x[-1])
-        noticed = max(CHANGE * abs(share), FAR * abs(share - 1.0), TINY)
-        return STEP_TOLERANCE * abs(share - before) / noticed
-
-    def approach(self, before: Iterate, after: Iterate) -> Iterate:
-        """Go all the way: what it minimises is no expansion."""
-        return after
+# what limits take falls with the duration's power of 1 to 4: accelerations with 2, more or less
+LEAST = Search(
+    precision=0.02, close=0.04, aim=-0.015, slope=1.8, believed=(1.0, 4.0), stride=math.log(2.0), tries=20
+)
+ROUGHLY = attrs.evolve(LEAST, downward=True)
+SHORTEST = attrs.evolve(ROUGHLY, precision=3e-4, close=6e-4, aim=-3e-4)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -114,13 +53,13 @@ class Relaxed:
 
     Attributes
     ----------
-    share : float
+    wider : float
         How many times as wide they must be.
     found : ProgramSequence
         By which the motion was found.
     """
 
-    share: float
+    wider: float
     found: ProgramSequence
 
     @property
@@ -136,7 +75,7 @@ class Relaxed:
     @property
     def solution(self) -> Solution:
         """The motion as a solution, unless it swings too far."""
-        return conclude(self.found, SwayCost(beta=0.0, gamma=1.0), self.found.iterations)
+        return conclude(self.found, self.found.iterations)
 
 
 class Relaxation:
@@ -173,19 +112,15 @@ class Relaxation:
         rest = setup.transcription.rest()
         if self._near is not None and (start := self._near.start(problem)) and start.like(rest):
             return setup, self._near.found
-        free = CostProgram(
-            setup=attrs.evolve(unbounded, problem=attrs.evolve(setup.problem, limits=LimitsSpec())),
-            sway_cost=SwayCost(beta=0.0, gamma=1.0),
-            sway_limit=None,
-        )
-        return setup, sequence(rest, free, ROUGH)
+        free = attrs.evolve(unbounded, problem=attrs.evolve(setup.problem, limits=LimitsSpec()))
+        return setup, sequence(rest, Goal(setup=free, sway_limit=None), ROUGH)
 
-    def _least(self, loosened: tuple[str, ...]) -> Relaxed | None:
-        """Find how many times as wide limits must be, where those not loosened stay as they are.
+    def _least(self, widened: tuple[str, ...]) -> Relaxed | None:
+        """Find how many times as wide limits must be, where those not widened stay as they are.
 
         Parameters
         ----------
-        loosened : tuple of str
+        widened : tuple of str
             Places of limits, such as ``limits.sway``.
 
         Returns
@@ -198,10 +133,16 @@ class Relaxation:
             return None
         effort = setup.effort(unlimited.iterate.local)
         for price in PRICES:
-            goal = LeastShare(setup=setup, loosened=loosened, price=price / effort)
+            goal = Goal(
+                setup=setup,
+                sway_limit=setup.problem.nominal_sway,
+                effort_price=price / effort,
+                worst=RESTS,
+                widened=widened,
+            )
             found = sequence(unlimited.iterate, goal)
             if found.verdict is ConicStatus.SOLVED:
-                return Relaxed(share=float(found.solutions[-1].x[-1]), found=found)
+                return Relaxed(wider=float(found.solutions[-1].x[-1]), found=found)
             if found.verdict is ConicStatus.INFEASIBLE or found.iterations == MAX_ITERATIONS:
                 break
         return None
@@ -222,30 +163,27 @@ def least_duration(relaxation: Relaxation) -> float | None:
     Returns
     -------
     float or None
-        None where the limits cannot be kept however long the move is. The problem's own where no programs
-        settle, so that nothing is known.
+        None where the limits cannot be kept however long the move is. Where programs do not settle, so that
+        nothing more is known, the duration that was come to.
     """
     problem = relaxation.problem
-    places, asked, kept = eased_by_time(problem), math.log(problem.duration), list[float]()
+    places, settled, unsettled = eased_by_time(problem), [0.0], list[float]()
 
-    @cache
-    def excess(log_duration: float) -> float:
-        lasting = attrs.evolve(problem, duration=math.exp(log_duration))
-        found = (relaxation if log_duration == asked else Relaxation(lasting)).least(places)
-        exceeds = UNSETTLED if found is None else math.log(max(found.share, TINY)) - ENOUGH
-        kept.extend([log_duration] if exceeds <= 0.0 else [])
-        return exceeds
+    def excess(duration: float) -> float:
+        asked = duration == problem.duration
+        lasting = relaxation if asked else Relaxation(attrs.evolve(problem, duration=duration))
+        found = lasting.least(places)
+        if found is not None:
+            settled.append(duration)
+            return math.log(max(found.wider, TINY)) - ENOUGH
+        unsettled.append(duration)
+        return -math.inf if unsettled[0] < duration > max(settled) else math.inf
 
-    if not places or excess(asked) <= 0.0:
+    if not places:
         return problem.duration
-    try:
-        with budget(SEARCHING * left()):
-            found = _least_above(excess, asked, CLOSE)
-    except OutOfWork:
-        if not kept:
-            raise
-        found = min(kept)
-    return None if found is None else math.exp(found)
+    with budget(SEARCHING * left()):
+        duration = least(excess, problem.duration, LEAST)
+    return unsettled[0] if duration in unsettled else duration
 
 
 def shortest(
@@ -253,8 +191,7 @@ def shortest(
     guess: float | Relaxed,
     tried: Sequence[Mapping[str, float]] = (),
     progress: Progress = untold,
-    *,
-    roughly: bool = False,
+    search: Search = SHORTEST,
 ) -> Relaxed | None:
     """Find the shortest motion that keeps all limits.
 
@@ -267,95 +204,25 @@ def shortest(
     tried : sequence of mapping of str to float
         Machines whose residual sway is bounded.
     progress : Progress
-    roughly : bool
-        Whether a duration that exceeds the shortest by a few hundredths will do.
+    search : Search
 
     Returns
     -------
     Relaxed or None
         None where no duration was found to do.
     """
-    places, kept = eased_by_time(problem), list[Relaxed]()
-    last, begun = (guess, guess.duration) if isinstance(guess, Relaxed) else (None, guess)
+    found, places = dict[float, Relaxed](), eased_by_time(problem)
+    last, start = (guess, guess.duration) if isinstance(guess, Relaxed) else (None, guess)
 
-    @cache
-    def excess(log_duration: float) -> float:
+    def excess(duration: float) -> float:
         nonlocal last
-        lasting = attrs.evolve(problem, duration=math.exp(log_duration))
-        progress("looking for the shortest duration", remark=f"trying {lasting.duration:.3g} s")
-        last = Relaxation(lasting, tried, last).least(places)
+        progress("looking for the shortest duration", remark=f"trying {duration:.3g} s")
+        last = Relaxation(attrs.evolve(problem, duration=duration), tried, last).least(places)
         if last is None:
-            return UNSETTLED
-        if last.share <= 1.0 - KEPT:
-            kept.append(last)
-        return math.log(max(last.share, TINY)) - math.log(1.0 - KEPT)
+            return math.inf
+        found[duration] = last
+        return math.log(max(last.wider, TINY)) - math.log(1.0 - KEPT)
 
-    try:
-        with budget(SEARCHING * left()):
-            short = enough = math.log(begun)
-            close, steps = CLOSE if roughly else CLOSEST, (KNOWN_STEPS[0], STEPS[1])
-            while excess(short) <= 0.0:
-                enough, short = short, short - float(np.clip((close - excess(short)) / POWER, *steps))
-            if enough > short:
-                _close_to_zero(excess, short, enough, close)
-            else:
-                _least_above(excess, short, close, steps)
-    except OutOfWork:
-        if not kept:
-            raise
-    return min(kept, key=lambda relaxed: relaxed.duration, default=None)
-
-
-def _least_above(
-    excess: Callable[[float], float], asked: float, close: float, steps: tuple[float, ...] = STEPS
-) -> float | None:
-    """Find where an excess that falls comes close to 0 from a place on where it is positive.
-
-    Parameters
-    ----------
-    excess : float → float
-    asked : float
-    close : float
-        How little it may fall short of 0.
-    steps : tuple of float
-        Least and greatest first step.
-
-    Returns
-    -------
-    float or None
-        None where it falls no more; where nothing is known of it, the place itself.
-    """
-    short = lowest = asked
-    power = POWER
-    for _ in range(ROUNDS):
-        enough = short + float(np.clip((excess(short) + close / 2.0) / power, steps[0], steps[-1]))
-        if excess(enough) <= 0.0:
-            return _close_to_zero(excess, short, enough, close)
-        unsettled = excess(enough) >= UNSETTLED > excess(lowest)
-        if unsettled and excess(short) >= UNSETTLED:
-            return short  # by all that is known
-        if excess(enough) < excess(lowest) - LITTLE:
-            lowest = enough
-        elif excess(enough) < UNSETTLED and enough - lowest > STEPS[1]:
-            return None
-        known = (excess(short) - excess(enough)) / (enough - short)
-        settled = excess(short) < UNSETTLED and POWERS[0] < known < POWERS[1]
-        power, steps = (known, KNOWN_STEPS) if settled else (POWER, STEPS[: 2 - unsettled])
-        short = enough
-    return asked
-
-
-def _close_to_zero(excess: Callable[[float], float], short: float, enough: float, close: float) -> float:
-    """Interpolate between two values, until the excess of the greater one falls little short of 0."""
-    tried = [short, enough]
-    for _ in range(CLOSER):
-        if excess(enough) > -close or enough - short < close / POWER:
-            break
-        nearest, near = sorted(tried, key=lambda place: abs(excess(place)))[:2]
-        slope = (excess(nearest) - excess(near)) / (nearest - near)
-        middle = nearest - (excess(nearest) + close / 2.0) / slope if slope < 0.0 else math.inf
-        if not short < middle < enough or excess(short) >= UNSETTLED:
-            middle = (short + enough) / 2.0
-        tried.append(middle)
-        short, enough = (short, middle) if excess(middle) <= 0.0 else (middle, enough)
-    return enough
+    with budget(SEARCHING * left()):
+        duration = least(excess, start, search)
+    return None if duration is None else found[duration]

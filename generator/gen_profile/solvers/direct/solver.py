@@ -11,7 +11,6 @@ motion can do where angles are small.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import attrs
 import numpy as np
@@ -47,47 +46,116 @@ MAX_BISECTIONS = 6
 BISECTING = 0.7  # share of the work that is left, after which a motion on the first mesh will do
 WORTH_BISECTING = 1e-4  # relative change of the cost from one mesh to the next; what is left is less
 WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
-LEAST_SHARE = 0.01  # of a load's limit, of which a change is still measured
+LEAST_FRACTION = 0.01  # of a load's limit, of which a change is still measured
+CHANGE = 1e-4  # of how many times as wide limits are, relative, that is worth another program
+FAR = 1e-2  # likewise of how far that is from 1
+TINY = 1e-6  # below which how little it is does not matter
 HORIZONTAL = np.pi / 2.0
+UNWEIGHTED = SwayCost(beta=0.0, gamma=1.0)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Goal:
+    """What programs shall achieve, and keep within bounds.
+
+    Attributes
+    ----------
+    setup : Setup
+        Its machines tried keep their loads' limits after the move.
+    sway_limit : float or None
+        m, on the way, of the nominal machine at the collocation points.
+    sway_cost : SwayCost
+        Of eq. (26), which is minimised.
+    effort_price : float or None
+        Minimise the last variable instead, and so many times the effort, which makes the motion unique: how
+        many times as wide the widened limits are, or the worst fraction of a load's limit.
+    worst : float or None
+        Bound of the worst fraction of a load's limit after the move.
+    widened : tuple of str
+        Places of limits that the last variable widens; travel by so many times its width, less one, at either
+        end.
+    """
+
+    setup: Setup
+    sway_limit: float | None
+    sway_cost: SwayCost = UNWEIGHTED
+    effort_price: float | None = None
+    worst: float | None = None
+    widened: tuple[str, ...] = ()
+
+    @property
+    def extra(self) -> int:
+        """Number of variables of its own, the program's last."""
+        return self.setup.extra + bool(self.widened)
+
+    def pose(
+        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
+    ) -> tuple[Matrix, Array]:
+        """Add the bounds to a program and expand the cost: P and q."""
+        setup, transcription = self.setup, self.setup.transcription
+        goals.keep_limits(program, setup.problem, transcription, self.widened)
+        if self.sway_limit is not None:
+            wide = "limits.sway" in self.widened
+            goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0], widened=wide)
+        if setup.tried:
+            goals.bound_worst(program, transcription, setup.tried, maps, self.worst)
+        linear = np.zeros(program.variables)
+        if self.effort_price is not None:
+            linear[-1] = 1.0
+            if self.widened:
+                program.at_most(-linear[None], np.zeros(1))
+            return self.effort_price * transcription.effort(setup.forms, program.variables), linear
+        scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / setup.cost_scale)
+        expanded, slope = goals.cost(transcription, setup.forms, scaled, iterate, maps[0])
+        quadratic = sparse.csc_matrix(expanded)
+        quadratic.resize(program.variables, program.variables)
+        linear[: len(slope)] = slope
+        return quadratic, linear
+
+    def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
+        """Measure by how much what counts changed last.
+
+        That is the motion, by the effort of its change relative to its own, or the last variable in units of
+        what would be noticed.
+        """
+        after = solutions[-1].x
+        if self.effort_price is not None:
+            last, before = float(after[-1]), float("inf")
+            if len(solutions) > 1:
+                before = float(solutions[-2].x[-1])
+            noticed = WORTHWHILE * max(abs(last), LEAST_FRACTION)
+            if self.widened:
+                noticed = max(CHANGE * abs(last), FAR * abs(last - 1.0), TINY)
+            return STEP_TOLERANCE * abs(last - before) / noticed
+        columns = slice(0, start.local.size)
+        moved = solutions[-2].x[columns] if len(solutions) > 1 else start.local.ravel()
+        effort = self.setup.effort
+        return float(np.sqrt(effort(after[columns] - moved) / effort(after[columns])))
+
+    def approach(self, before: Iterate, after: Iterate) -> Iterate:
+        """Go from one iterate towards the next, as far as what was expanded holds."""
+        return goals.approach(self.setup.transcription, self.sway_cost, before, after)
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class ProgramSequence:
-    """Where a sequence of programs ended, on which mesh."""
+    """Where a sequence of programs for a goal ended."""
 
-    setup: Setup
+    goal: Goal
     verdict: ConicStatus
     iterate: Iterate
     solutions: tuple[ConicSolution, ...]
     step: float
 
     @property
+    def setup(self) -> Setup:
+        """The problem, transcribed, on its last mesh."""
+        return self.goal.setup
+
+    @property
     def iterations(self) -> int:
         """Number of programs."""
         return len(self.solutions)
-
-
-class Goal(Protocol):
-    """What programs shall achieve."""
-
-    @property
-    def setup(self) -> Setup:
-        """The problem, transcribed."""
-
-    @property
-    def extra(self) -> int:
-        """Number of variables of its own, the program's last."""
-
-    def pose(
-        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
-    ) -> tuple[Matrix, Array]:
-        """Add limits and constraints of its own to a program, and give its cost: P and q."""
-
-    def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
-        """Measure by how much what counts changed from one program to the next."""
-
-    def approach(self, before: Iterate, after: Iterate) -> Iterate:
-        """Go from one iterate towards the next, as far as what was expanded holds."""
 
 
 def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False) -> Solution:
@@ -118,13 +186,13 @@ def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False
 
     def attempt(sway_limit: float | None) -> Solution:
         nonlocal setup, iterations, start
-        goal = CostProgram(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
+        goal = Goal(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
         if problem.limits.stated() and not coarse:
             found = refined(start, goal)
         else:
             found = sequence(start, goal, COARSE if coarse else STEP_TOLERANCE)
         setup, start, iterations = found.setup, found.iterate, iterations + found.iterations
-        return conclude(found, sway_cost, iterations)
+        return conclude(found, iterations)
 
     return within_sway(problem, attempt)
 
@@ -136,18 +204,18 @@ def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
     quiet = attrs.evolve(problem, sway_weight=0.0, sway_scale=1.0, limits=LimitsSpec(), worst_case=None)
     solution = solve(quiet)
     if solution.optimum is None:
-        return SwayCost(beta=0.0, gamma=1.0), solution.iterations
+        return UNWEIGHTED, solution.iterations
     effort, sway = solution.optimum.cost / problem.duration, sway_on_the_way(solution)
     if not 0.0 < sway < np.inf:  # a hoist alone swings nothing
-        return SwayCost(beta=0.0, gamma=1.0), solution.iterations
+        return UNWEIGHTED, solution.iterations
     return SwayCost(
         beta=problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2, gamma=AUTO_SWAY / sway
     ), solution.iterations
 
 
-def refined(start: Iterate, goal: CostProgram) -> ProgramSequence:
+def refined(start: Iterate, goal: Goal) -> ProgramSequence:
     """Solve programs on a mesh that is bisected as long as that pays and the work reaches."""
-    begun: list[tuple[Iterate, CostProgram]] = []
+    begun: list[tuple[Iterate, Goal]] = []
     try:
         with budget(BISECTING * left()):
             return _refined(start, goal, begun)
@@ -158,7 +226,7 @@ def refined(start: Iterate, goal: CostProgram) -> ProgramSequence:
         return sequence(*begun[0])
 
 
-def _refined(start: Iterate, goal: CostProgram, begun: list[tuple[Iterate, CostProgram]]) -> ProgramSequence:
+def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> ProgramSequence:
     """Bisect a mesh where limits begin or cease to bind, and list what was begun on which mesh."""
     solutions: tuple[ConicSolution, ...] = ()
     cost = float("inf")
@@ -211,9 +279,7 @@ def sequence(start: Iterate, goal: Goal, enough: float = STEP_TOLERANCE) -> Prog
             if step > SLOW * before:
                 iterate = iterate.of_flat(accelerate(points, images, transcription.importance))
             iterate = goal.approach(iterate.of_flat(points[-1]), iterate)
-    return ProgramSequence(
-        setup=goal.setup, verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step
-    )
+    return ProgramSequence(goal=goal, verdict=verdict, iterate=iterate, solutions=tuple(solutions), step=step)
 
 
 def _stalled(step: float, before: float, *, exact: bool) -> bool:
@@ -221,101 +287,7 @@ def _stalled(step: float, before: float, *, exact: bool) -> bool:
     return (step < STALLED and not (shrinks and exact)) or (step < STALLED_INEXACT and not (shrinks or exact))
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class CostProgram:
-    """Minimise eq. (26), with the end load's sway and the worst case within bounds.
-
-    Attributes
-    ----------
-    setup : Setup
-    sway_cost : SwayCost
-    sway_limit : float or None
-        m, on the way.
-    worst : float or None
-        Share of a load's limit, after the move.
-    """
-
-    setup: Setup
-    sway_cost: SwayCost
-    sway_limit: float | None
-    worst: float | None = None
-
-    @property
-    def extra(self) -> int:
-        """Number of variables of its own."""
-        return self.setup.extra
-
-    def pose(
-        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
-    ) -> tuple[Matrix, Array]:
-        """Add the bounds to a program and expand the cost: P and q."""
-        transcription = self.setup.transcription
-        goals.keep_limits(program, self.setup.problem, transcription)
-        if self.sway_limit is not None:
-            goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0])
-        if self.worst is not None:
-            goals.bound_worst(program, transcription, self.setup.tried, maps, self.worst)
-        scaled = attrs.evolve(self.sway_cost, beta=self.sway_cost.beta / self.setup.cost_scale)
-        quadratic, linear = goals.cost(transcription, self.setup.forms, scaled, iterate, maps[0])
-        return _widen(quadratic, program.variables), np.pad(linear, (0, program.variables - len(linear)))
-
-    def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
-        """Measure by how much the motion changed last, as the effort of the change relative to its own."""
-        transcription = self.setup.transcription
-        columns = slice(0, transcription.intervals * transcription.breadth)
-        after = solutions[-1].x[columns]
-        before = solutions[-2].x[columns] if len(solutions) > 1 else start.local.ravel()
-        return float(np.sqrt(self.setup.effort(after - before) / self.setup.effort(after)))
-
-    def approach(self, before: Iterate, after: Iterate) -> Iterate:
-        """Go as far as the sway's cost may be believed."""
-        return goals.approach(self.setup.transcription, self.sway_cost, before, after)
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class LeastWorst:
-    """Minimise the worst share of a load's limit; a trace of effort makes the motion unique."""
-
-    setup: Setup
-    trace: float
-    sway_limit: float | None
-
-    @property
-    def extra(self) -> int:
-        """Number of variables of its own."""
-        return self.setup.extra
-
-    def pose(
-        self, program: ConicProgram, iterate: Iterate, maps: Sequence[IntervalMaps]
-    ) -> tuple[Matrix, Array]:
-        """Add the bounds to a program: P and q."""
-        transcription = self.setup.transcription
-        goals.keep_limits(program, self.setup.problem, transcription)
-        if self.sway_limit is not None:
-            goals.keep_sway(program, transcription, self.sway_limit, iterate, maps[0])
-        column = goals.bound_worst(program, transcription, self.setup.tried, maps)
-        linear = np.zeros(program.variables)
-        linear[column] = 1.0
-        return self.trace * transcription.effort(self.setup.forms, program.variables), linear
-
-    def step(self, solutions: Sequence[ConicSolution], start: Iterate) -> float:
-        """Measure by how much the worst share changed last, in units of what would be noticed."""
-        before = solutions[-2].x[-1] if len(solutions) > 1 else float("inf")
-        noticed = WORTHWHILE * max(abs(float(solutions[-1].x[-1])), LEAST_SHARE)
-        return STEP_TOLERANCE * abs(float(solutions[-1].x[-1] - before)) / noticed
-
-    def approach(self, before: Iterate, after: Iterate) -> Iterate:
-        """Go all the way: what it minimises is no expansion."""
-        return after
-
-
-def _widen(matrix: Matrix, width: int) -> Matrix:
-    widened = sparse.csc_matrix(matrix)
-    widened.resize(width, width)
-    return widened
-
-
-def conclude(found: ProgramSequence, sway_cost: SwayCost, iterations: int) -> Solution:
+def conclude(found: ProgramSequence, iterations: int) -> Solution:
     """Turn the outcome of programs into a solution."""
     problem = found.setup.problem
     status, cure = Status.CONVERGED, ""
@@ -329,14 +301,14 @@ def conclude(found: ProgramSequence, sway_cost: SwayCost, iterations: int) -> So
         status=status,
         method=METHOD,
         problem=problem,
-        optimum=_optimum(found, sway_cost) if status is Status.CONVERGED else None,
+        optimum=_optimum(found) if status is Status.CONVERGED else None,
         iterations=iterations,
         residual=found.step,
         cure=cure,
     )
 
 
-def _optimum(found: ProgramSequence, sway_cost: SwayCost) -> Optimum:
+def _optimum(found: ProgramSequence) -> Optimum:
     """Return to SI units."""
     problem, transcription = found.setup.problem, found.setup.transcription
     piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
@@ -361,9 +333,9 @@ def _optimum(found: ProgramSequence, sway_cost: SwayCost) -> Optimum:
         top_order=piece.order,
         sway=machine.equations.sway(points, felt, machine.parameters)[:, :, 0],
         angle=greatest_angle(found),
-        cost=found.setup.cost(found.iterate, sway_cost),
-        sway_weight=sway_cost.beta,
-        sway_scale=sway_cost.gamma,
+        cost=found.setup.cost(found.iterate, found.goal.sway_cost),
+        sway_weight=found.goal.sway_cost.beta,
+        sway_scale=found.goal.sway_cost.gamma,
         defect=None,
         hamiltonian_variation=None,
     )

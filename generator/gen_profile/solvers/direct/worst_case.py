@@ -9,6 +9,7 @@ as the best, the one of least cost is taken.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
@@ -30,8 +31,7 @@ from gen_profile.solvers.direct.solver import (
     COARSE,
     ROUGH,
     STEP_TOLERANCE,
-    CostProgram,
-    LeastWorst,
+    Goal,
     ProgramSequence,
     conclude,
     resolve_sway_cost,
@@ -39,16 +39,16 @@ from gen_profile.solvers.direct.solver import (
 )
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import to_be_asked
-from gen_profile.solvers.minimum_time import least
 from gen_profile.solvers.motion import optimal_profile
+from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import AxisLimitsSpec
 from gen_profile.work import OutOfWork, budget, left, spend
 
 TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case
-BISECTED = (
-    0.35  # relative precision of the least worst case where programs for it fail; less takes ever more effort
-)
+# where programs for the least worst case fail; a better one takes ever more effort
+BISECTION = Search(precision=0.35, close=0.0, stride=math.log(1.5), growth=1.0, downward=True)
+BISECTING = 0.6  # fraction of the work that is left for it
 HOPELESS = 1e3  # times a load's limit, above which the least worst case is not looked for
 MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
 SLACK = 1.003  # what the least cost may give away of the least worst case
@@ -158,7 +158,7 @@ def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
     swaying = problem.nominal_sway
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
-        goal = CostProgram(setup=setup, sway_cost=sway_cost, sway_limit=swaying, worst=GOOD_ENOUGH)
+        goal = Goal(setup=setup, sway_cost=sway_cost, sway_limit=swaying, worst=GOOD_ENOUGH)
         start = _begun(setup, found)
         # the bound only rises with more machines: what was not good enough before is not now
         found = sequence(start, goal, precision) if bound <= GOOD_ENOUGH else None
@@ -167,14 +167,14 @@ def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
             iterations += best.iterations
             bound, enough = float(best.solutions[0].x[-1]), SLACK * float(best.solutions[-1].x[-1]) + MARGIN
             if best.verdict is ConicStatus.FAILED and (bisected := _bisected(start, goal)) is not None:
-                bound, enough = (1.0 - BISECTED) * bisected, bisected
+                bound, enough = bisected / math.exp(BISECTION.precision), bisected
             elif best.verdict is not ConicStatus.SOLVED:
-                yield conclude(best, sway_cost, iterations)
+                yield conclude(best, iterations)
                 return
             goal = attrs.evolve(goal, worst=enough)
             found = sequence(best.iterate if best.verdict is ConicStatus.SOLVED else start, goal, precision)
         iterations += found.iterations
-        solution = conclude(found, sway_cost, iterations)
+        solution = conclude(found, iterations)
         yield attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
         if solution.optimum is None:
             return
@@ -188,23 +188,25 @@ def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
         tried = [*tried, *worse]
 
 
-def _least_worst(goal: CostProgram, traces: Sequence[float]) -> ProgramSequence:
+def _least_worst(goal: Goal, traces: Sequence[float]) -> ProgramSequence:
     """Minimise the worst share, for as little effort besides as the programs can tell from none."""
     for trace in traces:
-        least_worst = LeastWorst(setup=goal.setup, trace=trace, sway_limit=goal.sway_limit)
+        least_worst = attrs.evolve(goal, effort_price=trace, worst=None)
         best = sequence(goal.setup.transcription.rest(), least_worst)
         if best.verdict is not ConicStatus.FAILED:
             break
     return best
 
 
-def _bisected(start: Iterate, goal: CostProgram) -> float | None:
+def _bisected(start: Iterate, goal: Goal) -> float | None:
     """Find about the least worst share that motions of least cost keep to, whose programs do not fail."""
 
-    def feasible(worst: float) -> bool:
-        return sequence(start, attrs.evolve(goal, worst=worst), ROUGH).verdict is ConicStatus.SOLVED
+    def excess(worst: float) -> float:
+        found = sequence(start, attrs.evolve(goal, worst=worst), ROUGH)
+        return -math.inf if found.verdict is ConicStatus.SOLVED else math.inf
 
-    return least(feasible, 1.0, HOPELESS, BISECTED)
+    with budget(BISECTING * left()):
+        return least(excess, 1.0, BISECTION, HOPELESS)
 
 
 def _begun(setup: Setup, found: ProgramSequence | None) -> Iterate:

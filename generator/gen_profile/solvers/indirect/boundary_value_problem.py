@@ -155,18 +155,10 @@ class BoundaryValueProblem:
             solution.scaled(np.concatenate([1.0 / largest, largest])),
         )
 
-    def towards(self, share: float) -> BoundaryValueProblem:
-        """Pose the problem for a share of the move and of the initial swing."""
-        return attrs.evolve(self, initial=share * self.initial, final=share * self.final)
-
     @property
     def resolved(self) -> bool:
         """Whether every mode is asked to rest: none is so fast that no mesh could follow it."""
         return not np.isnan(self.final[: 2 * self.system.layout.n_u]).any()
-
-    def slower(self, factor: float) -> BoundaryValueProblem:
-        """Pose the problem for a longer duration."""
-        return attrs.evolve(self, data=attrs.evolve(self.data, duration=factor * self.data.duration))
 
     def weights(self, *solutions: Trajectory) -> Array:
         """Tell how much each coordinate counts, shape (n,).

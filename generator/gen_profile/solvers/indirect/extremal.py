@@ -65,20 +65,12 @@ def _optimum(canonical: BoundaryValueProblem, solution: Trajectory) -> Optimum:
     )
 
 
-def too_steep(problem: Problem, iterations: int, named: str = "") -> Solution:
+def too_steep(problem: Problem, iterations: int) -> Solution:
     """Blame a cost so steep that the motion changes faster than any mesh."""
     other = "." if problem.sway_scale is None else ', or set cost.sway_scale = "auto".'
-    return failure(problem, Status.DIVERGED, iterations, f"Lower cost.sway_weight{named}{other}")
+    return failure(problem, Status.DIVERGED, iterations, f"Lower cost.sway_weight{other}")
 
 
 def failure(problem: Problem, status: Status, iterations: int, cure: str) -> Solution:
     """Say that there is no solution, and what would help."""
-    return Solution(
-        status=status,
-        method=METHOD,
-        problem=problem,
-        optimum=None,
-        iterations=iterations,
-        residual=float("inf"),
-        cure=cure,
-    )
+    return Solution(status=status, method=METHOD, problem=problem, iterations=iterations, cure=cure)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gen_profile.motion.profile import Array
 from gen_profile.solvers.collocation import Trajectory
 from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValueProblem
-from gen_profile.solvers.indirect.newton import NewtonOutcome, solve_newton
+from gen_profile.solvers.indirect.newton import NewtonOutcome
 
 MAX_INTERVALS = 480
 MOST_PARTS = (4, 2)  # of an interval at once; the fewer, the nearer to the solution before
@@ -24,8 +24,8 @@ DEFECT_TOLERANCE = 3e-3  # see `defect`; what it costs in sway is of its square
 def refine(
     canonical: BoundaryValueProblem,
     coarse: Trajectory,
+    solve: Callable[[BoundaryValueProblem, Trajectory], NewtonOutcome],
     least: int = 0,
-    solve: Callable[[BoundaryValueProblem, Trajectory], NewtonOutcome] = solve_newton,
 ) -> NewtonOutcome:
     """Split intervals until the equations are met and the Hamiltonian is constant.
 
@@ -37,10 +37,10 @@ def refine(
     canonical : BoundaryValueProblem
     coarse : Trajectory
         Its solution on a mesh that may be too coarse to judge it by.
-    least : int
-        Intervals to begin with.
     solve : callable
         From a problem and a start to the solution on the same mesh.
+    least : int
+        Intervals to begin with.
     """
     meshes = [np.linspace(0.0, 1.0, least + 1)] if least >= len(coarse.mesh) else []
     solution, iterations, residual = coarse, 0, 0.0

@@ -1,14 +1,15 @@
 """Indirect method: Pontryagin's conditions solved as a two-point boundary value problem.
 
 Most machines swing so little that one linear model leads to the solution, on few long intervals and within
-milliseconds (`solvers.simplified_newton`). Where it does not, the solution is sought by homotopy, on meshes
-as fine as it takes (`solvers.homotopy`).
+milliseconds (`solvers.simplified_newton`). Where it does not, the full Newton's method takes over
+(`solvers.full_newton`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 
 import attrs
 import numpy as np
@@ -25,7 +26,7 @@ from gen_profile.solvers.indirect.boundary_value_problem import (
     with_sway_cost,
 )
 from gen_profile.solvers.indirect.extremal import METHOD, failure, judged
-from gen_profile.solvers.indirect.homotopy import MODERATE_ANGLE, solve_by_homotopy
+from gen_profile.solvers.indirect.full_newton import solve_fully
 from gen_profile.solvers.indirect.newton import NewtonOutcome
 from gen_profile.solvers.indirect.refinement import refine
 from gen_profile.solvers.indirect.simplified_newton import solve_simplified
@@ -35,6 +36,7 @@ __all__ = ["METHOD", "solve"]
 
 LONG_INTERVALS = 8  # at least
 RADIANS_PER_LONG_INTERVAL = 6.0  # of the fastest mode that matters
+MODERATE_ANGLE = np.pi / 4.0  # up to which Newton's method hardly fails
 
 
 def solve(problem: Problem, far: Callable[[], bool] = lambda: True) -> Solution:
@@ -69,13 +71,17 @@ def _solve(problem: Problem, far: Callable[[], bool]) -> Solution:
         solution = _solve(attrs.evolve(problem, desensitized=kept), far)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
-    try:
+    with suppress(np.linalg.LinAlgError):
         found = _solve_simply(problem, quiet)
+        if found is not None:
+            return found
+    if not far():
+        return failure(problem, Status.INFEASIBLE, 0, WIDER)
+    try:
+        return solve_fully(problem, quiet)
     except np.linalg.LinAlgError:
-        found = None
-    if found is not None:
-        return found
-    return solve_by_homotopy(problem, quiet) if far() else failure(problem, Status.INFEASIBLE, 0, WIDER)
+        cure = "The end conditions contradict one another; allow more time."
+        return failure(problem, Status.DIVERGED, 1, cure)
 
 
 def _solve_simply(problem: Problem, quiet: BoundaryValueProblem) -> Solution | None:
@@ -111,7 +117,7 @@ def _refined(problem: BoundaryValueProblem, start: Trajectory) -> NewtonOutcome:
     found = solve_simplified(problem, start)
     if found.solution is None:
         return found
-    refined = refine(problem, found.solution, solve=solve_simplified)
+    refined = refine(problem, found.solution, solve_simplified)
     return attrs.evolve(
         refined,
         iterations=found.iterations + refined.iterations,

@@ -6,7 +6,7 @@ import pytest
 from command_line import run_here
 from generator.planned_machines import BAY, HOIST
 
-from gen_profile.designs.planner_cures import cures
+from gen_profile.designs.planner_suggestions import planner_suggestions
 from gen_profile.errors import SpecError
 from gen_profile.spec.reading import parse_spec
 
@@ -30,25 +30,27 @@ def test_each_change_is_made_as_large_as_it_must_be(power):
         share = 5.0 * (uncertain / 0.05) ** (2.0 * power) * limits.velocity**power
         return proof(share * (0.05 / check.residual_sway["hook"]) ** power)
 
-    surer, slower, more = cures(spec, proof(5.0), swaying)
+    surer, slower, more = planner_suggestions(spec, proof(5.0), swaying)
     assert surer.values["check.uncertain.L1"] < 0.05
     assert set(slower.values) == {"limits.velocity", "limits.acceleration", "limits.jerk"}
     assert more.values["check.residual_sway"] > 0.05
-    assert all(cure.share <= 1.0 for cure in (surer, slower, more))
+    assert all(suggestion.share <= 1.0 for suggestion in (surer, slower, more))
 
 
 def test_nothing_is_named_that_does_not_help_or_cannot_be():
     spec = parse_spec(HOIST, ["check.uncertain={}"])
-    assert cures(spec, proof(5.0), lambda _: proof(3.0)) == ()
+    assert planner_suggestions(spec, proof(5.0), lambda _: proof(3.0)) == ()
 
     def refused(changed):
         if changed.limits != spec.limits:
             raise SpecError("too slow")
         return proof(0.5)
 
-    assert [list(cure.values) for cure in cures(spec, proof(5.0), refused)] == [["check.residual_sway"]]
-    assert cures(spec, proof(5.0, faults=("altered",)), lambda _: proof(0.5)) == ()
-    assert cures(spec, proof(5.0, broken=("a limit is broken",)), lambda _: proof(0.5)) == ()
+    assert [list(one.values) for one in planner_suggestions(spec, proof(5.0), refused)] == [
+        ["check.residual_sway"]
+    ]
+    assert planner_suggestions(spec, proof(5.0, faults=("altered",)), lambda _: proof(0.5)) == ()
+    assert planner_suggestions(spec, proof(5.0, broken=("a limit is broken",)), lambda _: proof(0.5)) == ()
 
 
 @pytest.mark.slow

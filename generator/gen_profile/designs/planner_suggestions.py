@@ -9,18 +9,20 @@ import attrs
 
 from gen_profile.errors import GenProfileError
 from gen_profile.planner.machine import planned_axes
+from gen_profile.problem.limits import rounded_down, rounded_up
 from gen_profile.proof.verdict import Proof
+from gen_profile.solvers.search import Search, least
 from gen_profile.spec.model import Spec
 
-TRIES = 4  # of each kind of change
-ENOUGH = 0.8  # share of the limits aimed at: other histories sway more
+# the first change that passes will do; aimed at are 0.8 of the limits, for other histories sway more
+FIRST = Search(precision=0.01, aim=math.log(0.8), longest=math.inf, tries=5)
 WHAT_MOVES = ("velocity", "acceleration", "jerk")
 
 Change = Callable[[Spec, float], tuple[Spec, dict[str, float]]]
 
 
 @attrs.frozen(kw_only=True)
-class Cure:
+class PlannerSuggestion:
     """Values with which a block passed its proof.
 
     Attributes
@@ -39,7 +41,9 @@ class Cure:
         return ", ".join(f"{place} = {value:g}" for place, value in self.values.items())
 
 
-def cures(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]) -> tuple[Cure, ...]:
+def planner_suggestions(
+    spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]
+) -> tuple[PlannerSuggestion, ...]:
     """Look for changes that help, where too much sway is all that is wrong.
 
     Parameters
@@ -52,53 +56,55 @@ def cures(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]) -> tuple[Cur
     """
     if proof.faults or any(judged.faults for judged in proof.judged):
         return ()
-    share = proof.share(proof.worst)
-    found = (_tried(spec, share, prove, change, power) for change, power in CHANGES.items())
-    return tuple(cure for cure in found if cure is not None)
+    found = (_tried(spec, proof, prove, change, power) for change, power in CHANGES.items())
+    return tuple(suggestion for suggestion in found if suggestion is not None)
 
 
 def _tried(
-    spec: Spec, share: float, prove: Callable[[Spec], Proof], change: Change, power: float
-) -> Cure | None:
-    """Change by a factor until the proof passes; the sway is taken to go with a power of it."""
-    factor = 1.0
-    for _ in range(TRIES):
-        factor *= (ENOUGH / share) ** (1.0 / power)
-        try:
-            changed, values = change(spec, factor)
-            proof = prove(changed) if values else None
-        except GenProfileError:  # out of what a spec or a block may be
-            return None
-        if proof is None:
-            return None
-        share = proof.share(proof.worst)
+    spec: Spec, failed: Proof, prove: Callable[[Spec], Proof], change: Change, power: float
+) -> PlannerSuggestion | None:
+    """Divide by a factor until the proof passes; the sway is taken to go with a power of it."""
+    passed: list[PlannerSuggestion] = []
+
+    def excess(factor: float) -> float:
+        changed, values = change(spec, 1.0 / factor)
+        proof = failed if factor == 1.0 else prove(changed)
+        fraction = proof.share(proof.worst)
         if proof.passed:
-            return Cure(values=values, share=share)
-        share = max(share, 1.0)
-    return None
+            passed.append(PlannerSuggestion(values=values, share=fraction))
+            return -math.inf
+        return math.log(max(fraction, 1.0 + FIRST.precision))
+
+    try:
+        if change(spec, 1.0)[1]:
+            least(excess, 1.0, attrs.evolve(FIRST, slope=power, believed=(power, power)))
+    except GenProfileError:  # out of what a spec or a block may be
+        return None
+    return passed[0] if passed else None
 
 
 def _slower(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
     stated, axes = spec.limits.stated(), planned_axes(spec)
     places = dict.fromkeys(spec.limits.place(axis, name) for axis in axes for name in WHAT_MOVES)
-    values = {place: _rounded_down(factor * stated[place]) for place in places}
+    values = {place: float(rounded_down(factor * stated[place], digits=2)) for place in places}
     return attrs.evolve(spec, limits=spec.limits.changed(values)), values
 
 
 def _surer(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
     stated = spec.robustness.uncertain if spec.check.uncertain is None else spec.check.uncertain
-    shares = {name: _rounded_down(factor * share) for name, share in stated.items()}
-    changed = attrs.evolve(spec, check=attrs.evolve(spec.check, uncertain=shares))
-    return changed, {f"check.uncertain.{name}": share for name, share in shares.items()}
+    errors = {name: float(rounded_down(factor * error, digits=2)) for name, error in stated.items()}
+    changed = attrs.evolve(spec, check=attrs.evolve(spec.check, uncertain=errors))
+    return changed, {f"check.uncertain.{name}": error for name, error in errors.items()}
 
 
 def _more_allowed(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
-    sway = {load: -_rounded_down(-most / factor) for load, most in spec.check.residual_sway.items()}
+    sway = {
+        load: float(rounded_up(most / factor, digits=2)) for load, most in spec.check.residual_sway.items()
+    }
     values = {f"check.residual_sway.{load}": most for load, most in sway.items()}
     if len(set(sway.values())) == 1:
         values = {"check.residual_sway": next(iter(sway.values()))}
-    changed = attrs.evolve(spec, check=attrs.evolve(spec.check, residual_sway=sway))
-    return changed, values
+    return attrs.evolve(spec, check=attrs.evolve(spec.check, residual_sway=sway)), values
 
 
 CHANGES: dict[Change, float] = {  # and the power of its factor that the sway goes with
@@ -106,9 +112,3 @@ CHANGES: dict[Change, float] = {  # and the power of its factor that the sway go
     _slower: 1.0,
     _more_allowed: 1.0,
 }
-
-
-def _rounded_down(value: float) -> float:
-    """Keep two digits."""
-    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 1)
-    return float(f"{math.floor(value / unit) * unit:.2g}")
