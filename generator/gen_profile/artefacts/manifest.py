@@ -52,6 +52,14 @@ class Artefact:
     payload_sha256: str = ""
 
 
+def artefact_of(format_: str, path: str, content: bytes, payload_sha256: str = "") -> Artefact:
+    """Describe a file that was written."""
+    digest = sha256(content)
+    return Artefact(
+        format=format_, path=path, sha256=digest, bytes=len(content), payload_sha256=payload_sha256
+    )
+
+
 @attrs.frozen(kw_only=True)
 class Manifest:
     """What was designed, from what, by what, and how it was judged.

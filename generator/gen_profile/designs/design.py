@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, parse_manifest, sha256, versions
+from gen_profile.artefacts.manifest import FILENAME, Artefact, Manifest, artefact_of, parse_manifest, versions
 from gen_profile.artefacts.writing import Kept, Staging, staged
 from gen_profile.designs.plan import Plan, plan
 from gen_profile.errors import OutputError, SpecError
@@ -74,37 +75,22 @@ class Design:
             "solver": self._solver(),
             "figures": self.figures,
             "check": None if self.check is None else self.check.to_dict(),
-            "artefacts": [
-                {
-                    "format": artefact.format,
-                    "path": os.path.relpath(self.folder / artefact.path),
-                    "sha256": artefact.sha256,
-                    "bytes": artefact.bytes,
-                }
-                for artefact in self.artefacts
-            ],
+            "artefacts": [{"format": one.format, **file_entry(self.folder, one)} for one in self.artefacts],
         }
 
     def _solver(self) -> dict[str, Any]:
         """Tell how the motion was found; what a shaper has not is null."""
-        solution, seconds = self.plan.solution, self.plan.solver_time
+        solution, spec, seconds = self.plan.solution, self.spec.solver, {"time_s": self.plan.solver_time}
         if solution is None:
-            return {
-                "status": "shaped",
-                "method": self.spec.solver.method,
-                "base": self.spec.solver.base,
-                "iterations": 0,
-                "residual": None,
-                "time_s": seconds,
-                "cost": None,
-            }
+            shaped = {"status": "shaped", "method": spec.method, "base": spec.base, "iterations": 0}
+            return {**shaped, "residual": None, **seconds, "cost": None}
         optimum = solution.raise_for_status()
         return {
             "status": solution.status.name.lower(),
             "method": solution.method,
             "iterations": solution.iterations,
             "residual": solution.residual,
-            "time_s": seconds,
+            **seconds,
             "cost": optimum.cost,
             "sway_weight": optimum.sway_weight,
             "sway_scale_per_m": optimum.sway_scale,
@@ -114,6 +100,12 @@ class Design:
             "redundant": list(solution.redundant),
             "worst_case_bound_m": solution.worst_case_bound,
         }
+
+
+def file_entry(folder: Path, artefact: Artefact) -> dict[str, Any]:
+    """Nest what a JSON document tells of a file that was written."""
+    path = os.path.relpath(folder / artefact.path)
+    return {"path": path, "sha256": artefact.sha256, "bytes": artefact.bytes}
 
 
 def design(
@@ -149,24 +141,23 @@ def design(
     GenProfileError
         Nothing was written.
     """
-    spec = as_spec(spec)
-    folder = Path(folder)
+    spec, folder = as_spec(spec), Path(folder)
+    verify = partial(_check, by_fmpy=by_fmpy, progress=progress) if check else None
     return _designed(
         spec,
         as_names(formats),
         folder,
         staged(folder),
-        check=check,
+        verify=verify,
         keep_failed=keep_failed,
-        by_fmpy=by_fmpy,
         progress=progress,
     )
 
 
 def design_in_memory(spec: Spec, formats: Sequence[str], *, by_fmpy: bool) -> tuple[Design, dict[str, bytes]]:
     """Do what `design` does, but hand over the files that pass, by name, for others to write."""
-    kept = Kept()
-    made = _designed(spec, formats, Path(), nullcontext(kept), by_fmpy=by_fmpy)
+    kept, verify = Kept(), partial(_check, by_fmpy=by_fmpy, progress=untold)
+    made = _designed(spec, formats, Path(), nullcontext(kept), verify=verify)
     return made, dict(sorted(kept.delivered.items()))
 
 
@@ -176,9 +167,8 @@ def _designed(
     folder: Path,
     place: AbstractContextManager[Staging],
     *,
-    check: bool = True,
+    verify: Callable[[Plan, Sequence[SampledProfile]], Check] | None,
     keep_failed: bool = False,
-    by_fmpy: bool,
     progress: Progress = untold,
 ) -> Design:
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
@@ -186,12 +176,12 @@ def _designed(
         raise SpecError("export: name at least one format.")
     require_end(exporters, stops=spec.move.stops)
     planned = plan(spec, progress)
-    spec = planned.spec
+    spec, command = planned.spec, planned.command
     with place as staging:
         progress("exporting")
-        artefacts, replayed = _export(spec, planned.evaluation.command, exporters, staging)
-        worst = _check(spec, planned, replayed, by_fmpy, progress) if check else None
-        digest = planned.evaluation.command.payload_hash()
+        artefacts, replayed = _export(spec, command, exporters, staging)
+        worst = None if verify is None else verify(planned, replayed)
+        digest = command.payload_hash()
         kept = deliver_judged(staging, spec, artefacts, worst, profile_sha256=digest, keep_failed=keep_failed)
     return Design(spec=spec, plan=planned, check=worst, artefacts=kept, folder=folder)
 
@@ -237,33 +227,32 @@ def _export(
             if index == 0:
                 replayed.append(exporter.replay(written, target))
                 payload = replayed[-1].payload_hash()
-            artefacts.append(
-                Artefact(
-                    format=name,
-                    path=file.filename,
-                    sha256=sha256(written),
-                    bytes=len(written),
-                    payload_sha256=payload,
-                )
-            )
+            artefacts.append(artefact_of(name, file.filename, written, payload))
     return tuple(artefacts), replayed
 
 
-def _check(
-    spec: Spec, planned: Plan, replayed: Sequence[SampledProfile], by_fmpy: bool, progress: Progress
-) -> Check:
+def _check(planned: Plan, replayed: Sequence[SampledProfile], *, by_fmpy: bool, progress: Progress) -> Check:
     """Judge all artefacts against the continuous motion, and keep the verdict on the worst."""
     progress("checking by co-simulation")
-    machines = planned.evaluation.machines
-    further = further_scenarios(spec, machines)
+    spec, machines = planned.spec, planned.evaluation.machines
+    known = [*machines, *further_scenarios(spec, machines)]
+    compiling = partial(progress, "compiling the plant's FMU, once")
     checks = []
     for setpoints in replayed:
-        worst = worst_machines(spec, setpoints, [*machines, *further], _compiling(progress))
-        rows = [*machines, *further, *worst.machines]
+        worst = worst_machines(spec, setpoints, known, compiling)
+        rows = [*known, *worst.machines]
         if spec.check.foreign is not None:
             check = judge_external(spec, spec.check.foreign, setpoints, rows)
         else:
-            check = _judged(spec, planned.evaluation, setpoints, rows, by_fmpy=by_fmpy, progress=progress)
+            check = _judged(
+                spec,
+                planned.evaluation,
+                setpoints,
+                rows,
+                compiling=compiling,
+                by_fmpy=by_fmpy,
+                progress=progress,
+            )
         checks.append(attrs.evolve(check, searched=worst.tried))
     return max(checks, key=lambda check: check.demand)
 
@@ -274,28 +263,18 @@ def _judged(
     setpoints: SampledProfile,
     rows: Sequence[Scenario],
     *,
+    compiling: Callable[[], None],
     by_fmpy: bool,
     progress: Progress,
 ) -> Check:
     """Judge one artefact in all its scenarios, of which the evaluation's machines are the first."""
-    machines = [row for row in rows if row.followed]
-    spacing = sample_spacing(spec, setpoints)
-    found = cosimulate(
-        spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, on_build=_compiling(progress)
-    )
+    machines, spacing = [row for row in rows if row.followed], sample_spacing(spec, setpoints)
+    found = cosimulate(spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, on_build=compiling)
     compared = found[0].times[found[0].times >= judged_from(spec, setpoints)]
     expected = evaluation.followed(compared, machines[len(evaluation.machines) :])
-    return with_further(
-        spec,
-        setpoints,
-        judge(spec, setpoints, machines, found, expected),
-        [row for row in rows if not row.followed],
-        lambda done, total: progress("checking by co-simulation", done, total),
-    )
-
-
-def _compiling(progress: Progress) -> Callable[[], None]:
-    return lambda: progress("compiling the plant's FMU, once")
+    check = judge(spec, setpoints, machines, found, expected)
+    further = [row for row in rows if not row.followed]
+    return with_further(spec, setpoints, check, further, partial(progress, "checking by co-simulation"))
 
 
 def _after_earlier_ones(manifest: Manifest, earlier: bytes | None) -> Manifest:

@@ -136,30 +136,23 @@ def export_fmu(
 
 def platform_names(choice: str) -> tuple[str, ...]:
     """Turn ``"host"``, ``"all"`` or a platform's name into names of `PLATFORMS`."""
-    match choice:
-        case "host":
-            return (host_platform(),)
-        case "all":
-            return tuple(PLATFORMS)
-    return (choice,)
+    return {"host": (host_platform(),), "all": tuple(PLATFORMS)}.get(choice, (choice,))
 
 
 def _model(spec: Spec, kind: str, input_kind: InputKind, progress: Progress) -> Model:
     name = identifier_of(f"{spec.name} {kind}")
+    if kind in ("profile", "system"):
+        evaluation = plan(spec, progress=progress).evaluation
+        if kind == "profile":
+            return profile_model(name, spec.machine().actuated, evaluation.command)
+        return system_model(name, _machine(spec, _nominals(spec, evaluation.motion)), evaluation.command)
     if kind == "plant":
         return plant_model(_machine(spec, _rough_nominals(spec)), input_kind, name)
+    progress("finding the modes over the live ranges")
+    text, live = planner_block(spec).text, tuple(spec.planner.live)
     if kind == "planner":
-        progress("finding the modes over the live ranges")
-        return planner_model(name, planner_block(spec).text, _planned(spec), tuple(spec.planner.live))
-    if kind == "planned-system":
-        progress("finding the modes over the live ranges")
-        machine = _machine(spec, _rough_nominals(spec))
-        text, live = planner_block(spec).text, tuple(spec.planner.live)
-        return planned_system_model(name, text, machine, _planned(spec), live)
-    evaluation = plan(spec, progress=progress).evaluation
-    if kind == "profile":
-        return profile_model(name, spec.machine().actuated, evaluation.command)
-    return system_model(name, _machine(spec, _nominals(spec, evaluation.motion)), evaluation.command)
+        return planner_model(name, text, _planned(spec), live)
+    return planned_system_model(name, text, _machine(spec, _rough_nominals(spec)), _planned(spec), live)
 
 
 def _planned(spec: Spec) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -10,9 +9,9 @@ from typing import Any
 
 import attrs
 
-from gen_profile.artefacts.manifest import PLANNER, Artefact, sha256
+from gen_profile.artefacts.manifest import PLANNER, Artefact, artefact_of
 from gen_profile.artefacts.writing import staged
-from gen_profile.designs.design import deliver_judged
+from gen_profile.designs.design import deliver_judged, file_entry
 from gen_profile.designs.planner_suggestions import PlannerSuggestion, planner_suggestions
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
@@ -53,10 +52,7 @@ class Deployment:
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
-        files = [
-            {"path": os.path.relpath(self.folder / file.path), "bytes": file.bytes, "sha256": file.sha256}
-            for file in self.files
-        ]
+        files = [file_entry(self.folder, file) for file in self.files]
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
@@ -120,10 +116,7 @@ def deploy_planner(
         prove_on = partial(prove, histories=histories, scheduler=scheduler, progress=progress)
         if check:
             proof, warnings = prove_on(spec, text), slow_axes(spec, block)
-        artefacts = tuple(
-            Artefact(format=PLANNER, path=name, sha256=sha256(content), bytes=len(content))
-            for name, content in written.items()
-        )
+        artefacts = tuple(artefact_of(PLANNER, name, content) for name, content in written.items())
         kept = deliver_judged(staging, spec, artefacts, proof, profile_sha256="", keep_failed=keep_failed)
     found: tuple[PlannerSuggestion, ...] = ()
     if proof is not None and not proof.passed and not keep_failed:
@@ -132,13 +125,7 @@ def deploy_planner(
             spec, proof, lambda changed: prove_on(changed, planner_block(changed).text)
         )
     return Deployment(
-        spec=spec,
-        block=block,
-        proof=proof,
-        folder=folder,
-        files=kept,
-        suggestions=found,
-        warnings=warnings,
+        spec=spec, block=block, proof=proof, folder=folder, files=kept, suggestions=found, warnings=warnings
     )
 
 

@@ -65,12 +65,7 @@ def attempt(
 
 
 def kept_by_all(
-    spec: Spec,
-    problem: Problem,
-    method: SolverName,
-    progress: Progress = untold,
-    *,
-    coarse: bool = False,
+    spec: Spec, problem: Problem, method: SolverName, progress: Progress = untold, *, coarse: bool = False
 ) -> Solution:
     """Solve a problem again with less sway of the nominal machine, until all of a spec's keep the limit.
 

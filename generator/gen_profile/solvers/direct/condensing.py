@@ -64,6 +64,16 @@ class IntervalMaps:
     stage_drive: Array
     stage_offset: Array
 
+    def scaled(self, scale: Array) -> IntervalMaps:
+        """Measure the states at the nodes in units of their own."""
+        return attrs.evolve(
+            self,
+            transition=self.transition * scale / scale[:, None],
+            drive=self.drive / scale[:, None],
+            offset=self.offset / scale,
+            stage_transition=self.stage_transition * scale,
+        )
+
     def stages(self, nodes: Array, local: Array) -> Array:
         """Values at the stages for (intervals, n) initial values and (intervals, local) coordinates."""
         return np.asarray(

@@ -17,14 +17,7 @@ from gen_profile.problem.problem import Problem
 from gen_profile.progress import Progress, untold
 from gen_profile.solvers.direct.conic import ConicStatus
 from gen_profile.solvers.direct.set_up import Setup, set_up
-from gen_profile.solvers.direct.solver import (
-    MAX_ITERATIONS,
-    ROUGH,
-    Goal,
-    ProgramSequence,
-    conclude,
-    sequence,
-)
+from gen_profile.solvers.direct.solver import MAX_ITERATIONS, ROUGH, Goal, ProgramSequence, conclude, sequence
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import Solution
@@ -102,10 +95,7 @@ class Relaxation:
     def _begun(self) -> tuple[Setup, ProgramSequence]:
         """Transcribe the problem, and find about what motion it would take without limits."""
         problem = self.problem
-        setup, redundant = set_up(problem, self._tried)
-        if redundant:
-            kept = tuple(name for name in problem.desensitized if name not in redundant)
-            setup, _ = set_up(attrs.evolve(problem, desensitized=kept), self._tried)
+        setup, _ = set_up(problem, self._tried)
         unbounded = attrs.evolve(setup, tried=())
         if not self._tried:
             setup = unbounded

@@ -25,6 +25,7 @@ from gen_profile.solvers.indirect.boundary_value_problem import (
     BoundaryValueProblem,
     canonical_problem,
     independence,
+    without,
 )
 
 INTERVALS = 40
@@ -84,7 +85,7 @@ class Setup:
 
 
 def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tuple[Setup, tuple[str, ...]]:
-    """Transcribe a problem; also name the parameters whose sensitivities need not be asked for.
+    """Transcribe a problem; also name the parameters whose sensitivities are left out, as others imply them.
 
     Parameters
     ----------
@@ -95,6 +96,8 @@ def set_up(problem: Problem, others: Sequence[Mapping[str, float]] = ()) -> tupl
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
     canonical = canonical_problem(problem, system)
     asked, redundant = independence(canonical)
+    if redundant:
+        return set_up(without(problem, redundant), others)[0], redundant
     machines = (
         _nominal(problem, canonical, asked),
         *(_other(problem, canonical, parameters) for parameters in others),
@@ -148,7 +151,7 @@ def _nominal(
     layout, scale = canonical.system.layout, canonical.data.scale
     states = np.r_[0 : 2 * layout.n_u, layout.sensitivities]
     exact = problem.worst_case is None or problem.worst_case.nominal_zero
-    modal = np.asarray(np.linalg.inv(canonical.coordinates.basis), dtype=np.float64)
+    modal = np.asarray(np.linalg.inv(canonical.basis), dtype=np.float64)
     swung = initial_state(problem.plant, problem.initial)
     return TranscribedMachine(
         equations=motion_equations(problem.plant, problem.desensitized, problem.order),

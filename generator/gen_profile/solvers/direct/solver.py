@@ -31,7 +31,7 @@ from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
 from gen_profile.solvers.solution import WIDER, Optimum, Solution, Status
 from gen_profile.spec.model import LimitsSpec
-from gen_profile.work import OutOfWork, budget, left, spend
+from gen_profile.work import OutOfWork, afford, left
 
 METHOD = "direct"
 STEP_TOLERANCE = 1e-8  # of the motion, relative
@@ -175,11 +175,7 @@ def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False
         Never raises for a problem that has none: the status says why.
     """
     setup, redundant = set_up(problem)
-    if redundant:
-        kept = tuple(name for name in problem.desensitized if name not in redundant)
-        solution = solve(attrs.evolve(problem, desensitized=kept), near, coarse=coarse)
-        return attrs.evolve(solution, problem=problem, redundant=redundant)
-    sway_cost, iterations = resolve_sway_cost(problem)
+    sway_cost, iterations = resolve_sway_cost(setup.problem)
     start = setup.transcription.rest()
     if near is not None and near.like(start):
         start = near
@@ -194,7 +190,7 @@ def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False
         setup, start, iterations = found.setup, found.iterate, iterations + found.iterations
         return conclude(found, iterations)
 
-    return within_sway(problem, attempt)
+    return attrs.evolve(within_sway(problem, attempt), problem=problem, redundant=redundant)
 
 
 def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
@@ -203,27 +199,21 @@ def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
         return SwayCost(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
     quiet = attrs.evolve(problem, sway_weight=0.0, sway_scale=1.0, limits=LimitsSpec(), worst_case=None)
     solution = solve(quiet)
-    if solution.optimum is None:
+    sway = 0.0 if solution.optimum is None else sway_on_the_way(solution)
+    if solution.optimum is None or not 0.0 < sway < np.inf:  # a hoist alone swings nothing
         return UNWEIGHTED, solution.iterations
-    effort, sway = solution.optimum.cost / problem.duration, sway_on_the_way(solution)
-    if not 0.0 < sway < np.inf:  # a hoist alone swings nothing
-        return UNWEIGHTED, solution.iterations
-    return SwayCost(
-        beta=problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2, gamma=AUTO_SWAY / sway
-    ), solution.iterations
+    effort = solution.optimum.cost / problem.duration
+    beta = problem.sway_weight * 2.0 * effort / AUTO_EFFORT**2
+    return SwayCost(beta=beta, gamma=AUTO_SWAY / sway), solution.iterations
 
 
 def refined(start: Iterate, goal: Goal) -> ProgramSequence:
     """Solve programs on a mesh that is bisected as long as that pays and the work reaches."""
     begun: list[tuple[Iterate, Goal]] = []
-    try:
-        with budget(BISECTING * left()):
-            return _refined(start, goal, begun)
-    except OutOfWork:
-        spend(0.0)
-        if not begun:
-            raise
-        return sequence(*begun[0])
+    found = afford(lambda: _refined(start, goal, begun), BISECTING * left())
+    if found is None and not begun:
+        raise OutOfWork
+    return found or sequence(*begun[0])
 
 
 def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> ProgramSequence:
@@ -318,9 +308,7 @@ def _optimum(found: ProgramSequence) -> Optimum:
     shares = np.append(0.0, np.cumsum(piece.length))
     knots = duration * (shares / shares[-1])  # the last one is the duration, to the last bit
     control = np.einsum("pb,kab->kpa", power_basis(3), local[:, :, piece.order :])
-    stages, machine = found.iterate.stages[0], transcription.machines[0]
-    points = stages.reshape(-1, stages.shape[2])
-    felt = transcription.axes(found.iterate.local).reshape(len(points), -1)
+    equations, points = transcription.machines[0].equations, transcription.nominal_points(found.iterate)
     states, costates = _nodes(found)
     return Optimum(
         knots=knots,
@@ -331,7 +319,7 @@ def _optimum(found: ProgramSequence) -> Optimum:
         * (reach / duration**piece.order)
         / lengths[:, None, None] ** np.arange(control.shape[1])[:, None],
         top_order=piece.order,
-        sway=machine.equations.sway(points, felt, machine.parameters)[:, :, 0],
+        sway=equations.sway(*points)[:, :, 0],
         angle=greatest_angle(found),
         cost=found.setup.cost(found.iterate, found.goal.sway_cost),
         sway_weight=found.goal.sway_cost.beta,
@@ -377,8 +365,6 @@ def _nodes(found: ProgramSequence) -> tuple[Array, Array]:
 
 def greatest_angle(found: ProgramSequence) -> float:
     """Greatest rope angle of the nominal machine at the collocation points, in rad."""
-    transcription, stages = found.setup.transcription, found.iterate.stages[0]
-    machine = transcription.machines[0]
-    points = stages.reshape(-1, stages.shape[2])
-    felt = transcription.axes(found.iterate.local).reshape(len(points), -1)
-    return float(np.abs(machine.equations.angle(points, felt, machine.parameters)).max())
+    transcription = found.setup.transcription
+    angles = transcription.machines[0].equations.angle(*transcription.nominal_points(found.iterate))
+    return float(np.abs(angles).max())

@@ -155,27 +155,18 @@ class Transcription:
 
     def maps(self, iterate: Iterate) -> tuple[IntervalMaps, ...]:
         """Linearise every machine about a motion; states in units of the machine's scale."""
-        found = []
-        for machine, stages in zip(self.machines, iterate.stages, strict=True):
-            maps = interval_maps(
+        lengths = self.duration * self.piece.length
+        return tuple(
+            interval_maps(
                 machine.equations,
                 machine.parameters,
                 self.axes,
                 stages=stages,
                 local=iterate.local,
-                lengths=self.duration * self.piece.length,
-            )
-            scale = machine.scale
-            found.append(
-                attrs.evolve(
-                    maps,
-                    transition=maps.transition * scale / scale[:, None],
-                    drive=maps.drive / scale[:, None],
-                    offset=maps.offset / scale,
-                    stage_transition=maps.stage_transition * scale,
-                )
-            )
-        return tuple(found)
+                lengths=lengths,
+            ).scaled(machine.scale)
+            for machine, stages in zip(self.machines, iterate.stages, strict=True)
+        )
 
     def program(self, maps: Sequence[IntervalMaps], extra: int = 0) -> ConicProgram:
         """Pose the motion: continuous, from rest to its target, and the nominal machine moved by it.
@@ -191,7 +182,7 @@ class Transcription:
         last = self._per_axis(np.stack(ends, axis=1))
         columns = self.local_columns
         program.equal(
-            self._repeat(first, columns, width) - _after(place(last[:-1], columns[:-1], width), len(first)),
+            _repeated(first, columns, width) - _after(place(last[:-1], columns[:-1], width), len(first)),
             np.zeros(len(first) * self.intervals),
         )
         end = np.zeros((len(self.target), orders))
@@ -201,7 +192,7 @@ class Transcription:
         n = len(machine.scale)
         moved = place(linear.transition, nodes[:-1], width) + place(linear.drive, columns, width)
         program.equal(
-            self._repeat(np.eye(n), nodes, width) - _after(moved, n),
+            _repeated(np.eye(n), nodes, width) - _after(moved, n),
             np.concatenate([machine.start, linear.offset.ravel()]),
         )
         program.equal(place(machine.end[None], nodes[-1:], width), np.zeros(len(machine.end)))
@@ -249,17 +240,15 @@ class Transcription:
         machine, stages = self.machines[0], iterate.stages[0]
         n, felt = len(machine.scale), self.axes(iterate.local)
         points = self.intervals * STAGES
-        values = machine.equations.end_sway(
-            stages.reshape(points, n), felt.reshape(points, -1), machine.parameters
-        )
+        values = machine.equations.end_sway(*self.nominal_points(iterate))
         values = values.reshape(self.intervals, STAGES, -1, values.shape[2])
         found, by_state, by_axes = values[..., 0], values[..., 1 : 1 + n], values[..., 1 + n :]
         by_local = by_axes @ self.axes.matrix + by_state @ maps.stage_drive
         by_node = by_state @ maps.stage_transition
         directions = found.shape[2]
-        matrix = place(
-            by_local.reshape(self.intervals, STAGES * directions, -1), self.local_columns, width
-        ) + place(by_node.reshape(self.intervals, STAGES * directions, -1), self.node_columns[:-1], width)
+        rows = (self.intervals, STAGES * directions, -1)
+        matrix = place(by_local.reshape(rows), self.local_columns, width)
+        matrix = matrix + place(by_node.reshape(rows), self.node_columns[:-1], width)
         offset = (
             found
             + np.einsum("ksda,ksa->ksd", by_state, maps.stage_offset - stages)
@@ -269,10 +258,13 @@ class Transcription:
 
     def end_sway_found(self, iterate: Iterate) -> Array:
         """Evaluate the end load's sway of the nominal machine in m, shape (points, directions)."""
-        machine, stages = self.machines[0], iterate.stages[0]
+        return self.machines[0].equations.end_sway(*self.nominal_points(iterate))[:, :, 0]
+
+    def nominal_points(self, iterate: Iterate) -> tuple[Array, Array, Array]:
+        """Give the nominal machine's states, what it feels of the axes, and its parameters, at all points."""
+        stages = iterate.stages[0]
         points = stages.reshape(-1, stages.shape[2])
-        felt = self.axes(iterate.local).reshape(len(points), -1)
-        return machine.equations.end_sway(points, felt, machine.parameters)[:, :, 0]
+        return points, self.axes(iterate.local).reshape(len(points), -1), self.machines[0].parameters
 
     def iterate(self, x: Array, maps: Sequence[IntervalMaps]) -> Iterate:
         """Read a motion and the machines' states off a program's solution."""
@@ -320,10 +312,11 @@ class Transcription:
         whole = np.einsum("ab,...rs->...arbs", np.eye(axes), rows)
         return np.asarray(whole.reshape(*rows.shape[:-2], axes * count, axes * size))
 
-    def _repeat(self, block: Array, columns: IntArray, width: int) -> Matrix:
-        return place(np.broadcast_to(block, (len(columns), *block.shape)), columns, width)
-
 
 def _after(matrix: Matrix, rows: int) -> Matrix:
     """Move a matrix down by some rows of zeros."""
     return sparse.vstack([sparse.csc_matrix((rows, matrix.shape[1])), matrix], format="csc")
+
+
+def _repeated(block: Array, columns: IntArray, width: int) -> Matrix:
+    return place(np.broadcast_to(block, (len(columns), *block.shape)), columns, width)

@@ -65,7 +65,9 @@ Parameters = Mapping[str, float]
 
 
 def solve(problem: Problem) -> Solution:
-    """Minimise the worst residual sway, each load in shares of its limit, then the cost.
+    """Minimise the worst residual sway, each load in fractions of its limit, then the cost.
+
+    Rounds go as far as work and programs allow; the last motion is the best.
 
     Parameters
     ----------
@@ -79,7 +81,16 @@ def solve(problem: Problem) -> Solution:
     """
     free = [axis for axis in range(len(problem.target)) if not _limits_effort(problem.limits.of(axis))]
     bounded = _held_back(problem, free) if free else problem
-    return attrs.evolve(_solve(bounded or problem, TRACES), problem=problem)
+    solutions: list[Solution] = []
+    try:
+        with budget(EXCHANGING * left()):
+            solutions.extend(_rounds(bounded or problem))
+    except OutOfWork:
+        spend(0.0)
+        if not solutions:
+            raise
+    motions = [solution for solution in solutions if solution.optimum is not None]
+    return attrs.evolve((motions or solutions)[-1], problem=problem)
 
 
 def _limits_effort(own: AxisLimitsSpec) -> bool:
@@ -98,13 +109,10 @@ def _held_back(problem: Problem, free: Sequence[int]) -> Problem | None:
     if exact.optimum is None:
         return None
     motion, limits = optimal_profile(exact), problem.limits
-    taken = {axis: HELD_BACK * greatest(motion, 2, axis) for axis in free}
-    own = {
-        f"axis{axis}": attrs.evolve(
-            limits.of(axis), acceleration=taken.get(axis) or limits.of(axis).acceleration
-        )
-        for axis in range(len(problem.target))
-    }
+    own = {f"axis{axis}": limits.of(axis) for axis in range(len(problem.target))}
+    for axis in free:
+        most = HELD_BACK * greatest(motion, 2, axis)
+        own[f"axis{axis}"] = attrs.evolve(limits.of(axis), acceleration=most or None)
     return attrs.evolve(problem, limits=attrs.evolve(limits, axis=own))
 
 
@@ -133,21 +141,7 @@ def shortest_motion(problem: Problem, guess: float | Relaxed, progress: Progress
     return None
 
 
-def _solve(problem: Problem, traces: Sequence[float]) -> Solution:
-    """Go from round to round as long as work and programs allow; the last motion is the best."""
-    solutions: list[Solution] = []
-    try:
-        with budget(EXCHANGING * left()):
-            solutions.extend(_rounds(problem, traces))
-    except OutOfWork:
-        spend(0.0)
-        if not solutions:
-            raise
-    motions = [solution for solution in solutions if solution.optimum is not None]
-    return (motions or solutions)[-1]
-
-
-def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
+def _rounds(problem: Problem) -> Iterator[Solution]:
     """Solve for a few machines, about, search for worse ones, and solve again with them.
 
     Where there are none, and none that sway too much between collocation points, solve exactly.
@@ -163,7 +157,7 @@ def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
         # the bound only rises with more machines: what was not good enough before is not now
         found = sequence(start, goal, precision) if bound <= GOOD_ENOUGH else None
         if found is None or found.verdict is not ConicStatus.SOLVED:
-            best = _least_worst(goal, traces)
+            best = _least_worst(goal)
             iterations += best.iterations
             bound, enough = float(best.solutions[0].x[-1]), SLACK * float(best.solutions[-1].x[-1]) + MARGIN
             if best.verdict is ConicStatus.FAILED and (bisected := _bisected(start, goal)) is not None:
@@ -188,10 +182,10 @@ def _rounds(problem: Problem, traces: Sequence[float]) -> Iterator[Solution]:
         tried = [*tried, *worse]
 
 
-def _least_worst(goal: Goal, traces: Sequence[float]) -> ProgramSequence:
+def _least_worst(goal: Goal) -> ProgramSequence:
     """Minimise the worst share, for as little effort besides as the programs can tell from none."""
-    for trace in traces:
-        least_worst = attrs.evolve(goal, effort_price=trace, worst=None)
+    for price in TRACES:
+        least_worst = attrs.evolve(goal, effort_price=price, worst=None)
         best = sequence(goal.setup.transcription.rest(), least_worst)
         if best.verdict is not ConicStatus.FAILED:
             break

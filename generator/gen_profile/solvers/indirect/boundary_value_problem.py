@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import attrs
@@ -33,29 +34,6 @@ QUINTIC_JERK = 60.0  # with which a quintic move starts, in distances per cube o
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Coordinates:
-    """Modal coordinates ξ and their costates, ζ together.
-
-    Attributes
-    ----------
-    basis : (n, n) array
-        The states of an `OptimalitySystem` are ``basis @ ξ``.
-    """
-
-    basis: Array
-
-    @cached_property
-    def transform(self) -> Array:
-        """Matrix from ζ to states and costates: canonical, so that the equations keep their form."""
-        return _blocks(self.basis, np.asarray(np.linalg.inv(self.basis)).T)
-
-    @cached_property
-    def inverse_transform(self) -> Array:
-        """Matrix from states and costates to ζ."""
-        return _blocks(np.asarray(np.linalg.inv(self.basis)), self.basis.T)
-
-
-@attrs.frozen(kw_only=True, eq=False)
 class BoundaryValueProblem:
     """A boundary value problem whose unknowns ζ are modal coordinates ξ and their costates.
 
@@ -66,7 +44,8 @@ class BoundaryValueProblem:
     ----------
     system : OptimalitySystem
     data : RuntimeParameters
-    coordinates : Coordinates
+    basis : (n, n) array
+        The states of `system` are ``basis @ ξ``.
     initial, final : (n,) arrays
         ξ at the start and at the end; NaN where no end condition is asked for.
     shown : (n,) array
@@ -78,15 +57,25 @@ class BoundaryValueProblem:
 
     system: OptimalitySystem
     data: RuntimeParameters
-    coordinates: Coordinates
+    basis: Array
     initial: Array
     final: Array
     shown: Array
     phase: float
 
+    @cached_property
+    def transform(self) -> Array:
+        """Matrix from ζ to states and costates: canonical, so that the equations keep their form."""
+        return _blocks(self.basis, np.asarray(np.linalg.inv(self.basis)).T)
+
+    @cached_property
+    def inverse_transform(self) -> Array:
+        """Matrix from states and costates to ζ."""
+        return _blocks(np.asarray(np.linalg.inv(self.basis)), self.basis.T)
+
     def unknowns(self, points: Array) -> Array:
         """Turn ζ into states and costates as `system` knows them, shape (points, 2 n)."""
-        return points @ self.coordinates.transform.T
+        return points @ self.transform.T
 
     def flow(self, points: Array) -> Array:
         """Evaluate ζ' and beside it its Jacobian, shape (points, 2 n, 1 + 2 n).
@@ -97,8 +86,8 @@ class BoundaryValueProblem:
             When they overflow.
         """
         flow = _finite(self.system.flow(self.unknowns(points), self.data.row()))
-        modal = self.coordinates.inverse_transform @ flow
-        modal[:, :, 1:] = modal[:, :, 1:] @ self.coordinates.transform
+        modal = self.inverse_transform @ flow
+        modal[:, :, 1:] = modal[:, :, 1:] @ self.transform
         return np.asarray(modal)
 
     def slopes(self, points: Array) -> tuple[Array, Array]:
@@ -111,7 +100,7 @@ class BoundaryValueProblem:
         """
         found = _finite(self.system.slopes(self.unknowns(points), self.data.row()))[:, :, 0]
         size = points.shape[1]
-        return found[:, :size] @ self.coordinates.inverse_transform.T, found[:, size:]
+        return found[:, :size] @ self.inverse_transform.T, found[:, size:]
 
     def linear(self, points: Array) -> tuple[Array, Array]:
         """Differentiate ξ' by ζ, and by ξ the end load's sway in m and what else costs half its square.
@@ -119,8 +108,8 @@ class BoundaryValueProblem:
         Shapes (points, n, 2 n) and (points, sways + …, n).
         """
         n = len(self.final)
-        linear = self.system.linear(self.unknowns(points), self.data.row()) @ self.coordinates.transform
-        return self.coordinates.inverse_transform[:n, :n] @ linear[:, :n], linear[:, n:, :n]
+        linear = self.system.linear(self.unknowns(points), self.data.row()) @ self.transform
+        return self.inverse_transform[:n, :n] @ linear[:, :n], linear[:, n:, :n]
 
     @property
     def sway_cost(self) -> SwayCost:
@@ -147,7 +136,7 @@ class BoundaryValueProblem:
         return (
             attrs.evolve(
                 self,
-                coordinates=Coordinates(basis=self.coordinates.basis * largest),
+                basis=self.basis * largest,
                 initial=self.initial / largest,
                 final=self.final / largest,
                 shown=self.shown * largest,
@@ -245,7 +234,7 @@ def canonical_problem(problem: Problem, system: OptimalitySystem) -> BoundaryVal
     return BoundaryValueProblem(
         system=system,
         data=data,
-        coordinates=Coordinates(basis=basis),
+        basis=basis,
         initial=initial,
         final=final,
         shown=shown,
@@ -271,6 +260,12 @@ def independence(canonical: BoundaryValueProblem) -> tuple[NDArray[np.bool_], tu
     useful = {name for (names, _), keep in kept if keep for name in names}
     every = dict.fromkeys(name for names, _ in layout.sensitivity_rows for name in names)
     return asked, tuple(name for name in every if name not in useful)
+
+
+def without(problem: Problem, redundant: Sequence[str]) -> Problem:
+    """Ask for fewer sensitivities."""
+    kept = tuple(name for name in problem.desensitized if name not in redundant)
+    return attrs.evolve(problem, desensitized=kept)
 
 
 def quintic(canonical: BoundaryValueProblem, mesh: Array, scheme: Scheme) -> Trajectory:

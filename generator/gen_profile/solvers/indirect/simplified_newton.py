@@ -137,12 +137,7 @@ def _model(problem: BoundaryValueProblem, like: Trajectory, points: Array) -> _M
         conditions=final_gain[asked],
     )
     return _Model(
-        response=response,
-        driven=driven,
-        costed=costed,
-        asked=asked,
-        machine=machine,
-        is_uniform=is_uniform,
+        response=response, driven=driven, costed=costed, asked=asked, machine=machine, is_uniform=is_uniform
     )
 
 

@@ -24,6 +24,7 @@ from gen_profile.solvers.indirect.boundary_value_problem import (
     independence,
     quintic,
     with_sway_cost,
+    without,
 )
 from gen_profile.solvers.indirect.extremal import METHOD, failure, judged
 from gen_profile.solvers.indirect.full_newton import solve_fully
@@ -67,8 +68,7 @@ def _solve(problem: Problem, far: Callable[[], bool]) -> Solution:
     quiet = canonical_problem(problem, system)
     asked, redundant = independence(quiet)
     if redundant:
-        kept = tuple(name for name in problem.desensitized if name not in redundant)
-        solution = _solve(attrs.evolve(problem, desensitized=kept), far)
+        solution = _solve(without(problem, redundant), far)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
     with suppress(np.linalg.LinAlgError):
@@ -95,16 +95,13 @@ def _solve_simply(problem: Problem, quiet: BoundaryValueProblem) -> Solution | N
     if not quiet.resolved:
         return None
     intervals = max(LONG_INTERVALS, math.ceil(quiet.phase / RADIANS_PER_LONG_INTERVAL))
-    mesh = np.linspace(0.0, 1.0, intervals + 1)
-    start = quintic(quiet, mesh, LONG_GAUSS)
-    weighted, iterations = quiet, 0
-    if problem.sway_weight > 0.0:
-        if problem.sway_scale is None:
-            measured = _refined(quiet, start)
-            if measured.solution is None:
-                return None
-            start, iterations = measured.solution, measured.iterations
-        weighted = with_sway_cost(problem, quiet, start)
+    start, iterations = quintic(quiet, np.linspace(0.0, 1.0, intervals + 1), LONG_GAUSS), 0
+    if problem.sway_weight > 0.0 and problem.sway_scale is None:  # the scale is measured on this motion
+        measured = _refined(quiet, start)
+        if measured.solution is None:
+            return None
+        start, iterations = measured.solution, measured.iterations
+    weighted = with_sway_cost(problem, quiet, start)
     found = _refined(weighted, start)
     if found.solution is None:
         return None
@@ -119,7 +116,5 @@ def _refined(problem: BoundaryValueProblem, start: Trajectory) -> NewtonOutcome:
         return found
     refined = refine(problem, found.solution, solve_simplified)
     return attrs.evolve(
-        refined,
-        iterations=found.iterations + refined.iterations,
-        residual=refined.residual or found.residual,
+        refined, iterations=found.iterations + refined.iterations, residual=refined.residual or found.residual
     )
