@@ -12,5 +12,8 @@ class Progress(Protocol):
         """Take the stage, how many of its steps are done, of how many if that is known, and a remark."""
 
 
-def untold(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
+def no_progress(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
     """Tell nobody."""
+
+
+untold = no_progress  # its former name, where it is still imported

@@ -215,6 +215,6 @@ def test_a_cost_that_is_too_steep_is_blamed():
     problem = crane_problem(initial={"theta1": 0.3}, target=(0.0,), desensitized=())
     solution = solve(problem)
     assert solution.status is Status.DIVERGED
-    assert solution.cure.startswith("Lower cost.sway_weight")
-    assert solution.cure.endswith(', or set cost.sway_scale = "auto".')
+    assert solution.suggestion.startswith("Lower cost.sway_weight")
+    assert solution.suggestion.endswith(', or set cost.sway_scale = "auto".')
     solve(attrs.evolve(problem, sway_scale=None)).raise_for_status()

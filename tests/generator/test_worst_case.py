@@ -71,7 +71,7 @@ def test_what_lies_between_the_ends_counts():
         {**problem.parameters, "L1": problem.parameters["L1"] * (1.0 + share)}
         for share in np.linspace(-0.4, 0.4, 41)
     ]
-    shares = worst_case.residual_shares(problem, problem.worst_case, motion, inside)
+    shares = worst_case.residual_fractions(problem, problem.worst_case, motion, inside)
     assert shares.max() <= 1.05 * max(shares[0], shares[-1], shares[20], np.sort(shares)[-5])
 
 
@@ -111,7 +111,7 @@ def test_no_machine_inside_is_worse_than_those_found(monkeypatch):
     motion = optimal_profile(choice.attempt(problem))
     found = worst_case.worse_machines(problem, problem.worst_case, motion, 0.0)
     inside = drawn(problem, problem.worst_case.uncertain, 500)
-    shares = worst_case.residual_shares(problem, problem.worst_case, motion, [*found, *inside])
+    shares = worst_case.residual_fractions(problem, problem.worst_case, motion, [*found, *inside])
     assert shares[: len(found)].max() >= 0.999 * shares.max()
     assert not worst_case.worse_machines(problem, problem.worst_case, motion, 1.01 * shares.max())
 
@@ -122,7 +122,7 @@ def test_two_ranges():
     problem = ranged(uncertain={"L1": 0.1, "m2": 0.2})
     solution = choice.attempt(problem)
     inside = drawn(problem, problem.worst_case.uncertain, 300)
-    worst = worst_case.residual_shares(problem, problem.worst_case, optimal_profile(solution), inside)
+    worst = worst_case.residual_fractions(problem, problem.worst_case, optimal_profile(solution), inside)
     assert worst.max() * 0.003 <= 1.04 * solution.worst_case_bound
 
 
@@ -139,7 +139,7 @@ def test_minimum_time_keeps_the_loads_limits():
     machines = drawn(problem, problem.worst_case.uncertain, 100)
 
     def worst(motion):
-        return worst_case.residual_shares(problem, problem.worst_case, motion, machines).max()
+        return worst_case.residual_fractions(problem, problem.worst_case, motion, machines).max()
 
     assert 0.9 < worst(optimal_profile(shortest.solution)) < 1.0
     sooner = attrs.evolve(problem, duration=0.97 * shortest.duration)
@@ -164,7 +164,7 @@ def test_where_programs_for_the_least_worst_case_fail_it_is_bisected(monkeypatch
 
     def worst(solution):
         motion, machines = optimal_profile(solution), worst_case.ends(problem, problem.worst_case)
-        return worst_case.residual_shares(problem, problem.worst_case, motion, machines).max()
+        return worst_case.residual_fractions(problem, problem.worst_case, motion, machines).max()
 
     assert worst(best) < worst(found) < 1.6 * worst(best)
     assert found.worst_case_bound < 0.003 * worst(found)

@@ -18,7 +18,7 @@ from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios
 from gen_profile.motion.profile import Profile, SampledProfile
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.verification.cosimulation import cosimulate, judge, judged_from, sample_spacing
@@ -116,7 +116,7 @@ def design(
     check: bool = True,
     keep_failed: bool = False,
     by_fmpy: bool = True,
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Design:
     """Solve, export, replay what was written, co-simulate, and deliver what passes.
 
@@ -156,7 +156,7 @@ def design(
 
 def design_in_memory(spec: Spec, formats: Sequence[str], *, by_fmpy: bool) -> tuple[Design, dict[str, bytes]]:
     """Do what `design` does, but hand over the files that pass, by name, for others to write."""
-    kept, verify = Kept(), partial(_check, by_fmpy=by_fmpy, progress=untold)
+    kept, verify = Kept(), partial(_check, by_fmpy=by_fmpy, progress=no_progress)
     made = _designed(spec, formats, Path(), nullcontext(kept), verify=verify)
     return made, dict(sorted(kept.delivered.items()))
 
@@ -169,7 +169,7 @@ def _designed(
     *,
     verify: Callable[[Plan, Sequence[SampledProfile]], Check] | None,
     keep_failed: bool = False,
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Design:
     exporters = {name: find_exporter(name) for name in dict.fromkeys(map(format_named, formats))}
     if not exporters:

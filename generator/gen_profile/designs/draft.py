@@ -14,7 +14,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, share_of_residual_sway
 from gen_profile.motion.profile import Profile, grid_duration
 from gen_profile.problem.limits import SWAY_TOLERANCE
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers.direct.relaxation import Relaxed
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
@@ -75,7 +75,7 @@ def drafted(spec: Spec, solution: Solution, solver_time: float = 0.0) -> Draft:
 
 
 def solved(
-    spec: Spec, progress: Progress = untold, spread: float = 1.0, near: Relaxed | None = None
+    spec: Spec, progress: Progress = no_progress, spread: float = 1.0, near: Relaxed | None = None
 ) -> Draft:
     """Solve a spec with a duration, or shape a move for it; `near` as in `transient_sway.attempt`."""
     if spec.solver.shaper is not None:

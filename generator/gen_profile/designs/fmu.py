@@ -17,7 +17,7 @@ from gen_profile.motion.profile import Profile
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.linearization import linearize
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
 from gen_profile.suggestion import suggestion
@@ -85,7 +85,7 @@ def export_fmu(
     input_kind: InputKind = InputKind.SETPOINT,
     platforms: tuple[str, ...] | None = None,
     author: str = AUTHOR,
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Export:
     """Write an FMU, or a system of two.
 

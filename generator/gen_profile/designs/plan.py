@@ -14,7 +14,7 @@ from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.motion.profile import Profile
 from gen_profile.problem.limits import SWAY_TOLERANCE, breaches
 from gen_profile.problem.problem import problem_of
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
@@ -59,7 +59,7 @@ class Plan:
         return self.evaluation.command
 
 
-def plan(spec: Spec | Path | str, progress: Progress = untold) -> Plan:
+def plan(spec: Spec | Path | str, progress: Progress = no_progress) -> Plan:
     """Solve a spec, or shape a move for it, and try the motion on all machines.
 
     Parameters
@@ -80,7 +80,7 @@ def plan(spec: Spec | Path | str, progress: Progress = untold) -> Plan:
         raise
 
 
-def draft(spec: Spec, progress: Progress = untold) -> Draft:
+def draft(spec: Spec, progress: Progress = no_progress) -> Draft:
     """Solve a spec, or shape a move for it, and look no further.
 
     Raises
@@ -96,7 +96,7 @@ def draft(spec: Spec, progress: Progress = untold) -> Draft:
     return solved(spec, progress)
 
 
-def judged(found: Draft, progress: Progress = untold) -> Plan:
+def judged(found: Draft, progress: Progress = no_progress) -> Plan:
     """Try a drafted motion on all machines; say what would help where there is none within the limits.
 
     Raises

@@ -16,7 +16,7 @@ from gen_profile.designs.planner_suggestions import PlannerSuggestion, planner_s
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
 from gen_profile.planner.full_speed import slow_axes
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.prove import HISTORIES, prove
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
@@ -77,7 +77,7 @@ def deploy_planner(
     check: bool = True,
     keep_failed: bool = False,
     scheduler: str | None = None,
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Deployment:
     """Write a planner block, prove what was written, and deliver what passes.
 

@@ -14,7 +14,7 @@ from gen_profile.designs.suggestions import sufficient_duration, suggestions
 from gen_profile.errors import InfeasibleProblem, SolverDiverged
 from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem, problem_of
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct.relaxation import ROUGHLY, SHORTEST, Relaxed
 from gen_profile.solvers.search import Search, least, slope_of
@@ -34,7 +34,7 @@ EXACT = attrs.evolve(COARSE, precision=1e-3, close=4e-3, aim=-1.5e-3, stride=1e-
 LONGEST = 10.0  # times the shortest duration within limits, after which a calmer motion is not looked for
 
 
-def timed(spec: Spec, progress: Progress = untold) -> Spec:
+def timed(spec: Spec, progress: Progress = no_progress) -> Spec:
     """Find the shortest duration where a spec asks for it.
 
     Raises
@@ -45,7 +45,7 @@ def timed(spec: Spec, progress: Progress = untold) -> Spec:
     return shortest(spec, progress).spec if spec.move.shortest else spec
 
 
-def shortest(spec: Spec, progress: Progress = untold) -> Draft:
+def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
     """Find the shortest motion that ends on a cycle of the controller.
 
     An optimal one takes longer than its limits make it where it would otherwise leave more sway than the
@@ -67,10 +67,10 @@ def shortest(spec: Spec, progress: Progress = untold) -> Draft:
     except OutOfWork as error:
         spend(0.0)
         duration = sufficient_duration(_slow(spec))
-        cure = f"Allow about {duration} s (move.duration)" if duration else "State a duration in s"
+        advice = f"Allow about {duration} s (move.duration)" if duration else "State a duration in s"
         raise SolverDiverged(
             "move.duration: the search for the shortest duration was given up, for it took too long. "
-            f"{cure}, or fewer limits."
+            f"{advice}, or fewer limits."
         ) from error
     if found is None:
         raise InfeasibleProblem(
@@ -94,12 +94,12 @@ def _within_limits(spec: Spec, progress: Progress) -> tuple[Problem, Relaxed]:
             problem = attrs.evolve(problem, sway_spread=more)
             found = choice.minimum_time(problem, progress, found)
     if found is None:
-        cure = (
+        advice = (
             suggestions(_slow(spec), in_time=True)
             or "Widen the limits, or see whether all numbers of the spec are in its units."
         )
         raise InfeasibleProblem(
-            f"move.duration: no duration keeps the limits and brings the load to rest. {cure}"
+            f"move.duration: no duration keeps the limits and brings the load to rest. {advice}"
         )
     return problem, found
 

@@ -61,10 +61,10 @@ def solve(spec: Spec) -> Solution:
 
 def explained(spec: Spec, solution: Solution) -> Solution:
     """Find out what would help where a solve failed, unless the indirect method knows."""
-    known = solution.method == indirect.METHOD and not spec.limits.stated() and solution.cure != LONGER
+    known = solution.method == indirect.METHOD and not spec.limits.stated() and solution.suggestion != LONGER
     if solution.optimum is not None or known:
         return solution
-    return attrs.evolve(solution, cure=remedy(spec, solution.problem.sway_spread) or IN_VAIN)
+    return attrs.evolve(solution, suggestion=remedy(spec, solution.problem.sway_spread) or IN_VAIN)
 
 
 def remedy(spec: Spec, spread: float = 1.0) -> str:

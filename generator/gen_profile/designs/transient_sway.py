@@ -18,7 +18,7 @@ from gen_profile.evaluation.simulation import greatest_sway
 from gen_profile.motion.profile import Profile
 from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import Problem, problem_of
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct.relaxation import Relaxed
 from gen_profile.solvers.indirect import solver as indirect
@@ -38,7 +38,7 @@ SAMPLES = 1001
 
 
 def attempt(
-    spec: Spec, progress: Progress = untold, spread: float = 1.0, near: Relaxed | None = None
+    spec: Spec, progress: Progress = no_progress, spread: float = 1.0, near: Relaxed | None = None
 ) -> Solution:
     """Solve a spec so that no machine of its ranges sways more on the way than its limit.
 
@@ -65,7 +65,12 @@ def attempt(
 
 
 def kept_by_all(
-    spec: Spec, problem: Problem, method: SolverName, progress: Progress = untold, *, coarse: bool = False
+    spec: Spec,
+    problem: Problem,
+    method: SolverName,
+    progress: Progress = no_progress,
+    *,
+    coarse: bool = False,
 ) -> Solution:
     """Solve a problem again with less sway of the nominal machine, until all of a spec's keep the limit.
 
@@ -102,7 +107,7 @@ def _kept(
     problem: Problem,
     solve: Callable[[Problem], Solution],
     enough: float = ENOUGH,
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Solution:
     """Find the least spread with which the worst machine sways no more than enough times its limit."""
     solutions: list[Solution] = []

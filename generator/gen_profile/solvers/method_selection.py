@@ -13,7 +13,7 @@ from gen_profile.motion.actuator import lag_compensated
 from gen_profile.problem.limits import breaches
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import Problem
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct import worst_case
 from gen_profile.solvers.direct.relaxation import SHORTEST, Relaxation, Relaxed, shortest
@@ -71,8 +71,8 @@ def attempt(
 
 def given_up(problem: Problem) -> Solution:
     """Tell that a problem takes too much work."""
-    cure = "See whether all numbers of the spec are in its units; else change the duration or limits."
-    return Solution(status=Status.GIVEN_UP, method="none", problem=problem, cure=cure)
+    suggestion = "See whether all numbers of the spec are in its units; else change the duration or limits."
+    return Solution(status=Status.GIVEN_UP, method="none", problem=problem, suggestion=suggestion)
 
 
 def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution:
@@ -90,7 +90,9 @@ def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution
 
 
 def _infeasible(problem: Problem, nearest: Relaxed) -> Solution:
-    return attrs.evolve(nearest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, cure=WIDER)
+    return attrs.evolve(
+        nearest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, suggestion=WIDER
+    )
 
 
 def least_violation(problem: Problem) -> Relaxed | None:
@@ -116,7 +118,7 @@ def _over_a_range(problem: Problem, *, coarse: bool) -> Solution:
 
 
 def minimum_time(
-    problem: Problem, progress: Progress = untold, near: Relaxed | None = None, search: Search = SHORTEST
+    problem: Problem, progress: Progress = no_progress, near: Relaxed | None = None, search: Search = SHORTEST
 ) -> Relaxed | None:
     """Find the shortest motion for a problem's limits and robustness; None where none was found.
 

@@ -102,7 +102,7 @@ class Solution:
     worst_case_bound : float or None
         Residual sway of the end load in m below which no motion could bring the worst machine, as far as
         angles are small; None where the worst machine was not what counted.
-    cure : str
+    suggestion : str
         What to change, a sentence; empty on success.
     """
 
@@ -114,7 +114,7 @@ class Solution:
     residual: float = float("inf")
     redundant: tuple[str, ...] = ()
     worst_case_bound: float | None = None
-    cure: str = ""
+    suggestion: str = ""
 
     @property
     def redundancy(self) -> str:
@@ -132,5 +132,5 @@ class Solution:
             With the status's sentence and what to change.
         """
         if self.optimum is None:
-            raise ERRORS[self.status](f"{self.status.value} {self.cure}".strip())
+            raise ERRORS[self.status](f"{self.status.value} {self.suggestion}".strip())
         return self.optimum

@@ -29,5 +29,5 @@ def accelerate(points: Sequence[Array], images: Sequence[Array], weights: Array)
     """
     x, step = np.array(points[-MEMORY:]), np.array(images[-MEMORY:]) - np.array(points[-MEMORY:])
     changes = np.diff(step, axis=0)
-    shares = np.linalg.lstsq((weights * changes).T, weights * step[-1], rcond=SINGULAR)[0]
-    return np.asarray(x[-1] + step[-1] - shares @ (np.diff(x, axis=0) + changes))
+    mixture = np.linalg.lstsq((weights * changes).T, weights * step[-1], rcond=SINGULAR)[0]
+    return np.asarray(x[-1] + step[-1] - mixture @ (np.diff(x, axis=0) + changes))

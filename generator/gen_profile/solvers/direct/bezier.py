@@ -36,10 +36,10 @@ def gram(degree: int) -> Array:
 
 def elevation(degree: int) -> Array:
     """Raise the degree by one without changing the polynomial, shape (degree + 2, degree + 1)."""
-    share = np.arange(degree + 2) / (degree + 1)
+    fraction = np.arange(degree + 2) / (degree + 1)
     raised = np.zeros((degree + 2, degree + 1))
-    raised[:-1] += np.diag(1.0 - share[:-1])
-    raised[1:] += np.diag(share[1:])
+    raised[:-1] += np.diag(1.0 - fraction[:-1])
+    raised[1:] += np.diag(fraction[1:])
     return raised
 
 

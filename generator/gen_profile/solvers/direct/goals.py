@@ -19,7 +19,7 @@ from gen_profile.solvers.direct.condensing import IntervalMaps
 from gen_profile.solvers.direct.conic import ConicProgram, Matrix, place
 from gen_profile.solvers.direct.transcription import Iterate, Transcription
 
-WITHIN = 1.0 - 1e-6  # share of a limit that a program may use: its own tolerance must not break the limit
+WITHIN = 1.0 - 1e-6  # fraction of a limit that a program may use: its own tolerance must not break the limit
 
 STEEPER = 2.0  # by which the exponent of the sway's cost may grow from one expansion to the next
 HELD = 3e-7  # cost of changing the highest derivative by as much as it is usually
@@ -81,9 +81,9 @@ def cost(
     if sway_cost.beta > 0.0:
         sway, matrix, offset = transcription.end_sway(iterate, maps, width)
         points, directions = sway.shape
-        shares = transcription.quadrature()
+        weights = transcription.quadrature()
         slope, curvature = sway_cost.derivatives(sway)
-        slope, curvature = shares[:, None] * slope, shares[:, None, None] * curvature
+        slope, curvature = weights[:, None] * slope, weights[:, None, None] * curvature
         hessian = place(curvature, np.arange(points) * directions, points * directions)
         quadratic = quadratic + matrix.T @ hessian @ matrix
         linear = matrix.T @ (slope.ravel() + hessian @ (offset - sway.ravel()))
@@ -222,18 +222,18 @@ def keep_sway(
 
 @attrs.frozen(kw_only=True, eq=False)
 class Amplitudes:
-    """How the modes of a machine show in its loads, in shares of the loads' limits.
+    """How the modes of a machine show in its loads, in fractions of the loads' limits.
 
     Attributes
     ----------
     rows : (modes, 2, n) array
         From the dimensionless state at the end to the two quadratures of every mode.
-    shares : (loads, modes) array
+    fractions : (loads, modes) array
         What the unit amplitude of a mode takes of the limit of a load.
     """
 
     rows: Array
-    shares: Array
+    fractions: Array
 
 
 def amplitudes(
@@ -248,7 +248,7 @@ def amplitudes(
     rows = np.zeros((n_u, 2, 2 * n_u))
     rows[:, 0, :n_u] = greatest[:, None] * inverse
     rows[:, 1, n_u:] = (greatest / linear.frequencies)[:, None] * inverse
-    return Amplitudes(rows=rows * scale[: 2 * n_u], shares=gains / greatest)
+    return Amplitudes(rows=rows * scale[: 2 * n_u], fractions=gains / greatest)
 
 
 def bound_worst(
@@ -270,7 +270,7 @@ def bound_worst(
     Returns
     -------
     int
-        Column of that variable: the worst share of a limit.
+        Column of that variable: the worst fraction of a limit.
     """
     column = transcription.variables
     worst = column + worst_case_variables(tried) - 1
@@ -281,9 +281,9 @@ def bound_worst(
             radius = place(-np.ones((1, 1, 1)), np.array([mode]), program.variables)
             sides = np.append(0.0, rows @ offset)
             program.within_cones(sparse.vstack([radius, -sparse.csc_matrix(rows) @ end]), sides[None])
-        sums = place(machine.shares[None], modes[:1], program.variables)
-        all_shares = place(np.ones((1, len(machine.shares), 1)), np.array([worst]), program.variables)
-        program.at_most(sums - all_shares, np.zeros(len(machine.shares)))
+        sums = place(machine.fractions[None], modes[:1], program.variables)
+        all_fractions = place(np.ones((1, len(machine.fractions), 1)), np.array([worst]), program.variables)
+        program.at_most(sums - all_fractions, np.zeros(len(machine.fractions)))
         column += len(modes)
     if most is not None:
         program.at_most(place(np.ones((1, 1, 1)), np.array([worst]), program.variables), np.array([most]))

@@ -16,7 +16,7 @@ from gen_profile.solvers.direct.bezier import CONTROL_DEGREE, Piece, halving
 from gen_profile.solvers.direct.set_up import Setup, on_mesh
 from gen_profile.solvers.direct.transcription import Iterate
 
-REACHED = 1e-4  # share of a limit, by which less than all of it is taken for all
+REACHED = 1e-4  # fraction of a limit, by which less than all of it is taken for all
 
 
 def switching(setup: Setup, iterate: Iterate, sway_limit: float | None) -> NDArray[np.bool_]:
@@ -31,7 +31,7 @@ def switching(setup: Setup, iterate: Iterate, sway_limit: float | None) -> NDArr
     if sway_limit is not None:
         sway = np.linalg.norm(transcription.end_sway_found(iterate), axis=1)
         taken.append(sway.reshape(transcription.intervals, STAGES) / sway_limit)
-    binds = [shares > 1.0 - REACHED for shares in taken]
+    binds = [fractions > 1.0 - REACHED for fractions in taken]
     return np.asarray(np.any([some.any(axis=1) & ~some.all(axis=1) for some in binds], axis=0))
 
 

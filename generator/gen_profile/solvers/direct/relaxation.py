@@ -14,7 +14,7 @@ from functools import cache, cached_property
 import attrs
 
 from gen_profile.problem.problem import Problem
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers.direct.conic import ConicStatus
 from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.solver import MAX_ITERATIONS, ROUGH, Goal, ProgramSequence, conclude, sequence
@@ -180,7 +180,7 @@ def shortest(
     problem: Problem,
     guess: float | Relaxed,
     tried: Sequence[Mapping[str, float]] = (),
-    progress: Progress = untold,
+    progress: Progress = no_progress,
     search: Search = SHORTEST,
 ) -> Relaxed | None:
     """Find the shortest motion that keeps all limits.

@@ -40,10 +40,10 @@ ROUGH = 0.5  # step after which a mesh is refined: what programs on coarse ones 
 # steps taken for the programs' own tolerance when they cease to shrink, usually and of programs that are not
 # solved exactly; they cost their square
 STALLED, STALLED_INEXACT = 2e-4, 1e-2
-SLOW = 0.3  # share of the step before from which on steps are combined
+SLOW = 0.3  # fraction of the step before from which on steps are combined
 MAX_ITERATIONS = 50
 MAX_BISECTIONS = 6
-BISECTING = 0.7  # share of the work that is left, after which a motion on the first mesh will do
+BISECTING = 0.7  # fraction of the work that is left, after which a motion on the first mesh will do
 WORTH_BISECTING = 1e-4  # relative change of the cost from one mesh to the next; what is left is less
 WORTHWHILE = 1e-3  # relative change of the worst case that is worth another program
 LEAST_FRACTION = 0.01  # of a load's limit, of which a change is still measured
@@ -197,8 +197,8 @@ def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
     """Give β and γ their values, and count the iterations that it took."""
     if problem.sway_weight == 0.0 or problem.sway_scale is not None:
         return SwayCost(beta=problem.sway_weight, gamma=problem.sway_scale or 1.0), 0
-    quiet = attrs.evolve(problem, sway_weight=0.0, sway_scale=1.0, limits=LimitsSpec(), worst_case=None)
-    solution = solve(quiet)
+    unweighted = attrs.evolve(problem, sway_weight=0.0, sway_scale=1.0, limits=LimitsSpec(), worst_case=None)
+    solution = solve(unweighted)
     sway = 0.0 if solution.optimum is None else sway_on_the_way(solution)
     if solution.optimum is None or not 0.0 < sway < np.inf:  # a hoist alone swings nothing
         return UNWEIGHTED, solution.iterations
@@ -242,7 +242,7 @@ def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> P
     return attrs.evolve(found, solutions=solutions)
 
 
-def sequence(start: Iterate, goal: Goal, enough: float = STEP_TOLERANCE) -> ProgramSequence:
+def sequence(start: Iterate, goal: Goal, tolerance: float = STEP_TOLERANCE) -> ProgramSequence:
     """Solve programs linearised about one another's motion until what counts changes by little enough."""
     transcription, iterate = goal.setup.transcription, start
     solutions: list[ConicSolution] = []
@@ -263,7 +263,7 @@ def sequence(start: Iterate, goal: Goal, enough: float = STEP_TOLERANCE) -> Prog
         points.append(iterate.flat())
         iterate = transcription.iterate(solutions[-1].x, maps)
         images.append(iterate.flat())
-        if step < enough or _stalled(step, before, exact=solutions[-1].exact):
+        if step < tolerance or _stalled(step, before, exact=solutions[-1].exact):
             verdict = ConicStatus.SOLVED
         else:
             if step > SLOW * before:
@@ -280,13 +280,13 @@ def _stalled(step: float, before: float, *, exact: bool) -> bool:
 def conclude(found: ProgramSequence, iterations: int) -> Solution:
     """Turn the outcome of programs into a solution."""
     problem = found.setup.problem
-    status, cure = Status.CONVERGED, ""
+    status, suggestion = Status.CONVERGED, ""
     if found.verdict is ConicStatus.INFEASIBLE:
-        status, cure = Status.INFEASIBLE, WIDER
+        status, suggestion = Status.INFEASIBLE, WIDER
     elif found.verdict is not ConicStatus.SOLVED:
-        status, cure = Status.DIVERGED, "Allow more time (move.duration)."
+        status, suggestion = Status.DIVERGED, "Allow more time (move.duration)."
     elif greatest_angle(found) > HORIZONTAL:
-        status, cure = Status.SWINGS_TOO_FAR, "Allow more time (move.duration), or shorten the move."
+        status, suggestion = Status.SWINGS_TOO_FAR, "Allow more time (move.duration), or shorten the move."
     return Solution(
         status=status,
         method=METHOD,
@@ -294,7 +294,7 @@ def conclude(found: ProgramSequence, iterations: int) -> Solution:
         optimum=_optimum(found) if status is Status.CONVERGED else None,
         iterations=iterations,
         residual=found.step,
-        cure=cure,
+        suggestion=suggestion,
     )
 
 
@@ -305,8 +305,8 @@ def _optimum(found: ProgramSequence) -> Optimum:
     intervals, axes = transcription.intervals, len(reach)
     local = found.iterate.local.reshape(intervals, axes, piece.size)
     lengths = duration * piece.length
-    shares = np.append(0.0, np.cumsum(piece.length))
-    knots = duration * (shares / shares[-1])  # the last one is the duration, to the last bit
+    instants = np.append(0.0, np.cumsum(piece.length))
+    knots = duration * (instants / instants[-1])  # the last one is the duration, to the last bit
     control = np.einsum("pb,kab->kpa", power_basis(3), local[:, :, piece.order :])
     equations, points = transcription.machines[0].equations, transcription.nominal_points(found.iterate)
     states, costates = _nodes(found)

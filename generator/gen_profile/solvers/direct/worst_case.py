@@ -22,7 +22,7 @@ from gen_profile.motion.metrics import greatest
 from gen_profile.motion.profile import Array, Profile
 from gen_profile.problem.parameter_box import FEW, box_of, start, worst_places
 from gen_profile.problem.problem import Problem, WorstCase
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.conic import ConicStatus
 from gen_profile.solvers.direct.relaxation import Relaxed, shortest
@@ -50,12 +50,12 @@ TRACES = (1e-8, 1e-6, 1e-4)  # of effort, in the least worst case
 BISECTION = Search(precision=0.35, close=0.0, stride=math.log(1.5), growth=1.0, downward=True)
 BISECTING = 0.6  # fraction of the work that is left for it
 HOPELESS = 1e3  # times a load's limit, above which the least worst case is not looked for
-MARGIN = 0.002  # share of a load's limit, with which the least cost need not balance on a knife edge
+MARGIN = 0.002  # fraction of a load's limit, with which the least cost need not balance on a knife edge
 SLACK = 1.003  # what the least cost may give away of the least worst case
-GOOD_ENOUGH = 0.01  # share of a load's limit below which nobody need seek less
+GOOD_ENOUGH = 0.01  # fraction of a load's limit below which nobody need seek less
 HELD_BACK = 1.5  # times the exact motion's acceleration: the cost of most motions over a range needs no more
 ROUNDS = 8
-EXCHANGING = 0.8  # share of the work that is left, after which the last motion is taken
+EXCHANGING = 0.8  # fraction of the work that is left, after which the last motion is taken
 CORNERS = 6  # parameters up to which all corners are tried
 ADDED = 3  # machines at most in one round
 WORSE = 1.01  # how much worse a machine must be than those tried to be added
@@ -104,8 +104,8 @@ def _held_back(problem: Problem, free: Sequence[int]) -> Problem | None:
     Without such a limit, ever less sway would ask for ever more acceleration.
     """
     names = tuple(problem.worst_case.uncertain) if problem.worst_case is not None else ()
-    quiet = attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0)
-    exact = direct.solve(quiet, coarse=True)
+    unweighted = attrs.evolve(problem, worst_case=None, desensitized=names, sway_weight=0.0)
+    exact = direct.solve(unweighted, coarse=True)
     if exact.optimum is None:
         return None
     motion, limits = optimal_profile(exact), problem.limits
@@ -116,7 +116,9 @@ def _held_back(problem: Problem, free: Sequence[int]) -> Problem | None:
     return attrs.evolve(problem, limits=attrs.evolve(limits, axis=own))
 
 
-def shortest_motion(problem: Problem, guess: float | Relaxed, progress: Progress = untold) -> Relaxed | None:
+def shortest_motion(
+    problem: Problem, guess: float | Relaxed, progress: Progress = no_progress
+) -> Relaxed | None:
     """Find the shortest motion that keeps all limits, and after which no machine breaks its loads' ones.
 
     Parameters
@@ -183,7 +185,7 @@ def _rounds(problem: Problem) -> Iterator[Solution]:
 
 
 def _least_worst(goal: Goal) -> ProgramSequence:
-    """Minimise the worst share, for as little effort besides as the programs can tell from none."""
+    """Minimise the worst fraction, for as little effort besides as the programs can tell from none."""
     for price in TRACES:
         least_worst = attrs.evolve(goal, effort_price=price, worst=None)
         best = sequence(goal.setup.transcription.rest(), least_worst)
@@ -193,7 +195,7 @@ def _least_worst(goal: Goal) -> ProgramSequence:
 
 
 def _bisected(start: Iterate, goal: Goal) -> float | None:
-    """Find about the least worst share that motions of least cost keep to, whose programs do not fail."""
+    """Find about the least worst fraction that motions of least cost keep to, whose programs do not fail."""
 
     def excess(worst: float) -> float:
         found = sequence(start, attrs.evolve(goal, worst=worst), ROUGH)
@@ -229,25 +231,25 @@ def ends(problem: Problem, worst_case: WorstCase) -> list[Parameters]:
 
 
 def worse_machines(
-    problem: Problem, worst_case: WorstCase, motion: Profile, share: float
+    problem: Problem, worst_case: WorstCase, motion: Profile, fraction: float
 ) -> list[Parameters]:
-    """Search the ranges for machines whose loads a motion leaves more than a share of their limits."""
+    """Search the ranges for machines whose loads a motion leaves more than a fraction of their limits."""
     low, high = (_machine(problem, worst_case, (end,) * len(worst_case.uncertain)) for end in (-1.0, 1.0))
     box = box_of(problem, {name: (low[name], high[name]) for name in worst_case.uncertain})
     if box is None:
         return []
 
-    def shares(places: Array) -> Array:
-        return residual_shares(problem, worst_case, motion, box.parameters(places))[:, None]
+    def fractions(places: Array) -> Array:
+        return residual_fractions(problem, worst_case, motion, box.parameters(places))[:, None]
 
-    places, _ = worst_places(shares, start(box.phases, len(box.ranges), FEW), ADDED)
-    return [*box.parameters(places[shares(places)[:, 0] > share])]
+    places, _ = worst_places(fractions, start(box.phases, len(box.ranges), FEW), ADDED)
+    return [*box.parameters(places[fractions(places)[:, 0] > fraction])]
 
 
-def residual_shares(
+def residual_fractions(
     problem: Problem, worst_case: WorstCase, motion: Profile, machines: Sequence[Parameters]
 ) -> Array:
-    """Find what share of its limit the load of every machine swings by where its modes meet, (machines,)."""
+    """Find what fraction of its limit the load of every machine swings by where its modes meet, (machines,)."""
     end, limits = np.array([motion.duration]), np.array(worst_case.load_limits)
     swing = PlantSimulation(
         problem.plant, motion, machines, motion.duration, problem.initial, accuracy=ACCURACY
@@ -259,7 +261,7 @@ def residual_shares(
 def _machine(problem: Problem, worst_case: WorstCase, place: Sequence[float] | Array) -> Parameters:
     """Give every uncertain parameter its place within its range, from −1 to 1."""
     shifted = {
-        name: problem.parameters[name] * (1.0 + share * float(at))
-        for (name, share), at in zip(worst_case.uncertain.items(), place, strict=True)
+        name: problem.parameters[name] * (1.0 + fraction * float(at))
+        for (name, fraction), at in zip(worst_case.uncertain.items(), place, strict=True)
     }
     return {**problem.parameters, **shifted}

@@ -26,8 +26,8 @@ from gen_profile.solvers.collocation import Scheme, Trajectory, linearize, sampl
 # What a sensitivity left at a thousandth of itself adds to the sway is far less than what second order does.
 DEPENDENT = 1e-8
 INSENSITIVE = 1e-3
-PROMINENT = 1e-4  # sway left by a mode, as a share of the sway that another may leave
-NEGLIGIBLE = 1e-7  # sway left by a mode, as a share of the move
+PROMINENT = 1e-4  # sway left by a mode, as a fraction of the sway that another may leave
+NEGLIGIBLE = 1e-7  # sway left by a mode, as a fraction of the move
 SWAY_SAMPLES = 1001
 QUINTIC = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 QUINTIC_JERK = 60.0  # with which a quintic move starts, in distances per cube of its duration
@@ -171,7 +171,7 @@ class BoundaryValueProblem:
         return float(np.sqrt(np.mean((self.weights(one, other) * difference) ** 2)))
 
     def missed(self, solution: Trajectory) -> float:
-        """Greatest share by which an end condition fails that was not asked for, as others imply it."""
+        """Greatest fraction by which an end condition fails that was not asked for, as others imply it."""
         own = slice(0, 2 * self.system.layout.n_u)
         implied = np.isnan(self.final[own])
         return float(
@@ -254,8 +254,8 @@ def independence(canonical: BoundaryValueProblem) -> tuple[NDArray[np.bool_], tu
     order = np.concatenate([np.arange(2 * layout.n_u, first), np.arange(2 * layout.n_u), np.arange(first, n)])
     order = order[~np.isnan(canonical.final[order])]
     asked = np.zeros(n, dtype=bool)
-    shares = np.where(order < first, DEPENDENT, INSENSITIVE)
-    asked[order] = independent_states(A, B, order, shares)
+    thresholds = np.where(order < first, DEPENDENT, INSENSITIVE)
+    asked[order] = independent_states(A, B, order, thresholds)
     kept = zip(layout.sensitivity_rows, asked[layout.sensitivities], strict=True)
     useful = {name for (names, _), keep in kept if keep for name in names}
     every = dict.fromkeys(name for names, _ in layout.sensitivity_rows for name in names)
@@ -283,20 +283,20 @@ def quintic(canonical: BoundaryValueProblem, mesh: Array, scheme: Scheme) -> Tra
 
 
 def with_sway_cost(
-    problem: Problem, quiet: BoundaryValueProblem, solution: Trajectory
+    problem: Problem, unweighted: BoundaryValueProblem, solution: Trajectory
 ) -> BoundaryValueProblem:
     """Pose the same problem with the β asked for; an automatic γ is scaled by a solution without."""
     beta, gamma = problem.sway_weight, problem.sway_scale
     if beta == 0.0:
-        return quiet
+        return unweighted
     if gamma is None:
-        _, sway = quiet.slopes(solution(np.linspace(0.0, 1.0, SWAY_SAMPLES)))
+        _, sway = unweighted.slopes(solution(np.linspace(0.0, 1.0, SWAY_SAMPLES)))
         largest = float(peak(np.linalg.norm(sway, axis=1, keepdims=True))[0])
         if largest == 0.0:  # a hoist alone swings nothing
-            return quiet
+            return unweighted
         gamma = AUTO_SWAY / largest
-        beta *= 2.0 * solution.integral(quiet.quantities(solution.points)[:, 1]) / AUTO_EFFORT**2
-    return attrs.evolve(quiet, data=attrs.evolve(quiet.data, beta=beta, gamma=gamma))
+        beta *= 2.0 * solution.integral(unweighted.quantities(solution.points)[:, 1]) / AUTO_EFFORT**2
+    return attrs.evolve(unweighted, data=attrs.evolve(unweighted.data, beta=beta, gamma=gamma))
 
 
 def _modal(layout: StateLayout, linear: Linearization, shown: Array) -> tuple[Array, Array]:

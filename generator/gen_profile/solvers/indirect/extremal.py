@@ -11,7 +11,7 @@ from gen_profile.solvers.indirect.refinement import defect
 from gen_profile.solvers.solution import Optimum, Solution, Status
 
 METHOD = "indirect"
-UNRESOLVED = 0.1  # defect, as a share of a state's size, of a mesh that does not follow the motion
+UNRESOLVED = 0.1  # defect, as a fraction of a state's size, of a mesh that does not follow the motion
 TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the linear model implies
 
 
@@ -20,8 +20,8 @@ def judged(
 ) -> Solution:
     """Accept a solution where it stands up to a look between the mesh's points."""
     if weighted.missed(found) > TOLERATED_MISS:
-        cure = "Check the machine's equations and parameters."
-        return failure(problem, Status.NOT_CONTROLLABLE, iterations, cure)
+        suggestion = "Check the machine's equations and parameters."
+        return failure(problem, Status.NOT_CONTROLLABLE, iterations, suggestion)
     optimum = _optimum(weighted, found)
     if optimum.defect is not None and optimum.defect > UNRESOLVED:
         return too_steep(problem, iterations)
@@ -71,6 +71,8 @@ def too_steep(problem: Problem, iterations: int) -> Solution:
     return failure(problem, Status.DIVERGED, iterations, f"Lower cost.sway_weight{other}")
 
 
-def failure(problem: Problem, status: Status, iterations: int, cure: str) -> Solution:
+def failure(problem: Problem, status: Status, iterations: int, suggestion: str) -> Solution:
     """Say that there is no solution, and what would help."""
-    return Solution(status=status, method=METHOD, problem=problem, iterations=iterations, cure=cure)
+    return Solution(
+        status=status, method=METHOD, problem=problem, iterations=iterations, suggestion=suggestion
+    )

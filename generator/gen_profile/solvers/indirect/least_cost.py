@@ -96,9 +96,9 @@ def least_cost(
         )
         step = (gain @ change).reshape(outputs.shape)
         growth = cost.exponents(reached + step[:, :sways]) - cost.exponents(reached)
-        share = min(1.0, STEEP / max(growth.max(), STEEP))
-        controls += share * change
-        outputs += share * step
+        fraction = min(1.0, STEEP / max(growth.max(), STEEP))
+        controls += fraction * change
+        outputs += fraction * step
         pull += (stiffness @ step[..., None])[..., 0]
         if np.abs(growth).max() <= CLOSE or cost.beta == 0.0:
             break

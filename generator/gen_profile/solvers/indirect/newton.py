@@ -17,7 +17,7 @@ from gen_profile.solvers.indirect.boundary_value_problem import BoundaryValuePro
 
 TOLERANCE = 1e-7  # step after which the next iterate's error is of the order of its square
 STALLED = 1e-5  # step that is taken for rounding noise when it ceases to shrink
-SLOW = 0.5  # share of the step before that is no longer Newton's convergence
+SLOW = 0.5  # fraction of the step before that is no longer Newton's convergence
 SMALLEST_DAMPING = 1.0 / 16.0
 MAX_ITERATIONS = 20
 

@@ -23,7 +23,7 @@ from gen_profile.work import spend
 
 TOLERANCE = 1e-7  # distance to the solution, as the last steps let it be foreseen
 BELIEVED = 0.01  # least quotient of steps that is taken for the rate of convergence
-SLOW = 0.5  # share of the step before beyond which another method is the better one
+SLOW = 0.5  # fraction of the step before beyond which another method is the better one
 MAX_ITERATIONS = 20
 WORK = 1e-7  # s of work for the square of the number of controls
 MOST_CONTROLS = 800  # up to which to solve for all of them at once

@@ -65,26 +65,26 @@ def solve(problem: Problem, far: Callable[[], bool] = lambda: True) -> Solution:
 
 def _solve(problem: Problem, far: Callable[[], bool]) -> Solution:
     system = optimality_system(problem.plant, problem.desensitized, problem.effort, problem.order)
-    quiet = canonical_problem(problem, system)
-    asked, redundant = independence(quiet)
+    unweighted = canonical_problem(problem, system)
+    asked, redundant = independence(unweighted)
     if redundant:
         solution = _solve(without(problem, redundant), far)
         return attrs.evolve(solution, problem=problem, redundant=redundant)
-    quiet = attrs.evolve(quiet, final=np.where(asked, quiet.final, np.nan))
+    unweighted = attrs.evolve(unweighted, final=np.where(asked, unweighted.final, np.nan))
     with suppress(np.linalg.LinAlgError):
-        found = _solve_simply(problem, quiet)
+        found = _solve_simply(problem, unweighted)
         if found is not None:
             return found
     if not far():
         return failure(problem, Status.INFEASIBLE, 0, WIDER)
     try:
-        return solve_fully(problem, quiet)
+        return solve_fully(problem, unweighted)
     except np.linalg.LinAlgError:
-        cure = "The end conditions contradict one another; allow more time."
-        return failure(problem, Status.DIVERGED, 1, cure)
+        suggestion = "The end conditions contradict one another; allow more time."
+        return failure(problem, Status.DIVERGED, 1, suggestion)
 
 
-def _solve_simply(problem: Problem, quiet: BoundaryValueProblem) -> Solution | None:
+def _solve_simply(problem: Problem, unweighted: BoundaryValueProblem) -> Solution | None:
     """Solve with few long intervals and one linear model; there is none where the machine swings too far.
 
     Raises
@@ -92,16 +92,16 @@ def _solve_simply(problem: Problem, quiet: BoundaryValueProblem) -> Solution | N
     numpy.linalg.LinAlgError
         When it swings so far that equations overflow.
     """
-    if not quiet.resolved:
+    if not unweighted.resolved:
         return None
-    intervals = max(LONG_INTERVALS, math.ceil(quiet.phase / RADIANS_PER_LONG_INTERVAL))
-    start, iterations = quintic(quiet, np.linspace(0.0, 1.0, intervals + 1), LONG_GAUSS), 0
+    intervals = max(LONG_INTERVALS, math.ceil(unweighted.phase / RADIANS_PER_LONG_INTERVAL))
+    start, iterations = quintic(unweighted, np.linspace(0.0, 1.0, intervals + 1), LONG_GAUSS), 0
     if problem.sway_weight > 0.0 and problem.sway_scale is None:  # the scale is measured on this motion
-        measured = _refined(quiet, start)
+        measured = _refined(unweighted, start)
         if measured.solution is None:
             return None
         start, iterations = measured.solution, measured.iterations
-    weighted = with_sway_cost(problem, quiet, start)
+    weighted = with_sway_cost(problem, unweighted, start)
     found = _refined(weighted, start)
     if found.solution is None:
         return None

@@ -32,9 +32,9 @@ def refused(preset, *overrides):
     """Solve what cannot be solved; the changes that are named then, each a list of settings."""
     solution = suggestions.solve(preset_spec(preset, overrides))
     assert solution.optimum is None
-    longer = re.findall(r"duration of ([\d.]+) s will do \(move\.duration\)", solution.cure)
+    longer = re.findall(r"duration of ([\d.]+) s will do \(move\.duration\)", solution.suggestion)
     changes = [[f"move.duration={duration}"] for duration in longer]
-    named = re.findall(rf"with ({SETTING}(?: and {SETTING})*)", solution.cure)
+    named = re.findall(rf"with ({SETTING}(?: and {SETTING})*)", solution.suggestion)
     changes.extend([setting.replace(" = ", "=") for setting in together.split(" and ")] for together in named)
     return changes
 
@@ -213,12 +213,14 @@ def test_no_hint_of_the_indirect_method_is_told_where_there_are_limits(monkeypat
     for method, told in (("auto", ""), ("indirect", 'Set solver.method = "auto". ')):
         spec = preset_spec("paper", ["limits.acceleration=0.2", f"solver.method={method}"])
         unlimited = attrs.evolve(
-            choice.given_up(problem_of(spec)), method="indirect", cure="Allow about 1.42 s (move.duration)."
+            choice.given_up(problem_of(spec)),
+            method="indirect",
+            suggestion="Allow about 1.42 s (move.duration).",
         )
         monkeypatch.setattr(suggestions, "suggestions", lambda *_: "It takes 4 s.")
-        assert suggestions.explained(spec, unlimited).cure == f"{told}It takes 4 s."
+        assert suggestions.explained(spec, unlimited).suggestion == f"{told}It takes 4 s."
         monkeypatch.setattr(suggestions, "suggestions", lambda *_: "")
-        assert suggestions.explained(spec, unlimited).cure == suggestions.IN_VAIN
+        assert suggestions.explained(spec, unlimited).suggestion == suggestions.IN_VAIN
 
 
 def test_a_limit_that_the_next_run_refuses_as_implausible_is_not_named():
