@@ -1,1 +1,1 @@
-"""Optimal motions: which method solves which problem, and what to change where none does."""
+"""Optimal motions: which method solves which problem, and how least values are searched."""

@@ -249,7 +249,7 @@ def worse_machines(
 def residual_fractions(
     problem: Problem, worst_case: WorstCase, motion: Profile, machines: Sequence[Parameters]
 ) -> Array:
-    """Find what fraction of its limit the load of every machine swings by where its modes meet, (machines,)."""
+    """Find what fraction of its limit every machine's load swings by where its modes meet, (machines,)."""
     end, limits = np.array([motion.duration]), np.array(worst_case.load_limits)
     swing = PlantSimulation(
         problem.plant, motion, machines, motion.duration, problem.initial, accuracy=ACCURACY

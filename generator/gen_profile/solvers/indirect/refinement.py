@@ -105,7 +105,7 @@ def _split(mesh: Array, parts: NDArray[np.intp]) -> Array:
 def defect(canonical: BoundaryValueProblem, solution: Trajectory) -> Array:
     """Greatest miss of the state equations between collocation points, on each interval.
 
-    Per interval, as a fraction of each state's size. (What is missed of the costates' shows in the Hamiltonian.)
+    Per interval, as a fraction of each state's size. What is missed of the costates' shows in the Hamiltonian.
     What fast modes make of a small displacement is filtered as stiff solvers do (Hairer and Wanner, Solving
     Ordinary Differential Equations II, eq. IV.8.20).
     """
