@@ -1,1 +1,1 @@
-"""The main job: a motion planned, exported, checked and delivered; what to change where there is none; FMUs written."""
+"""The main job: a motion planned, exported, checked and delivered, or what to change; FMUs written."""

@@ -16,7 +16,8 @@ import attrs
 from gen_profile.work import OutOfWork
 
 ASIDE = 0.4  # of the precision, by which a try lies at least beside another one
-HOPELESS = 0.99 * math.log(2.0), 0.01  # where an excess falls no more over so much, none works
+# where an excess falls by no more than that over some twice the value, none works
+LEAST_FALL, HOPELESS = 0.01, 0.99 * math.log(2.0)
 FARTHEST = math.log(30.0)  # longest step where two tries tell how the excess falls
 
 
@@ -119,10 +120,8 @@ def _next(tried: Mapping[float, float], search: Search) -> float | None:
     slope = slope_of(tried)
     nearest = min(tried, key=lambda value: abs(tried[value]))
     if slope is not None and slope > 0.0:
-        beyond, aside = (
-            math.log(nearest / lower) + (tried[nearest] - search.aim) / slope,
-            ASIDE * search.precision,
-        )
+        beyond = math.log(nearest / lower) + (tried[nearest] - search.aim) / slope
+        aside = ASIDE * search.precision
         if 0.0 < beyond < gap:
             return lower * math.exp(min(max(beyond, aside), gap - aside))
     return math.sqrt(upper * lower)
@@ -135,15 +134,13 @@ def _step(tried: Mapping[float, float], last: float, search: Search) -> float | 
         unknown = (value for value in tried if value != last and math.isinf(tried[value]))
         strides = [abs(math.log(last / value)) for value in unknown]
         return sign * min(search.growth * min(strides) if strides else search.stride, search.longest)
-    apart, falls = HOPELESS
-    stays = min((value for value in tried if tried[value] < exceeds + falls), default=last)
-    if sign > 0.0 and math.log(last / stays) > apart:
+    unchanged = min((value for value in tried if tried[value] < exceeds + LEAST_FALL), default=last)
+    if sign > 0.0 and math.log(last / unchanged) > HOPELESS:
         return None
-    known, (least_slope, greatest_slope) = slope_of(tried), search.believed
-    if known is None or known <= 0.0:
-        return sign * min(max(abs(exceeds - search.aim) / search.slope, search.precision), search.longest)
-    longest = FARTHEST if least_slope < known < greatest_slope else search.longest
-    slope = min(max(known, least_slope), greatest_slope)
+    slope, longest, known = search.slope, search.longest, slope_of(tried)
+    if known is not None and known > 0.0:
+        slope = min(max(known, search.believed[0]), search.believed[1])
+        longest = FARTHEST if slope == known else longest
     return sign * min(max(abs(exceeds - search.aim) / slope, search.precision), longest)
 
 

@@ -105,9 +105,9 @@ def _split(mesh: Array, parts: NDArray[np.intp]) -> Array:
 def defect(canonical: BoundaryValueProblem, solution: Trajectory) -> Array:
     """Greatest miss of the state equations between collocation points, on each interval.
 
-    Per interval, as a fraction of each state's size. What is missed of the costates' shows in the Hamiltonian.
-    What fast modes make of a small displacement is filtered as stiff solvers do (Hairer and Wanner, Solving
-    Ordinary Differential Equations II, eq. IV.8.20).
+    It is a fraction of each state's size. What is missed of the costates' shows in the Hamiltonian. What fast
+    modes make of a small displacement is filtered as stiff solvers do (Hairer and Wanner, Solving Ordinary
+    Differential Equations II, eq. IV.8.20).
     """
     scheme, n, lengths = solution.scheme, len(canonical.final), np.diff(solution.mesh)[:, None, None]
     local = np.convolve(np.concatenate([[0.0], scheme.c, [1.0]]), [0.5, 0.5], "valid")[:, None]
