@@ -36,7 +36,6 @@ class Scheme:
 
     Attributes
     ----------
-    name : str
     c, b : (stages,) arrays
         Collocation points, and weights for integrals.
     A, adjoint : (stages, stages) arrays
@@ -49,7 +48,6 @@ class Scheme:
         From values at 0 and the points to coefficients of the polynomial through them, lowest power first.
     """
 
-    name: str
     c: Array
     b: Array
     A: Array
@@ -64,13 +62,12 @@ class Scheme:
         return len(self.c)
 
 
-def _scheme(name: str, c: Array) -> Scheme:
+def _scheme(c: Array) -> Scheme:
     powers = np.arange(1, len(c) + 1)
     vandermonde = c[:, None] ** (powers - 1)
     A = (c[:, None] ** powers / powers) @ np.linalg.inv(vandermonde)
     b = (1.0 / powers) @ np.linalg.inv(vandermonde)
     return Scheme(
-        name=name,
         c=c,
         b=b,
         A=A,
@@ -82,19 +79,19 @@ def _scheme(name: str, c: Array) -> Scheme:
     )
 
 
-def _gauss(name: str, stages: int) -> Scheme:
-    return _scheme(name, (legendre.leggauss(stages)[0] + 1.0) / 2.0)
+def _gauss(stages: int) -> Scheme:
+    return _scheme((legendre.leggauss(stages)[0] + 1.0) / 2.0)
 
 
-def _radau(name: str, stages: int) -> Scheme:
+def _radau(stages: int) -> Scheme:
     """Collocate at the zeros of two neighbouring Legendre polynomials' difference, the last of which is 1."""
     zeros = legendre.legroots([0.0] * (stages - 1) + [1.0, -1.0])
-    return _scheme(name, np.append((zeros[:-1] + 1.0) / 2.0, 1.0))
+    return _scheme(np.append((zeros[:-1] + 1.0) / 2.0, 1.0))
 
 
-GAUSS = _gauss("Gauss", STAGES)
-LONG_GAUSS = _gauss("Gauss, long intervals", 9)
-RADAU = _radau("Radau", STAGES)
+GAUSS = _gauss(STAGES)
+LONG_GAUSS = _gauss(9)
+RADAU = _radau(STAGES)
 
 
 @attrs.frozen(kw_only=True, eq=False)
