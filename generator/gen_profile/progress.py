@@ -1,4 +1,4 @@
-"""What long work tells of how far it is."""
+"""What long work reports of its progress."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Progress(Protocol):
 
 
 def no_progress(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 untold = no_progress  # its former name, where it is still imported

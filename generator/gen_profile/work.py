@@ -40,7 +40,7 @@ class _Budget:
         if self.left < self.look:
             self.look = self.left - LOOK
             if time.process_time() > self.ends:
-                self.left = -math.inf  # for whoever catches this and goes on
+                self.left = -math.inf  # for code that catches this and goes on
                 raise OutOfWork
 
 

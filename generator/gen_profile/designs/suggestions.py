@@ -99,7 +99,7 @@ def suggestions(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> st
     eased = {place: stated[place] for place in eased_by_time(problem)}
     families = [limits for limits in ([eased] if eased == stated else [eased, stated]) if len(limits) > 1]
     together = [partial(_wider_limits, spec, relaxation, limits, WIDEST) for limits in families]
-    with suppress(OutOfWork):  # of the budget for the whole answer: what was found so far is told
+    with suppress(OutOfWork):  # of the budget for the whole answer: name what was found so far
         if not in_time:
             needed = _in_time(partial(least_duration, relaxation))
             duration = needed and _in_time(partial(_longer, spec, relaxation, needed), LONGEST)

@@ -1,6 +1,6 @@
 """The least value that works, where every greater one does: one search for whatever is looked for like that.
 
-A candidate is told by a number: a duration, how many times as wide limits are, a machine's spread. Its excess
+A candidate is a number: a duration, how many times as wide limits are, a spread of machines. Its excess
 is the logarithm of what it takes over what is allowed; a candidate works where that is not positive. Excesses
 fall with the logarithm of the number, more or less steadily: secants lead to the least one that works, and
 bisection where an excess is infinite, so that only is known whether the candidate works.

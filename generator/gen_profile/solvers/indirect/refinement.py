@@ -101,7 +101,7 @@ def _split(mesh: Array, parts: NDArray[np.intp]) -> Array:
     return np.concatenate([*pieces, mesh[-1:]])
 
 
-@lru_cache(maxsize=1)  # who refined is asked again for what was reached
+@lru_cache(maxsize=1)  # after refinement, the last one is asked for again
 def defect(canonical: BoundaryValueProblem, solution: Trajectory) -> Array:
     """Greatest miss of the state equations between collocation points, on each interval.
 
