@@ -94,7 +94,7 @@ def test_all_axes_arrive_together_as_soon_as_the_slowest_can(block, target):
     shorter, rate = CYCLE * ends[0] / 1.10, np.sqrt([G / ROPE])
     reached = [farthest(shorter, rate, limits[:3]) for limits in LIMITS.values()]
     assert any(reach < place for reach, place in zip(reached, target, strict=True))
-    assert np.argmax(out["fVelocity_x"] != 0.0) <= 21  # though two are planned
+    assert np.argmax(out["fVelocity_x"] != 0.0) <= 42  # though two are planned
 
 
 @pytest.mark.parametrize(("cycles", "x"), [(6000, 12.0), (8000, 4.0)])
@@ -234,4 +234,4 @@ def test_short_slots_leave_no_cycle_more_work():
     ways = [(70, 40.0, 8.7), (215, 33.8, 9.7), (6000, 0.0, 0.14)]
     parts = [block.hold(cycles, bExecute=1.0, fTarget_x=x, fTarget_y=y) for cycles, x, y in ways]
     assert max(part["operations"].max() for part in parts) <= 3000
-    assert parts[-1]["fVelocity_x"][1600] < -0.1
+    assert parts[-1]["fVelocity_x"][2200] < -0.1

@@ -26,7 +26,11 @@ on the way, and likewise what is for zones and events where there are none.
   mode is l * sway; what it will be left with by the committed future is a sum over its coefficients, as of a
   plan, and so is its slope. A pulse that ends where it begins and leaves the opposite of both takes them
   away: of the kernel's shape, by the factors of the kernel's conditions.
-- ``model.st`` evaluates the modes at the live parameters; ``extent.st`` tells how many columns a row fills.
+- ``variations.st``: machines whose frequencies differ from the nominal ones by shares of the stated
+  errors. What the committed future leaves on each is a state. ``slope_bounds.st`` bounds the slopes of a plan such that
+  past and plan together leave no more than plans may spend.
+- ``formulas/``: the modes at the live parameters, powers of complex numbers, how many columns a row fills,
+  which slow zones are near.
 """
 
 from __future__ import annotations
@@ -53,10 +57,19 @@ MOST = 48  # unknowns of a plan; in a longer one the slots in the middle have th
 KERNEL_SLOTS = 56
 LONG_KERNEL = 40  # slots, from which on no longer one is sought
 WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
-REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
+REACH_SLOTS = (10, 12, 14, *range(16, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
 CHUNK = 45  # slots that a phase takes at once
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
 ITERATIONS = 6
+RAMP_LEAST = 0.05  # of full speed: a change of the stick that is planned for
+RAMP_LEAST_SLOTS = 9
+TIGHTER = 20.0  # weight of second order, where as much of it is left as plans may spend
+PULSE_ADMITTED = 0.9
+ADMITTED = 0.8  # of the allowed sway: no plan that leaves more, if that is more than now
+BETWEEN = 1.05  # of the sway on the machines watched: those between them
+MET = 1e-6  # sum of shares by which a plan may miss a condition
+RAMP_SLOTS = 5.0  # that a plan to another velocity takes longer than the axis alone would
+VARIATIONS = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)  # of the stated errors: machines watched
 HOLD = 0.2  # s, in which an input that is out of range is held
 STILL = 1e-3  # of full speed: a velocity that counts as standing, and a way as none
 ROUNDING = 1e-3  # of a live parameter's greatest rate
@@ -76,7 +89,7 @@ RESERVE = 0.1  # share of the limits that only calming takes up, where live para
 INSIDE = 5e-4  # share of each limit that a plan leaves, for rounding
 FOR, END_FOR = re.compile(r"( *)FOR (\w+) := (.+) TO (.+) DO(.*)"), re.compile(r"( *)END_FOR;(.*)")
 AXIS_LOOP = re.compile(r"(?ms)^( *)FOR (\w+) := 0 TO cAxes - 1 DO[^\n]*\n(.*?)^\1END_FOR;[^\n]*\n")
-WHERE = re.compile(r"(?ms)^@where_(\w+)\n(.*?)^@end\n")
+WHERE = re.compile(r"(?ms)^ *@where_(\w+)\n(.*?)^ *@end\n")
 PART = re.compile(r"(?m)^( *)@(\w+)\n")
 TEXT = Path(__file__).with_name("text")
 
@@ -104,6 +117,8 @@ class PlannerConstants:
         How fast some may change on the way, per s.
     lowers : mapping of str to float
         Of live parameters that lower all loads by as much as they grow: the inverse of gravity, in s²/m.
+    sway_limit : float
+        m, that the loads may sway after a motion.
     calm : float
         m, sway up to which nothing is done about it.
     events : bool
@@ -114,6 +129,9 @@ class PlannerConstants:
         That a cycle may spend.
     periods : sequence of float
         s, of the slowest mode at the corners of the live ranges.
+    sway_share : float
+        m, of the sway that errors may leave: what plans may spend; 0 for motions that leave none to first
+        order.
     doubt : float
         Relative error that the frequencies may have.
     second_order : (modes,) array
@@ -123,13 +141,15 @@ class PlannerConstants:
     degrees : int
         Chebyshev polynomials per live parameter.
     bends : sequence of float
-        Of each live parameter t from -1 to 1: k of (t + k) / (1 + k t), of which they are.
+        Of each live parameter t from -1 to 1: k of (t + k) / (1 + k t), of which they are; of the
+        frequencies and decays, then of what follows.
     exponents : (parameters, terms) array of int
         Which of them are multiplied.
     modes : int
     model : (rows, terms) array
-        Coefficients for the squared frequencies (of two, for their sum and product), for the decays, and with
-        rates for the matrix of the linear machine in the loads' sway, row by row.
+        Coefficients for the squared frequencies (of two, for their sum and product), for the decays, then
+        with rates for the matrix of the linear machine in the loads' sway, row by row, or else for the
+        errors of the frequencies and the loads' sway by what is left in a mode, axis by axis.
     """
 
     name: str
@@ -142,11 +162,13 @@ class PlannerConstants:
     drift: tuple[float, ...]
     rates: Mapping[str, float]
     lowers: Mapping[str, float]
+    sway_limit: float
     calm: float
     events: bool
     zones: bool
     operations: int
     periods: Sequence[float]
+    sway_share: float
     doubt: float
     second_order: Array
     degrees: int
@@ -158,7 +180,13 @@ class PlannerConstants:
 
 def block_text(constants: PlannerConstants) -> str:
     """Write the function block."""
-    parts = {"followed": bool(constants.rates), "zones": constants.zones, "events": constants.events}
+    parts = {
+        "followed": bool(constants.rates),
+        "zones": constants.zones,
+        "events": constants.events,
+        "ramped": not constants.rates,
+        "varied": constants.doubt > 0.0 and not constants.rates,
+    }
     text = WHERE.sub(lambda part: part[2] if parts[part[1]] else "", _part("block"))
     values = _values(constants)
     text = re.sub(r"@([a-z_]+)", lambda hole: values[hole[1]], text)
@@ -170,9 +198,14 @@ def _part(name: str, margin: str = "") -> str:
     """Read a part of the text, with those that it names where it names them."""
 
     def named(hole: re.Match[str]) -> str:
-        return _part(hole[2], hole[1]) if (TEXT / f"{hole[2]}.st").is_file() else hole[0]
+        return _part(hole[2], hole[1]) if hole[2] in _parts() else hole[0]
 
-    return indent(PART.sub(named, (TEXT / f"{name}.st").read_text("ascii")), margin)
+    return indent(PART.sub(named, _parts()[name]), margin)
+
+
+@cache
+def _parts() -> dict[str, str]:
+    return {path.stem: path.read_text("ascii") for path in TEXT.rglob("*.st")}
 
 
 def _without_loops(text: str) -> str:
@@ -251,13 +284,18 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
         "matrix": modes**2,
         "sway": 12 * axes * modes,
         "look": 4 * modes,
-        "model": modes * (2 + modes),
+        "model": len(c.model),
         "column": WIDE,
         "wide": WIDE,
         "conditions": conditions * KERNEL_SLOTS,
         "row": conditions,
         "gram": conditions**2,
-        "bounds": 3 * WIDE,
+        "bounds": 4 * WIDE,
+        "left": axes * modes * len(VARIATIONS),
+        "one": len(VARIATIONS),
+        "variation": modes * len(VARIATIONS),
+        "back": modes * (len(VARIATIONS) + 1),
+        "gain": axes * modes,
         "reach": axes * len(REACH_SLOTS),
     }
 
@@ -285,6 +323,10 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cFresh": FRESH,
         "cCycleWork": _cycle_work(c),
         "cConditions": _conditions(c),
+        "cVariations": len(VARIATIONS) if not c.rates else 0,
+        "cSlotBits": _longest_slot(c).bit_length(),
+        "cRampLeastSlots": RAMP_LEAST_SLOTS,
+        "cAhead": 2 if c.rates else 1,
         "cSeconds": np.count_nonzero(c.second_order),
         "cLives": len(c.live),
         "cTerms": terms,
@@ -342,6 +384,11 @@ def _reaction(c: PlannerConstants) -> float:
     return max(bound(period) for period in c.periods)
 
 
+def _longest_slot(c: PlannerConstants) -> int:
+    """Cycles in the longest slot."""
+    return max(1, int(max(c.periods) / (SLOTS_PER_PERIOD * c.cycle)) + 1)
+
+
 def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
     following = 60 + 4 * c.modes * (4 * c.modes + 17)
@@ -377,6 +424,22 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cAtOnce": AT_ONCE,
         "cAfterCut": AFTER_CUT,
         "cDoubt": c.doubt,
+        **(
+            {}
+            if c.rates
+            else {
+                "cSwayShare": c.sway_share / len(c.axes),
+                "cSwayLimit": c.sway_limit,
+                "cBetween": BETWEEN,
+                "cTighter": TIGHTER,
+                "cAdmitted": ADMITTED,
+                "cPulseAdmitted": PULSE_ADMITTED,
+                "cVariationSum": float(np.sum(np.power(VARIATIONS, 4))),
+            }
+        ),
+        "cRampLeast": RAMP_LEAST,
+        "cRampSlots": RAMP_SLOTS,
+        "cMet": MET,
         "cSpare": SPARE,
         "cMirrorDecay": MIRROR_DECAY,
         "cCentre": CENTRE,
@@ -403,7 +466,8 @@ def _arrays(c: PlannerConstants) -> dict[str, Sequence[float] | Array]:
         **({"cLowers": [c.lowers.get(name, 0.0) for name in lives]} if c.rates else {}),
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
-        "cLiveBend": c.bends or (0.0,),
+        "cLiveBend": c.bends or (0.0, 0.0),
+        **({} if c.rates else {"cVariation": VARIATIONS}),
         "cLiveDrift": c.drift or (0.0,),
         "cLiveStep": [c.cycle * c.rates.get(name, 0.0) * (1.0 + ROUNDING) for name in lives],
         "cModel": c.model.ravel(),

@@ -52,6 +52,17 @@ class Interpolant:
         return attrs.evolve(self, exponents=self.exponents[:, kept], coefficients=coefficients[:, kept])
 
 
+def same_terms(*interpolants: Interpolant) -> tuple[NDArray[np.int64], list[Array]]:
+    """Give the degrees of all terms, (variables, terms), and each interpolant's coefficients of them."""
+    terms = sorted({tuple(term) for one in interpolants for term in one.exponents.T.tolist()})
+    coefficients = []
+    for one in interpolants:
+        table = np.zeros((len(one.coefficients), len(terms)))
+        table[:, [terms.index(tuple(term)) for term in one.exponents.T.tolist()]] = one.coefficients
+        coefficients.append(table)
+    return np.array(terms, dtype=np.int64).reshape(len(terms), -1).T, coefficients
+
+
 def bend(values: Sequence[float]) -> float:
     """Find k: 1 / (1 + k t), scaled and shifted, takes these values at t = −1, 0 and 1; 0 if none does."""
     first, second = np.diff(values)

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
-from gen_profile.planner.chebyshev import Array
+from gen_profile.planner.chebyshev import Array, same_terms
 from gen_profile.planner.machine import (
     LiveModes,
     corners,
@@ -39,6 +39,8 @@ OPERATIONS, ZONED_OPERATIONS = (
 CALM = 0.1  # of the allowed sway, which the block leaves as it is
 MARGIN = 2.0  # between targets and the travel's ends, relative to the allowed sway, for calming
 HALF_A_SLOT = 0.05  # of the allowed sway: where stated errors leave so much, it is worth that time
+TOLERANT = 10.0  # times that, where plans may spend a share of the allowed sway
+LEAST_ERROR = 1e-3  # of a frequency, that is watched to second order
 USUAL = 20.0  # slots in half a motion
 LITTLE = 0.3  # weight that does not count
 QUICK = 2.0  # default deceleration of a quick stop, relative to the limit of the acceleration
@@ -86,7 +88,7 @@ def planner_block(spec: Spec) -> PlannerBlock:
     least = ZONED_OPERATIONS if spec.planner.zones else OPERATIONS
     if spec.planner.operations and spec.planner.operations < least:
         raise SpecError(f"planner.operations: at least {least} with zones, found {spec.planner.operations}.")
-    interpolant = found.interpolant
+    exponents, (rates, others) = same_terms(found.interpolant, found.others)
     constants = PlannerConstants(
         name=spec.name,
         machine=spec.machine().type,
@@ -105,14 +107,16 @@ def planner_block(spec: Spec) -> PlannerBlock:
         zones=spec.planner.zones,
         operations=spec.planner.operations or max(least, round(least * spec.export.cycle_time / 1e-3)),
         periods=tuple(2.0 * np.pi / _rates(found, point)[0][0] for point in corners(found.live)),
+        sway_limit=min(spec.check.residual_sway.values()),
         calm=CALM * min(spec.check.residual_sway.values()),
         doubt=float(frequency_errors(spec).max(initial=0.0)),
         second_order=_second_order(spec, found),
-        degrees=int(interpolant.exponents.max(initial=0)) + 1,
-        bends=interpolant.bends,
-        exponents=interpolant.exponents,
+        sway_share=_sway_share(spec),
+        degrees=int(exponents.max(initial=0)) + 1,
+        bends=[*found.interpolant.bends, *found.others.bends],
+        exponents=exponents,
         modes=found.modes,
-        model=interpolant.coefficients,
+        model=np.vstack([rates, others]),
     )
     text = block_text(constants)
     declared = Counter(name.lower() for name in DECLARED.findall(text))  # the language has one case only
@@ -163,9 +167,18 @@ def _faults(spec: Spec, number: int, suffix: str) -> list[str]:
     return faults
 
 
+def _sway_share(spec: Spec) -> float:
+    """Find how much sway in m plans may leave by the stated errors."""
+    if spec.planner.live_rate or not frequency_errors(spec).max(initial=0.0) > 0.0:
+        return 0.0
+    return spec.planner.sway_share * min(spec.check.residual_sway.values())
+
+
 def _second_order(spec: Spec, found: LiveModes) -> Array:
     """Weigh what the stated errors leave in each mode, where it counts in a motion of usual length."""
     weights = second_order_sway(spec) / (HALF_A_SLOT * min(spec.check.residual_sway.values()))
+    if _sway_share(spec) > 0.0:
+        return np.where(frequency_errors(spec) > LEAST_ERROR, weights / TOLERANT, 0.0)
     velocity = max(spec.limits.of(number).velocity or 0.0 for number in planned_axes(spec))
     slot_angle = 2.0 * np.pi / SLOTS_PER_PERIOD
     usual = [
@@ -204,5 +217,5 @@ def _nominal(spec: Spec, name: str) -> float:
 
 
 def _rates(found: LiveModes, point: Sequence[float]) -> tuple[Array, Array]:
-    invariants, decays, _ = np.split(found.interpolant(point), [found.modes, 2 * found.modes])
+    invariants, decays = np.split(found.interpolant(point), [found.modes])
     return frequencies(invariants), decays

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import product
 from types import SimpleNamespace
 
@@ -38,8 +38,10 @@ class LiveModes:
     live : mapping of str to (float, float)
     interpolant : Interpolant
         Of the live parameters, each mapped to −1 … 1: the squared frequencies (of two modes, their sum and
-        product, which have no branch point where these come near each other), then the decays; and where
-        live parameters change on the way, the matrix of the loads' sway in 1/s², row by row.
+        product, which have no branch point where these come near each other), then the decays.
+    others : Interpolant
+        Where live parameters change on the way the matrix of the loads' sway in 1/s², row by row, and
+        elsewhere `left_by_errors`, none below what is true.
     error : float
         Greatest relative error of a frequency found between the points of interpolation.
     """
@@ -47,6 +49,7 @@ class LiveModes:
     modes: int
     live: Mapping[str, tuple[float, float]]
     interpolant: Interpolant
+    others: Interpolant
     error: float
 
 
@@ -69,17 +72,21 @@ def live_modes(spec: Spec) -> LiveModes:
             [
                 *([squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares),
                 *(found.distinct_damping_ratios * found.distinct_frequencies),
-                *(_sway_matrix(found).ravel() if spec.planner.live_rate else ()),
             ]
+        )
+
+    def others(point: Sequence[float]) -> Array:
+        return (
+            _sway_matrix(_linearized(spec, point)).ravel()
+            if spec.planner.live_rate
+            else left_by_errors(spec, point)
         )
 
     modes = len(_linearized(spec, [0.0] * len(live)).distinct_frequencies)
     between = list(product(np.linspace(-1.0, 1.0, 6), repeat=len(live)))
     exact = [_linearized(spec, point).distinct_frequencies for point in between]
-    axes = np.eye(len(live))
-    bent = [bend([invariants((t * axis).tolist())[0] for t in (-1.0, 0.0, 1.0)]) for axis in axes]
     straight = [0.0] * len(live)
-    for degree, bends in product(DEGREES if live else (0,), (bent, straight)):
+    for degree, bends in product(DEGREES if live else (0,), (_bends(invariants, len(live)), straight)):
         interpolant = interpolate(invariants, bends, degree).without(NEGLIGIBLE)
         found = [frequencies(interpolant(point)[:modes]) for point in between]
         error = float(np.abs(np.array(found) / exact - 1.0).max())
@@ -90,6 +97,10 @@ def live_modes(spec: Spec) -> LiveModes:
             f"planner.live: over these ranges the frequencies would be known to {error:.1g} only; "
             "narrow the ranges, or write a block for each part of them."
         )
+    if spec.planner.live_rate:
+        second = interpolate(others, bends, degree).without(NEGLIGIBLE)
+    else:
+        second = _raised(interpolate(others, _bends(others, len(live)), degree), others, between)
     ratios = [rates[-1] / rates[0] for rates in exact]
     if max(ratios) > MOST_RATIO:
         farthest = zip(live.items(), between[np.argmax(ratios)], strict=True)
@@ -104,7 +115,22 @@ def live_modes(spec: Spec) -> LiveModes:
             f"{MOST_RATIO:g} at most; {'narrow the ranges, or ' if live else ''}"
             "state a machine without the fast mode, such as a single pendulum."
         )
-    return LiveModes(modes=modes, live=live, interpolant=interpolant, error=error)
+    return LiveModes(modes=modes, live=live, interpolant=interpolant, others=second, error=error)
+
+
+def _bends(functions: Callable[[Sequence[float]], Array], variables: int) -> list[float]:
+    """Find how each variable bends the first of some functions."""
+    return [bend([functions((t * axis).tolist())[0] for t in (-1.0, 0.0, 1.0)]) for axis in np.eye(variables)]
+
+
+def _raised(
+    interpolant: Interpolant, functions: Callable[[Sequence[float]], Array], points: Sequence[Sequence[float]]
+) -> Interpolant:
+    """Raise functions until at some points none lies below what is true."""
+    below = np.max([functions(point) - interpolant(point) for point in points], axis=0)
+    raised = interpolant.coefficients.copy()
+    raised[:, ~interpolant.exponents.any(axis=0)] += np.maximum(below, 0.0)[:, None]
+    return attrs.evolve(interpolant, coefficients=raised)
 
 
 def frequencies(invariants: Array) -> Array:
@@ -129,6 +155,23 @@ def frequency_errors(spec: Spec) -> Array:
     return np.asarray(
         np.max([_frequency_errors(spec, point) for point in corners(spec.planner.live)], axis=0)
     )
+
+
+def left_by_errors(spec: Spec, point: Sequence[float]) -> Array:
+    """Give the relative errors of the modes' frequencies, then the loads' sway by each axis and mode.
+
+    A mode that is left swinging, ``∫ velocity · exp(iωt) dt`` in m (or rad), makes the load that shows it
+    most sway by so many m times its modulus.
+    """
+    at = _linearized(spec, point)
+    modes = np.abs(at.frequencies[:, None] - at.distinct_frequencies).argmin(axis=1)
+    shown, driven = at.sway_gain @ at.modes, np.linalg.solve(at.modes, at.input)
+    gains = [
+        np.abs(shown[:, modes == mode] @ driven[modes == mode, axis]).max()
+        for axis in planned_axes(spec)
+        for mode in range(len(at.distinct_frequencies))
+    ]
+    return np.concatenate([_frequency_errors(spec, point), gains])
 
 
 def second_order_sway(spec: Spec) -> Array:

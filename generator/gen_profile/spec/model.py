@@ -370,6 +370,9 @@ class PlannerSpec(Checked, table="planner"):
         Whether blocked and slow intervals of the travel are inputs of the block.
     operations : int or None
         Floating-point operations that the block may spend in a cycle; None takes 3000 for each millisecond.
+    sway_share : float
+        Share of `check.residual_sway` that a motion may leave on the machines of the stated errors, for being
+        quick; 0 plans motions that leave none to first order.
     quick_stop : float or None
         Deceleration of a stop that lets the load swing, in m/s²; None takes twice the limit.
     quick_stop_jerk : float or None
@@ -382,6 +385,7 @@ class PlannerSpec(Checked, table="planner"):
     events: bool = False
     zones: bool = False
     operations: Annotated[int, Bounds(least=3000, most=100_000)] | None = None
+    sway_share: Annotated[float, Bounds(least=0.0, most=0.8)] = 0.5
     quick_stop: Positive | None = None
     quick_stop_jerk: Positive | None = None
 
