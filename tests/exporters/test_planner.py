@@ -74,7 +74,7 @@ ORDERS = [
     (80, {}),
     (160, {"bExecute": 1.0, "fTarget": 3.0}),
     (140, {"bExecute": 1.0, "fTarget": 9.0}),
-    (120, {"bVelocity": 1.0, "fVelocityCommand": -0.4, "fL1": 5.5}),
+    (120, {"bVelocity": 1.0, "fVelocityCommand": -0.4, "fL1": 5.95}),
     (20, {"bQuickStop": 1.0}),
 ]
 STICK = [

@@ -27,8 +27,8 @@ on the way, and likewise what is for zones and events where there are none.
   plan, and so is its slope. A pulse that ends where it begins and leaves the opposite of both takes them
   away: of the kernel's shape, by the factors of the kernel's conditions.
 - ``variations.st``: machines whose frequencies differ from the nominal ones by shares of the stated
-  errors. What the committed future leaves on each is a state. ``slope_bounds.st`` bounds the slopes of a plan such that
-  past and plan together leave no more than plans may spend.
+  errors. What the committed future leaves on each is a state. ``slope_bounds.st`` bounds the slopes of a
+  plan such that past and plan together leave no more than plans may spend.
 - ``formulas/``: the modes at the live parameters, powers of complex numbers, how many columns a row fills,
   which slow zones are near.
 """
@@ -57,7 +57,8 @@ MOST = 48  # unknowns of a plan; in a longer one the slots in the middle have th
 KERNEL_SLOTS = 56
 LONG_KERNEL = 40  # slots, from which on no longer one is sought
 WIDE = KERNEL_SLOTS + 4  # with two committed shares before, and two zeros behind
-REACH_SLOTS = (10, 12, 14, *range(16, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
+REACH_SLOTS = (*range(20, 31), *range(32, MOST, 2), *range(MOST, 88, 4), 96, LONGEST)  # measured
+SHORT_SLOTS = (10, 12, 14, *range(16, 20))  # likewise, where plans may leave a slope
 CHUNK = 45  # slots that a phase takes at once
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
 ITERATIONS = 6
@@ -296,7 +297,7 @@ def _lengths(c: PlannerConstants) -> dict[str, int]:
         "variation": modes * len(VARIATIONS),
         "back": modes * (len(VARIATIONS) + 1),
         "gain": axes * modes,
-        "reach": axes * len(REACH_SLOTS),
+        "reach": axes * len(_reach_slots(c)),
     }
 
 
@@ -310,7 +311,7 @@ def _constants(c: PlannerConstants) -> str:
     lines.append(_array("cExponent", "DINT", [str(v) for v in exponents.ravel()]))
     before = np.cumsum(np.sign(c.second_order)) - 1.0
     lines.append(_array("cSecond", "DINT", [str(int(number)) for number in before]))
-    lines.append(_array("cReachSlots", "DINT", [str(v) for v in REACH_SLOTS]))
+    lines.append(_array("cReachSlots", "DINT", [str(v) for v in _reach_slots(c)]))
     return "\n".join(lines)
 
 
@@ -350,8 +351,12 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cMoreIterations": MORE_ITERATIONS,
         "cWayIterations": WAY_ITERATIONS,
         "cColumnWork": _column_work(c),
-        "cReaches": len(REACH_SLOTS),
+        "cReaches": len(_reach_slots(c)),
     }
+
+
+def _reach_slots(c: PlannerConstants) -> Sequence[int]:
+    return REACH_SLOTS if c.rates or not c.sway_share else (*SHORT_SLOTS, *REACH_SLOTS)
 
 
 def _conditions(c: PlannerConstants) -> int:
