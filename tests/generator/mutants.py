@@ -85,7 +85,7 @@ class Mutant:
 
 def mutants(text: str) -> Iterator[Mutant]:
     """Give all that there are of a block with this text (of which only constants matter)."""
-    for path in sorted(block.TEXT.glob("*.st")):
+    for path in sorted(block.TEXT.rglob("*.st")):
         if path.stem not in UNKNOWN:
             for number, line in enumerate(_code(path.read_text("ascii"))):
                 if any(re.search(alike, line) for alike in ALIKE):
