@@ -24,7 +24,7 @@ def quiet():
 
 
 def left(velocity, rope, load):
-    """Sway in m that the hook or the payload is left with at most: two point masses on a rope, little swing."""
+    """Sway in m that hook or payload is left with at most: two point masses on a rope, little swing."""
     ratio = load / M1
     matrix = np.array(
         [[(1.0 + ratio) * G / rope + ratio * G / L2, -ratio * G / L2], [-G / L2, G / L2]]
