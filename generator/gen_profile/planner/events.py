@@ -41,6 +41,7 @@ WORDS = {  # {:g} is the event's value
     62: "the load may sway: after a quick stop or a take-over it is unknown how it swings",
     63: "not ready: no live parameters taken over yet",
     64: "nothing is promised while disabled",
+    65: "the load may sway: what the stated errors leave has added up to more than is allowed",
     70: "the target is reached, at {:g}",
 }
 

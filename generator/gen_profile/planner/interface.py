@@ -18,6 +18,7 @@ LATER = ("bReset", "bLoadAtRest", "fActVelocity", "fFollowingLimit")  # inputs t
 LOST = {  # promises, by nPromise
     1: "a live parameter changed on the way",
     2: "there was a quick stop, or the axis was moved while the block was disabled",
+    5: "what the stated errors leave adds up, from motion to motion, to more than is allowed",
 }
 UNITS = ("m", "rad")
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from gen_profile.planner.interface import BlockAxis
 
 PAUSE = 0.25  # s between two reports
-PROMISES = {0: "no sway", 1: "may sway", 2: "may sway", 3: "not ready", 4: "not ready"}  # by nPromise
+PROMISES = {0: "no sway", 1: "may sway", 2: "may sway", 3: "not ready", 4: "not ready", 5: "may sway"}  # by nPromise
 
 
 class StatusLine:
