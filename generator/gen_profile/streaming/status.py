@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from gen_profile.planner.interface import BlockAxis
 
 PAUSE = 0.25  # s between two reports
-PROMISES = {0: "no sway", 1: "may sway", 2: "may sway", 3: "not ready", 4: "not ready", 5: "may sway"}  # by nPromise
+PROMISES = {0: "no sway", 3: "not ready", 4: "not ready"}  # by nPromise; "may sway" otherwise
 
 
 class StatusLine:
@@ -29,7 +29,7 @@ class StatusLine:
         if cycle < self._reported + self._pause:
             return ""
         self._reported = cycle
-        state = PROMISES[int(issued["nPromise"])]
+        state = PROMISES.get(int(issued["nPromise"]), "may sway")
         if issued["nErrorId"]:
             state = f"error {issued['nErrorId']:.0f}"
         places = in_units((issued[a.of("fPosition")] for a in self._axes), self._axes, "{:.3f}")
