@@ -37,8 +37,9 @@ class CalledBlock:
         Their names, in the order in which the function writes them.
     axes : (axes, 3) sequence of str
         Outputs that are position, velocity and acceleration of an axis.
-    states : (3,) sequence of str
-        Outputs that tell whether it is busy, whether its promise holds, and the number of its error.
+    states : (4,) sequence of str
+        Outputs that tell whether it is busy, whether its promise holds, the number of its error, and whether
+        it guides its axes: without that, nothing is asked of what it issues.
     """
 
     play: int
@@ -60,6 +61,8 @@ class Script:
         Cycle from which each row of inputs holds; the first is 0.
     inputs : (rows, inputs) array
         Of the block, and behind them what else axes follow.
+    actual : (axes,) sequence of int
+        Places of the inputs that say where the axes are, given relative to the setpoints of the cycle before.
     longest : int
         Cycles after the last row within which the axes must stand.
     settle, watch : int
@@ -69,6 +72,7 @@ class Script:
     cycle: float
     begins: Sequence[int]
     inputs: Array
+    actual: Sequence[int]
     longest: int
     settle: int
     watch: int
@@ -159,7 +163,7 @@ class _Block(Structure):
         *((name, c_void_p) for name in ("play", "instance")),
         *((name, c_size_t) for name in ("n_inputs", "n_outputs", "n_axes")),
         ("axes", POINTER(c_size_t)),
-        *((name, c_size_t) for name in ("busy", "promise", "error", "size")),
+        *((name, c_size_t) for name in ("busy", "promise", "error", "enabled", "size")),
     ]
 
 
@@ -169,6 +173,7 @@ class _History(Structure):
         ("n_rows", c_size_t),
         ("begins", POINTER(c_long)),
         ("inputs", POINTER(c_double)),
+        ("actual", POINTER(c_size_t)),
         *((name, c_long) for name in ("longest", "settle", "watch")),
         *((name, c_size_t) for name in ("n_parameters", "n_setpoints", "n_loads")),
         *((f"{name}_references", POINTER(c_uint)) for name in ("parameter", "setpoint", "load")),
@@ -270,7 +275,7 @@ class BlockFollower:
             copies=copies.ctypes.data,
             n_rows=rows,
         )
-        room = np.empty(2 * outputs + loads + len(block.axes))
+        room = np.empty(2 * outputs + loads + len(block.axes) + script.inputs.shape[1])
         self._loop(
             byref(self._fmu),
             byref(_called(block, script)),
@@ -307,6 +312,7 @@ class BlockFollower:
             n_rows=len(begins),
             begins=begins,
             inputs=_doubles(script.inputs),
+            actual=(c_size_t * len(script.actual))(*script.actual),
             longest=script.longest,
             settle=script.settle,
             watch=script.watch,
@@ -340,7 +346,7 @@ _SIMPLE = ("stands", "cycles", "promise", "error", "fault")
 
 def _called(block: CalledBlock, script: Script) -> _Block:
     places = [block.outputs.index(name) for axis in block.axes for name in axis]
-    busy, promise, error = (block.outputs.index(name) for name in block.states)
+    busy, promise, error, enabled = (block.outputs.index(name) for name in block.states)
     return _Block(
         play=block.play,
         instance=ctypes.addressof(block.memory),
@@ -351,6 +357,7 @@ def _called(block: CalledBlock, script: Script) -> _Block:
         busy=busy,
         promise=promise,
         error=error,
+        enabled=enabled,
         size=ctypes.sizeof(block.memory),
     )
 

@@ -13,7 +13,7 @@ from gen_profile.errors import ExportError, SpecError
 COMMON = ("bEnable", "bExecute", "bVelocity", "bStop", "bQuickStop", "rOverride", "fCycleTime")
 OWN = ("fTarget", "fVelocityCommand", "fVelocityLimit", "fActPosition")  # of each axis
 ISSUED = ("fPosition", "fVelocity", "fAcceleration")  # likewise
-STATES = ("bBusy", "bPromise", "nErrorId")
+STATES = ("bBusy", "bPromise", "nErrorId", "bEnabled")
 LATER = ("bReset", "bLoadAtRest", "fActVelocity", "fFollowingLimit")  # inputs that the first blocks had not
 LOST = {  # promises, by nPromise
     1: "a live parameter changed on the way",

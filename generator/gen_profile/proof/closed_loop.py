@@ -196,9 +196,9 @@ class ClosedLoop:
         return float(np.abs(response.sway[1:] - traced[:, len(self.outputs) :]).max())
 
     def _script(self, history: History) -> Script:
-        axes, places = self._histories.axes, history.places
-        stands = {axis.of("fActPosition"): places[number] for number, axis in axes.items()}
-        values = self._block.inputs | {"bEnable": 1.0, **stands}
+        axes = self._histories.axes
+        actual = [axis.of("fActPosition") for axis in axes.values()]
+        values = self._block.inputs | {"bEnable": 1.0, **dict.fromkeys(actual, 0.0)}
         values |= {f"f{name}": value for name, value in history.live.items()}
         begins, inputs = self._hoisted(
             history, *input_rows(history.commands, [*axes.values()], values, self.cycle)
@@ -213,6 +213,7 @@ class ClosedLoop:
             cycle=self.cycle,
             begins=begins,
             inputs=inputs,
+            actual=[list(values).index(name) for name in actual],
             longest=longest,
             settle=settled,
             watch=watched,

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import inf
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.proof.orders import POSITION, Ends, TimedOrder
-
-Flags = NDArray[np.bool_]
+from gen_profile.proof.orders import DISABLED, POSITION, Ends, Flags, TimedOrder, Told
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
 
@@ -34,6 +32,19 @@ IN_VELOCITY = 2e-6  # share of the greatest velocity, by which one counts as rea
 
 
 @attrs.frozen(kw_only=True)
+class Zone:
+    """An interval that is blocked, or slow (`limit` above 0), in m and s, from a cycle to another."""
+
+    axis: int
+    low: float
+    high: float
+    limit: float
+    begin: int
+    end: int
+    number: int = 1
+
+
+@attrs.frozen(kw_only=True)
 class Followed:
     """A history as the block saw it, and what it issued.
 
@@ -44,7 +55,7 @@ class Followed:
     axes : sequence of BlockAxis
     limits : sequence of Ends
         Of the same axes.
-    orders : sequence of TimedOrder
+    told : Told
     issued : mapping of str to (cycles,) array
         By names of the block's outputs.
     reserve : float
@@ -53,6 +64,12 @@ class Followed:
         m, that calming may lead away from a target.
     seen : sequence of int
         Cycles in which the load is seen to hang still.
+    zones : sequence of Zone
+    drifts : (cycles,) array of bool
+        Whether a live parameter is other than at first.
+    steps, speeds : (axes, cycles) array
+        How far axes are from the setpoints of the cycle before, in m, and how fast they go where they are not
+        guided.
     """
 
     cycle: float
@@ -60,11 +77,50 @@ class Followed:
     reaction: float
     axes: Sequence[BlockAxis]
     limits: Sequence[Ends]
-    orders: Sequence[TimedOrder]
+    told: Told
     issued: Mapping[str, Array]
     reserve: float = 0.0
     wander: float = 0.0
     seen: Sequence[int] = ()
+    zones: Sequence[Zone] = ()
+    drifts: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
+    steps: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
+    speeds: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
+
+    @property
+    def enabled(self) -> list[int]:
+        """Cycles in which it is."""
+        return [0, *(order.end for order in self.orders if order.kind == DISABLED)]
+
+    def moved(self, begin: int, end: int) -> float:
+        """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""
+        ways = np.abs(self.steps[:, begin : end + 1].sum(axis=1)).tolist()
+        return max(float(way) / own.velocity for way, own in zip(ways, self.limits, strict=True))
+
+    @property
+    def orders(self) -> Sequence[TimedOrder]:
+        """Of what it is told."""
+        return self.told.orders
+
+    def room(self, axis: int, position: Array, way: Array) -> Array:
+        """Tell how far an axis may go from positions, (cycles,), in the direction of ways, (cycles,)."""
+        ends = sorted(
+            [
+                *self.limits[axis].targets,
+                *(
+                    end
+                    for zone in self.zones
+                    if zone.axis == axis and not zone.limit
+                    for end in (zone.low, zone.high)
+                ),
+            ]
+        )
+        up, down = (
+            np.searchsorted(ends, position + side * EXACT).clip(1, len(ends) - 1) for side in (1.0, -1.0)
+        )
+        bounds = np.array(ends)
+        room: Array = np.where(way > 0.0, bounds[up] - position, position - bounds[down - 1])
+        return room
 
     def of(self, name: str) -> Array:
         """Give an output of all axes, (axes, cycles)."""
@@ -89,6 +145,8 @@ class IssuedMotion:
     position, velocity, acceleration : (axes, cycles) array
     stands : (cycles,) array of bool
         Whether all axes do.
+    guided : (cycles,) array of bool
+        Whether the block is enabled.
     goes : (cycles,) array of bool
         Whether a position is told.
     way : (axes, cycles) array
@@ -101,6 +159,7 @@ class IssuedMotion:
     velocity: Array
     acceleration: Array
     stands: Flags
+    guided: Flags
     goes: Flags
     way: Array
     away: Array
@@ -113,7 +172,10 @@ class IssuedMotion:
         )
         still = (0.0,) * len(followed.axes)
         lengths = [order.end - order.begin for order in followed.orders]
-        goes = np.repeat([order.kind == POSITION for order in followed.orders], lengths)
+        guided, goes = (
+            np.repeat([(order.kind == kind) == is_it for order in followed.orders], lengths)
+            for kind, is_it in ((DISABLED, False), (POSITION, True))
+        )
         told = np.repeat([order.values or still for order in followed.orders], lengths, axis=0).T
         way = told - position * goes
         return cls(
@@ -121,6 +183,7 @@ class IssuedMotion:
             velocity=velocity,
             acceleration=acceleration,
             stands=~((velocity != 0.0) | (acceleration != 0.0)).any(axis=0),
+            guided=guided,
             goes=goes,
             way=way,
             away=np.abs(way).max(axis=0) * goes,
@@ -151,6 +214,21 @@ def never(what: str, flags: Flags, begin: int = 0) -> Iterator[Allowance]:
         yield Allowance(what, begin + int(np.argmax(flags)), 1.0, 0.0)
 
 
+def greatest(what: str, needed: Array, allowed: float, begin: int = 0) -> Iterator[Allowance]:
+    """Measure the greatest of values, (cycles,) or (axes, cycles), from the first of these cycles on."""
+    most = needed if needed.ndim == 1 else needed.max(axis=0)
+    at = int(np.argmax(most))
+    yield Allowance(what, begin + at, float(most[at]), allowed)
+
+
+def runs_of(flags: Flags) -> list[tuple[int, int]]:
+    """Find where flags are set, as pairs of first and behind last."""
+    if not flags.any():
+        return []
+    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
 def slowing(followed: Followed, before: Array, periods: float) -> float:
     """Tell the time in s in which axes stop from some velocities, (axes,)."""
     slowest = max(
@@ -174,8 +252,9 @@ def arriving(followed: Followed, place: Array, before: Array, order: TimedOrder)
     """Tell the time in s in which axes come from places and velocities, (axes,), to an order's targets."""
     periods = (ON_WAY if before.any() else FROM_REST) + calmed(followed)
     share, ways = 1.0 - followed.reserve, map(float, np.abs(place - order.values))
+    slow = min((zone.limit for zone in followed.zones if zone.limit), default=inf)
     slowest = max(
-        FAR * way / (share * top) + (top + abs(v)) / own.acceleration + own.acceleration / own.jerk
+        FAR * way / (share * min(top, slow)) + (top + abs(v)) / own.acceleration + own.acceleration / own.jerk
         for way, v, top, own in zip(ways, map(float, before), order.tops, followed.limits, strict=True)
     )
     return slowest + periods * followed.period

@@ -17,16 +17,17 @@ from gen_profile.proof.followed import (
     TO_STOP,
     TO_TURN,
     Allowance,
-    Flags,
     Followed,
     IssuedMotion,
     arriving,
     calmed,
     reaching,
+    runs_of,
     slowing,
 )
-from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, TimedOrder
-from gen_profile.proof.statements import numbers, promises, stops, truths, velocities
+from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, Flags, TimedOrder
+from gen_profile.proof.places import blocked, slowed, stops, taken_over
+from gen_profile.proof.statements import numbers, promises, truths, velocities
 
 STILL = 1e-6  # m, from a target that an axis need not leave for
 
@@ -42,19 +43,21 @@ WORDS = {
     "loose": "the stated ends of a stop are wider than a stop can be by {over:.3g} m",
     "fast": "a velocity is above override or velocity limit by {over:.3g} m/s",
     "done": "bDone is set away from the target or before the axis stands",
-    "not done": "bDone is not set where the axis stands at its target",
+    "not done": "bDone is set later than the axis stands at its target by {needed:.3g} s",
     "busy": "bBusy is not set while the axis moves",
-    "not busy": "bBusy stays set after a stop",
+    "not busy": "bBusy is reset later than the motion ends by {needed:.3g} s",
     "vanished": "none of bBusy, bDone, bCommandAborted and bError tells of a command",
     "in velocity": "bInVelocity is set without the velocity of the command",
     "not in velocity": "bInVelocity is not set at the velocity of the command",
     "aborted": "bCommandAborted is set though no command was replaced",
     "not aborted": "bCommandAborted is not set though a command was replaced",
     "error": "bError and nErrorId contradict each other",
-    "unanswered": "a command that cannot be obeyed is not answered by bCommandAborted or bError",
-    "refused": "nErrorId does not tell why a command is refused",
-    "untold": "nErrorId tells an error without a cause by {needed:.0f}",
-    "disabled": "bEnabled is not set",
+    "refused": "nErrorId does not tell an error, or not as long as stated",
+    "untold": "nErrorId tells an error without a cause, or another one",
+    "disabled": "bEnabled is not what bEnable asks for",
+    "blocked": "the axis or the stated end of a stop lies within a blocked interval by {needed:.3g} m",
+    "zone": "nZone is not the number of the blocked interval",
+    "taken over": "a setpoint is not where the axis is taken over by {needed:.3g} m",
     QUICK_STOP: "a quick stop ends later than allowed by {over:.3g} s",
     "jump": "a position is not the integral of the velocity in a quick stop by {needed:.3g} m",
     "distance": "fDistanceToGo is wrong by {needed:.3g} m",
@@ -62,7 +65,6 @@ WORDS = {
     "stop distance": "fStopDistance is not the greater distance to the stated ends by {needed:.3g} m",
     "promise": "bPromise and nPromise contradict each other",
     "lost": "nPromise tells a reason that is none",
-    "not given back": "nPromise does not change though the load was seen to hang still",
     "kept": "bPromise is set though it cannot be known",
 }
 
@@ -101,6 +103,9 @@ def measured(followed: Followed, reactions: Mapping[int, int | None]) -> Iterato
         stops,
         numbers,
         promises,
+        blocked,
+        slowed,
+        taken_over,
     ):
         yield from judge(followed, motion)
     yield from _reactions(followed, motion, reactions)
@@ -127,11 +132,11 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                 there = np.ones(end - begin, dtype=bool)
                 for k, w in enumerate(wanted):
                     there &= _near(followed, motion, k, w, own)
-            case "quick-stop":
-                continue
-            case _:
+            case "stop":
                 allowed = slowing(followed, before, TO_STOP)
                 there = motion.stands[own]
+            case _:
+                continue
         latest = begin + followed.after(allowed)
         first = begin + int(np.argmax(there)) if there.any() else end
         if first < end:
@@ -149,11 +154,9 @@ def _near(followed: Followed, motion: IssuedMotion, axis: int, wanted: float, ow
         np.abs(motion.velocity[axis, own] - wanted)
         <= IN_VELOCITY * limits.velocity + followed.reserve * limits.velocity
     )
-    low, high = limits.targets
     if not wanted or reached[-1]:
         return reached
-    room = high - motion.position[axis, own] if wanted > 0.0 else motion.position[axis, own] - low
-    speed = abs(wanted)
+    room, speed = followed.room(axis, motion.position[axis, own], np.array(wanted)), abs(wanted)
     return reached | (
         room
         <= speed
@@ -165,35 +168,26 @@ def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]
     """Judge that axes go never the wrong way, nor at rest, for longer than it takes to turn round."""
     against, wants = np.zeros((2, followed.cycles), dtype=bool)
     near = max(STILL, followed.wander)
-    for velocity, position, way, limits in zip(
-        motion.velocity, motion.position, motion.way, followed.limits, strict=True
+    for k, (velocity, position, way, limits) in enumerate(
+        zip(motion.velocity, motion.position, motion.way, followed.limits, strict=True)
     ):
         slack = (EXACT + 1.5 * followed.reserve) * limits.velocity
-        low, high = limits.targets
-        room = np.where(way > 0.0, high - position, position - low)
+        room = followed.room(k, position, way)
         there = np.where(
             motion.goes, np.abs(way) > near, room * (way != 0.0) > 0.1 * followed.period * np.abs(way)
         )
         against |= (velocity * np.sign(way) < -slack) & (there | ~motion.goes)
         wants |= there
     for order in followed.orders:
-        if not min(order.tops) > 0.0:
+        if order.kind == DISABLED or not min(order.tops) > 0.0:
             against[order.begin : order.end] = wants[order.begin : order.end] = False
-    for begin, end in _runs(against):
+    for begin, end in runs_of(against):
         allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_TURN)
         yield Allowance("against", begin, (end - begin) * followed.cycle, allowed)
-    for begin, end in _runs(wants & motion.stands):
-        ready = ENABLED if begin < followed.after(ENABLED) else 0.0
+    for begin, end in runs_of(wants & motion.stands):
+        ready = ENABLED if any(0 <= begin - at < followed.after(ENABLED) for at in followed.enabled) else 0.0
         allowed = followed.reaction + ready + calmed(followed) * followed.period
         yield Allowance("idle", begin, (end - begin) * followed.cycle, allowed)
-
-
-def _runs(flags: Flags) -> list[tuple[int, int]]:
-    """Find where flags are set, as pairs of first and behind last."""
-    if not flags.any():
-        return []
-    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def _velocity_limits(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
@@ -206,7 +200,7 @@ def _velocity_limits(followed: Followed, motion: IssuedMotion) -> Iterator[Allow
             latest = order.begin + followed.after(takes)
         before = order.tops
         begin = max(order.begin, latest)
-        if begin >= order.end or order.kind in (STOP, QUICK_STOP):
+        if begin >= order.end or order.kind not in (POSITION, VELOCITY):
             continue
         for k, (top, own) in enumerate(zip(order.tops, followed.limits, strict=True)):
             if top < own.velocity:

@@ -1,19 +1,31 @@
-"""What a planner block is told, from its inputs alone: which command holds from which cycle to which."""
+"""What a planner block is told, from its inputs: which command holds from which cycle to which.
+
+Beside its inputs, what a command means depends on what the block did: one that is done ends with bExecute,
+and none is taken while a quick stop lasts. Before a run nothing is known of that.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 
 import attrs
+import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
 
-POSITION, VELOCITY, STOP, QUICK_STOP = "position", "velocity", "stop", "quick-stop"
-FOLLOWING = 7  # error
-FOLLOWED = ("fFollowingLimit", "fActPosition")
-ROOM = 100.0  # m (or rad) beyond the targets, where no setpoint is
+POSITION, VELOCITY, STOP = "position", "velocity", "stop"
+QUICK_STOP, DISABLED = "quick-stop", "disabled"
+MISTIMED, LIVE, REFUSED, NO_NUMBER, LIMITS, CONTRADICTORY, FOLLOWING, BLOCKED = range(1, 9)  # errors
+OF_COMMANDS = (REFUSED, CONTRADICTORY, BLOCKED)  # which go with them
+REPLACED, ABORTED_POSITION, ABORTED_VELOCITY = 3, 1, 2  # why bCommandAborted is set
+ZONES = 8  # intervals of each kind
+NUMBERS = 1e9  # m (or rad), up to which an axis may be somewhere
+
+Flags = NDArray[np.bool_]
+Interval = tuple[float, float]
 
 
 @attrs.frozen(kw_only=True)
@@ -30,10 +42,6 @@ class TimedOrder:
         Of each axis the target or the velocity; none of a stop.
     tops : tuple of float
         Of each axis the greatest velocity, by limit, override and velocity limit; 0 holds.
-    refused : int
-        Error for which it is a stop.
-    denied : bool
-        Whether it begins with a rising edge of bExecute that cannot be obeyed.
     edge : int
         Cycle in which the command came; before `begin` where but the velocity limits have changed since.
     """
@@ -44,8 +52,6 @@ class TimedOrder:
     values: tuple[float, ...]
     tops: tuple[float, ...]
     edge: int
-    refused: int = 0
-    denied: bool = False
 
 
 @attrs.frozen(kw_only=True)
@@ -55,8 +61,9 @@ class Ends:
     velocity: float
     acceleration: float
     jerk: float
-    targets: tuple[float, float]
+    targets: Interval
     quick: tuple[float, float] = (inf, inf)
+    margin: float = 0.0
 
 
 @attrs.frozen(kw_only=True)
@@ -80,12 +87,50 @@ class Inputs:
     names: Sequence[str]
     axes: Sequence[BlockAxis]
     limits: Sequence[Ends]
-    live: Mapping[str, tuple[float, float]] = attrs.field(factory=dict)
-    held: int = 0
-    cycle: float = inf
+    live: Mapping[str, Interval]
+    held: int
+    cycle: float
 
 
-def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tuple[TimedOrder, ...]:
+@attrs.frozen(kw_only=True)
+class Facts:
+    """What a block issued, as far as commands depend on it.
+
+    Attributes
+    ----------
+    done, stands : (cycles,) array of bool
+    errors : (cycles,) array
+    low, high : (axes, cycles) array
+        Where a stop would lead.
+    """
+
+    done: Flags
+    stands: Flags
+    errors: Array
+    low: Array
+    high: Array
+
+
+@attrs.frozen(kw_only=True)
+class Told:
+    """What a block is told, and what it must say of that.
+
+    Attributes
+    ----------
+    orders : tuple of TimedOrder
+    aborted : (cycles,) array of bool
+    error : (cycles,) array of int
+    holds : (cycles,) array of bool
+        Whether a command does.
+    """
+
+    orders: tuple[TimedOrder, ...]
+    aborted: Flags
+    error: NDArray[np.int64]
+    holds: Flags
+
+
+def told(begins: Sequence[int], rows: Array, inputs: Inputs, last: int, facts: Facts | None = None) -> Told:
     """Read rows of inputs as the block's header tells.
 
     Parameters
@@ -96,108 +141,199 @@ def orders(begins: Sequence[int], rows: Array, inputs: Inputs, last: int) -> tup
     inputs : Inputs
     last : int
         Cycle after the last one.
+    facts : Facts, optional
+        Of the run that these inputs led to.
     """
-    found = list[TimedOrder]()
-    for order in sorted(_changes(begins, rows, inputs), key=lambda order: order.begin):
-        if found and found[-1].begin == order.begin:
-            found.pop()
+    reader, found, seen = _Reader(inputs, facts), list[TimedOrder](), list[tuple[int, bool, int, bool]]()
+    places, row, values = [*begins, last], 0, rows.tolist()
+    pending = sorted({*begins, *(_events(begins, facts) if facts else ())}, reverse=True)
+    while pending and (cycle := pending.pop()) < last:
+        while places[row + 1] <= cycle:
+            row += 1
+        order = reader.step(cycle, dict(zip(inputs.names, values[row], strict=False)))
+        if reader.due is not None and cycle < reader.due < (pending[-1] if pending else last):
+            pending.append(reader.due)
+        seen.append((cycle, reader.aborted > 0, reader.error, reader.command in (POSITION, VELOCITY)))
         if not found or not _same(order, found[-1]):
             found.append(order)
     ends = [*(order.begin for order in found[1:]), last]
-    return tuple(attrs.evolve(order, end=end) for order, end in zip(found, ends, strict=True))
+    cycles, *flags = zip(*seen, strict=True)
+    lengths = np.diff([*cycles, last])
+    aborted, error, holds = (np.repeat(flag, lengths) for flag in flags)
+    orders = tuple(attrs.evolve(order, end=end) for order, end in zip(found, ends, strict=True))
+    return Told(orders=orders, aborted=aborted, error=error, holds=holds)
+
+
+def _events(begins: Sequence[int], facts: Facts) -> list[int]:
+    """Cycles in which something may change though no input does."""
+    changes = np.flatnonzero(
+        np.diff(facts.done, prepend=False) | np.diff(facts.errors == BLOCKED, prepend=False)
+    )
+    return [begin + 1 for begin in begins] + [at + k for at in changes.tolist() for k in (0, 1)]
 
 
 def _same(order: TimedOrder, before: TimedOrder) -> bool:
     """Whether nothing new is told; stops know no velocity limit."""
-    again = (order.kind, order.values, order.refused) == (before.kind, before.values, before.refused)
-    return again and not order.denied and (order.kind in (STOP, QUICK_STOP) or order.tops == before.tops)
+    again = (order.kind, order.values, order.edge) == (before.kind, before.values, before.edge)
+    return again and (order.kind not in (POSITION, VELOCITY) or order.tops == before.tops)
 
 
-def _changes(begins: Sequence[int], rows: Array, inputs: Inputs) -> Iterator[TimedOrder]:
-    """Give an order for every row, and one where wrong values have lasted too long."""
-    place = {name: number for number, name in enumerate(inputs.names)}
+class _Reader:
+    """Reads inputs cycle by cycle, those left out in which nothing changes."""
 
-    def of(name: str) -> list[int]:
-        return [place[axis.of(name)] for axis in inputs.axes]
+    def __init__(self, inputs: Inputs, facts: Facts | None) -> None:
+        self._inputs, self._facts = inputs, facts
+        self.aborted, self.error, self.command = 0, 0, STOP
+        self.due: int | None = None  # the cycle in which wrong values begin to count
+        self._latched = self._execute = self._velocity = self._braking = False
+        self._neutral, self._enabled, self._edge, self._since = False, False, 0, -1
+        self._goal, self._kind = tuple[float, ...](), STOP
+        self._tops = tuple(own.velocity for own in inputs.limits)
 
-    targets, sticks, slow = of("fTarget"), of("fVelocityCommand"), of("fVelocityLimit")
-    reset = place.get("bReset")
-    kind, values, execute, edge, since, latched = STOP, tuple[float, ...](), False, 0, -1, 0
-    neutral = True  # the stick, since an error stopped the axis
-    full = tops = tuple(own.velocity for own in inputs.limits)
-    for begin, end, row in zip(begins, [*begins[1:], begins[-1]], rows.tolist(), strict=True):
-        given, wrong = [row[number] for number in slow], _wrong(row, place, slow, inputs.live)
-        since = -1 if not wrong else begin if since < 0 else since
-        if reset is None or row[reset]:
-            latched = 0
-        if _strays(row, place, inputs):
-            latched = FOLLOWING
-        if not wrong:
-            tops = tuple(
-                min(row[place["rOverride"]] * most, limit or most)
-                for most, limit in zip(full, given, strict=True)
-            )
-        at_rest = not row[place["bVelocity"]] or not any(row[number] for number in sticks)
-        was, rises = (kind, values), bool(row[place["bExecute"]]) and not execute
-        execute, refused = bool(row[place["bExecute"]]), latched or _mistimed(row, place, inputs)
-        neutral = not refused and (neutral or at_rest)
-        denied = rises and bool(refused or row[place["bStop"]] or row[place["bQuickStop"]])
-        if row[place["bQuickStop"]] or latched == FOLLOWING:
-            kind, values = QUICK_STOP, ()
-        elif refused or row[place["bStop"]] or not row[place["bEnable"]]:
-            kind, values = STOP, ()
-        elif row[place["bVelocity"]] and neutral:
-            kind, values = VELOCITY, tuple(row[number] for number in sticks)
-        elif rises:
-            kind, values = POSITION, tuple(row[number] for number in targets)
-            within = zip(values, (own.targets for own in inputs.limits), strict=True)
-            if not all(low <= value <= high for value, (low, high) in within):
-                kind, values, refused = STOP, (), 3
-        elif kind in (VELOCITY, QUICK_STOP):
-            kind, values = STOP, ()
-        if was != (kind, values):
-            edge = begin
-        yield TimedOrder(
-            begin=begin,
-            end=begin,
-            kind=kind,
-            values=values,
-            tops=tops,
-            edge=edge,
-            refused=refused,
-            denied=denied,
+    def step(self, cycle: int, row: Mapping[str, float]) -> TimedOrder:
+        before, goal = self._kind, self._goal
+        self._kind = self._read(cycle, row)
+        if self._kind not in (POSITION, VELOCITY):
+            self._goal = ()
+        if (before, goal) != (self._kind, self._goal):
+            self._edge = cycle
+        self._execute, self._velocity = bool(row["bExecute"]), bool(row["bVelocity"])
+        return TimedOrder(
+            begin=cycle,
+            end=cycle,
+            kind=self._kind,
+            values=self._goal,
+            tops=self._tops,
+            edge=self._edge,
         )
-        if wrong and not latched and end > since + inputs.held:
-            kind, values, latched, edge, neutral = STOP, (), wrong, since + inputs.held, False
-            yield TimedOrder(
-                begin=edge, end=edge, kind=kind, values=values, tops=tops, edge=edge, refused=wrong
+
+    def _of(self, row: Mapping[str, float], name: str) -> tuple[float, ...]:
+        return tuple(row[axis.of(name)] for axis in self._inputs.axes)
+
+    def _read(self, cycle: int, row: Mapping[str, float]) -> str:
+        facts = self._facts
+        done = bool(facts is not None and cycle and facts.done[cycle - 1])
+        self._braking = self._braking and not (facts is None or facts.stands[cycle - 1])
+        if done and not row["bExecute"]:
+            self.command = STOP
+        if not (row["bExecute"] if self.aborted == 1 else self.aborted == 2 and row["bVelocity"]):
+            self.aborted = 0
+        if not row["bEnable"]:
+            self._abort(done)
+            self.error, self._latched, self._enabled, self._neutral = 0, False, False, False
+            return DISABLED
+        if not self._enabled:
+            self._enabled = True
+            self._braking = any(self._of(row, "fActVelocity")) if "fActVelocity" in row else False
+        fault = self._fault(cycle, row)
+        self._neutral = self._neutral or not row["bVelocity"]
+        rises = bool(row["bExecute"]) and not self._execute
+        if row["bStop"] or row["bQuickStop"] or self._latched or fault or self._braking:
+            self._abort(done)
+            if rises:
+                self.aborted = ABORTED_POSITION
+            self._neutral = not row["bVelocity"]
+        elif row["bVelocity"]:
+            self._take_stick(row, rises, done)
+        elif rises:
+            self._take_target(row, done, cycle)
+        elif self.command == VELOCITY:
+            self.command = STOP
+        quick = row["bQuickStop"] or fault == FOLLOWING
+        if quick and not (facts is None or (cycle and facts.stands[cycle - 1])):
+            self._braking = True
+        return QUICK_STOP if quick or self.error == FOLLOWING else self.command
+
+    def _abort(self, done: bool) -> None:
+        if self.command != STOP and not done:
+            self.aborted = ABORTED_POSITION if self.command == POSITION else ABORTED_VELOCITY
+        self.command = STOP
+
+    def _fault(self, cycle: int, row: Mapping[str, float]) -> int:
+        """Take limits and errors; give the fault of this cycle."""
+        given = self._of(row, "fVelocityLimit")
+        good = 0.0 <= row["rOverride"] <= 1.0 and all(limit >= 0.0 for limit in given)
+        if good:
+            self._tops = tuple(
+                min(row["rOverride"] * own.velocity, limit or own.velocity)
+                for own, limit in zip(self._inputs.limits, given, strict=True)
             )
+        live = all(low <= row[f"f{name}"] <= high for name, (low, high) in self._inputs.live.items())
+        self._since = -1 if good and live else cycle if self._since < 0 else self._since
+        self.due = None if self._since < 0 else self._since + self._inputs.held
+        lasts = self.due is not None and cycle >= self.due
+        if row.get("bReset"):
+            self.error, self._latched = 0, False
+        cycle_time = self._inputs.cycle
+        fault = MISTIMED * (not abs(row["fCycleTime"] - cycle_time) <= 1e-6 * cycle_time)
+        if lasts:
+            fault = LIVE if good else LIMITS
+        if self._facts is not None and self._facts.errors[cycle] == BLOCKED and self._is_in_the_way(row):
+            fault = BLOCKED
+        if self._strays(row):
+            fault = FOLLOWING
+        if fault:
+            self._latched |= fault == FOLLOWING or (fault > MISTIMED and self.command != STOP)
+            self.error = fault
+        elif not self._latched and not (self.error in OF_COMMANDS and (row["bExecute"] or row["bVelocity"])):
+            self.error = 0
+        return fault
 
+    def _strays(self, row: Mapping[str, float]) -> bool:
+        """Whether an axis is farther from its setpoint than its limit allows."""
+        if self._inputs.axes[0].of("fFollowingLimit") not in row:
+            return False
+        pairs = zip(self._of(row, "fFollowingLimit"), self._of(row, "fActPosition"), strict=True)
+        return any(limit > 0.0 and not abs(apart) <= limit for limit, apart in pairs)
 
-def _strays(row: Sequence[float], place: Mapping[str, int], inputs: Inputs) -> bool:
-    """Whether an axis is farther from wherever its setpoint may be than its limit allows."""
-    for axis, own in zip(inputs.axes, inputs.limits, strict=True):
-        most, now = (row[place[name]] if (name := axis.of(of)) in place else 0.0 for of in FOLLOWED)
-        low, high = own.targets
-        if most > 0.0 and not low - most - ROOM <= now <= high + most + ROOM:
-            return True
-    return False
+    def _take_stick(self, row: Mapping[str, float], rises: bool, done: bool) -> None:
+        speeds = self._of(row, "fVelocityCommand")
+        if self.error == REFUSED or not self._velocity:
+            self.error = 0
+        if not all(abs(speed) <= NUMBERS for speed in speeds):
+            self.error = REFUSED
+        if rises:
+            self.error = CONTRADICTORY
+        self._neutral = (self._neutral or not any(speeds)) and not self.error
+        if self.command == POSITION or not self._neutral:
+            self._abort(done)
+        self.command, self._goal = (VELOCITY, speeds) if self._neutral else (STOP, ())
 
+    def _take_target(self, row: Mapping[str, float], done: bool, cycle: int) -> None:
+        targets = self._of(row, "fTarget")
+        within = zip(targets, (own.targets for own in self._inputs.limits), strict=True)
+        self.error = 0 if all(low <= target <= high for target, (low, high) in within) else REFUSED
+        if any(self._is_closed(k, target, row, cycle) for k, target in enumerate(targets)):
+            self.error = BLOCKED
+        self.aborted = ABORTED_POSITION if self.error else 0
+        if self.error:
+            self.command = STOP
+        elif self.command != POSITION or targets != self._goal:
+            if self.command == POSITION and not done:
+                self.aborted = REPLACED
+            self.command, self._goal = POSITION, targets
 
-def _mistimed(row: Sequence[float], place: Mapping[str, int], inputs: Inputs) -> int:
-    """Give the error of a task that has another cycle time; 0 for none."""
-    cycle = row[place["fCycleTime"]] if "fCycleTime" in place else inputs.cycle
-    return int(inputs.cycle < inf and not abs(cycle - inputs.cycle) <= 1e-6 * inputs.cycle)
+    def _closed(self, row: Mapping[str, float], axis: int) -> list[Interval]:
+        """Blocked intervals of an axis."""
+        of = self._inputs.axes[axis].of
+        if f"{of('aBlockedLow')}[0]" not in row:
+            return []
+        ends = [(row[f"{of('aBlockedLow')}[{k}]"], row[f"{of('aBlockedHigh')}[{k}]"]) for k in range(ZONES)]
+        return [(low, high) for low, high in ends if low < high]
 
+    def _is_closed(self, axis: int, target: float, row: Mapping[str, float], cycle: int) -> bool:
+        """Whether a target lies within or behind a blocked interval."""
+        margin, facts = self._inputs.limits[axis].margin, self._facts
+        for low, high in self._closed(row, axis):
+            beyond, before = target > low - margin, target < high + margin
+            if beyond and before:
+                return True
+            if facts is not None and (
+                (beyond and facts.high[axis, cycle - 1] <= low)
+                or (before and facts.low[axis, cycle - 1] >= high)
+            ):
+                return True
+        return False
 
-def _wrong(
-    row: Sequence[float],
-    place: Mapping[str, int],
-    slow: Sequence[int],
-    live: Mapping[str, tuple[float, float]],
-) -> int:
-    """Give the error of values that cannot be, if they last; 0 for none."""
-    if not all(low <= row[place[f"f{name}"]] <= high for name, (low, high) in live.items()):
-        return 2
-    good = 0.0 <= row[place["rOverride"]] <= 1.0 and all(row[number] >= 0.0 for number in slow)
-    return 0 if good else 5
+    def _is_in_the_way(self, row: Mapping[str, float]) -> bool:
+        return any(self._closed(row, axis) for axis in range(len(self._inputs.axes)))

@@ -10,67 +10,48 @@ from gen_profile.proof.followed import (
     ENABLED,
     EXACT,
     IN_VELOCITY,
-    TO_STOP,
     Allowance,
     Followed,
     IssuedMotion,
+    greatest,
     never,
-    slowing,
+    runs_of,
 )
-from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, TimedOrder
+from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, VELOCITY, Flags, TimedOrder
 
 BARELY = 5e-7  # share of the greatest velocity, within which one certainly is reached
+FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
+NOTICED = 0.2  # periods, in which the end of a motion is
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 
 
 def truths(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
-    """Judge the outputs that are truth values."""
+    """Judge the outputs that are truth values, and the number of the error."""
     done, busy, aborted, error, enabled = (
         followed.issued[name] != 0.0 for name in ("bDone", "bBusy", "bCommandAborted", "bError", "bEnabled")
     )
-    yield from never("busy", ~(motion.stands | busy))
-    yield from never("error", error != (followed.issued["nErrorId"] != 0.0))
-    yield from never("disabled", ~enabled)
-    yield from never("done", done & (busy | ~motion.stands | (motion.away > EXACT)))
-    rises = done.copy()
-    rises[1:] &= ~done[:-1]
-    yield from never("done", rises & ~motion.goes)  # it may last after the command, but not begin
-    told = done | busy | aborted | error
-    quiet, there = motion.goes & ~told, motion.goes & motion.stands & (motion.away <= EXACT)
-    may_be, wrong = np.zeros((2, followed.cycles), dtype=bool)
-    before, stands, over = None, False, False  # whether a refusal still counts; whether the command has ended
-    for order in followed.orders:
-        own = slice(order.begin, order.end)
-        stands = bool(order.refused) or (stands and order.kind == STOP)  # until the next command
-        wrong[own] = stands
-        if order.refused:
-            shown = followed.issued["nErrorId"][order.begin : order.end][:2]  # in that cycle or the next
-            yield Allowance("refused", order.begin, float((shown != order.refused).all()), 0.0)
-        if order.denied:
-            shown = aborted[order.begin] or error[order.begin]
-            yield Allowance("unanswered", order.begin, float(not shown), 0.0)
-            may_be[order.begin :] = True
-        if before and before.kind in (POSITION, VELOCITY):
-            may_be[order.begin :] = True
-            if before.kind == POSITION and order.edge == order.begin and not over:
-                yield Allowance("not aborted", order.begin, float(not aborted[order.begin]), 0.0)
-        over, ended = over and order.edge < order.begin, (done | error)[own]
-        if order.kind == POSITION and not over and quiet[own].any():
-            until = int(np.argmax(ended)) if ended.any() else len(ended)
-            yield from never("vanished", quiet[own][:until], order.begin)
-        arrives = order.kind == POSITION and there[order.begin + 1 : order.end].any()
-        if arrives and not (over or followed.reserve or done[own].any()):
-            yield Allowance("not done", order.begin, 1.0, 0.0)
-        over = over or bool(ended.any())
-        if order.kind == STOP and not followed.reserve:
-            latest = order.begin + followed.after(slowing(followed, motion.velocity[:, order.begin], TO_STOP))
-            if latest < order.end:
-                yield from never(
-                    "not busy", busy[latest : order.end] & motion.stands[latest : order.end], latest
-                )
-        before = order
-    yield from never("untold", error & ~wrong)
-    yield from never("aborted", aborted & ~may_be & ~error)
+    told, number = followed.told, followed.issued["nErrorId"]
+    there = told.holds & motion.goes & motion.stands & (motion.away <= EXACT)
+    yield from never("disabled", enabled != motion.guided)
+    yield from never("error", error != (number != 0.0))
+    yield from never("untold", (number != told.error) & (number != 0.0))
+    yield from never("refused", (number != told.error) & (number == 0.0))
+    yield from never("aborted", aborted & ~told.aborted)
+    yield from never("not aborted", told.aborted & ~aborted)
+    yield from never("busy", motion.guided & ~(motion.stands | busy))
+    yield from never("done", done & (busy | ~there))
+    yield from never("vanished", told.holds & motion.goes & ~busy & ~done)
+    if not followed.reserve:  # calming goes on as long as it must
+        yield from _lasting(followed, "not done", there & ~done)
+        yield from _lasting(followed, "not busy", busy & motion.stands & ~(told.holds & motion.goes))
+
+
+def _lasting(followed: Followed, what: str, flags: Flags) -> Iterator[Allowance]:
+    """Measure what must not last after a motion has ended."""
+    for begin, end in runs_of(flags):
+        yield Allowance(
+            what, begin, (end - begin) * followed.cycle, NOTICED * followed.period + 2.0 * followed.cycle
+        )
 
 
 def velocities(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
@@ -86,47 +67,10 @@ def velocities(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     yield from never("in velocity", shown & ~(sticks & (apart <= IN_VELOCITY)))
 
 
-def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
-    """Judge stops by the ends that were stated when they came."""
-    stated = f"fStopLow{followed.axes[0].suffix}" in followed.issued
-    if stated:
-        ends = np.maximum(
-            followed.of("fStopHigh") - motion.position, motion.position - followed.of("fStopLow")
-        )
-        apart = np.abs(followed.of("fStopDistance") - ends).max(axis=0)
-        yield Allowance("stop distance", int(np.argmax(apart)), float(apart.max()), EXACT)
-    targets = list[tuple[float, ...]]()
-    for order in followed.orders:
-        if order.kind == POSITION:
-            targets.append(order.values)
-        if order.kind != STOP:
-            continue
-        known = np.abs(
-            np.array([*targets, motion.position[:, order.begin]]) - motion.position[:, order.begin]
-        ).max(axis=0)
-        begin, own = order.begin, slice(order.begin, order.end)
-        takes = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
-        for k, axis in enumerate(followed.axes):
-            place = motion.position[k, own]
-            if stated:
-                low, high = (
-                    float(followed.issued[axis.of(name)][begin]) for name in ("fStopLow", "fStopHigh")
-                )
-            else:
-                distance = float(followed.issued[axis.of("fStopDistance")][begin])
-                low, high = place[0] - distance, place[0] + distance
-            yield Allowance("ends", begin, max(low - place.min(), place.max() - high), EXACT)
-            leads = (
-                known[k] + followed.limits[k].velocity * takes
-            )  # a stop that is not planned yet may end there
-            yield Allowance("loose", begin, max(place[0] - low, high - place[0]), leads)
-
-
 def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge the outputs that are distances and times."""
-    wrong = np.abs(followed.of("fDistanceToGo") - motion.way).max(axis=0) * motion.goes
-    at = int(np.argmax(wrong))
-    yield Allowance("distance", at, float(wrong[at]), max(EXACT, followed.wander))
+    wrong = followed.of("fDistanceToGo") - motion.way * (motion.goes & followed.told.holds)
+    yield from greatest("distance", np.abs(wrong), max(EXACT, followed.wander))
     if followed.reserve:
         return  # calming goes on as long as it must
     time, slot = followed.issued["fTimeToGo"], 0.1 * followed.period + 2.0 * followed.cycle
@@ -160,15 +104,34 @@ def promises(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge the promise, and why it is dropped."""
     promise, why = followed.issued["bPromise"] != 0.0, followed.issued["nPromise"]
     yield from never("promise", promise != (why == 0.0))
-    ready = followed.after(ENABLED + followed.reaction)
-    yield from never("lost", why[ready:] > 2.0, ready)
-    yield from never("lost", why == 1.0)  # live parameters keep their stated rates, but for spikes
-    braked = [order.begin for order in followed.orders if order.kind == QUICK_STOP]
-    yield from never("lost", why[: min(braked, default=followed.cycles)] == 2.0)
-    seen = [at for at in followed.seen if motion.stands[at] and not followed.issued["bBusy"][at - 1]]
-    for begin in braked:
-        if not motion.stands[max(0, begin - 1)]:
-            end = next((at for at in seen if at >= begin), followed.cycles)
-            yield from never("kept", promise[begin:end], begin)
-    for at in seen:
-        yield Allowance("not given back", at, float(why[at] == 2.0), 0.0)
+    yield from never("lost", (why == 4.0) != ~motion.guided)
+    ready, after = np.ones(followed.cycles, dtype=bool), followed.after(ENABLED + followed.reaction)
+    for begin in followed.enabled:
+        ready[begin : begin + after] = False
+    yield from never("lost", (why == 3.0) & ready)
+    may_be, must_be = _unknown(followed, motion)
+    yield from never("lost", (why == 2.0) & ~may_be)
+    yield from never("kept", promise & must_be)
+    drifted = np.cumsum(followed.drifts) > 0
+    yield from never("lost", (why == 1.0) & ~drifted)
+
+
+def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
+    """Tell when it may, and when it must be unknown how the load swings."""
+    may_be, must_be = np.zeros((2, followed.cycles), dtype=bool)
+    for order in followed.orders:
+        moving, at = not motion.stands[max(0, order.begin - 1)], order.begin
+        if order.kind == DISABLED:
+            at = order.end
+            moving |= bool(motion.velocity[:, at - 1 : at].any())
+            moved = followed.moved(order.begin, at) > 0.0
+            may_be[at:] |= moving or moved
+            must_be[at:] |= (moving or followed.moved(order.begin, at) > FAR_MOVED) and not followed.reserve
+        elif order.kind == QUICK_STOP and moving:
+            may_be[at:] = must_be[at:] = True
+        later = [at for at in followed.seen if order.begin <= at < order.end and motion.guided[at]]
+        for at in later:
+            if motion.stands[at]:
+                must_be[at:] = False
+                may_be[at:] &= followed.issued["bBusy"][at - 1] != 0.0
+    return may_be, must_be

@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from ctypes import CFUNCTYPE, POINTER, c_double, c_int, c_long, c_void_p
+from itertools import product
 from typing import Any
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_profile.motion.profile import Array
-from gen_profile.planner.design import quick_limits, target_range
+from gen_profile.planner.design import STEADY, quick_limits, target_range
 from gen_profile.planner.execution import BlockInstance
-from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed
+from gen_profile.proof.followed import LEAST_REACTION, REACTION, Followed, Zone, runs_of
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import faults
-from gen_profile.proof.orders import QUICK_STOP, Ends, Inputs, TimedOrder, orders
+from gen_profile.proof.orders import (
+    DISABLED,
+    QUICK_STOP,
+    ZONES,
+    Ends,
+    Facts,
+    Flags,
+    Inputs,
+    TimedOrder,
+    told,
+)
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.block import RESERVE
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
@@ -42,7 +54,7 @@ class BlockWatch:
         Likewise.
     cycle : float
         s.
-    told : Inputs
+    known : Inputs
     reaction : float
         s, within which a new command must be obeyed.
     """
@@ -51,7 +63,7 @@ class BlockWatch:
     inputs: Sequence[str]
     outputs: Sequence[str]
     cycle: float
-    told: Inputs
+    known: Inputs
     reaction: float
 
     @classmethod
@@ -64,7 +76,7 @@ class BlockWatch:
             inputs=list(block.inputs),
             outputs=block.outputs,
             cycle=block.inputs["fCycleTime"],
-            told=Inputs(
+            known=Inputs(
                 names=list(block.inputs),
                 axes=[*histories.axes.values()],
                 limits=tuple(_ends(histories.spec, number) for number in histories.axes),
@@ -84,13 +96,13 @@ class BlockWatch:
         """Read what a script tells the block."""
         begins, rows = self._changes(script)
         last = script.begins[-1] + script.longest + script.settle + script.watch
-        return orders(begins, rows, self.told, last)
+        return told(begins, rows, self.known, last).orders
 
     def _changes(self, script: Script) -> tuple[list[int], Array]:
         """Leave out rows in which but live parameters change, within their ranges."""
         begins, rows = np.asarray(script.begins), script.inputs[:, : len(self.inputs)]
         kept = rows.copy()
-        for name, (low, high) in self.told.live.items():
+        for name, (low, high) in self.known.live.items():
             live = kept[:, self.inputs.index(f"f{name}")]
             live[(live >= low) & (live <= high)] = low
         changed = np.flatnonzero(np.concatenate([[True], (kept[1:] != kept[:-1]).any(axis=1)]))
@@ -102,11 +114,13 @@ class BlockWatch:
         return [
             one.begin
             for one in told
-            if 0 < one.begin == one.edge and one.end - one.begin > least and one.kind != QUICK_STOP
+            if 0 < one.begin == one.edge
+            and one.end - one.begin > least
+            and one.kind not in (QUICK_STOP, DISABLED)
         ]
 
     def faults(
-        self, period: float, script: Script, told: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
+        self, period: float, script: Script, expected: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
     ) -> tuple[str, ...]:
         """Say what is wrong, each in words that end a sentence.
 
@@ -116,35 +130,43 @@ class BlockWatch:
             s, of the slowest swing that the block is told of.
         script : Script
             Of a history.
-        told : sequence of TimedOrder
-            Of that script.
+        expected : sequence of TimedOrder
+            Of that script, as its inputs alone tell.
         block : CalledBlock
         run : BlockRun
             With its trace, and copies of the block before `marks`.
         """
-        return tuple(faults(*self.followed(period, script, told, block, run)))
+        return tuple(faults(*self.followed(period, script, expected, block, run)))
 
     def followed(
-        self, period: float, script: Script, told: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
+        self, period: float, script: Script, expected: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
     ) -> tuple[Followed, dict[int, int | None]]:
         """Give what is to be judged."""
         assert run.trace is not None
         reserve = RESERVE if self.spec.planner.live_rate else 0.0
+        issued = dict(zip(self.outputs, run.trace.T, strict=False))
+        begins, rows = self._changes(script)
+        now = np.searchsorted(script.begins, np.arange(run.cycles), side="right") - 1
+        given = dict(zip(self.inputs, script.inputs.T, strict=False))
+        steps, speeds = (
+            np.stack([given.get(axis.of(name), np.zeros(len(rows)))[now] for axis in self.known.axes])
+            for name in ("fActPosition", "fActVelocity")
+        )
         followed = Followed(
             cycle=self.cycle,
             period=period,
             reaction=self.reaction,
-            axes=[*self.histories.axes.values()],
-            limits=self.told.limits,
-            orders=[
-                order if order.end <= run.cycles else attrs.evolve(order, end=run.cycles)
-                for order in told
-                if order.begin < run.cycles
-            ],
-            issued=dict(zip(self.outputs, run.trace.T, strict=False)),
+            axes=self.known.axes,
+            limits=self.known.limits,
+            told=told(begins, rows, self.known, run.cycles, self._facts(issued)),
+            issued=issued,
             reserve=reserve,
             wander=WANDER * max(self.spec.check.residual_sway.values()) if reserve else 0.0,
             seen=self._seen(script, run.cycles),
+            zones=list(self._zones(begins, rows, run.cycles)),
+            drifts=self._drifts(script, now),
+            steps=steps,
+            speeds=speeds,
         )
         if run.copies is None:
             return followed, {}
@@ -152,10 +174,58 @@ class BlockWatch:
         places = [self.outputs.index(name) for axis in block.axes for name in axis]
         reactions = {
             mark: self._first_difference(script, (mark, ends[mark]), block, memory, run.trace[:, places])
-            for mark, memory in zip(self.marks(told), run.copies, strict=True)
+            for mark, memory in zip(self.marks(expected), run.copies, strict=True)
             if mark in ends
         }
         return followed, reactions
+
+    def _facts(self, issued: Mapping[str, Array]) -> Facts:
+        velocity, acceleration, low, high = (
+            np.stack([issued[axis.of(name)] for axis in self.known.axes])
+            for name in ("fVelocity", "fAcceleration", "fStopLow", "fStopHigh")
+        )
+        return Facts(
+            done=issued["bDone"] != 0.0,
+            stands=~((velocity != 0.0) | (acceleration != 0.0)).any(axis=0),
+            errors=issued["nErrorId"],
+            low=low,
+            high=high,
+        )
+
+    def _zones(self, begins: Sequence[int], rows: Array, cycles: int) -> Iterator[Zone]:
+        """Find intervals that are blocked or slow for some time."""
+        kinds = (("aBlockedLow", "aBlockedHigh", None), ("aSlowLow", "aSlowHigh", "aSlowLimit"))
+        if "nZone" not in self.outputs:
+            return
+        for (k, axis), number, names in product(enumerate(self.known.axes), range(ZONES), kinds):
+            columns = [rows[:, self.inputs.index(f"{axis.of(name)}[{number}]")] for name in names if name]
+            values = np.stack([*columns, np.zeros(len(rows))][:3], axis=1)
+            changes = [0, *(np.flatnonzero((values[1:] != values[:-1]).any(axis=1)) + 1).tolist()]
+            for row, end in zip(changes, [*changes[1:], None], strict=True):
+                low, high, limit = values[row].tolist()
+                until = cycles if end is None else min(begins[end], cycles)
+                if low < high and begins[row] < until:
+                    yield Zone(
+                        axis=k,
+                        low=low,
+                        high=high,
+                        limit=limit,
+                        begin=begins[row],
+                        end=until,
+                        number=number + 1,
+                    )
+
+    def _drifts(self, script: Script, now: NDArray[np.int64]) -> Flags:
+        """Tell where a live parameter is other than at first for as long as counts."""
+        found, held = np.zeros(len(now), dtype=bool), self.known.held
+        for name, (low, high) in self.known.live.items():
+            if name in self.spec.planner.live_rate:
+                continue
+            value = script.inputs[:, self.inputs.index(f"f{name}")][now]
+            apart = (np.abs(value - value[0]) > STEADY * high) & (value >= low) & (value <= high)
+            for begin, end in runs_of(apart):
+                found[begin + held // 2 : end] |= end - begin > held // 2
+        return found
 
     def _seen(self, script: Script, cycles: int) -> list[int]:
         """Tell when bLoadAtRest rises; blocks of earlier versions have none."""
@@ -172,6 +242,7 @@ class BlockWatch:
         begin, end = cycles
         play, places = _PLAY(block.play), [self.outputs.index(name) for axis in block.axes for name in axis]
         live = [self.inputs.index(f"f{name}") for name in self.spec.planner.live]
+        actual = list(script.actual)
         row, inputs = int(np.searchsorted(script.begins, begin - 1, side="right")) - 1, len(self.inputs)
         first, many = begin, AT_ONCE
         while first < end:
@@ -179,6 +250,7 @@ class BlockWatch:
             given = np.tile(script.inputs[row, :inputs], (len(part), 1))
             now = np.searchsorted(script.begins, part, side="right") - 1
             given[:, live] = script.inputs[now[:, None], live]
+            given[:, actual] += issued[part - 1, ::3]
             outputs = np.empty((len(part), len(self.outputs)))
             if play(memory.ctypes.data, _doubles(given), len(part), _doubles(outputs)):
                 return None
@@ -191,12 +263,14 @@ class BlockWatch:
 
 def _ends(spec: Spec, axis: int) -> Ends:
     own = spec.limits.of(axis)
-    assert own.velocity and own.acceleration and own.jerk
+    assert own.velocity and own.acceleration and own.jerk and own.travel
+    targets = target_range(spec, axis)
     return Ends(
         velocity=own.velocity,
         acceleration=own.acceleration,
         jerk=own.jerk,
-        targets=target_range(spec, axis),
+        targets=targets,
+        margin=targets[0] - own.travel[0],
         quick=quick_limits(spec, axis),
     )
 

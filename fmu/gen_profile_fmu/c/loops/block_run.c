@@ -18,7 +18,7 @@ typedef struct {
     void *instance;
     size_t n_inputs, n_outputs, n_axes;
     const size_t *axes;                  /* n_axes x 3: places of position, velocity and acceleration among outputs */
-    size_t busy, promise, error;         /* likewise */
+    size_t busy, promise, error, enabled; /* likewise */
     size_t size;                         /* of the instance in bytes */
 } Block;
 
@@ -27,6 +27,7 @@ typedef struct {
     size_t n_rows;
     const long *begins;                  /* cycle from which each row of inputs holds; the first is 0 */
     const double *inputs;                /* n_rows x n_inputs */
+    const size_t *actual;                /* places of the axes' actual positions, which are given relative to the setpoint before */
     long longest;                        /* cycles after the last row within which the axes must stand */
     long settle, watch;                  /* cycles of standing before the loads' sway counts, and while it does */
     size_t n_parameters, n_setpoints, n_loads;
@@ -109,10 +110,10 @@ static void take_loads(const History *history, const double *sway, bool counts, 
     }
 }
 
-/* `room`: 2 x n_outputs + n_loads + n_axes. */
+/* `room`: 2 x n_outputs + n_loads + n_axes + n_inputs. */
 EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history, double *room, Found *found) {
-    double *before = NULL, *now = room, *other = room + block->n_outputs;
-    double *sway = room + 2 * block->n_outputs, *stood = sway + history->n_loads;
+    double *before = NULL, *now = room;
+    double *sway = room + 2 * block->n_outputs, *stood = sway + history->n_loads, *inputs = stood + block->n_axes;
     long last = history->begins[history->n_rows - 1], end = last + history->longest;
     size_t row = 0, mark = 0;
     begin_axes(block, found);
@@ -120,7 +121,8 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
     found->status = begin(fmu, 0.0, history->parameter_references, history->n_parameters, history->parameters);
     for (long k = 0; k < end && found->status == GOOD; k++, found->cycles = k) {
         while (row + 1 < history->n_rows && history->begins[row + 1] <= k) row++;
-        const double *inputs = history->inputs + row * block->n_inputs;
+        memcpy(inputs, history->inputs + row * block->n_inputs, block->n_inputs * sizeof(double));
+        for (size_t i = 0; i < block->n_axes; i++) inputs[history->actual[i]] += history->setpoints[history->led[i]];
         for (; mark < history->n_marks && history->marks[mark] == k; mark++) {
             memcpy(found->copies + mark * block->size, block->instance, block->size);
         }
@@ -128,6 +130,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         if (found->fault == 0 && !numbers(block, now)) found->fault = NO_NUMBER;
         if (found->fault != 0) return;
         take_states(block, now, found);
+        const bool guides = now[block->enabled] != 0.0;
         if (k >= last && found->stands < 0 && standing(block, now)) {
             found->stands = k;
             end = k + history->settle + history->watch;
@@ -135,7 +138,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
         }
         for (size_t i = 0; i < block->n_axes; i++) {
             const double position = now[block->axes[3 * i]];
-            take_axis(block->axes + 3 * i, before, now, history->cycle, found->axes + i);
+            if (guides) take_axis(block->axes + 3 * i, before, now, history->cycle, found->axes + i);
             if (found->stands >= 0) found->axes[i].creep = greater(found->axes[i].creep, position - stood[i]);
             history->setpoints[history->led[i]] = position;
         }
@@ -151,8 +154,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
             for (size_t i = 0; i < block->n_outputs; i++, kept += found->n_rows) *kept = now[i];
             for (size_t i = 0; i < history->n_loads; i++, kept += found->n_rows) *kept = sway[i];
         }
-        before = now;
-        now = other;
-        other = before;
+        before = guides ? now : NULL;
+        now = now == room ? room + block->n_outputs : room;
     }
 }
