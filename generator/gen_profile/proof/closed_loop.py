@@ -29,6 +29,7 @@ STEP_PHASE = 0.05  # rad of the fastest mode that an integration step may cover
 WATCHED = 2.2  # of the slowest periods in which the residual sway shows
 PATIENCE = 30.0  # of these periods that the axes have to come to rest, and the travel's time beside
 NOISY_ON = 6.0  # of these periods after the last command, in which live parameters go on being noisy
+LONGEST = 10**9  # cycles, for ever
 HOIST_STARTS = 0.1  # of these periods, in which a hoist takes up its speed
 
 
@@ -267,11 +268,12 @@ class ClosedLoop:
         if not history.changes:
             return begins, inputs
         spans = [
-            (first, first + max(1, round(change.lasts / self.cycle)), change)
+            (first, first + max(1, round(min(change.lasts / self.cycle, LONGEST))), change)
             for change in history.changes
             for first in [round(change.time / self.cycle)]
         ]
-        cycles = sorted({*begins, *(edge for begin, end, _ in spans for edge in (begin, end))})
+        edges = {edge for begin, end, _ in spans for edge in (begin, end) if edge < LONGEST}
+        cycles = sorted({*begins, *edges})
         inputs = inputs[np.searchsorted(begins, cycles, side="right") - 1]
         for begin, end, change in spans:
             within = slice(bisect_left(cycles, begin), bisect_left(cycles, end))

@@ -28,6 +28,7 @@ RUN_OUT = 0.7  # before a motion that ends soon anyway gives way to another (0.6
 CALMED = 3.0  # more where live parameters change on the way (2.1)
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
 ENABLED = 1.7  # s, which a block takes once it is enabled (1.4, of a damped crane at 4 ms)
+SETTLING = 5.0  # periods in which that may go on while it is commanded
 IN_VELOCITY = 2e-6  # share of the greatest velocity, by which one counts as reached
 
 
@@ -92,6 +93,11 @@ class Followed:
         """Cycles in which it is."""
         return [0, *(order.end for order in self.orders if order.kind == DISABLED)]
 
+    @property
+    def slowest(self) -> float:
+        """Least velocity limit of a slow interval, in m/s."""
+        return min((zone.limit for zone in self.zones if zone.limit), default=inf)
+
     def moved(self, begin: int, end: int) -> float:
         """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""
         ways = np.abs(self.steps[:, begin : end + 1].sum(axis=1)).tolist()
@@ -104,22 +110,13 @@ class Followed:
 
     def room(self, axis: int, position: Array, way: Array) -> Array:
         """Tell how far an axis may go from positions, (cycles,), in the direction of ways, (cycles,)."""
-        ends = sorted(
-            [
-                *self.limits[axis].targets,
-                *(
-                    end
-                    for zone in self.zones
-                    if zone.axis == axis and not zone.limit
-                    for end in (zone.low, zone.high)
-                ),
-            ]
-        )
-        up, down = (
-            np.searchsorted(ends, position + side * EXACT).clip(1, len(ends) - 1) for side in (1.0, -1.0)
-        )
-        bounds = np.array(ends)
-        room: Array = np.where(way > 0.0, bounds[up] - position, position - bounds[down - 1])
+        closed = [zone for zone in self.zones if zone.axis == axis and not zone.limit]
+        low, high = self.limits[axis].targets
+        ahead = np.array(sorted([*(zone.low for zone in closed if zone.low < high), high]))
+        behind = np.array(sorted([low, *(zone.high for zone in closed if zone.high > low)]))
+        up = ahead[np.searchsorted(ahead, position - EXACT).clip(0, len(ahead) - 1)] - position
+        down = position - behind[np.searchsorted(behind, position + EXACT).clip(1) - 1]
+        room: Array = np.where(way > 0.0, up, down)
         return room
 
     def of(self, name: str) -> Array:
@@ -252,12 +249,18 @@ def arriving(followed: Followed, place: Array, before: Array, order: TimedOrder)
     """Tell the time in s in which axes come from places and velocities, (axes,), to an order's targets."""
     periods = (ON_WAY if before.any() else FROM_REST) + calmed(followed)
     share, ways = 1.0 - followed.reserve, map(float, np.abs(place - order.values))
-    slow = min((zone.limit for zone in followed.zones if zone.limit), default=inf)
+    slow = followed.slowest
     slowest = max(
         FAR * way / (share * min(top, slow)) + (top + abs(v)) / own.acceleration + own.acceleration / own.jerk
         for way, v, top, own in zip(ways, map(float, before), order.tops, followed.limits, strict=True)
     )
-    return slowest + periods * followed.period
+    return slowest + periods * followed.period + getting_ready(followed, order.begin)
+
+
+def getting_ready(followed: Followed, begin: int) -> float:
+    """Tell the time in s that a block takes more where it was enabled not long before."""
+    since = min(begin - at for at in followed.enabled if at <= begin)
+    return ENABLED if since < followed.after(SETTLING * followed.period) else 0.0
 
 
 def calmed(followed: Followed) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 
 from gen_profile.planner.commands import Command
-from gen_profile.proof.orders import FOLLOWING
+from gen_profile.proof.orders import ZONES
 
 REPEATED = 16  # commands
 CREEPING = 40
@@ -19,6 +19,8 @@ STOPS = 4
 WRONG = 0.5  # s, at least, in which values count that cannot be
 OUTSIDE = 10.0  # m (or rad) beyond the targets
 FAR = 1e6  # m (or rad)
+HAND = 0.2  # of the greatest velocity, by which an axis is moved by hand
+OFTEN = 3  # so often some habits are taken
 
 _MORE = 0.6180339887  # turns one choice into others
 
@@ -49,13 +51,10 @@ class Manner:
     commands : tuple of Command
         In its place.
     changes : tuple of Change
-    errors : tuple of int
-        That the block must show.
     """
 
     commands: tuple[Command, ...]
     changes: tuple[Change, ...] = ()
-    errors: tuple[int, ...] = ()
 
 
 @attrs.frozen(kw_only=True)
@@ -74,6 +73,10 @@ class Surroundings:
         Ranges of the live parameters.
     hoists : bool
         Whether they change on the way.
+    zones : bool
+        Whether the block knows of any.
+    rough : bool
+        Whether the load may be left swinging.
     """
 
     cycle: float
@@ -83,6 +86,25 @@ class Surroundings:
     suffixes: tuple[str, ...]
     live: Mapping[str, tuple[float, float]]
     hoists: bool
+    zones: bool
+    rough: bool
+
+    def zone(self, axis: int, place: float, width: float, number: int, *, slow: bool) -> dict[str, float]:
+        """Choose an interval of an axis that is blocked, or slow."""
+        (low, high), (_, fastest), end = (
+            self.targets[axis],
+            self.speeds[axis],
+            f"{self.suffixes[axis]}[{number}]",
+        )
+        begin = low + place * (high - low)
+        until = begin + (0.02 + 0.15 * width) * (high - low)
+        if slow:
+            return {
+                f"aSlowLow{end}": begin,
+                f"aSlowHigh{end}": until,
+                f"aSlowLimit{end}": fastest * (0.2 + 0.6 * width),
+            }
+        return {f"aBlockedLow{end}": begin, f"aBlockedHigh{end}": until}
 
     def target(self, share: float) -> tuple[float, ...]:
         """Choose a place."""
@@ -106,12 +128,14 @@ def manner(command: Command, which: float, how: float, around: Surroundings) -> 
         Shares from 0 to 1.
     around : Surroundings
     """
-    number = int(2.0 * len(HABITS) * (which - 0.5)) if which >= 0.5 else -1
-    return (
-        Manner(commands=(command,))
-        if number < 0
-        else HABITS[min(number, len(HABITS) - 1)](command, how, around)
-    )
+    if which < 0.5:
+        return Manner(commands=(command,))
+    habits = [*GENTLE, *[_fenced] * around.zones * OFTEN, *ROUGH * around.rough * OFTEN]
+    return habits[min(int(2.0 * len(habits) * (which - 0.5)), len(habits) - 1)](command, how, around)
+
+
+def _between(ends: tuple[float, float], share: float) -> float:
+    return ends[0] + share * (ends[1] - ends[0])
 
 
 def _share(share: float, number: int) -> float:
@@ -249,18 +273,15 @@ def _wild(command: Command, how: float, around: Surroundings) -> Manner:
 def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
     """Give a live parameter, override or velocity limit that cannot be for long; acknowledge the error."""
     later, lasts = around.period * _share(how, 3), WRONG * (1.0 + _share(how, 4))
-    values = [
-        (5, {"rOverride": -0.1}),
-        (5, {"rOverride": 1.01}),
-        (5, {f"fVelocityLimit{around.suffixes[-1]}": nan}),
+    values: list[dict[str, float]] = [
+        {"rOverride": -0.1},
+        {"rOverride": 1.01},
+        {f"fVelocityLimit{around.suffixes[-1]}": nan},
+        {f"fVelocityLimit{around.suffixes[-1]}": -1e-3},
     ]
     for name, (low, high) in around.live.items() if not around.hoists else ():  # then the promise is lost
-        values += [
-            (2, {f"f{name}": 0.99 * low - 1e-3}),
-            (2, {f"f{name}": 1.01 * high}),
-            (2, {f"f{name}": nan}),
-        ]
-    error, inputs = values[int(how * len(values)) % len(values)]
+        values += [{f"f{name}": wrong} for wrong in (0.99 * low - 1e-3, 1.01 * high, nan)]
+    inputs = values[int(how * len(values)) % len(values)]
     begin = command.time + later
     reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
     commands = [command, _followed(command, later + lasts + 10.0 * around.cycle)]
@@ -271,7 +292,6 @@ def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
     return Manner(
         commands=tuple(commands),
         changes=(Change(time=begin, lasts=lasts, inputs=inputs), reset),
-        errors=(error,),
     )
 
 
@@ -296,7 +316,6 @@ def _refused(command: Command, how: float, around: Surroundings) -> Manner:
     wrong = (*first.values[:-1], (nan, inf, low - OUTSIDE, high + OUTSIDE)[int(4.0 * how) % 4])
     return Manner(
         commands=(first, _followed(first, wait, values=wrong), _followed(first, wait + 0.5 * around.period)),
-        errors=(3,),
     )
 
 
@@ -320,16 +339,20 @@ def _mistimed(command: Command, how: float, around: Surroundings) -> Manner:
     return Manner(
         commands=(command, again),
         changes=(Change(time=command.time + later, lasts=lasts, inputs=inputs),),
-        errors=(1,),
     )
 
 
 def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
-    """Let the last axis be where it cannot be: with a limit of that, and before without one."""
+    """Let the last axis be elsewhere than its setpoint: with a limit of that, and before without one."""
     first, suffix = _towards(command, how, around), around.suffixes[-1]
     begin = first.time + around.period * (0.2 + _share(how, 3))
-    away = {f"fActPosition{suffix}": (nan, -FAR, FAR)[int(3.0 * how) % 3]}
-    most, lasts = {f"fFollowingLimit{suffix}": 0.1 + how}, around.period * _share(how, 4)
+    limit = 0.1 + how
+    away = {
+        f"fActPosition{suffix}": (nan, -FAR, FAR, -1.01 * limit, 1.01 * limit, 0.99 * limit)[
+            int(6.0 * how) % 6
+        ]
+    }
+    most, lasts = {f"fFollowingLimit{suffix}": limit}, around.period * _share(how, 4)
     within = around.period * (1.0 + _share(how, 5))
     return Manner(
         commands=(first, _followed(first, begin - first.time + within, command="stop", values=())),
@@ -338,7 +361,6 @@ def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
             Change(time=begin, lasts=lasts, inputs=away | most),
             Change(time=begin + within - 4.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0}),
         ),
-        errors=(FOLLOWING,),
     )
 
 
@@ -356,7 +378,69 @@ def _braked(command: Command, how: float, around: Surroundings) -> Manner:
     )
 
 
-HABITS: tuple[Callable[[Command, float, Surroundings], Manner], ...] = (
+def _released(command: Command, how: float, around: Surroundings) -> Manner:
+    """Drop bExecute, on the way or long before it rises again."""
+    later, lasts = 5.0 * around.period * how, _log(around.cycle, 3.0 * around.period, _share(how, 3))
+    dropped = Change(time=command.time + later, lasts=lasts, inputs={"bExecute": 0.0})
+    return Manner(commands=(_towards(command, how, around),), changes=(dropped,))
+
+
+def _contradicted(command: Command, how: float, around: Surroundings) -> Manner:
+    """Give a stick that is none, or a position while it is deflected; then let it go."""
+    stick = attrs.evolve(command, command="velocity", values=around.speed(how))
+    lasts, gone = _log(around.cycle, 0.3 * around.period, how), 0.8 * around.period
+    wrong = (
+        {"bExecute": 1.0} if how < 0.5 else {f"fVelocityCommand{around.suffixes[-1]}": (nan, inf)[how > 0.75]}
+    )
+    return Manner(
+        commands=(
+            stick,
+            _followed(stick, gone, values=(0.0,) * len(around.speeds)),
+            _followed(stick, 1.2 * gone),
+        ),
+        changes=(Change(time=stick.time + around.period * _share(how, 4), lasts=lasts, inputs=wrong),),
+    )
+
+
+def _fenced(command: Command, how: float, around: Surroundings) -> Manner:
+    """Block an interval for some time, or make it slow, wherever the axis is."""
+    later, lasts = around.period * _share(how, 3), around.period * (2.0 + 6.0 * _share(how, 4))
+    k = int(how * len(around.suffixes)) % len(around.suffixes)
+    zone = around.zone(k, _share(how, 5), _share(how, 6), ZONES - 1, slow=_share(how, 7) < 0.5)
+    begin = command.time + later
+    reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
+    return Manner(commands=(command,), changes=(Change(time=begin, lasts=lasts, inputs=zone), reset))
+
+
+def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
+    """Drop bEnable, mostly on the way; let the axis stand there, or move it by hand, until it is set again."""
+    later, lasts = around.period * _share(how, 3), _log(around.cycle, around.period, _share(how, 4))
+    begin, taken = command.time + later, dict[str, float]()
+    if how < 0.6:
+        for (_, most), suffix in zip(around.speeds, around.suffixes, strict=True):
+            speed = most * HAND * (2.0 * _share(how, 5) - 1.0)
+            taken |= {f"fActPosition{suffix}": speed * around.cycle, f"fActVelocity{suffix}": speed}
+    goes = how > 0.3  # still, as it is taken over
+    changes = [
+        Change(time=begin, lasts=lasts + 4.0 * around.cycle * (not goes), inputs={"bEnable": 0.0}),
+        Change(time=begin, lasts=lasts + 1.5 * around.cycle * goes, inputs=taken),
+    ]
+    seen = begin + lasts + 3.0 * around.period
+    changes.append(Change(time=seen, lasts=0.0, inputs={"bLoadAtRest": 1.0}))
+    again = _followed(command, later + lasts + around.period)
+    return Manner(commands=(command, again), changes=tuple(changes if not around.hoists else changes[:-1]))
+
+
+def _respooled(command: Command, how: float, around: Surroundings) -> Manner:
+    """Tell another live parameter on the way, faster than may be, and that of before later."""
+    later, lasts = around.period * _share(how, 3), _log(0.1, around.period, _share(how, 4))
+    inputs = {f"f{name}": _between(ends, _share(how, 5)) for name, ends in around.live.items()}
+    changes = (Change(time=command.time + later, lasts=lasts, inputs=inputs),) if inputs else ()
+    return Manner(commands=(command,), changes=() if around.hoists else changes)
+
+
+Habit = Callable[[Command, float, Surroundings], Manner]
+GENTLE: tuple[Habit, ...] = (
     _again,
     _creeping,
     _tap,
@@ -371,6 +455,7 @@ HABITS: tuple[Callable[[Command, float, Surroundings], Manner], ...] = (
     _refused,
     _denied,
     _mistimed,
-    _strayed,
-    _braked,
+    _released,
+    _contradicted,
 )
+ROUGH: tuple[Habit, ...] = (_strayed, _braked, _disabled, _respooled)  # the load swings then

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate, islice, pairwise, product
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, Self
 
 import attrs
@@ -28,7 +28,6 @@ from gen_profile.problem.hoisted_plant import hoisted
 from gen_profile.problem.linearization import linearize
 from gen_profile.proof.habits import Change, Manner, Surroundings
 from gen_profile.proof.habits import manner as habit
-from gen_profile.proof.orders import FOLLOWING
 from gen_profile.spec.model import Spec
 
 COMMANDED = 40.0  # s in which commands come; slow machines take longer, see PERIODS
@@ -39,6 +38,7 @@ MOST_COMMANDS = 16
 MANNERS = ((0.85, 0.05, 0.1), (0.05, 0.9, 0.05), (0.4, 0.4, 0.2))  # shares of positions, a stick, and stops
 MOST_CORNERS = 10  # ranges up to which all corners are tried where histories are enough
 SLOWEST = 0.3  # override, and velocity limit as a share of the machine's
+ROUGH = 0.35  # share of the histories in which the load may be left swinging
 ALONE = 0.1  # half the share of stick commands that leave one of several axes alone
 LEGS = 8  # of one speed each, in which a live parameter changes on the way
 HOISTED_ON = 2.0  # periods after the last command in which it still may
@@ -46,6 +46,7 @@ HOISTED_ON = 2.0  # periods after the last command in which it still may
 _PER_COMMAND = 2  # choices: which, how long; its values; and how slowly, where that is varied
 _PER_HABIT = 2  # choices: which, and how
 _PER_LEG = 2  # choices: speed, how long
+_MORE = 0.6180339887  # turns one choice into others
 
 
 @attrs.frozen(kw_only=True)
@@ -68,8 +69,6 @@ class History:
         line, which begins with the value in `live` and ends constant.
     changes : tuple of Change
         Of inputs, beside the commands.
-    errors : tuple of int
-        That the block must show, as commands are wrong.
     """
 
     live: Mapping[str, float]
@@ -79,7 +78,6 @@ class History:
     axes: Mapping[int, BlockAxis] = {0: BlockAxis(name="")}
     hoisting: Mapping[str, tuple[tuple[float, float], ...]] = attrs.field(factory=dict)
     changes: tuple[Change, ...] = ()
-    errors: tuple[int, ...] = ()
 
     @property
     def starts(self) -> dict[str, float]:
@@ -123,7 +121,7 @@ class History:
         return [
             {
                 "time_s": change.time,
-                "lasts_s": change.lasts,
+                "lasts_s": written(change.lasts),
                 "inputs": {name: written(value) for name, value in change.inputs.items()},
             }
             for change in self.changes
@@ -132,12 +130,27 @@ class History:
     @property
     def brakes(self) -> bool:
         """Whether it has a quick stop, after which nothing is promised."""
-        return FOLLOWING in self.errors or any(one.command == "quick-stop" for one in self.commands)
+        stops = any(one.command == "quick-stop" for one in self.commands)
+        return stops or self._has("fFollowingLimit")
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether what becomes of the load cannot be known for another reason."""
+        return any(map(self._has, ("bEnable", *(f"f{name}" for name in self.live))))
+
+    @property
+    def moved(self) -> bool:
+        """Whether axes are moved by hand."""
+        return self._has("fActVelocity")
 
     @property
     def reassured(self) -> bool:
         """Whether the block is told that the load hangs still, true or not."""
-        return any("bLoadAtRest" in change.inputs for change in self.changes)
+        return self._has("bLoadAtRest")
+
+    def _has(self, name: str) -> bool:
+        """Whether an input differs for some time from what the commands say."""
+        return any(known.startswith(name) for change in self.changes for known in change.inputs)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -306,8 +319,10 @@ class Histories:
             commands=commands,
             axes=self.axes,
             hoisting=self._hoisting(choices[self._first_leg :], told, commands[-1].time),
-            changes=tuple(change for one in manners for change in one.changes),
-            errors=tuple(error for one in manners for error in one.errors),
+            changes=(
+                *self._zones(starts, first, amount),
+                *(change for one in manners for change in one.changes),
+            ),
         )
 
     def _hoisting(
@@ -334,7 +349,7 @@ class Histories:
         within = max(COMMANDED, PERIODS * self.period)
         likely = MANNERS[min(int(manner * len(MANNERS)), len(MANNERS) - 1)]
         time, last = first * SOONEST, 1 + len(self.axes)
-        around, earliest = self._surroundings(), 0.0
+        around, earliest = self._surroundings(rough=manner * len(MANNERS) % 1.0 < ROUGH), 0.0
         for row in rows.tolist():
             if time > within:
                 break
@@ -355,7 +370,20 @@ class Histories:
             last_one = self._command(time, 0 if how < 0.5 else 2, [(how - 0.05) / 0.45, *others])
         yield Manner(commands=(last_one,))
 
-    def _surroundings(self) -> Surroundings:
+    def _zones(self, starts: Sequence[float], *shares: float) -> Iterator[Change]:
+        """Block intervals beyond where the axes start, and make others slow."""
+        around = self._surroundings(rough=False)
+        if not self.spec.planner.zones:
+            return
+        for k, start in enumerate(starts):
+            place, width = ((share + _MORE * (k + 1)) % 1.0 for share in shares)
+            zone = around.zone(
+                k, 0.8 + 0.15 * place if start < 0.5 else 0.05 + 0.1 * place, 0.3 * width, 0, slow=False
+            )
+            zone |= around.zone(k, 0.2 + 0.5 * width, place, 1, slow=True)
+            yield Change(time=0.0, lasts=inf, inputs=zone)
+
+    def _surroundings(self, *, rough: bool) -> Surroundings:
         speeds = tuple(self._velocity(number) for number in self.axes)
         return Surroundings(
             cycle=self.spec.export.cycle_time,
@@ -365,6 +393,8 @@ class Histories:
             suffixes=tuple(axis.suffix for axis in self.axes.values()),
             live=self.spec.planner.live,
             hoists=bool(self.spec.planner.live_rate),
+            zones=self.spec.planner.zones,
+            rough=rough,
         )
 
     def _slowed(self, command: Command, choice: float = 0.0) -> Command:

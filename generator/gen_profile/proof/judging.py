@@ -87,9 +87,7 @@ def _faults(history: History, run: BlockRun, limits: dict[str, float]) -> Iterat
         yield from _axis_faults(history, named, axis, limits)
     if run.stands < 0:
         yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
-    if run.error and run.error not in history.errors:
-        yield f"the block shows error {run.error}"
-    if not run.promise and not history.brakes:
+    if not run.promise and not (history.brakes or history.disturbed):
         yield "the block takes its promise back"
 
 
@@ -102,9 +100,9 @@ def _axis_faults(
         if not share <= 1.0 + ROUNDING:
             yield f"the {name}{of} is above its limit by {100.0 * (share - 1.0):.3g} %"
     beyond = limits[f"{named.prefix}beyond_travel_{named.unit}"]
-    if not beyond <= ROUNDING:
+    if not beyond <= ROUNDING and not history.moved:
         yield f"the {which} leaves its travel by {beyond:.3g} {named.unit}"
-    if not axis.gap <= ROUNDING and not history.brakes:  # a quick stop ends within a cycle
+    if not axis.gap <= ROUNDING and not (history.brakes or history.moved):  # a quick stop ends within a cycle
         yield f"a setpoint{of} jumps by {axis.gap:.3g} {named.unit}"
     if not axis.creep <= STEADY:
         yield f"the {which} moves on at rest by {axis.creep:.3g} {named.unit}"

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from gen_profile.proof.followed import (
-    ENABLED,
     EXACT,
     FROM_REST,
     IN_VELOCITY,
@@ -21,6 +20,7 @@ from gen_profile.proof.followed import (
     IssuedMotion,
     arriving,
     calmed,
+    getting_ready,
     reaching,
     runs_of,
     slowing,
@@ -126,6 +126,8 @@ def _arrivals(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
                 allowed = arriving(followed, place, before, order)
                 there = (motion.away[own] <= EXACT) & motion.stands[own]
             case "velocity":
+                if max(map(abs, order.values)) > followed.slowest:
+                    continue
                 tops = [(1.0 - followed.reserve) * top for top in order.tops]
                 wanted = [min(max(w, -top), top) for w, top in zip(order.values, tops, strict=True)]
                 allowed = reaching(followed, before, wanted)
@@ -185,8 +187,8 @@ def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]
         allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_TURN)
         yield Allowance("against", begin, (end - begin) * followed.cycle, allowed)
     for begin, end in runs_of(wants & motion.stands):
-        ready = ENABLED if any(0 <= begin - at < followed.after(ENABLED) for at in followed.enabled) else 0.0
-        allowed = followed.reaction + ready + calmed(followed) * followed.period
+        ready = getting_ready(followed, begin) + calmed(followed) * followed.period
+        allowed = followed.reaction + ready
         yield Allowance("idle", begin, (end - begin) * followed.cycle, allowed)
 
 

@@ -166,10 +166,9 @@ def told(begins: Sequence[int], rows: Array, inputs: Inputs, last: int, facts: F
 
 def _events(begins: Sequence[int], facts: Facts) -> list[int]:
     """Cycles in which something may change though no input does."""
-    changes = np.flatnonzero(
-        np.diff(facts.done, prepend=False) | np.diff(facts.errors == BLOCKED, prepend=False)
-    )
-    return [begin + 1 for begin in begins] + [at + k for at in changes.tolist() for k in (0, 1)]
+    flags = np.stack([facts.done, facts.stands, facts.errors == BLOCKED])
+    changes = np.flatnonzero(np.diff(flags, prepend=False).any(axis=0)).tolist()
+    return [begin + 1 for begin in begins] + [at + k for at in changes for k in (0, 1)]
 
 
 def _same(order: TimedOrder, before: TimedOrder) -> bool:
@@ -185,7 +184,7 @@ class _Reader:
         self._inputs, self._facts = inputs, facts
         self.aborted, self.error, self.command = 0, 0, STOP
         self.due: int | None = None  # the cycle in which wrong values begin to count
-        self._latched = self._execute = self._velocity = self._braking = False
+        self._latched = self._execute = self._velocity = self._braking = self._in_the_way = False
         self._neutral, self._enabled, self._edge, self._since = False, False, 0, -1
         self._goal, self._kind = tuple[float, ...](), STOP
         self._tops = tuple(own.velocity for own in inputs.limits)
@@ -224,7 +223,7 @@ class _Reader:
             return DISABLED
         if not self._enabled:
             self._enabled = True
-            self._braking = any(self._of(row, "fActVelocity")) if "fActVelocity" in row else False
+            self._braking = any(row.get(axis.of("fActVelocity")) for axis in self._inputs.axes)
         fault = self._fault(cycle, row)
         self._neutral = self._neutral or not row["bVelocity"]
         rises = bool(row["bExecute"]) and not self._execute
@@ -268,7 +267,7 @@ class _Reader:
         fault = MISTIMED * (not abs(row["fCycleTime"] - cycle_time) <= 1e-6 * cycle_time)
         if lasts:
             fault = LIVE if good else LIMITS
-        if self._facts is not None and self._facts.errors[cycle] == BLOCKED and self._is_in_the_way(row):
+        if self._is_in_the_way(cycle, row) and not self._latched:
             fault = BLOCKED
         if self._strays(row):
             fault = FOLLOWING
@@ -335,5 +334,10 @@ class _Reader:
                 return True
         return False
 
-    def _is_in_the_way(self, row: Mapping[str, float]) -> bool:
-        return any(self._closed(row, axis) for axis in range(len(self._inputs.axes)))
+    def _is_in_the_way(self, cycle: int, row: Mapping[str, float]) -> bool:
+        """Whether a blocked interval is: the block says so, not of a target that has just come."""
+        if self._facts is None or self._facts.errors[cycle] != BLOCKED:
+            self._in_the_way = False
+        elif self._facts.errors[cycle - 1] != BLOCKED and not (row["bExecute"] and not self._execute):
+            self._in_the_way = any(self._closed(row, axis) for axis in range(len(self._inputs.axes)))
+        return self._in_the_way

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from gen_profile.motion.profile import Array
 from gen_profile.proof.followed import (
     EXACT,
     TO_SLOW,
@@ -17,16 +18,20 @@ from gen_profile.proof.followed import (
     greatest,
     slowing,
 )
-from gen_profile.proof.orders import BLOCKED, DISABLED, POSITION, QUICK_STOP, STOP
+from gen_profile.proof.orders import BLOCKED, DISABLED, POSITION, QUICK_STOP, STOP, Flags
+
+TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
+STILL = 1e-9  # m/s2
 
 
 def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge where a stop leads by the ends that are stated in every cycle."""
     low, high = followed.of("fStopLow"), followed.of("fStopHigh")
-    up, down = (high - motion.position) * motion.guided, (motion.position - low) * motion.guided
+    told, turns = motion.guided & ~_fenced(followed, motion), _turning(followed, motion)
+    up, down = (high - motion.position) * told, (motion.position - low) * told
     apart = np.abs(followed.of("fStopDistance") - np.maximum(high - motion.position, motion.position - low))
     yield from greatest("stop distance", apart, EXACT)
-    yield from greatest("ends", -np.minimum(up, down), EXACT)
+    yield from greatest("ends", -np.minimum(up, down) - turns, EXACT)
     targets = list[tuple[float, ...]]()
     for order in followed.orders:
         begin, own = order.begin, slice(order.begin, order.end)
@@ -38,7 +43,9 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         lowest, highest = (
             most.accumulate(place[:, ::-1], axis=1)[:, ::-1] for most in (np.minimum, np.maximum)
         )
-        yield from greatest("ends", np.maximum(low[:, own] - lowest, highest - high[:, own]), EXACT, begin)
+        if not (followed.reserve and begin in followed.enabled):  # what swings as it is taken over is calmed
+            leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * told[own] - turns[:, own]
+            yield from greatest("ends", leaves, EXACT, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
         takes = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
         rests = motion.stands[own] & (followed.issued["bBusy"][own] == 0.0)
@@ -48,6 +55,27 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             yield from greatest(
                 "loose", np.maximum(up[k, own], down[k, own]) * rests, limits.margin + EXACT, begin
             )
+
+
+def _turning(followed: Followed, motion: IssuedMotion) -> Array:
+    """Tell how far axes go on that turn round where a plan takes over, (axes, cycles)."""
+    slow = np.array([[TURNING * limits.velocity] for limits in followed.limits])
+    velocity, acceleration = motion.velocity, np.abs(motion.acceleration)
+    turns = (velocity * motion.acceleration < 0.0) & (np.abs(velocity) < slow)
+    way: Array = np.where(turns, velocity**2 / np.maximum(acceleration, STILL), 0.0)
+    return way
+
+
+def _fenced(followed: Followed, motion: IssuedMotion) -> Flags:
+    """Tell when an axis is within an interval that was blocked where it was, or beyond its travel."""
+    found = np.zeros(followed.cycles, dtype=bool)
+    for place, limits in zip(motion.position, followed.limits, strict=True):
+        low, high = limits.targets
+        found |= (place < low - limits.margin) | (place > high + limits.margin)
+    for zone in followed.zones:
+        own, place = slice(zone.begin, zone.end), motion.position[zone.axis, zone.begin : zone.end]
+        found[own] |= (not zone.limit) & (place > zone.low) & (place < zone.high)
+    return found
 
 
 def blocked(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
@@ -103,7 +131,8 @@ def taken_over(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         own = slice(order.begin, last + 1)
         x, v = motion.position[:, order.begin - 1 : last + 1], motion.velocity[:, own]
         apart = np.abs(np.diff(x, axis=1) - followed.steps[:, own])
-        apart[:, -1] -= np.abs(v[:, -1]) * followed.cycle
+        braked = [limits.quick[1] * followed.cycle**3 for limits in followed.limits]
+        apart[:, -1] -= np.abs(v[:, -1]) * followed.cycle + braked
         yield from greatest("taken over", apart, EXACT, order.begin)
         allowed = np.array([[limits.quick[0]] for limits in followed.limits]) * followed.cycle
         wrong = np.abs(v - followed.speeds[:, own])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 
 import numpy as np
 
@@ -85,7 +86,7 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         error = np.abs(time[first:rests] - (rests - np.arange(first, rests)) * followed.cycle)
         yield Allowance("time", first + int(np.argmax(error)), float(error.max()), slot)
         begun = order.begin + followed.after(followed.reaction + followed.period)
-        if begun < rests:
+        if begun < rests and followed.slowest == inf:
             left = (rests - np.arange(begun, rests)) * followed.cycle
             over = np.abs(time[begun:rests] - left) - ROUGHLY * left
             yield Allowance("time", begun + int(np.argmax(over)), float(over.max()), followed.period)
