@@ -244,7 +244,7 @@ def chosen(machines: list[Machine], count: int, seed: str) -> list[Mutant]:
 
 
 def killed(mutant: Mutant, machines: list[Machine]) -> tuple[str | None, str]:
-    """Say by which judge, on which machine and in which history a mutant is killed; or what it does otherwise."""
+    """Say by which judge, on which machine and in which history it is killed; or what it does otherwise."""
     later, otherwise = [], 0
     for one in machines:
         text = mutated(one, mutant)

@@ -5,26 +5,48 @@ import re
 import attrs
 import numpy as np
 import pytest
-from generator.mutants import judged
+from generator.mutants import judged, kinds_of
 from generator.planned_machines import BAY
 
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.proof.followed import Followed
-from gen_profile.proof.habits import HABITS
+from gen_profile.proof.followed import Followed, Zone
+from gen_profile.proof.habits import GENTLE, ROUGH
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.obedience import WORDS, faults, measured
-from gen_profile.proof.orders import POSITION, QUICK_STOP, STOP, VELOCITY, Ends, Inputs, TimedOrder, orders
+from gen_profile.proof.orders import (
+    DISABLED,
+    POSITION,
+    QUICK_STOP,
+    STOP,
+    VELOCITY,
+    Ends,
+    Facts,
+    Inputs,
+    TimedOrder,
+    Told,
+    told,
+)
 from gen_profile.proof.verdict import kind_of
-from gen_profile.spec.reading import parse_spec
+from gen_profile.spec.reading import parse_spec, preset_spec
 
 CYCLE, CYCLES = 0.01, 6000
 TARGET, TOLD, STICK, STOPPED = 5.0, 100, 2500, 4000  # m; cycles in which commands come
 LIMITS = Ends(velocity=1.0, acceleration=0.5, jerk=5.0, targets=(-100.0, 100.0), quick=(1.0, 10.0))
 
 
-def told(begin, end, kind, *values, top=1.0):
+def order(begin, end, kind, *values, top=1.0):
     return TimedOrder(begin=begin, end=end, kind=kind, values=values, tops=(top,), edge=begin)
+
+
+def as_told(*orders):
+    """Orders that replace each other without a word, and no errors."""
+    holds = np.zeros(CYCLES, dtype=bool)
+    for one in orders:
+        holds[one.begin : one.end] = one.kind in (POSITION, VELOCITY)
+    return Told(
+        orders=orders, aborted=np.zeros(CYCLES, dtype=bool), error=np.zeros(CYCLES, dtype=int), holds=holds
+    )
 
 
 def obedient():
@@ -67,13 +89,15 @@ def obedient():
         reaction=1.5,
         axes=[BlockAxis(name="")],
         limits=[LIMITS],
-        orders=[
-            told(0, TOLD, STOP),
-            told(TOLD, STICK, POSITION, TARGET),
-            told(STICK, STOPPED, VELOCITY, 0.8),
-            told(STOPPED, CYCLES, STOP),
-        ],
+        told=as_told(
+            order(0, TOLD, STOP),
+            order(TOLD, STICK, POSITION, TARGET),
+            order(STICK, STOPPED, VELOCITY, 0.8),
+            order(STOPPED, CYCLES, STOP),
+        ),
         issued=issued,
+        steps=np.zeros((1, CYCLES)),
+        speeds=np.zeros((1, CYCLES)),
     )
 
 
@@ -92,8 +116,35 @@ def with_output(name, within, value):
 
 
 def with_orders(*given, moved=0.0, **changes):
-    followed = attrs.evolve(obedient(), orders=given, **changes)
+    followed = attrs.evolve(obedient(), told=as_told(*given), **changes)
     followed.issued["fPosition"][510:] += moved
+    return followed
+
+
+def with_told(name, within, value):
+    followed = obedient()
+    getattr(followed.told, name)[within] = value
+    return followed
+
+
+def with_zone(**changes):
+    zone = {"axis": 0, "low": 2.0, "high": 4.0, "limit": 0.0, "begin": 0, "end": CYCLES, "number": 1}
+    followed = attrs.evolve(obedient(), zones=[Zone(**zone | changes)])
+    followed.issued["nZone"] = np.ones(CYCLES)
+    followed.issued["nErrorId"][300] = 8.0 * (zone | changes)["number"] - 8.0
+    return followed
+
+
+def disabled(**changes):
+    """Not guided while it stands at its target."""
+    rest, move, *others = obedient().orders
+    off = order(1000, 1100, DISABLED)
+    orders = (rest, attrs.evolve(move, end=1000), off, order(1100, STICK, STOP), *others)
+    followed = attrs.evolve(obedient(), told=as_told(*orders), **changes)
+    for name, value in (("bEnabled", 0.0), ("bPromise", 0.0), ("nPromise", 4.0)):
+        followed.issued[name][1000:1100] = value
+    followed.issued["bDone"][1000:STICK] = 0.0
+    followed.issued["fDistanceToGo"][1000:STICK] = 0.0
     return followed
 
 
@@ -106,7 +157,7 @@ REST, MOVE, STICKS, STOPS = obedient().orders
 FAULTS = {
     POSITION: with_orders(REST, attrs.evolve(MOVE, values=(5.1,)), STICKS, STOPS),
     VELOCITY: with_orders(REST, MOVE, attrs.evolve(STICKS, values=(0.9,)), STOPS),
-    STOP: with_orders(REST, attrs.evolve(MOVE, end=150), told(150, CYCLES, STOP), period=1.0),
+    STOP: with_orders(REST, attrs.evolve(MOVE, end=150), order(150, CYCLES, STOP), period=1.0),
     "left": with_output("fPosition", slice(1500, 1600), 5.01),
     "against": with_orders(REST, attrs.evolve(MOVE, values=(-5.0,)), STICKS, STOPS),
     "idle": with_orders(
@@ -133,23 +184,22 @@ FAULTS = {
     "in velocity": with_output("bInVelocity", 2600, 1.0),
     "not in velocity": with_output("bInVelocity", 3500, 0.0),
     "aborted": with_output("bCommandAborted", 300, 1.0),
-    "not aborted": with_orders(
-        REST, attrs.evolve(MOVE, end=300), told(300, STICK, POSITION, 5.0000001), STICKS, STOPS
-    ),
+    "not aborted": with_told("aborted", 300, True),
     "error": with_output("bError", 300, 1.0),
-    "unanswered": with_orders(attrs.evolve(REST, denied=True), MOVE, STICKS, STOPS),
-    "not given back": attrs.evolve(with_output("nPromise", 50, 2.0), seen=[50]),
-    "refused": with_orders(attrs.evolve(REST, refused=3), MOVE, STICKS, STOPS),
+    "refused": with_told("error", slice(300, 400), 3),
     "untold": with_output(("bError", "nErrorId"), slice(300, 400), 1.0),
-    QUICK_STOP: with_orders(REST, attrs.evolve(MOVE, end=500), told(500, CYCLES, QUICK_STOP)),
-    "jump": with_orders(REST, attrs.evolve(MOVE, end=500), told(500, CYCLES, QUICK_STOP), moved=0.001),
+    "blocked": with_zone(),
+    "zone": with_zone(low=-2.0, high=-1.0, number=2),
+    "taken over": disabled(steps=np.full((1, CYCLES), 0.1)),
+    QUICK_STOP: with_orders(REST, attrs.evolve(MOVE, end=500), order(500, CYCLES, QUICK_STOP)),
+    "jump": with_orders(REST, attrs.evolve(MOVE, end=500), order(500, CYCLES, QUICK_STOP), moved=0.001),
     "disabled": with_output("bEnabled", 300, 0.0),
     "distance": with_output("fDistanceToGo", 300, 1.0),
     "time": with_output("fTimeToGo", slice(720, 820), 3.0),
     "stop distance": with_output("fStopDistance", 300, 1.0),
     "promise": with_output("bPromise", 300, 0.0),
     "lost": with_output("nPromise", slice(2000, 3000), 1.0),
-    "kept": with_orders(REST, attrs.evolve(MOVE, end=300), told(300, CYCLES, QUICK_STOP)),
+    "kept": with_orders(REST, attrs.evolve(MOVE, end=300), order(300, CYCLES, QUICK_STOP)),
 }
 
 
@@ -158,13 +208,23 @@ def test_every_fault_is_found(what):
     assert kind_of(WORDS[what]) in kinds(FAULTS[what])
 
 
+def test_a_block_that_is_disabled_and_taken_over_has_no_fault():
+    assert kinds(disabled()) == set()
+
+
+def test_slow_intervals_are_kept():
+    assert kind_of(WORDS["fast"]) in kinds(with_zone(limit=0.5))
+    assert kinds(with_zone(limit=1.0)) == set()
+    assert kinds(with_zone(limit=0.5, low=5.5, high=5.6, begin=800, end=2000)) == set()
+
+
 def test_every_kind_of_fault_is_tried():
     assert {*FAULTS, "reaction"} == set(WORDS)
 
 
 def test_a_command_that_changes_nothing_for_too_long_is_obeyed_late():
     late = kind_of(WORDS["reaction"])
-    early = with_orders(REST, attrs.evolve(MOVE, end=120), told(120, CYCLES, STOP), reaction=0.5)
+    early = with_orders(REST, attrs.evolve(MOVE, end=120), order(120, CYCLES, STOP), reaction=0.5)
     assert late not in kinds(early, {120: 49})
     assert late in kinds(early, {120: 52})
     assert kinds(obedient(), {TOLD: 152, STOPPED: 152}) == set()  # the way was the right one
@@ -202,14 +262,14 @@ INPUTS = Inputs(
 )
 
 
-def read(*rows):
-    """Orders from cycles and inputs that differ from those before."""
+def read(*rows, facts=None):
+    """What is told by cycles and inputs that differ from those before."""
     begin = {"bEnable": 1.0, "rOverride": 1.0, "fL": 1.5, "fCycleTime": CYCLE}
     values, given = dict.fromkeys(NAMES, 0.0) | begin, []
     for _, changes in rows:
         values |= changes
         given.append(list(values.values()))
-    return orders([begin for begin, _ in rows], np.array(given), INPUTS, 1000)
+    return told([begin for begin, _ in rows], np.array(given), INPUTS, 1000, facts)
 
 
 def test_orders_are_read_from_inputs():
@@ -224,16 +284,22 @@ def test_orders_are_read_from_inputs():
         (70, {"bExecute": 1.0, "fTarget": 1000.0}),
         (80, {"bExecute": 0.0, "bQuickStop": 1.0, "rOverride": np.nan}),
     )
-    assert [(one.begin, one.kind, one.values, one.tops, one.edge, one.refused) for one in found] == [
-        (0, STOP, (), (1.0,), 0, 0),
-        (10, POSITION, (5.0,), (1.0,), 10, 0),  # and nothing new with the second edge
-        (40, POSITION, (5.0,), (0.5,), 10, 0),
-        (50, VELOCITY, (-0.3,), (0.2,), 50, 0),
-        (60, STOP, (), (1.0,), 60, 0),
-        (70, STOP, (), (1.0,), 60, 3),
-        (80, QUICK_STOP, (), (1.0,), 80, 0),
+    assert [(one.begin, one.kind, one.values, one.tops, one.edge) for one in found.orders] == [
+        (0, STOP, (), (1.0,), 0),
+        (10, POSITION, (5.0,), (1.0,), 10),  # and nothing new with the second edge
+        (40, POSITION, (5.0,), (0.5,), 10),
+        (50, VELOCITY, (-0.3,), (0.2,), 50),
+        (60, STOP, (), (1.0,), 60),
+        (80, QUICK_STOP, (), (1.0,), 80),
     ]
-    assert [one.end for one in found] == [*(one.begin for one in found[1:]), 1000]
+    assert [one.end for one in found.orders] == [*(one.begin for one in found.orders[1:]), 1000]
+    assert changes(found.error) == {70: 3, 80: 0, 100: 5}
+    assert changes(found.aborted) == {50: 1, 60: 0, 70: 1, 80: 0}
+
+
+def changes(flags):
+    """Values from the cycles in which they change on."""
+    return {int(at) + 1: int(flags[at + 1]) for at in np.flatnonzero(np.diff(flags.astype(int)))}
 
 
 def test_what_cannot_be_obeyed_is_read_from_inputs():
@@ -247,15 +313,13 @@ def test_what_cannot_be_obeyed_is_read_from_inputs():
         (60, {"fFollowingLimit": 0.1}),
         (70, {"fFollowingLimit": 0.0}),
         (80, {"bReset": 1.0}),
+        (90, {"bReset": 0.0, "bVelocity": 1.0, "bExecute": 1.0}),
+        (95, {"bExecute": 0.0}),
+        (97, {"bVelocity": 0.0}),
     )
-    assert [(one.begin, one.kind, one.refused, one.denied) for one in found] == [
-        (0, STOP, 0, False),
-        (10, STOP, 0, True),
-        (30, STOP, 1, True),
-        (40, STOP, 0, False),
-        (60, QUICK_STOP, 7, False),
-        (80, STOP, 0, False),
-    ]
+    assert [(one.begin, one.kind) for one in found.orders] == [(0, STOP), (60, QUICK_STOP), (80, STOP)]
+    assert changes(found.error) == {30: 1, 40: 0, 60: 7, 80: 0, 90: 6, 97: 0}
+    assert changes(found.aborted) == {10: 1, 20: 0, 30: 1, 50: 0}
 
 
 def test_wrong_values_count_once_they_have_lasted():
@@ -270,13 +334,33 @@ def test_wrong_values_count_once_they_have_lasted():
         (95, {"bExecute": 0.0, "bReset": 1.0}),
         (99, {"bExecute": 1.0, "bReset": 0.0}),
     )
-    assert [(one.begin, one.kind, one.refused) for one in found] == [
-        (0, POSITION, 0),
-        (60, STOP, 5),
-        (90, STOP, 5),  # a command that is denied
-        (95, STOP, 0),
-        (99, POSITION, 0),
-    ]
+    assert [(one.begin, one.kind) for one in found.orders] == [(0, POSITION), (60, STOP), (99, POSITION)]
+    assert changes(found.error) == {60: 5, 95: 0}
+    assert changes(found.aborted) == {60: 1, 80: 0, 90: 1, 95: 0}
+
+
+def test_what_commands_mean_depends_on_what_the_block_did():
+    rows = (
+        (0, {"bExecute": 1.0, "fTarget": 5.0}),
+        (200, {"bExecute": 0.0}),
+        (300, {"bEnable": 0.0}),
+        (310, {"bEnable": 1.0, "fVelocityCommand": 0.1, "bVelocity": 1.0}),
+    )
+    none = np.zeros(1000, dtype=bool)
+    far = np.zeros((1, 1000))
+    facts = {"done": none, "stands": none, "errors": 1.0 * none, "low": far, "high": far}
+    assert changes(read(*rows, facts=Facts(**facts)).holds) == {300: 0}
+    done = none.copy()
+    done[150:201] = True
+    found = read(*rows, facts=Facts(**facts | {"done": done}))
+    assert changes(found.holds) == {201: 0}
+    assert [one.kind for one in found.orders] == [
+        POSITION,
+        STOP,
+        DISABLED,
+        STOP,
+    ]  # deflected as it was enabled
+    assert not found.aborted.any()
 
 
 @pytest.fixture(scope="module")
@@ -285,7 +369,12 @@ def bay():
     histories = Histories.of(spec)
     drawn = [histories.history(choices) for choices in histories.drawn(24, seed=4)]
     text = planner_block(spec).text
-    return spec, text, histories, drawn, [found for _, found in judged(spec, text, histories, drawn)]
+    return spec, text, histories, drawn, shown(spec, text, histories, drawn)
+
+
+def shown(spec, text, histories, drawn):
+    """Kinds of faults, history by history."""
+    return [kinds_of(spec, one) for _, one in judged(spec, text, histories, drawn)]
 
 
 def disobedient(text, before="", after=""):
@@ -317,8 +406,8 @@ def disobedient(text, before="", after=""):
 )
 def test_a_block_that_disobeys_fails(bay, before, after, what):
     spec, text, histories, drawn, sound = bay
-    found = dict(judged(spec, disobedient(text, before, after), histories, drawn))
-    assert any(kind_of(WORDS[what]) in found[number] - shown for number, shown in enumerate(sound))
+    found = shown(spec, disobedient(text, before, after), histories, drawn)
+    assert any(kind_of(WORDS[what]) in one - known for one, known in zip(found, sound, strict=True))
 
 
 @pytest.mark.parametrize("value", ["1.0E+300 * 1.0E+300", "0.0 * (1.0E+300 * 1.0E+300)", "1.0E+200"])
@@ -327,8 +416,7 @@ def test_a_setpoint_that_is_no_number_is_a_verdict(bay, value):
     wrong = disobedient(
         text, after=f"nSince := nSince + 1; IF nSince > 500 THEN fPosition := {value}; END_IF;"
     )
-    (_, found), *_ = judged(spec, wrong, histories, drawn[:1])
-    assert found == {"a setpoint is no number"}
+    assert shown(spec, wrong, histories, drawn[:1]) == [{"a setpoint is no number"}]
 
 
 def test_histories_hold_what_operators_and_controllers_do(bay):
@@ -343,13 +431,16 @@ def test_histories_hold_what_operators_and_controllers_do(bay):
     )
     inputs = {name for history in drawn for change in history.changes for name in change.inputs}
     assert inputs == {
-        *("rOverride", "fVelocityLimit", "fL1", "fm2", "bReset", "bExecute", "bLoadAtRest"),
-        *("fCycleTime", "fFollowingLimit", "fActPosition"),
+        *("rOverride", "fVelocityLimit", "fL1", "fm2", "bReset", "bExecute", "bLoadAtRest", "bEnable"),
+        *("fCycleTime", "fFollowingLimit", "fActPosition", "fActVelocity", "fVelocityCommand"),
     }
-    assert any(history.errors for history in drawn)
     again = [sum(map(_same, history.commands, history.commands[1:])) for history in drawn]
     assert max(again) > 10
-    assert len(HABITS) > 8
+    assert len({*GENTLE, *ROUGH}) == 21
+    zoned = Histories.of(preset_spec("bay-crane", ["planner.zones=true"]))
+    drawn = [zoned.history(choices) for choices in zoned.drawn(40, seed=1)]
+    closed = {name for history in drawn for change in history.changes for name in change.inputs}
+    assert {"aBlockedLow[0]", "aSlowLimit[1]", "aBlockedHigh[7]", "aSlowHigh[7]"} <= closed
 
 
 def _same(first, second):

@@ -27,8 +27,7 @@ TO_TURN = 1.9  # (1.6)
 RUN_OUT = 0.7  # before a motion that ends soon anyway gives way to another (0.6)
 CALMED = 3.0  # more where live parameters change on the way (2.1)
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
-ENABLED = 1.7  # s, which a block takes once it is enabled (1.4, of a damped crane at 4 ms)
-SETTLING = 5.0  # periods in which that may go on while it is commanded
+ENABLED = 1.7  # s, which a block takes more to get ready, of far targets even later (1.4, of a damped crane at 4 ms)
 IN_VELOCITY = 2e-6  # share of the greatest velocity, by which one counts as reached
 
 
@@ -100,7 +99,7 @@ class Followed:
 
     def moved(self, begin: int, end: int) -> float:
         """Tell how far an axis is moved while it is disabled, relative to its greatest velocity in 1/s."""
-        ways = np.abs(self.steps[:, begin : end + 1].sum(axis=1)).tolist()
+        ways = np.abs(np.nansum(self.steps[:, begin : end + 1], axis=1)).tolist()
         return max(float(way) / own.velocity for way, own in zip(ways, self.limits, strict=True))
 
     @property
@@ -254,13 +253,7 @@ def arriving(followed: Followed, place: Array, before: Array, order: TimedOrder)
         FAR * way / (share * min(top, slow)) + (top + abs(v)) / own.acceleration + own.acceleration / own.jerk
         for way, v, top, own in zip(ways, map(float, before), order.tops, followed.limits, strict=True)
     )
-    return slowest + periods * followed.period + getting_ready(followed, order.begin)
-
-
-def getting_ready(followed: Followed, begin: int) -> float:
-    """Tell the time in s that a block takes more where it was enabled not long before."""
-    since = min(begin - at for at in followed.enabled if at <= begin)
-    return ENABLED if since < followed.after(SETTLING * followed.period) else 0.0
+    return slowest + periods * followed.period + (0.0 if before.any() else ENABLED)
 
 
 def calmed(followed: Followed) -> float:

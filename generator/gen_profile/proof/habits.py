@@ -233,7 +233,7 @@ def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
 
 def _slowed_on_the_way(command: Command, how: float, around: Surroundings) -> Manner:
     """Change override or velocity limit while the axis moves, without a new command."""
-    later, lasts = around.period * _share(how, 3), around.period * (1.0 + 5.0 * _share(how, 4))
+    later, lasts = 3.0 * around.period * _share(how, 3), around.period * (1.0 + 6.0 * _share(how, 4))
     share = 0.3 + 0.5 * how
     inputs = {"rOverride": share}
     if _share(how, 5) < 0.5:
@@ -241,9 +241,13 @@ def _slowed_on_the_way(command: Command, how: float, around: Surroundings) -> Ma
             f"fVelocityLimit{end}": share * most
             for end, (_, most) in zip(around.suffixes, around.speeds, strict=True)
         }
-    return Manner(
-        commands=(command,), changes=(Change(time=command.time + later, lasts=lasts, inputs=inputs),)
-    )
+    slowed = Change(time=command.time + later, lasts=lasts, inputs=inputs)
+    return Manner(commands=(command, _followed(command, later + lasts)), changes=(slowed,))
+
+
+def _patient(command: Command, how: float, around: Surroundings) -> Manner:
+    """Wait for what a command comes to."""
+    return Manner(commands=(command, _followed(command, around.period * (3.0 + 7.0 * how))))
 
 
 def _held(command: Command, how: float, around: Surroundings) -> Manner:
@@ -413,14 +417,17 @@ def _fenced(command: Command, how: float, around: Surroundings) -> Manner:
 
 
 def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
-    """Drop bEnable, mostly on the way; let the axis stand there, or move it by hand, until it is set again."""
+    """Drop bEnable, mostly on the way; let the axis stand, or move it by hand, until it is set again."""
     later, lasts = around.period * _share(how, 3), _log(around.cycle, around.period, _share(how, 4))
     begin, taken = command.time + later, dict[str, float]()
     if how < 0.6:
-        for (_, most), suffix in zip(around.speeds, around.suffixes, strict=True):
-            speed = most * HAND * (2.0 * _share(how, 5) - 1.0)
+        for k, ((_, most), suffix) in enumerate(zip(around.speeds, around.suffixes, strict=True)):
+            speed = most * HAND * max(0.0, 1.5 * _share(how, 5 + k) - 0.5) * (1.0 if how < 0.45 else -1.0)
             taken |= {f"fActPosition{suffix}": speed * around.cycle, f"fActVelocity{suffix}": speed}
     goes = how > 0.3  # still, as it is taken over
+    if how > 0.8 and not around.hoists:  # nowhere, and so not taken over yet
+        name = "fActPosition" if how < 0.9 else "fActVelocity"
+        taken = {f"{name}{around.suffixes[int(100.0 * how) % len(around.suffixes)]}": nan}
     changes = [
         Change(time=begin, lasts=lasts + 4.0 * around.cycle * (not goes), inputs={"bEnable": 0.0}),
         Change(time=begin, lasts=lasts + 1.5 * around.cycle * goes, inputs=taken),
@@ -441,6 +448,8 @@ def _respooled(command: Command, how: float, around: Surroundings) -> Manner:
 
 Habit = Callable[[Command, float, Surroundings], Manner]
 GENTLE: tuple[Habit, ...] = (
+    _patient,
+    _patient,
     _again,
     _creeping,
     _tap,

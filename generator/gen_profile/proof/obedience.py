@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from gen_profile.proof.followed import (
+    ENABLED,
     EXACT,
     FROM_REST,
     IN_VELOCITY,
@@ -20,7 +21,6 @@ from gen_profile.proof.followed import (
     IssuedMotion,
     arriving,
     calmed,
-    getting_ready,
     reaching,
     runs_of,
     slowing,
@@ -187,8 +187,7 @@ def _directions(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]
         allowed = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_TURN)
         yield Allowance("against", begin, (end - begin) * followed.cycle, allowed)
     for begin, end in runs_of(wants & motion.stands):
-        ready = getting_ready(followed, begin) + calmed(followed) * followed.period
-        allowed = followed.reaction + ready
+        allowed = followed.reaction + ENABLED + calmed(followed) * followed.period
         yield Allowance("idle", begin, (end - begin) * followed.cycle, allowed)
 
 

@@ -22,6 +22,7 @@ MISTIMED, LIVE, REFUSED, NO_NUMBER, LIMITS, CONTRADICTORY, FOLLOWING, BLOCKED = 
 OF_COMMANDS = (REFUSED, CONTRADICTORY, BLOCKED)  # which go with them
 REPLACED, ABORTED_POSITION, ABORTED_VELOCITY = 3, 1, 2  # why bCommandAborted is set
 ZONES = 8  # intervals of each kind
+ROUNDING = 1e-9  # m (or rad)
 NUMBERS = 1e9  # m (or rad), up to which an axis may be somewhere
 
 Flags = NDArray[np.bool_]
@@ -185,7 +186,8 @@ class _Reader:
         self.aborted, self.error, self.command = 0, 0, STOP
         self.due: int | None = None  # the cycle in which wrong values begin to count
         self._latched = self._execute = self._velocity = self._braking = self._in_the_way = False
-        self._neutral, self._enabled, self._edge, self._since = False, False, 0, -1
+        self._neutral, self._enabled, self._edge = False, False, 0
+        self._since = {LIVE: -1, LIMITS: -1}  # cycles from which values are wrong
         self._goal, self._kind = tuple[float, ...](), STOP
         self._tops = tuple(own.velocity for own in inputs.limits)
 
@@ -222,6 +224,9 @@ class _Reader:
             self.error, self._latched, self._enabled, self._neutral = 0, False, False, False
             return DISABLED
         if not self._enabled:
+            self.error = self._hinders(row)
+            if self.error:
+                return DISABLED
             self._enabled = True
             self._braking = any(row.get(axis.of("fActVelocity")) for axis in self._inputs.axes)
         fault = self._fault(cycle, row)
@@ -243,6 +248,17 @@ class _Reader:
             self._braking = True
         return QUICK_STOP if quick or self.error == FOLLOWING else self.command
 
+    def _mistimed(self, row: Mapping[str, float]) -> bool:
+        cycle = self._inputs.cycle
+        return not abs(row["fCycleTime"] - cycle) <= 1e-6 * cycle
+
+    def _hinders(self, row: Mapping[str, float]) -> int:
+        """Give the error for which axes are not taken over; 0 for none."""
+        names = [axis.of(name) for axis in self._inputs.axes for name in ("fActPosition", "fActVelocity")]
+        if not all(abs(row.get(name, 0.0)) <= NUMBERS for name in names):
+            return NO_NUMBER
+        return MISTIMED * self._mistimed(row)
+
     def _abort(self, done: bool) -> None:
         if self.command != STOP and not done:
             self.aborted = ABORTED_POSITION if self.command == POSITION else ABORTED_VELOCITY
@@ -258,15 +274,14 @@ class _Reader:
                 for own, limit in zip(self._inputs.limits, given, strict=True)
             )
         live = all(low <= row[f"f{name}"] <= high for name, (low, high) in self._inputs.live.items())
-        self._since = -1 if good and live else cycle if self._since < 0 else self._since
-        self.due = None if self._since < 0 else self._since + self._inputs.held
-        lasts = self.due is not None and cycle >= self.due
+        for error, right in ((LIVE, live), (LIMITS, good)):
+            self._since[error] = -1 if right else cycle if self._since[error] < 0 else self._since[error]
+        counts = {since + self._inputs.held: error for error, since in self._since.items() if since >= 0}
+        self.due = min((at for at in counts if at > cycle), default=None)
         if row.get("bReset"):
             self.error, self._latched = 0, False
-        cycle_time = self._inputs.cycle
-        fault = MISTIMED * (not abs(row["fCycleTime"] - cycle_time) <= 1e-6 * cycle_time)
-        if lasts:
-            fault = LIVE if good else LIMITS
+        fault = MISTIMED * self._mistimed(row)
+        fault = max((error for at, error in counts.items() if at <= cycle), default=fault)
         if self._is_in_the_way(cycle, row) and not self._latched:
             fault = BLOCKED
         if self._strays(row):

@@ -21,6 +21,7 @@ from gen_profile.proof.followed import (
 from gen_profile.proof.orders import BLOCKED, DISABLED, POSITION, QUICK_STOP, STOP, Flags
 
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
+CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
 
 
@@ -45,7 +46,8 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         )
         if not (followed.reserve and begin in followed.enabled):  # what swings as it is taken over is calmed
             leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * told[own] - turns[:, own]
-            yield from greatest("ends", leaves, EXACT, begin)
+            calms = CALMS * max(limits.margin for limits in followed.limits)
+            yield from greatest("ends", leaves, EXACT + calms, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
         takes = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
         rests = motion.stands[own] & (followed.issued["bBusy"][own] == 0.0)
@@ -130,11 +132,12 @@ def taken_over(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         last = min(order.end, followed.cycles - 1)
         own = slice(order.begin, last + 1)
         x, v = motion.position[:, order.begin - 1 : last + 1], motion.velocity[:, own]
-        apart = np.abs(np.diff(x, axis=1) - followed.steps[:, own])
+        known = np.isfinite(followed.steps[:, own] + followed.speeds[:, own]).all(axis=0)
+        apart = np.abs(np.diff(x, axis=1) - np.where(known, followed.steps[:, own], 0.0))
         braked = [limits.quick[1] * followed.cycle**3 for limits in followed.limits]
         apart[:, -1] -= np.abs(v[:, -1]) * followed.cycle + braked
         yield from greatest("taken over", apart, EXACT, order.begin)
         allowed = np.array([[limits.quick[0]] for limits in followed.limits]) * followed.cycle
-        wrong = np.abs(v - followed.speeds[:, own])
+        wrong = np.abs(v - np.where(known, followed.speeds[:, own], v))
         yield from greatest("taken over", wrong[:, :-1], EXACT, order.begin)
         yield from greatest("taken over", wrong[:, -1:] - allowed, EXACT, last)
