@@ -351,9 +351,9 @@ def test_what_commands_mean_depends_on_what_the_block_did():
     facts = {"done": none, "stands": none, "errors": 1.0 * none, "low": far, "high": far}
     assert changes(read(*rows, facts=Facts(**facts)).holds) == {300: 0}
     done = none.copy()
-    done[150:201] = True
+    done[150:200] = True
     found = read(*rows, facts=Facts(**facts | {"done": done}))
-    assert changes(found.holds) == {201: 0}
+    assert changes(found.holds) == {200: 0}
     assert [one.kind for one in found.orders] == [
         POSITION,
         STOP,

@@ -17,7 +17,7 @@ EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated e
 # Times beyond those that distance, velocity, acceleration and jerk take, in slow periods; in brackets the
 # longest met in 6000 histories of twelve machines, but for faults of the block.
 FAR = 1.1  # of the way's time at full speed
-FROM_REST = 1.5  # (1.24)
+FROM_REST = 1.6  # (1.5)
 ON_WAY = 4.2  # to a target: after changes of mind an axis turns to and fro (3.5; without them 1.9)
 TO_STICK = 3.1  # to its velocity, as a motion to a target is stopped first (2.6)
 MORE_AXES = 1.3  # for each further axis, as they are planned one after the other (1.1)
@@ -27,7 +27,7 @@ TO_TURN = 1.9  # (1.6)
 RUN_OUT = 0.7  # before a motion that ends soon anyway gives way to another (0.6)
 CALMED = 3.0  # more where live parameters change on the way (2.1)
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
-ENABLED = 1.7  # s, which a block takes more to get ready, of far targets even later (1.4, of a damped crane at 4 ms)
+ENABLED = 1.7  # s, which a block takes more to get ready (1.4, of a damped crane at 4 ms)
 IN_VELOCITY = 2e-6  # share of the greatest velocity, by which one counts as reached
 
 
@@ -253,7 +253,7 @@ def arriving(followed: Followed, place: Array, before: Array, order: TimedOrder)
         FAR * way / (share * min(top, slow)) + (top + abs(v)) / own.acceleration + own.acceleration / own.jerk
         for way, v, top, own in zip(ways, map(float, before), order.tops, followed.limits, strict=True)
     )
-    return slowest + periods * followed.period + (0.0 if before.any() else ENABLED)
+    return slowest + periods * followed.period + (0.0 if before.any() else followed.reaction)
 
 
 def calmed(followed: Followed) -> float:
