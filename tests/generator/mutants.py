@@ -49,6 +49,12 @@ CONSTANT = re.compile(r"(?m)^ *(c\w+) : (ARRAY \[[^]]*\] OF )?(LREAL|DINT) := \[
 ROUNDING, BEYOND = 1e-5, 1e6  # numbers that are as good half as great again: of rounding, and beyond all
 UNKNOWN = {"interface"}  # parts that hold no statements
 ALIKE = {  # mutants, by part and the line that they make: why a block with it is as good
+    "inputs: aLiveOnce[nIndex] := aLiveOnce[nIndex];": "of the first three values two are alike all the same",
+    "inputs: IF NOT (ABS(aActual[cAxes - 1 - nAxis]) <= 1.0E+9)"
+    " OR NOT (ABS(aActualVelocity[nAxis]) <= 1.0E+9) THEN": "both axes are asked",
+    "programme: IF nPart = 2 THEN fHalf := 0.0 - (1.0 / fCurve); END_IF;": "these bounds are symmetric",
+    "programme: fSlackA := 0.5 * (1.0E+30);": "any number will do that is great enough",
+    "programme: fSlackB := 0.5 * (1.0E+30);": "any number will do that is great enough",
 }
 
 

@@ -13,7 +13,6 @@ from command_line import run_here
 from distributed import LocalCluster
 from generator.planned_machines import BAY, CYCLE, GANTRY, HOIST, PAPER, swing
 
-from gen_profile.artefacts.manifest import parse_manifest
 from gen_profile.charts.proof import history_figure
 from gen_profile.errors import SpecError
 from gen_profile.planner.commands import Command, play
@@ -90,20 +89,6 @@ def test_a_move_on_the_machine_as_told_leaves_a_thousandth_of_its_sway(spec, tex
     with ClosedLoop(spec, text, Histories.of(spec)) as loop:
         run = loop.run(history)
     assert (run.residual < 1e-3 * run.on_the_way).all()
-
-
-@pytest.mark.slow
-def test_numbers_of_an_earlier_version_mean_what_they_meant(deployed, tmp_path):
-    """Its manifest tells neither of override and velocity limit nor of habits: these histories have none."""
-    (tmp_path / "bay 3.st").write_bytes((deployed[0] / "bay 3.st").read_bytes())
-    manifest = parse_manifest((deployed[0] / "manifest.json").read_bytes(), "manifest.json")
-    check = {key: value for key, value in manifest.check.items() if key not in {"slowed", "habits"}}
-    (tmp_path / "manifest.json").write_bytes(attrs.evolve(manifest, check=check).to_json())
-    found = run_here("check", tmp_path / "bay 3.st", "--history", 13, "--json").document["history"]
-    assert {(one["override"], one["velocity_limit_m_per_s"]) for one in found["commands"]} == {(1.0, 0.0)}
-    before = Histories.of(parse_spec(BAY), slowed=False, habits=False)
-    assert before.choices == 5 + 3 + 3 * 16
-    assert found["commands"][0]["time_s"] == before.history(before.drawn(18, 0)[13]).commands[0].time
 
 
 def test_a_sound_block_is_proved(spec, proof):
@@ -317,7 +302,6 @@ GOOD = BlockRun(
         ({"gap": 1e-6}, "a setpoint jumps by 1e-06 m"),
         ({"creep": 1e-6}, "the axis moves on at rest"),
         ({"stands": -1}, "the axis does not come to rest"),
-        ({"error": 3}, "the block shows error 3"),
         ({"promise": False}, "the block takes its promise back"),
         ({"fault": 2}, "the block repeats a loop without end"),
     ],

@@ -421,10 +421,6 @@ def test_a_setpoint_that_is_no_number_is_a_verdict(bay, value):
 
 def test_histories_hold_what_operators_and_controllers_do(bay):
     histories = Histories.of(bay[0])
-    before = attrs.evolve(histories, habits=False)
-    assert histories.choices == before.choices + 2 * 16
-    plain = before.history(before.drawn(8, seed=1)[5])
-    assert not plain.changes
     drawn = [histories.history(choices) for choices in histories.drawn(400, seed=1)]
     assert all(
         history.commands == tuple(sorted(history.commands, key=lambda one: one.time)) for history in drawn

@@ -127,17 +127,16 @@ def check_block(
     standing = provenance(manifest, content, spec)
     known = _record(manifest) if standing != "none" else {}
     count = histories or known.get("histories", HISTORIES)
-    kinds = {name: known.get(name, not known) for name in ("slowed", "habits")}
     if history is not None and not 0 <= history < count:
         raise SpecError(f"history {history}: the histories are numbered from 0 to {count - 1}.")
-    proof = partial(prove, spec, text, histories=count, **kinds, scheduler=scheduler, progress=progress)
+    proof = partial(prove, spec, text, histories=count, scheduler=scheduler, progress=progress)
     if history is None:
         found = proof()
     else:
         if known.get("histories") != count:  # the search's histories depend on what it has found
             known = proof().to_dict()
         seed, parents = known["seed"], known["search_parents"]
-        numbering = Numbering.of(Histories.of(spec, **kinds), count, seed, parents)
+        numbering = Numbering.of(Histories.of(spec), count, seed, parents)
         found = replay(spec, text, numbering, history, progress)
     check = attrs.evolve(found, faults=alterations(path, standing))
     return BlockJudgement(path=path, text=text, spec=spec, check=check, manifest=standing, history=history)

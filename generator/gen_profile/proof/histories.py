@@ -168,10 +168,6 @@ class Histories:
         Of the slowest mode over all ranges, in s.
     fastest : float
         Frequency of the fastest mode there, in rad/s.
-    slowed : bool
-        Whether override and velocity limit vary, too; those of earlier manifests do not.
-    habits : bool
-        Whether commands also come as `proof.habits` tells; those of earlier manifests do not.
     """
 
     spec: Spec
@@ -179,11 +175,9 @@ class Histories:
     uncertain: Mapping[str, tuple[float, float]]
     period: float
     fastest: float
-    slowed: bool = True
-    habits: bool = True
 
     @classmethod
-    def of(cls, spec: Spec, *, slowed: bool = True, habits: bool = True) -> Self:
+    def of(cls, spec: Spec) -> Self:
         """Look at the ranges of a spec, whose limits are stated."""
         live, nominal = spec.planner.live, spec.plant.parameters
         ranges = {
@@ -206,8 +200,6 @@ class Histories:
             uncertain=ranges,
             period=period,
             fastest=fastest,
-            slowed=slowed,
-            habits=habits,
         )
 
     def slowest(self, history: History) -> float:
@@ -247,7 +239,7 @@ class Histories:
 
     @property
     def _per_command(self) -> int:
-        return _PER_COMMAND + len(self.axes) + self.slowed + _PER_HABIT * self.habits
+        return _PER_COMMAND + len(self.axes) + 1 + _PER_HABIT
 
     @property
     def _first_command(self) -> int:
@@ -354,12 +346,9 @@ class Histories:
             if time > within:
                 break
             command = self._command(time, int(np.searchsorted(np.cumsum(likely), row[0])), row[1:last])
-            more = iter(row[last + 1 :])
-            command = self._slowed(command, *islice(more, self.slowed))
-            found = Manner(commands=(command,))
-            if self.habits:
-                found = habit(command, next(more), next(more), around)
-                earliest = found.commands[-1].time + 2.0 * around.cycle
+            slowed, which, how = row[last + 1 :]
+            found = habit(self._slowed(command, slowed), which, how, around)
+            earliest = found.commands[-1].time + 2.0 * around.cycle
             yield found
             time = found.commands[-1].time + self.period * SHORTEST * (LONGEST / SHORTEST) ** row[last]
         time = max(min(time, within), earliest)
@@ -397,7 +386,7 @@ class Histories:
             rough=rough,
         )
 
-    def _slowed(self, command: Command, choice: float = 0.0) -> Command:
+    def _slowed(self, command: Command, choice: float) -> Command:
         """Limit one command in four by the override, and one in four by the velocity limit."""
         if choice < 0.5:
             return command

@@ -26,8 +26,16 @@ from gen_profile.proof.followed import (
     slowing,
 )
 from gen_profile.proof.orders import DISABLED, POSITION, QUICK_STOP, STOP, VELOCITY, Flags, TimedOrder
-from gen_profile.proof.places import blocked, slowed, stops, taken_over
-from gen_profile.proof.statements import numbers, promises, truths, velocities
+from gen_profile.proof.statements import (
+    blocked,
+    numbers,
+    promises,
+    slowed,
+    stops,
+    taken_over,
+    truths,
+    velocities,
+)
 
 STILL = 1e-6  # m, from a target that an axis need not leave for
 

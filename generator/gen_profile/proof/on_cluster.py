@@ -39,8 +39,6 @@ class ProofRecipe:
         That the spec names, by their names.
     text : str
         The block.
-    slowed, habits : bool
-        As of `Histories`.
     versions : tuple of (str, str)
         Of the libraries that shape the numbers.
     """
@@ -48,8 +46,6 @@ class ProofRecipe:
     spec: str = attrs.field(repr=False)
     files: tuple[tuple[str, bytes], ...] = attrs.field(repr=False)
     text: str = attrs.field(repr=False)
-    slowed: bool
-    habits: bool
     versions: tuple[tuple[str, str], ...]
 
     @classmethod
@@ -59,8 +55,6 @@ class ProofRecipe:
             spec=json.dumps(spec.to_dict()),
             files=tuple(spec.files().items()),
             text=text,
-            slowed=histories.slowed,
-            habits=histories.habits,
             versions=versions(),
         )
 
@@ -123,7 +117,7 @@ def judge_part(recipe: ProofRecipe, rows: Sequence[tuple[int, str, list[float]]]
     """
     require_versions(recipe.versions, "this proof")
     spec = recipe.read_spec()
-    histories = Histories.of(spec, slowed=recipe.slowed, habits=recipe.habits)
+    histories = Histories.of(spec)
     with ClosedLoop(spec, recipe.text, histories) as loop:
         made = [(number, group, histories.history(np.array(choices))) for number, group, choices in rows]
         return [

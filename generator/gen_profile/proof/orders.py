@@ -315,10 +315,12 @@ class _Reader:
 
     def _take_target(self, row: Mapping[str, float], done: bool, cycle: int) -> None:
         targets = self._of(row, "fTarget")
-        within = zip(targets, (own.targets for own in self._inputs.limits), strict=True)
-        self.error = 0 if all(low <= target <= high for target, (low, high) in within) else REFUSED
-        if any(self._is_closed(k, target, row, cycle) for k, target in enumerate(targets)):
-            self.error = BLOCKED
+        self.error = 0
+        for k, (target, own) in enumerate(zip(targets, self._inputs.limits, strict=True)):
+            if not own.targets[0] <= target <= own.targets[1]:
+                self.error = REFUSED
+            if self._is_closed(k, target, row, cycle):
+                self.error = BLOCKED
         self.aborted = ABORTED_POSITION if self.error else 0
         if self.error:
             self.command = STOP

@@ -31,8 +31,6 @@ def prove(
     text: str,
     *,
     histories: int = HISTORIES,
-    slowed: bool = True,
-    habits: bool = True,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress = untold,
@@ -46,8 +44,6 @@ def prove(
     text : str
         The block, as it was written.
     histories : int
-    slowed, habits : bool
-        As of `Histories`.
     workers : int, optional
         Processors to use; all that there are by default. What is found does not depend on it.
     scheduler : str, optional
@@ -66,7 +62,7 @@ def prove(
     OutputError
         Dask is not installed.
     """
-    numbering = Numbering.of(Histories.of(spec, slowed=slowed, habits=habits), histories, spec.check.seed)
+    numbering = Numbering.of(Histories.of(spec), histories, spec.check.seed)
     with ExitStack() as stack:
         judge: Judge | None = None
         if scheduler is not None:  # before anything takes its time
@@ -172,8 +168,6 @@ def _verdict(
         error_bound=error,
         seed=numbering.seed,
         count=numbering.count,
-        slowed=numbering.histories.slowed,
-        habits=numbering.histories.habits,
         parents=numbering.parents,
         judged=tuple(judged),
         by_fmpy=tuple(by_fmpy),

@@ -99,10 +99,6 @@ class Proof(Examination):
         No residual is further than this from the truth, in m.
     seed, count : int
         With which the histories were drawn, and how many.
-    slowed : bool
-        Whether override and velocity limit varied, too.
-    habits : bool
-        Whether commands also came as operators and controllers give them.
     parents : sequence of sequences of int
         From which histories each round of the search began.
     judged : tuple of JudgedHistory
@@ -120,8 +116,6 @@ class Proof(Examination):
     error_bound: float
     seed: int
     count: int
-    slowed: bool
-    habits: bool
     parents: Sequence[Sequence[int]]
     judged: tuple[JudgedHistory, ...]
     by_fmpy: tuple[int, ...]
@@ -184,8 +178,8 @@ class Proof(Examination):
             "error_bound_m": self.error_bound,
             "histories": self.count,
             "seed": self.seed,
-            "slowed": self.slowed,
-            "habits": self.habits,
+            "slowed": True,  # as those of the first manifests were not
+            "habits": True,
             "search_parents": [list(numbers) for numbers in self.parents],
             "share": self.share(self.worst),
             "worst": self.described(self.worst),
