@@ -146,14 +146,15 @@ def told(begins: Sequence[int], rows: Array, inputs: Inputs, last: int, facts: F
         Of the run that these inputs led to.
     """
     reader, found, seen = _Reader(inputs, facts), list[TimedOrder](), list[tuple[int, bool, int, bool]]()
-    places, row, values = [*begins, last], 0, rows.tolist()
+    places, row, values, due = [*begins, last], 0, rows.tolist(), None
     pending = sorted({*begins, *(_events(begins, facts) if facts else ())}, reverse=True)
     while pending and (cycle := pending.pop()) < last:
         while places[row + 1] <= cycle:
             row += 1
         order = reader.step(cycle, dict(zip(inputs.names, values[row], strict=False)))
-        if reader.due is not None and cycle < reader.due < (pending[-1] if pending else last):
-            pending.append(reader.due)
+        for at in (cycle + 1 if cycle == due else None, due := reader.due):
+            if at is not None and cycle < at < (pending[-1] if pending else last):
+                pending.append(at)
         seen.append((cycle, reader.aborted > 0, reader.error, reader.command in (POSITION, VELOCITY)))
         if not found or not _same(order, found[-1]):
             found.append(order)

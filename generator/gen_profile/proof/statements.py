@@ -145,8 +145,9 @@ def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
             moved = followed.moved(order.begin, at) > 0.0
             may_be[at:] |= moving or moved
             must_be[at:] |= (moving or followed.moved(order.begin, at) > FAR_MOVED) and not followed.reserve
-        elif order.kind == QUICK_STOP and moving:
-            may_be[at:] = must_be[at:] = True
+        elif order.kind == QUICK_STOP:
+            may_be[at:] |= moving or bool(followed.issued["bBusy"][max(0, at - 1)])
+            must_be[at:] |= moving
         later = [at for at in followed.seen if order.begin <= at < order.end and motion.guided[at]]
         for at in later:
             if motion.stands[at]:
