@@ -17,9 +17,9 @@ EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated e
 # Times beyond those that distance, velocity, acceleration and jerk take, in slow periods; in brackets the
 # longest met in 6000 histories of twelve machines, but for faults of the block.
 FAR = 1.1  # of the way's time at full speed
-FROM_REST = 1.6  # (1.5)
+FROM_REST = 1.8  # (1.7)
 ON_WAY = 4.2  # to a target: after changes of mind an axis turns to and fro (3.5; without them 1.9)
-TO_STICK = 3.1  # to its velocity, as a motion to a target is stopped first (2.6)
+TO_STICK = 3.4  # to its velocity, as a motion to a target is stopped first (3.2)
 MORE_AXES = 1.3  # for each further axis, as they are planned one after the other (1.1)
 TO_STOP = 3.4  # (3.1 where stated errors of the frequencies count, 2.3 elsewhere)
 TO_SLOW = 2.5  # below a new velocity limit: a new target is planned, or a motion stopped, first (2.1)

@@ -188,6 +188,7 @@ class _Reader:
         self.due: int | None = None  # the cycle in which wrong values begin to count
         self._latched = self._execute = self._velocity = self._braking = self._in_the_way = False
         self._neutral, self._enabled, self._edge = False, False, 0
+        self._fences, self._fenced = list[list[Interval]](), False
         self._since = {LIVE: -1, LIMITS: -1}  # cycles from which values are wrong
         self._goal, self._kind = tuple[float, ...](), STOP
         self._tops = tuple(own.velocity for own in inputs.limits)
@@ -345,17 +346,22 @@ class _Reader:
             beyond, before = target > low - margin, target < high + margin
             if beyond and before:
                 return True
-            if facts is not None and (
-                (beyond and facts.high[axis, cycle - 1] <= low)
-                or (before and facts.low[axis, cycle - 1] >= high)
-            ):
-                return True
+            if facts is None:
+                continue
+            lowest, highest = facts.low[axis, cycle - 1], facts.high[axis, cycle - 1]
+            if (beyond and highest <= low + ROUNDING) or (before and lowest >= high - ROUNDING):
+                touches = min(abs(highest - low), abs(lowest - high)) <= ROUNDING
+                return not touches or facts.errors[cycle] == BLOCKED  # else it is told a cycle later
         return False
 
     def _is_in_the_way(self, cycle: int, row: Mapping[str, float]) -> bool:
-        """Whether a blocked interval is: the block says so, not of a target that has just come."""
-        if self._facts is None or self._facts.errors[cycle] != BLOCKED:
+        """Whether one is that was set after the first cycle; the block tells when it is."""
+        fences = [self._closed(row, axis) for axis in range(len(self._inputs.axes))]
+        facts, self._fenced = self._facts, self._fenced or bool(cycle and fences != self._fences)
+        self._fences = fences
+        if facts is None or not any(fences) or facts.errors[cycle] != BLOCKED:
             self._in_the_way = False
-        elif self._facts.errors[cycle - 1] != BLOCKED and not (row["bExecute"] and not self._execute):
-            self._in_the_way = any(self._closed(row, axis) for axis in range(len(self._inputs.axes)))
+            return False
+        begins = facts.errors[cycle - 1] != BLOCKED and not (row["bExecute"] and not self._execute)
+        self._in_the_way |= begins and (self._fenced or cycle == self._edge + 1)
         return self._in_the_way
