@@ -27,7 +27,7 @@ TO_TURN = 1.9  # (1.6)
 RUN_OUT = 0.7  # before a motion that ends soon anyway gives way to another (0.6)
 CALMED = 3.0  # more where live parameters change on the way (2.1)
 LEAST_REACTION, REACTION = 0.5, 0.6  # s, and periods: where the block states none
-ENABLED = 1.7  # s, which a block takes more to get ready (1.4, of a damped crane at 4 ms)
+ENABLED = 2.2  # s, which a block takes more to get ready (2.1, of a damped crane at 4 ms)
 IN_VELOCITY = 2e-6  # share of the greatest velocity, by which one counts as reached
 
 

@@ -413,7 +413,8 @@ def _fenced(command: Command, how: float, around: Surroundings) -> Manner:
     zone = around.zone(k, _share(how, 5), _share(how, 6), ZONES - 1, slow=_share(how, 7) < 0.5)
     begin = command.time + later
     reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
-    return Manner(commands=(command,), changes=(Change(time=begin, lasts=lasts, inputs=zone), reset))
+    again = _followed(command, later + lasts + 0.5 * around.period)
+    return Manner(commands=(command, again), changes=(Change(time=begin, lasts=lasts, inputs=zone), reset))
 
 
 def _disabled(command: Command, how: float, around: Surroundings) -> Manner:

@@ -39,6 +39,7 @@ FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis w
 NOTICED = 0.2  # periods, in which the end of a motion is
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
+STATED = 1e-5  # m, by which the ends of a stop may be left as a plan takes over
 CALMS = 0.5  # of the room for calming, by which that may leave the stated ends of a stop
 STILL = 1e-9  # m/s2
 
@@ -163,7 +164,7 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     up, down = (high - motion.position) * told, (motion.position - low) * told
     apart = np.abs(followed.of("fStopDistance") - np.maximum(high - motion.position, motion.position - low))
     yield from greatest("stop distance", apart, EXACT)
-    yield from greatest("ends", -np.minimum(up, down) - turns, EXACT)
+    yield from greatest("ends", -np.minimum(up, down) - turns, STATED)
     targets = list[tuple[float, ...]]()
     for order in followed.orders:
         begin, own = order.begin, slice(order.begin, order.end)
@@ -178,7 +179,7 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         if not (followed.reserve and begin in followed.enabled):  # what swings as it is taken over is calmed
             leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * told[own] - turns[:, own]
             calms = CALMS * max(limits.margin for limits in followed.limits)
-            yield from greatest("ends", leaves, EXACT + calms, begin)
+            yield from greatest("ends", leaves, STATED + calms, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
         takes = followed.reaction + slowing(followed, motion.velocity[:, begin], TO_STOP)
         rests = motion.stands[own] & (followed.issued["bBusy"][own] == 0.0)
