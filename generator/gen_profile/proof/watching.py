@@ -33,6 +33,8 @@ from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.block import RESERVE
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
 
+LARGE_SWINGS = 0.1  # of the allowed sway, which the linear machine of a block does not know
+STATED = 1.05  # sway by what the block states: between the machines that it watches
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
 
@@ -136,7 +138,16 @@ class BlockWatch:
         run : BlockRun
             With its trace, and copies of the block before `marks`.
         """
-        return tuple(faults(*self.followed(period, script, expected, block, run)))
+        followed, reactions = self.followed(period, script, expected, block, run)
+        return (*faults(followed, reactions), *self._understated(run, followed))
+
+    def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
+        """Tell where more sways on than the block states that errors may leave."""
+        states, left = followed.issued.get("fSwayLeft"), float(run.residual.max(initial=0.0))
+        if states is None or any(order.kind in (QUICK_STOP, DISABLED) for order in followed.orders):
+            return  # it is not known how the load swings
+        if left > STATED * states[-1] + LARGE_SWINGS * min(self.spec.check.residual_sway.values()):
+            yield f"a load sways by {left:.3g} m, where fSwayLeft states {states[-1]:.3g} m"
 
     def followed(
         self, period: float, script: Script, expected: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
