@@ -273,7 +273,7 @@ def test_the_main_job_says_what_is_not_proved_and_writes_no_certificate(tmp_path
     assert made.code == 4 and made.document["check"]["passed"] and not made.document["certificate"]["proved"]
     assert made.errors[0].startswith("Not proved: The payload is proved to sway by at most")
     assert [path.suffix for path in tmp_path.iterdir() if "certificate" in path.name] == []
-    wide = ("--set", "check.uncertain={L0=0.1, m=0.9, g=0.1, c=0.9}", "--set", "check.residual_sway=9")
+    wide = ("--set", "check.uncertain={L0=0.5, m=0.9, g=0.5, c=0.9}", "--set", "check.residual_sway=1.9")
     refused = run_here(*BARE, *wide, "--certify", "--out", tmp_path, "--json")
     assert refused.code == 4 and refused.document["certificate"] is None
     assert "too wide" in refused.errors[-2] and (tmp_path / "single-pendulum-crane.csv").exists()

@@ -33,6 +33,7 @@ FIRST = 1.03  # times the least value, for which there is but one motion
 COARSE = Search(precision=math.log(1.05), close=0.0, stride=math.log(1.07))
 FINE = attrs.evolve(COARSE, close=math.inf)
 MOST = 4.2  # times the least value, up to which one is tried
+FAR = 64.0  # likewise a duration where the relaxation knows of no limit, so of no least one
 FARTHER = 1.7  # times the least value that works, up to which one is looked for that is preferred
 AMPLE = math.log(1.3)  # step beyond a value that takes too much work: a smooth motion may do
 FRACTION = 0.5  # of the work that is left, which one suggestion may take, and one duration tried
@@ -160,7 +161,7 @@ def usual_spread(spec: Spec) -> float:
 
 
 def least_factor(
-    changed: Callable[[float], Spec], known_spread: float = 1.0, fraction: float = 1.0
+    changed: Callable[[float], Spec], known_spread: float = 1.0, fraction: float = 1.0, most: float = MOST
 ) -> float | None:
     """Find the least factor of a change that works, as near as the work that is left allows.
 
@@ -171,6 +172,8 @@ def least_factor(
         How many times as much as the nominal machine the worst one is supposed to sway.
     fraction : float
         Of the work that is left, which one factor may take.
+    most : float
+        Factor, up to which one is tried.
     """
 
     @cache
@@ -196,10 +199,10 @@ def least_factor(
 
     nearest: float | None = None
     with suppress(OutOfWork), budget(FRACTION * left()):
-        nearest = least(partial(excess, coarse=True), FIRST, COARSE, MOST)
+        nearest = least(partial(excess, coarse=True), FIRST, COARSE, most)
         nearest = nearest and (least(preferred, nearest, COARSE, FARTHER * nearest) or nearest)
     spend(0.0)
-    return nearest and least(partial(excess, coarse=False), nearest, FINE, MOST)
+    return nearest and least(partial(excess, coarse=False), nearest, FINE, most)
 
 
 def _longer(spec: Spec, relaxation: Relaxation, needed: float) -> str:
@@ -208,7 +211,8 @@ def _longer(spec: Spec, relaxation: Relaxation, needed: float) -> str:
     def changed(factor: float) -> Spec:
         return lasting(spec, float(rounded_up(factor * needed)))
 
-    factor = least_factor(changed, relaxation.problem.sway_spread, FRACTION)
+    most = MOST if eased_by_time(relaxation.problem) else FAR
+    factor = least_factor(changed, relaxation.problem.sway_spread, FRACTION, most)
     return "" if factor is None else rounded_up(factor * needed)
 
 
