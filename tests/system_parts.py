@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sysconfig
 from typing import NoReturn
 
 import pytest
@@ -24,5 +25,7 @@ def missing(what: str) -> NoReturn:
 
 
 def program(name: str, package: str) -> str:
-    """Find a program of a Debian package."""
-    return shutil.which(name) or missing(f"{name} (Debian package {package})")
+    """Find a program of a Debian package, not the script of that name that a Python package brings."""
+    own = sysconfig.get_path("scripts")
+    path = os.pathsep.join(one for one in os.environ["PATH"].split(os.pathsep) if one != own)
+    return shutil.which(name, path=path) or missing(f"{name} (Debian package {package})")

@@ -10,12 +10,13 @@ import attrs
 from gen_profile.errors import GenProfileError
 from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.limits import rounded_down, rounded_up
-from gen_profile.proof.verdict import Proof
+from gen_profile.proof.verdict import TAKEN_BACK, Proof
 from gen_profile.solvers.search import Search, least
 from gen_profile.spec.model import Spec
 
 # the first change that passes will do; aimed at are 0.8 of the limits, for other histories sway more
 FIRST = Search(precision=0.01, aim=math.log(0.8), longest=math.inf, tries=5)
+UNKNOWN = 1.25  # times the limit: at least so much a block counts that takes its promise back
 WHAT_MOVES = ("velocity", "acceleration", "jerk")
 
 Change = Callable[[Spec, float], tuple[Spec, dict[str, float]]]
@@ -44,7 +45,7 @@ class PlannerSuggestion:
 def planner_suggestions(
     spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]
 ) -> tuple[PlannerSuggestion, ...]:
-    """Look for changes that help, where too much sway is all that is wrong.
+    """Look for changes that help, where too much sway, or a promise taken back for it, is all that is wrong.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ def planner_suggestions(
     prove : Spec → Proof
         Of the block of a changed spec, on as many histories.
     """
-    if proof.faults or any(judged.faults for judged in proof.judged):
+    if proof.faults or any(fault != TAKEN_BACK for judged in proof.judged for fault in judged.faults):
         return ()
     found = (_tried(spec, proof, prove, change, power) for change, power in CHANGES.items())
     return tuple(suggestion for suggestion in found if suggestion is not None)
@@ -73,7 +74,7 @@ def _tried(
         if proof.passed:
             passed.append(PlannerSuggestion(values=values, share=fraction))
             return -math.inf
-        return math.log(max(fraction, 1.0 + FIRST.precision))
+        return math.log(max(fraction, UNKNOWN))
 
     try:
         if change(spec, 1.0)[1]:

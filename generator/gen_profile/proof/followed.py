@@ -62,6 +62,8 @@ class Followed:
         Share of the limits for calming while live parameters change, else 0.
     wander : float
         m, that calming may lead away from a target.
+    sway_limit : float
+        m, for all that stated errors may leave.
     seen : sequence of int
         Cycles in which the load is seen to hang still.
     zones : sequence of Zone
@@ -81,6 +83,7 @@ class Followed:
     issued: Mapping[str, Array]
     reserve: float = 0.0
     wander: float = 0.0
+    sway_limit: float = inf
     seen: Sequence[int] = ()
     zones: Sequence[Zone] = ()
     drifts: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))

@@ -8,7 +8,7 @@ from gen_profile.planner.design import quick_limits
 from gen_profile.planner.interface import BlockAxis
 from gen_profile.proof.histories import History
 from gen_profile.proof.numbering import Numbering
-from gen_profile.proof.verdict import JudgedHistory
+from gen_profile.proof.verdict import TAKEN_BACK, JudgedHistory
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.st_to_c import FAULTS
 from gen_profile_fmu.running.block_run import NO_NUMBER, AxisExtremes, BlockRun
@@ -88,7 +88,7 @@ def _faults(history: History, run: BlockRun, limits: dict[str, float]) -> Iterat
     if run.stands < 0:
         yield "the axis does not come to rest" if len(run.axes) == 1 else "the axes do not come to rest"
     if not run.promise and not (history.brakes or history.disturbed):
-        yield "the block takes its promise back"
+        yield TAKEN_BACK
 
 
 def _axis_faults(

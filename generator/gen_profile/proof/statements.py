@@ -37,6 +37,7 @@ from gen_profile.proof.orders import (
 BARELY = 5e-7  # share of the greatest velocity, within which one certainly is reached
 FAR_MOVED = 0.01  # share of the greatest velocity times 1 s, by which an axis was certainly moved
 NOTICED = 0.2  # periods, in which the end of a motion is
+USED_UP = 0.75  # of the allowed sway: plans are refused from 0.8 on
 ROUGHLY = 0.25  # of the time to go, by which it may be wrong from early on, and a period beside
 TURNING = 0.05  # of the greatest velocity, below which a plan may begin that turns an axis round
 STATED = 1e-5  # m, by which the ends of a stop may be left as a plan takes over
@@ -106,10 +107,19 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         begun = order.begin + followed.after(followed.reaction + followed.period)
         if begun < rests and followed.slowest == inf:
             left = (rests - np.arange(begun, rests)) * followed.cycle
-            over = np.abs(time[begun:rests] - left) - ROUGHLY * left
+            over = time[begun:rests] - left
+            if not _waits(followed, order):
+                over = np.abs(over)
+            over -= ROUGHLY * left
             yield Allowance("time", begun + int(np.argmax(over)), float(over.max()), followed.period)
         after = np.abs(time[rests + 1 : order.end])
         yield Allowance("time", rests + 1, float(after.max(initial=0.0)), EXACT)
+
+
+def _waits(followed: Followed, order: TimedOrder) -> bool:
+    """Whether so much may be left by errors that plans wait until it swings otherwise, or are slower."""
+    left = followed.issued.get("fSwayLeft", np.zeros(1))
+    return bool(left[order.begin : order.end].max(initial=0.0) > USED_UP * followed.sway_limit)
 
 
 def _is_end(motion: IssuedMotion, order: TimedOrder, at: int) -> bool:

@@ -21,6 +21,7 @@ GROUPS = {
 QUANTILES = (0.5, 0.9, 0.99)
 AGREEMENT = 1e-9  # m, by which FMPy may find another sway
 LISTED = 10  # of the worst histories
+TAKEN_BACK = "the block takes its promise back"
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -146,7 +146,7 @@ class BlockWatch:
         states, left = followed.issued.get("fSwayLeft"), float(run.residual.max(initial=0.0))
         if states is None or any(order.kind in (QUICK_STOP, DISABLED) for order in followed.orders):
             return  # it is not known how the load swings
-        if left > STATED * states[-1] + LARGE_SWINGS * min(self.spec.check.residual_sway.values()):
+        if left > STATED * states[-1] + LARGE_SWINGS * followed.sway_limit:
             yield f"a load sways by {left:.3g} m, where fSwayLeft states {states[-1]:.3g} m"
 
     def followed(
@@ -173,6 +173,7 @@ class BlockWatch:
             issued=issued,
             reserve=reserve,
             wander=WANDER * max(self.spec.check.residual_sway.values()) if reserve else 0.0,
+            sway_limit=min(self.spec.check.residual_sway.values()),
             seen=self._seen(script, run.cycles),
             zones=list(self._zones(begins, rows, run.cycles)),
             drifts=self._drifts(script, now),
