@@ -387,12 +387,14 @@ def test_a_planner_block_is_driven_by_hand(page):
     assert page.run("return document.querySelector('#drive .envelope').getAttribute('d')").startswith("M")
     look_at(page, "design")  # meanwhile time stands still
     look_at(page, "drive")
-    assert page.violations() == []
-    page.find("#halt").click()
-    page.wait("return document.querySelectorAll('#driven dd')[1].textContent.startsWith('0.000')")
-    page.find("#leave").click()
-    page.find("#undo").click()
-    page.wait("return !document.querySelector('#command').textContent.includes('bay.toml')")
+    try:
+        assert page.violations() == []
+    finally:
+        page.find("#halt").click()
+        page.wait("return document.querySelectorAll('#driven dd')[1].textContent.startsWith('0.000')")
+        page.find("#leave").click()
+        page.find("#undo").click()
+        page.wait("return !document.querySelector('#command').textContent.includes('bay.toml')")
 
 
 def test_it_speaks_german_of_what_is_shown(page):
