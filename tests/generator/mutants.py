@@ -194,7 +194,7 @@ def _parts(mutant: Mutant) -> Iterator[None]:
     with tempfile.TemporaryDirectory() as folder:
         altered = Path(folder) / "text"
         shutil.copytree(block.TEXT, altered)
-        path, sound = altered / f"{mutant.part}.st", block.TEXT
+        path, sound = next(altered.rglob(f"{mutant.part}.st")), block.TEXT
         lines = path.read_text("ascii").split("\n")
         lines[mutant.line] = mutant.now
         path.write_text("\n".join(lines), "ascii")

@@ -1,6 +1,7 @@
 """Judging whether a block obeys: synthetic motions, each fault by itself, and blocks that disobey."""
 
 import re
+from types import SimpleNamespace
 
 import attrs
 import numpy as np
@@ -28,6 +29,7 @@ from gen_profile.proof.orders import (
     told,
 )
 from gen_profile.proof.verdict import kind_of
+from gen_profile.proof.watching import BlockWatch
 from gen_profile.spec.reading import parse_spec, preset_spec
 
 CYCLE, CYCLES = 0.01, 6000
@@ -441,3 +443,12 @@ def test_histories_hold_what_operators_and_controllers_do(bay):
 
 def _same(first, second):
     return first.command == second.command == "position" and first.values == second.values
+
+
+def test_a_damped_load_is_held_to_what_is_stated_where_the_axis_comes_to_rest():
+    followed = SimpleNamespace(
+        issued={"fSwayLeft": np.array([0.0, 0.02, 0.01, 0.005])}, orders=(), sway_limit=0.05
+    )
+    for left, told in ((0.02, []), (0.03, ["a load sways by 0.03 m, where fSwayLeft states 0.02 m"])):
+        run = SimpleNamespace(residual=np.array([left]), stands=1)
+        assert list(BlockWatch._understated(None, run, followed)) == told

@@ -146,8 +146,9 @@ class BlockWatch:
         states, left = followed.issued.get("fSwayLeft"), float(run.residual.max(initial=0.0))
         if states is None or any(order.kind in (QUICK_STOP, DISABLED) for order in followed.orders):
             return  # it is not known how the load swings
-        if left > STATED * states[-1] + LARGE_SWINGS * followed.sway_limit:
-            yield f"a load sways by {left:.3g} m, where fSwayLeft states {states[-1]:.3g} m"
+        stated = float(states[run.stands :].max(initial=0.0))  # a damped load's falls
+        if left > STATED * stated + LARGE_SWINGS * followed.sway_limit:
+            yield f"a load sways by {left:.3g} m, where fSwayLeft states {stated:.3g} m"
 
     def followed(
         self, period: float, script: Script, expected: Sequence[TimedOrder], block: CalledBlock, run: BlockRun
