@@ -1,0 +1,129 @@
+"""How soon and how far the planner block obeys, beside the quickest motions that keep the same promise.
+
+Times from the command on, planning included, and ways, as ratios: stops and new targets at random moments, and
+sticks from rest to a speed.
+"""
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from exporters.counted_block import CountedBlock, compile_counting
+from exporters.promised_motion import Promise, State, quickest
+
+from gen_profile.planner.design import planner_block
+from gen_profile.planner.machine import frequencies, left_by_errors, live_modes
+from gen_profile.spec.reading import preset_spec
+
+STATES, LITTLE = 60, 0.02
+PAPER = (
+    "limits={velocity=0.3, acceleration=0.7, jerk=20.0, travel=[0.0, 2.0]}",
+    "planner.live={L1=[0.3, 0.6]}",
+    "check.residual_sway=0.01",
+)
+MACHINES = {
+    "bay, 4 ms": ("bay-crane", ()),
+    "bay, 20 ms": ("bay-crane", ("export.cycle_time=0.02",)),
+    "paper, 1 ms": ("paper", PAPER),
+}
+
+
+class Axis:
+    """A block at a random place, rope and load, and what it issued."""
+
+    def __init__(self, spec, modes, compiled, random):
+        self.spec, self.issued, limits = spec, [], spec.limits.of(0)
+        live = {name: random.uniform(*ends) for name, ends in spec.planner.live.items()}
+        point = [(2.0 * live[n] - low - high) / (high - low) for n, (low, high) in spec.planner.live.items()]
+        rates = np.sort(frequencies(modes.interpolant(point)[: modes.modes]))
+        self.promise = Promise(
+            rates,
+            *np.split(left_by_errors(spec, point), [modes.modes]),
+            spec.planner.sway_share * min(spec.check.residual_sway.values()),
+            (limits.velocity, limits.acceleration, limits.jerk),
+        )
+        inputs = {f"f{name}": value for name, value in live.items()}
+        self.block = CountedBlock(compiled, fActPosition=random.uniform(*limits.travel), **inputs)
+        self.cycle = spec.export.cycle_time
+        self.hold(1.0 * self.promise.period)
+
+    def hold(self, seconds, **inputs):
+        issued = self.block.hold(max(2, round(seconds / self.cycle)), **inputs)
+        self.issued.append(issued)
+        return issued
+
+    def state(self):
+        named = ("fPosition", "fVelocity", "fAcceleration")
+        return State.after(
+            self.promise,
+            self.cycle,
+            *(np.concatenate([part[name] for part in self.issued]) for name in named),
+        )
+
+    def moves(self, random):
+        """Move in some way for a while; whether it goes then."""
+        low, high = self.spec.limits.of(0).travel
+        while_ = random.uniform(0.2, 2.5) * self.promise.period
+        if random.integers(2):
+            self.hold(while_, bExecute=1.0, fTarget=random.uniform(low, high))
+        else:
+            self.hold(0.0, bVelocity=1.0, fVelocityCommand=0.0)
+            self.hold(while_, fVelocityCommand=self.promise.limits[0] * random.choice([-1.0, 0.2, 1.0]))
+        return abs(self.state().velocity) > LITTLE * self.promise.limits[0]
+
+
+def _rests(issued, cycle):
+    """Time in s after which the axis stands, and how far it came."""
+    moving = np.flatnonzero(issued["fVelocity"])
+    return cycle * (moving[-1] + 1), issued["fPosition"][-1]
+
+
+def _orders(axis, random):
+    """Give an order at a random moment: by name the ratios of its time and way."""
+    limits, period = axis.spec.limits.of(0), axis.promise.period
+    speed = limits.velocity * random.choice([0.2, 1.0])
+    state = axis.state()
+    if abs(state.place - sum(limits.travel) / 2) < 0.2 * (limits.travel[1] - limits.travel[0]):
+        axis.hold(0.0, bVelocity=1.0, fVelocityCommand=0.0)
+        begins = axis.hold(3.0 * period, fVelocityCommand=speed)
+        soonest = quickest(axis.promise, state, speed=speed, travel=limits.travel)
+        if soonest:
+            reached = np.argmax(begins["bInVelocity"] > 0.0) * axis.cycle
+            yield f"stick to {speed / limits.velocity:.0%}", reached / soonest[0], 1.0
+        axis.hold(6.0 * period, bVelocity=0.0, bStop=1.0)
+        axis.hold(0.0, bStop=0.0)
+    if not axis.moves(random):
+        return
+    state = axis.state()
+    if random.integers(2):
+        time, place = _rests(axis.hold(12.0 * period, bStop=1.0, bVelocity=0.0), axis.cycle)
+        soonest = quickest(axis.promise, state, travel=limits.travel)
+        if soonest:
+            yield "stop", time / soonest[0], abs(place - state.place) / max(abs(soonest[1]), 1e-3)
+    else:
+        low, high = limits.travel
+        target = float(np.clip(state.place + 0.15 * (high - low) * random.normal(), low, high))
+        time, place = _rests(
+            axis.hold(30.0 * period, bExecute=1.0, fTarget=target, bVelocity=0.0), axis.cycle
+        )
+        soonest = quickest(axis.promise, state, target=target, travel=limits.travel)
+        assert abs(place - target) < 1e-9
+        if soonest:
+            yield "new target", time / soonest[0], 1.0
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_orders_at_random_moments(name):
+    preset, changes = MACHINES[name]
+    spec = preset_spec(preset, list(changes))
+    random, found = np.random.default_rng(26), defaultdict(list)
+    modes, compiled = live_modes(spec), compile_counting(planner_block(spec).text)
+    for _ in range(STATES):
+        for order, *ratios in _orders(Axis(spec, modes, compiled, random), random):
+            found[order].append(ratios)
+    for order, ratios in sorted(found.items()):
+        times, ways = np.transpose(ratios)
+        way = f", way {ways.mean():.2f}, at most {ways.max():.2f}" if order == "stop" else ""
+        print(
+            f"{name}, {len(times)} {order}: time {times.mean():.2f} of the quickest, at most {times.max():.2f}{way}"
+        )
