@@ -1,7 +1,7 @@
 """How soon and how far the planner block obeys, beside the quickest motions that keep the same promise.
 
-Times from the command on, planning included, and ways, as ratios: stops and new targets at random moments, and
-sticks from rest to a speed.
+Times from the command on, planning included, and ways, as ratios: stops and new targets at random
+moments, and sticks from rest to a speed.
 """
 
 from collections import defaultdict
@@ -125,5 +125,6 @@ def test_orders_at_random_moments(name):
         times, ways = np.transpose(ratios)
         way = f", way {ways.mean():.2f}, at most {ways.max():.2f}" if order == "stop" else ""
         print(
-            f"{name}, {len(times)} {order}: time {times.mean():.2f} of the quickest, at most {times.max():.2f}{way}"
+            f"{name}, {len(times)} {order}: time {times.mean():.2f} of the quickest,"
+            f" at most {times.max():.2f}{way}"
         )

@@ -1,7 +1,7 @@
-"""The quickest motion that keeps a planner block's promise, by linear programs of SciPy's: an oracle for planners.
+"""The quickest motion that keeps a planner block's promise, by linear programs of SciPy's: an oracle.
 
-The jerk is constant over pieces. A mode swings by ∫ v exp(iωt) dt times a gain: nought in the end, whatever was before,
-and its slope by the frequency's error within a bound.
+The jerk is constant over pieces. A mode swings by ∫ v exp(iωt) dt times a gain: nought in the end,
+whatever was before, and its slope by the frequency's error within a bound.
 """
 
 import attrs
@@ -14,7 +14,7 @@ STEP = 1e-5  # relative, for the slope by a frequency
 
 @attrs.frozen(eq=False)
 class Promise:
-    """What a motion must keep: frequencies, their relative errors, gains, the allowed sum of slopes, and limits."""
+    """What a motion must keep: the allowed sum of slopes, each by a mode's error and gain, and limits."""
 
     frequencies: np.ndarray
     errors: np.ndarray
@@ -29,7 +29,7 @@ class Promise:
 
 @attrs.frozen(eq=False)
 class State:
-    """Of an axis now: place, velocity, acceleration; of each mode ∫ v exp(iωt) dt of the past, and its slope."""
+    """Of an axis now, and of each mode ∫ v exp(iωt) dt of the past, and its slope by the frequency."""
 
     place: float
     velocity: float
@@ -89,9 +89,7 @@ def _motion(promise, state, pieces, step, target, speed, travel):
         equal, due = [*equal, places[-1]], [*due, target - state.place - drifted[-1]]
     above, most = [], []
     total = float(promise.gains @ promise.errors)
-    for mode, (rate, error, gain) in enumerate(
-        zip(promise.frequencies, promise.errors, promise.gains, strict=True)
-    ):
+    for mode, (rate, error) in enumerate(zip(promise.frequencies, promise.errors, strict=True)):
         row, rest = _wave(rate, begins, step, v, a)
         equal, due = [*equal, row.real, row.imag], [*due, *(-c for c in _parts(rest + state.waves[mode]))]
         (up, rest_up), (down, rest_down) = (
@@ -122,7 +120,7 @@ def _motion(promise, state, pieces, step, target, speed, travel):
 
 
 def _wave(rate, begins, step, velocity, acceleration):
-    """∫ v exp(iωt) dt by the jerk of each piece, and what is there without any; the end's own speed is no swing."""
+    """∫ v exp(iωt) dt by the jerk of each piece, and without any; the end's own speed is no swing."""
     i = 1j * rate
     return (np.exp(i * (begins + step)) - np.exp(i * begins)) / i**3, (acceleration / i - velocity) / i
 

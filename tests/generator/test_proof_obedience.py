@@ -449,6 +449,6 @@ def test_a_damped_load_is_held_to_what_is_stated_where_the_axis_comes_to_rest():
     followed = SimpleNamespace(
         issued={"fSwayLeft": np.array([0.0, 0.02, 0.01, 0.005])}, orders=(), sway_limit=0.05
     )
-    for left, told in ((0.02, []), (0.03, ["a load sways by 0.03 m, where fSwayLeft states 0.02 m"])):
+    for left, found in ((0.02, []), (0.03, ["a load sways by 0.03 m, where fSwayLeft states 0.02 m"])):
         run = SimpleNamespace(residual=np.array([left]), stands=1)
-        assert list(BlockWatch._understated(None, run, followed)) == told
+        assert list(BlockWatch._understated(None, run, followed)) == found
