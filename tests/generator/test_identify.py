@@ -461,6 +461,18 @@ def test_units_are_read_off_the_names(heads, below, second, radian):
     assert np.array_equal(read.times, as_said.times) and np.array_equal(read.values, as_said.values)
 
 
+@pytest.mark.parametrize(
+    ("name", "per_unit"),
+    [("Gyroscope x (rad/s)", 1.0), ("rate [deg/s]", 180.0 / math.pi), ("Drehrate (°/s)", 180.0 / math.pi)],
+)
+def test_rates_of_a_gyroscope_are_read(name, per_unit):
+    with pytest.raises(OutputError, match=r"take it for a log of the rate \(signal\)"):
+        headed("Time (s)", name)(per_second=None, per_unit=None)
+    read = headed("Time (s)", name)(per_second=None, per_unit=None, quantity="rate")
+    assert read.unit == "rad/s"
+    assert read.values[7] == pytest.approx(math.sin(0.7) / 10.0 / per_unit, abs=1e-6)
+
+
 @pytest.mark.parametrize("name", ["Gyroscope x (rad/s)", "ax [m/s²]", "U (mV)", "angle_mm"])
 def test_a_column_of_something_else_is_no_angle(name):
     with pytest.raises(OutputError, match=rf"column '{re.escape(name)}' is in .*, which measures no angle"):

@@ -106,6 +106,21 @@ def test_every_machine_is_told_by_its_swing(type_):
 
 
 @pytest.mark.slow
+def test_a_gyroscope_on_the_hook_tells_both_ropes():
+    """Of swings as large as they come on site, with a phone's noise and bias."""
+    given = CRANE.nominal()
+    true, times = given | {"L1": 1.06 * given["L1"], "L2": 0.95 * given["L2"]}, np.arange(0.0, 20.0, 0.02)
+    rates = states(true, times, [0.35, 0.1, 0.0, 0.4], [0.0], "double-pendulum-crane")[2]
+    values = rates + 0.02 + np.random.default_rng(3).normal(0.0, 5e-3, len(times))
+    log = SwingLog(times=times, values=values, quantity="rate", load="hook")
+    machine = SwingingMachine(plant=CRANE, parameters=given, q_a=(0.0,))
+    found = estimate(machine, ["L1", "L2"], [], [log])
+    assert inside(found, true)
+    assert max(found.half_range[name] / true[name] for name in ("L1", "L2")) < 2e-3
+    assert found.noise[0] == pytest.approx(5e-3, rel=0.1)
+
+
+@pytest.mark.slow
 def test_steps_of_an_encoder_do_not_average_out():
     """One degree of resolution and 4° of swing: errors repeat with the swing, wherever the zero lies."""
     true = HOIST.nominal() | {"L0": 2.3, "c": 300.0}

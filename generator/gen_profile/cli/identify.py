@@ -50,13 +50,14 @@ if TYPE_CHECKING:
     "--signal",
     metavar="SIGNAL",
     default="angle",
-    help="What the log's values are: angle or sway, of the first load or, as in angle:hook, of another.",
+    help="What the log's values are: angle, sway or rate (of the angle), of the first load or, as in "
+    "rate:hook, of another.",
 )
 @click.option(
     "--unit",
     metavar="UNIT",
-    help="Unit of the log's values: rad, deg, m, mm or um; by default what their column's name says; for "
-    "counts the size of one, as in '0.09 deg'.",
+    help="Unit of the log's values: rad, deg, m, mm, um, rad/s or deg/s; by default what their column's name "
+    "says; for counts the size of one, as in '0.09 deg'.",
 )
 @click.option(
     "--time-unit",

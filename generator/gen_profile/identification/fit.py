@@ -26,7 +26,7 @@ NOISE_ROUNDS = 2
 HELD = 0.3  # relative, by which a parameter may leave the spec's while only a part of a log is looked at
 TOLERANCE = 1e-6  # relative, of the sum of squares: it has as many terms as the logs have samples
 HALF = 0.5  # of a swing, which is left where two have the same phase within a twelfth of a period
-STEPS = 60  # of a search; near a solution five are enough
+STEPS = 30  # of a search; near a solution five are enough
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -138,10 +138,11 @@ def read_swing(
     columns : (str, str)
         Their names, or their numbers from 1.
     signal : str
-        What the values are: ``angle`` or ``sway`` of the first load, or of a named one, ``angle:hook``.
+        What the values are: ``angle``, ``sway`` or ``rate`` (of the angle) of the first load, or of a named
+        one, ``angle:hook``.
     unit : str or None
-        Of the values; by default what their column's name says, or rad or m. A number before it is the size
-        of one count, ``0.09 deg``.
+        Of the values; by default what their column's name says, or the SI unit. A number before it is the
+        size of one count, ``0.09 deg``.
     time_unit : str or None
         One of `TIME_UNITS`; by default what the column's name says, or s.
     after : float
@@ -175,7 +176,7 @@ def read_swing(
 
 
 def _per_unit(unit: str, quantity: str, si_unit: str) -> float:
-    """Say how many of a log's steps make a radian or metre."""
+    """Say how many of a log's steps make an SI unit."""
     name = unit.lstrip("0123456789. ").rstrip()
     size = unit.rstrip().removesuffix(name).strip()
     fitting = units_of(si_unit)

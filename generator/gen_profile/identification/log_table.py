@@ -25,6 +25,7 @@ SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no com
 MOST_BYTES = 1 << 25
 # units as loggers write them, in brackets or behind a name, and what they are called here
 SPELLINGS = {"°": "deg", "degree": "deg", "degrees": "deg", "grad": "deg", "radian": "rad", "radians": "rad"}
+SPELLINGS |= {"°/s": "deg/s", "dps": "deg/s"}
 SPELLINGS |= {"sec": "s", "seconds": "s", "sek": "s", "µs": "us", "μs": "us", "µm": "um", "μm": "um"}
 _BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")
 _BEHIND = re.compile(r".+[_ ](ms|us|s|rad|deg|mm|um)", re.IGNORECASE)

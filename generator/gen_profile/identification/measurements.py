@@ -22,7 +22,7 @@ LEAST_SAMPLES = 16
 GREATEST = 1e9  # s, swings or SI units of any reading
 FINEST = 1e-9  # of a value, to which no instrument reads it
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}  # how many of them make a second
-SI_UNITS = {"angle": "rad", "sway": "m"}  # of what may be logged of a load
+SI_UNITS = {"angle": "rad", "sway": "m", "rate": "rad/s"}  # of what may be logged of a load
 
 
 @attrs.frozen(kw_only=True)
@@ -60,12 +60,13 @@ class SwingLog:
     times : (samples,) array
         s, rising; not necessarily evenly spaced.
     values : (samples,) array
-        Of one output of one load in rad or m, which may be off by a constant.
+        Of one output of one load in rad, m or rad/s, which may be off by a constant.
     quantity : str
-        ``"angle"`` or ``"sway"``, as `gen_profile.plants.plant.Outputs` defines them.
+        ``"angle"`` or ``"sway"``, as `gen_profile.plants.plant.Outputs` defines them, or ``"rate"`` of the
+        angle, as a gyroscope on the load measures it.
     load : str
     resolution : float
-        Least step between different values as they were read, as of an encoder that counts; in rad or m.
+        Least step between different values as they were read, as of an encoder that counts.
     logged : int
         Samples that were read, of which `averaged` may have made fewer.
     """
@@ -182,7 +183,7 @@ def parse_swing(
     per_second : float or None
         How many of the time's unit make a second; None for what the column's name says, or s.
     per_unit : float or None
-        How many of the value's unit make a radian or metre; None for what the column's name says, or one.
+        How many of the value's unit make an SI unit; None for what the column's name says, or one.
     after : float
         Time in s from which on the axes stood still; earlier rows are left out.
     quantity, load : str
@@ -209,9 +210,11 @@ def parse_swing(
 def _per_stated(name: str, unit: str, source: str, measured: str, units: Mapping[str, float]) -> float:
     """Say how many of the unit that a column states, if it does, make an SI unit."""
     if unit and unit not in units:
+        others = [other for other, si in SI_UNITS.items() if unit in units_of(si)]
+        cure = f"take it for a log of the {others[0]} (signal)" if others else "name another column"
         raise OutputError(
-            f"{source}: column {name!r} is in {unit}, which measures no {measured}; name another column, or "
-            "state the unit if the name is wrong."
+            f"{source}: column {name!r} is in {unit}, which measures no {measured}; {cure}, or state the "
+            "unit if the name is wrong."
         )
     return units[unit] if unit else 1.0
 
@@ -224,7 +227,7 @@ def cut_swing(
     Parameters
     ----------
     times, values : (samples,) arrays
-        s, and rad or m.
+        s, and SI units.
     source : str
         Where it comes from, for errors.
     after : float

@@ -19,7 +19,8 @@ from gen_profile.problem.linearization import linearize
 
 STEP = 1e-6  # relative, of numerical slopes
 WIDEST_SWING = math.pi / 4.0  # rad, beyond which nobody lets a load swing
-STILL = 1e-9  # m or rad, which no sensor tells from rest
+STILL = 1e-9  # SI units, which no sensor tells from rest
+APART = 1e-3  # periods, between angles whose difference is a rate; at most half the time between samples
 MOST_SAMPLES, SWINGS = 6000, 300  # of a log that is fitted: twenty averages of each swing
 SHOWN = 1e-6  # relative size from which on a log shows a part of its start
 
@@ -88,7 +89,7 @@ class SwingModel:
         Returns
         -------
         residuals : (samples,) array
-            In rad or m.
+            In the log's unit.
         slopes : (samples, p + s + 1) array
         """
         count, n = self.samples(until), len(start) - 1
@@ -114,11 +115,13 @@ class SwingModel:
                     for row, start in zip(machines, starts, strict=True)
                 ]
             )
-        sway, angle = free_swing(
-            self.plant, machines, q_a=self.q_a, starts=starts, times=self.log.times[:count]
-        )
-        load = self.plant.loads.index(self.log.load)
-        return np.asarray((sway if self.log.quantity == "sway" else angle)[:, :, load])
+        times = self.log.times[:count]
+        apart = min(APART * self.period, 0.5 * float(np.diff(self.log.times).min()))
+        if self.log.quantity == "rate":  # half that time later, by which the start is another one
+            times = np.stack([times, times + apart], axis=1).ravel()
+        sway, angle = free_swing(self.plant, machines, q_a=self.q_a, starts=starts, times=times)
+        seen = (sway if self.log.quantity == "sway" else angle)[:, :, self.plant.loads.index(self.log.load)]
+        return np.asarray((seen[:, 1::2] - seen[:, ::2]) / apart if self.log.quantity == "rate" else seen)
 
     def _small_swing(self, parameters: Mapping[str, float], start: Array, count: int) -> Array:
         """Say what the log would show of a machine of small swings; of two conjugate rates one tells all."""
@@ -172,9 +175,11 @@ def _require_swing(
     plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog
 ) -> None:
     """Refuse a log of swings that no machine makes: it is in another unit."""
-    modes = linearize(plant, parameters, q_a).modes
-    seen = _gain(plant, parameters, q_a, log) @ modes
-    angles = _gain(plant, parameters, q_a, attrs.evolve(log, quantity="angle")) @ modes
+    linear = linearize(plant, parameters, q_a)
+    seen = _gain(plant, parameters, q_a, log) @ linear.modes
+    angles = _gain(plant, parameters, q_a, attrs.evolve(log, quantity="angle")) @ linear.modes
+    if log.quantity == "rate":
+        seen = seen * linear.frequencies
     mode = int(np.argmax(np.abs(seen)))
     swing = float(np.ptp(log.values)) / 2.0
     if swing < STILL:
@@ -212,12 +217,13 @@ def _linear_modes(
     n_u = len(linear.frequencies)
     system = np.block([[np.zeros((n_u, n_u)), np.eye(n_u)], [-linear.stiffness, -linear.damping]])
     rates, vectors = np.linalg.eig(system)
-    seen = np.concatenate([_gain(plant, parameters, q_a, log), np.zeros(n_u)])
-    return rates, seen @ vectors, np.linalg.inv(vectors)
+    seen = _gain(plant, parameters, q_a, log) @ vectors[:n_u]
+    return rates, seen * rates if log.quantity == "rate" else seen, np.linalg.inv(vectors)
 
 
 def _gain(plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog) -> Array:
-    """Slopes of the logged output by q_u, at rest."""
+    """Slopes of the logged output by q_u, at rest; of a rate those of its angle."""
     p, load = SimpleNamespace(**parameters), plant.loads.index(log.load)
     outputs = [plant.outputs(q_u, q_a, p) for q_u in STEP * np.eye(len(plant.unactuated))]
-    return np.array([getattr(output, log.quantity)[load] for output in outputs]) / STEP
+    name = "sway" if log.quantity == "sway" else "angle"
+    return np.array([getattr(output, name)[load] for output in outputs]) / STEP
