@@ -169,10 +169,12 @@ def test_a_request_that_is_not_sent_ends_and_a_conversation_stays():
 
         async def talk():
             page = await running.connect()
-            for begun in half_sent(place.netloc):
-                with socket.create_connection((place.hostname, place.port)) as stranger:
-                    stranger.sendall(begun)
-                    await asyncio.to_thread(until_closed, stranger)
+            with ExitStack() as held:
+                strangers = []
+                for begun in half_sent(place.netloc):
+                    strangers.append(socket.create_connection((place.hostname, place.port)))
+                    held.enter_context(strangers[-1]).sendall(begun)
+                await asyncio.gather(*(asyncio.to_thread(until_closed, one) for one in strangers))
             await page.write_message('{"say": "open", "address": ""}')
             while json.loads(await page.read_message())["part"] != "state":
                 pass
