@@ -109,7 +109,7 @@ def test_a_hand_in_time_with_the_swing_breaks_no_promise(text):
 
 def test_a_block_that_forgets_what_was_left_breaks_it(text):
     """The test above sees it."""
-    forgets = text.replace("IF (nState <> 2) OR (nTick + 1 = nSlot / 2) THEN", "IF FALSE THEN")
+    forgets = text.replace("IF (nState <> cMoving) OR (nTick + 1 = nSlot / 2) THEN", "IF FALSE THEN")
     assert forgets != text
     driver = standing(forgets, 9.0, 2000.0).hold(0.1, bVelocity=1, fVelocityCommand=0.0)
     for number in range(64):

@@ -10,11 +10,13 @@ on the way, and likewise what is for zones and events where there are none.
 - ``pulses.st`` adds pulses to it where a slot begins. Of each as much is admitted as keeps every limit over
   the whole committed time. Where full speed is too much for one pulse, they grow and decline from slot to
   slot; ``shape.st`` tells what that adds to the decline that is committed already.
-- ``next_job.st``, ``planning.st``: some steps in each cycle, which find modes, kernel, motion to a target,
-  stop. A plan is a linear programme: the coefficients of the velocity's spline that go farthest within the
-  limits on value, difference and second difference, so that the modes and their derivatives by frequency are
-  left at rest. ``request.st`` begins one: which way is left, from which slot on, over how many. (One that
-  takes longer than the motion lasts comes too late; one over too few slots does not get there.)
+- ``next_job.st``, ``planning.st``: some steps in each cycle, each a phase with a name, at the cost that
+  ``costs.st`` tells. ``modes.st`` finds modes and kernel; others plan a motion to a target, or a stop. A plan is
+  a linear programme: the coefficients of the velocity's spline that go farthest within the limits on value,
+  difference and second difference, so that the modes and their derivatives by frequency are left at rest.
+  ``request.st`` begins one: which way is left, from which slot on, over how many. (One that takes longer than
+  the motion lasts comes too late; one over too few slots does not get there.) ``conditions.st`` writes its
+  unknowns and conditions, ``plan.st`` takes the share that is needed and holds it against the limits.
 - ``programme.st`` solves it by a primal-dual interior-point method (Mehrotra 1992, with a fixed centring);
   the normal matrix has five diagonals, and the conditions enter by its Schur complement. Second derivatives
   by frequency, where stated errors make them count, are soft conditions: the square of what is left costs
@@ -29,6 +31,7 @@ on the way, and likewise what is for zones and events where there are none.
 - ``variations.st``: machines whose frequencies differ from the nominal ones by shares of the stated
   errors. What the committed future leaves on each is a state. ``slope_bounds.st`` bounds the slopes of a
   plan such that past and plan together leave no more than plans may spend.
+- ``events.st`` tells what is other than in the cycle before.
 - ``formulas/``: the modes at the live parameters, powers of complex numbers, how many columns a row fills,
   which slow zones are near.
 """

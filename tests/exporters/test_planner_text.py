@@ -1,0 +1,80 @@
+"""The planner block's text, as the engineer reads it who is to trust it."""
+
+import re
+
+import pytest
+from generator.planned_machines import GANTRY
+
+from gen_profile.planner.design import planner_block
+from gen_profile.planner.events import WORDS
+from gen_profile.spec.reading import parse_spec, preset_spec
+
+VARIANTS = {
+    "as it comes": [],
+    "zones and events": ["planner.zones=true", "planner.events=true"],
+    "a rope that changes": ["planner.live_rate={L1=0.1}", "planner.events=true"],
+}
+CODED = (
+    "nState",
+    "nJob",
+    "nNext",
+    "nPhase",
+    "nCommand",
+    "nAborted",
+    "nErrorId",
+    "nFault",
+    "nPromise",
+    "nEvent",
+    "nKind",
+)
+
+
+@pytest.fixture(scope="module", params=[*VARIANTS, "gantry"])
+def text(request):
+    changes = VARIANTS.get(request.param)
+    return planner_block(parse_spec(GANTRY) if changes is None else preset_spec("bay-crane", changes)).text
+
+
+def statements(text):
+    return re.sub(r"\(\*.*?\*\)", "", text[text.rindex("END_VAR") :], flags=re.DOTALL)
+
+
+def declared(text):
+    found = re.findall(r"(?m)^\s*(\w+) : (?:BOOL|DINT|LREAL|ARRAY)", text)
+    return dict.fromkeys(found)
+
+
+def test_states_jobs_phases_and_codes_have_names(text):
+    bare = rf"\b(?:{'|'.join(CODED)}) (?:<>|[<>:]?=|[<>]) -?\d+\b"
+    assert not re.findall(bare, statements(text))
+    assert not re.findall(r"\bCASE\b", statements(text))  # whose labels matiec takes as numbers only
+
+
+def test_names_are_used_and_differ_by_more_than_their_case(text):
+    names = declared(text)
+    assert len({name.lower() for name in names}) == len(names)
+    words = re.findall(r"\w+", statements(text))
+    phases = [name for name in names if name.startswith("cPhase")]
+    assert not {*phases} - {*words}
+
+
+def test_a_phase_has_a_number_of_its_own(text):
+    numbers = re.findall(r"\bcPhase\w+ : DINT := (\d+);", text)
+    assert len(numbers) > 20
+    assert len({*numbers}) == len(numbers)
+
+
+def test_every_code_of_an_event_is_one_that_is_said_in_words():
+    text = planner_block(preset_spec("bay-crane", VARIANTS["zones and events"])).text
+    numbers = {name: int(number) for name, number in re.findall(r"\b(c\w+) : DINT := (\d+);", text)}
+    kinds = {
+        "cEventState": ("cDisabled", "cStanding", "cMoving", "cBraking"),
+        "cEventCommand": ("cCommandNone", "cCommandPosition", "cCommandVelocity"),
+        "cEventPlan": ("cJobMove", "cJobStop"),
+        "cEventAborted": ("cCommandPosition", "cCommandVelocity", "cCommandReplaced"),
+        "cEventError": [name for name in numbers if name.startswith("cError")],
+        "cEventPromise": [name for name in numbers if name.startswith("cPromise")],
+    }
+    codes = {numbers[event] + numbers[name] for event, names in kinds.items() for name in names}
+    codes |= {numbers[name] for name in ("cEventHeld", "cEventGoesOn", "cEventDone")}
+    assert codes == WORDS.keys()
