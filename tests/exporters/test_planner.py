@@ -193,7 +193,7 @@ def test_no_machine_takes_more_operations(preset):
         *MACHINES[preset],
     ]
     text = planner_block(preset_spec(preset, changes)).text
-    assert len(text) < 130_000
+    assert len(text) < 145_000
     library, *_ = compiled = compile_counting(text)
     assert library.size() < 64 * 1024
     block = CountedBlock(compiled, fActPosition=0.0)
@@ -459,7 +459,7 @@ def test_a_machine_that_it_does_not_take_is_refused(preset, changes, words):
 
 def test_a_live_parameter_named_as_what_the_block_has_is_refused(tmp_path, request):
     machine = (request.config.rootpath / "examples/inclined_crane.py").read_text("utf-8")
-    (tmp_path / "crane.py").write_text(machine.replace("p.L", "p.half").replace('"L"', '"half"'), "utf-8")
-    changes = ['plant={file="crane.py"}', "planner.live={half=[2.0, 5.0]}", "check.residual_sway=0.1"]
-    with pytest.raises(SpecError, match=r"planner\.live\.half: the block has an fhalf of its own"):
+    (tmp_path / "crane.py").write_text(machine.replace("p.L", "p.scale").replace('"L"', '"scale"'), "utf-8")
+    changes = ['plant={file="crane.py"}', "planner.live={scale=[2.0, 5.0]}", "check.residual_sway=0.1"]
+    with pytest.raises(SpecError, match=r"planner\.live\.scale: the block has an fscale of its own"):
         planner_block(parse_spec(BAY, changes, folder=tmp_path))

@@ -1,6 +1,7 @@
 """The planner block's text, as the engineer reads it who is to trust it."""
 
 import re
+from collections import Counter
 
 import pytest
 from generator.planned_machines import GANTRY
@@ -56,6 +57,18 @@ def test_names_are_used_and_differ_by_more_than_their_case(text):
     words = re.findall(r"\w+", statements(text))
     phases = [name for name in names if name.startswith("cPhase")]
     assert not {*phases} - {*words}
+
+
+def test_no_variable_serves_for_many_things(text):
+    """One that did was assigned at 101 places; most now are what a complex product is made with."""
+    assigned = Counter(re.findall(r"\b(f\w+) :=", statements(text)))
+    assert max(assigned.values()) <= 16, assigned.most_common(3)
+    assert not {"fValue", "fHalf", "fSum", "fDelta", "fSquare", "fRe", "fIm", "nOther"} & {*declared(text)}
+
+
+def test_every_variable_is_used(text):
+    words = {*re.findall(r"\w+", statements(text))}
+    assert not {name for name in declared(text) if name[0] != "c"} - words
 
 
 def test_a_phase_has_a_number_of_its_own(text):

@@ -163,7 +163,7 @@ def zone_interface(axes: Sequence[AxisConstants]) -> dict[str, str]:
     return {
         "zone_inputs": "\n".join(declared),
         "check_zones": each(
-            lambda _, __, name: f"IF NOT (ABS({name}[nIndex]) <= 1.0E+9) THEN nOther := 1; END_IF;"
+            lambda _, __, name: f"IF NOT (ABS({name}[nIndex]) <= 1.0E+9) THEN bOutOfRange := TRUE; END_IF;"
         ),
         "take_zones": each(lambda first, array, name: f"{array}[nIndex + {first}] := {name}[nIndex];"),
     }

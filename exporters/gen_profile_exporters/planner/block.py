@@ -11,9 +11,9 @@ on the way, and likewise what is for zones and events where there are none.
   the whole committed time. Where full speed is too much for one pulse, they grow and decline from slot to
   slot; ``shape.st`` tells what that adds to the decline that is committed already.
 - ``next_job.st``, ``planning.st``: some steps in each cycle, each a phase with a name, at the cost that
-  ``costs.st`` tells. ``modes.st`` finds modes and kernel; others plan a motion to a target, or a stop. A plan is
-  a linear programme: the coefficients of the velocity's spline that go farthest within the limits on value,
-  difference and second difference, so that the modes and their derivatives by frequency are left at rest.
+  ``costs.st`` tells. ``modes.st`` finds modes and kernel; others plan a motion to a target, or a stop. A plan
+  is a linear programme: the coefficients of the velocity's spline that go farthest within the limits on
+  value, difference and second difference, so that the modes and their derivatives by frequency are at rest.
   ``request.st`` begins one: which way is left, from which slot on, over how many. (One that takes longer than
   the motion lasts comes too late; one over too few slots does not get there.) ``conditions.st`` writes its
   unknowns and conditions, ``plan.st`` takes the share that is needed and holds it against the limits.
