@@ -9,6 +9,7 @@ from generator.planned_machines import GANTRY
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.events import WORDS
 from gen_profile.spec.reading import parse_spec, preset_spec
+from gen_profile_exporters.planner.block import TEXT
 
 VARIANTS = {
     "as it comes": [],
@@ -75,6 +76,23 @@ def test_a_phase_has_a_number_of_its_own(text):
     numbers = re.findall(r"\bcPhase\w+ : DINT := (\d+);", text)
     assert len(numbers) > 20
     assert len({*numbers}) == len(numbers)
+
+
+def test_each_part_has_a_heading_and_numbers_of_equations_that_the_documentation_has(request):
+    page = (request.config.rootpath / "docs/planner-algorithm.md").read_text("utf-8")
+    known = dict(re.findall(r"(?m)^\| \((\d+)\) \| .* \| (.*) \|$", page))
+    assert list(known) == [str(number) for number in range(1, len(known) + 1)]
+    told = dict.fromkeys(known, "")
+    for path in sorted(TEXT.glob("*.st")):
+        if path.stem in ("block", "interface"):
+            continue
+        text = path.read_text("ascii")
+        assert re.match(r"\s*(@where_\w+\s*)?\(\* =====", text), path.name
+        for heading in re.findall(r"\(\* =====.*?\*\)", text, re.DOTALL):
+            for number in re.findall(r"\((\d+)\)", heading):
+                told[number] += f"`{path.name}`, "
+    for number, parts in told.items():
+        assert {*parts.split(", ")} >= {*known[number].split(", ")}, number
 
 
 def test_every_code_of_an_event_is_one_that_is_said_in_words():

@@ -52,7 +52,7 @@ ALIKE = {  # mutants, by part and the line that they make: why a block with it i
     "inputs: aLiveOnce[nIndex] := aLiveOnce[nIndex];": "of the first three values two are alike all the same",
     "inputs: IF NOT (ABS(aActual[cAxes - 1 - nAxis]) <= 1.0E+9)"
     " OR NOT (ABS(aActualVelocity[nAxis]) <= 1.0E+9) THEN": "both axes are asked",
-    "programme: IF nKind = cBoundJerk THEN fSteepness := 0.0 - (1.0 / fCurve); END_IF;": "these are symmetric",
+    "programme: IF nKind = cBoundJerk THEN fSteepness := 0.0 - (1.0 / fCurve); END_IF;": "it is symmetric",
     "programme: fInverseA := 0.5 * (1.0E+30);": "any number will do that is great enough",
     "programme: fInverseB := 0.5 * (1.0E+30);": "any number will do that is great enough",
 }
