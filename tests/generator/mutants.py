@@ -200,11 +200,13 @@ def _parts(mutant: Mutant) -> Iterator[None]:
         path.write_text("\n".join(lines), "ascii")
         block.TEXT = altered
         block._part.cache_clear()
+        block._parts.cache_clear()
         try:
             yield
         finally:
             block.TEXT = sound
             block._part.cache_clear()
+            block._parts.cache_clear()
 
 
 def mutated(machine: Machine, mutant: Mutant) -> str:

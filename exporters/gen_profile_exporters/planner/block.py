@@ -10,7 +10,7 @@ on the way, and likewise what is for zones and events where there are none.
 - ``pulses.st`` adds pulses to it where a slot begins. Of each as much is admitted as keeps every limit over
   the whole committed time. Where full speed is too much for one pulse, they grow and decline from slot to
   slot; ``shape.st`` tells what that adds to the decline that is committed already.
-- ``next_job.st``, ``planning.st``: some steps in each cycle, each a phase with a name, at the cost that
+- ``next_job.st``, ``planning/``: some steps in each cycle, each a phase with a name, at the cost that
   ``costs.st`` tells. ``modes.st`` finds modes and kernel; others plan a motion to a target, or a stop. A plan
   is a linear programme: the coefficients of the velocity's spline that go farthest within the limits on
   value, difference and second difference, so that the modes and their derivatives by frequency are at rest.
