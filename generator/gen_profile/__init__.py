@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from gen_profile.errors import GenProfileError as GenProfileError
     from gen_profile.errors import InfeasibleProblem as InfeasibleProblem
     from gen_profile.errors import LimitViolation as LimitViolation
+    from gen_profile.errors import NoMotion as NoMotion
     from gen_profile.errors import OutputError as OutputError
     from gen_profile.errors import SolverDiverged as SolverDiverged
     from gen_profile.errors import SpecError as SpecError
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "errors": "CertificateError CheckFailed CosimulationError ExportError GenProfileError InfeasibleProblem "
-    "LimitViolation OutputError SolverDiverged SpecError",
+    "LimitViolation NoMotion OutputError SolverDiverged SpecError",
     "certificate.from_file": "certify_artefact check_certificate",
     "charts.plot": "plot",
     "comparison.compare": "compare",

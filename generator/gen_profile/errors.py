@@ -5,9 +5,10 @@
     GenProfileError
     ├── SpecError            2   the spec, or the way it was asked for
     ├── OutputError          2   the output folder or a file cannot be read or written
-    ├── InfeasibleProblem    3   no such motion exists
-    ├── SolverDiverged       3   the solver found none
-    ├── LimitViolation       3   the motion found breaks a limit of the spec
+    ├── NoMotion             3   there is no motion for the spec
+    │   ├── InfeasibleProblem    no such motion exists
+    │   ├── SolverDiverged       the solver found none
+    │   └── LimitViolation       the motion found breaks a limit of the spec
     ├── CheckFailed          4   the written artefact leaves too much sway
     ├── CosimulationError    4   the check itself could not be carried out
     ├── CertificateError     4   a certificate cannot be made, or does not hold
@@ -15,18 +16,39 @@
     └── StreamAborted        6   streaming was stopped
 
 A message is one or more whole sentences: what is wrong, where (a spec path such as ``limits.jerk``, or a
-file and line), and what to do about it.
+file and line), and what to do about it. Why there is no motion is told in values, too: by reasons, each with
+a code, and by suggestions that were tried.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from enum import StrEnum
+from typing import Any, ClassVar
+
+import attrs
+
+from gen_profile.phrase import Phrase, alternatives
 
 
 class GenProfileError(Exception):
-    """Root of the tree; raised itself only for a broken invariant, which is a bug."""
+    """Root of the tree; raised itself only for a broken invariant, which is a bug.
+
+    Parameters
+    ----------
+    sentences : str
+    """
 
     exit_code: ClassVar[int] = 1
+
+    def __str__(self) -> str:
+        """Join the sentences."""
+        return "\n".join(self.sentences)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What is wrong, and what to do about it."""
+        return self.args
 
 
 class SpecError(GenProfileError):
@@ -40,9 +62,10 @@ class SpecError(GenProfileError):
 
     exit_code = 2
 
-    def __init__(self, *faults: str) -> None:
-        super().__init__("\n".join(faults))
-        self.faults = faults
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """One sentence each."""
+        return self.sentences
 
 
 class OutputError(GenProfileError):
@@ -51,33 +74,139 @@ class OutputError(GenProfileError):
     exit_code = 2
 
 
-class InfeasibleProblem(GenProfileError):
-    """No motion meets the requirements.
+class Code(StrEnum):
+    """What may be in the way of a motion: a closed list."""
+
+    INFEASIBLE = "infeasible"  # no motion meets the end conditions within the limits
+    SWINGS_TOO_FAR = "swings_too_far"  # a load would have to
+    NOT_CONTROLLABLE = "not_controllable"  # a part of the machine swings on, whatever the axes do
+    DIVERGED = "diverged"  # the solver found none
+    GIVEN_UP = "given_up"  # the search took too long
+    LIMIT_BROKEN = "limit_broken"  # the motion found needs more than a limit allows
+    TOO_SHORT = "too_short"  # the method takes longer
+    NOT_AT_REST = "not_at_rest"  # the method moves from rest to rest only
+    RESIDUAL_SWAY = "residual_sway"  # no duration leaves so little
+
+
+@attrs.frozen(kw_only=True)
+class Reason:
+    """Why there is no motion.
+
+    Attributes
+    ----------
+    code : Code
+    place : str
+        Key of the spec that is in the way, where one alone is.
+    found, allowed : float or None
+        What the motion needs, or the spec states, and what may be, in the spec's units.
+    """
+
+    code: Code
+    place: str = ""
+    found: float | None = None
+    allowed: float | None = None
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Suggestion:
+    """Values with which a motion was found, and tried on all machines of the ranges.
+
+    Attributes
+    ----------
+    values : mapping of str to value
+        By their places in the spec, such as ``{"move.duration": 3.16}``.
+    spec : Spec
+        With these values.
+    fraction : float
+        Of the limit of residual sway that the worst machine takes up then.
+    passes : bool
+        Whether the check is to pass.
+    """
+
+    values: Mapping[str, Any]
+    spec: Any  # a Spec, of which this module knows nothing
+    fraction: float
+    passes: bool = True
+
+    def __str__(self) -> str:
+        """Write the values as overrides of a spec."""
+        return ", ".join(f"{place} = {_written(value)}" for place, value in self.values.items())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON; see the command-line contract."""
+        return {"values": dict(self.values), "share": self.fraction, "passes": self.passes}
+
+
+def _written(value: Any) -> str:
+    """Write a value as TOML."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    return f"{value:.9g}" if isinstance(value, float) else f"[{', '.join(map(_written, value))}]"
+
+
+class NoMotion(GenProfileError):
+    """There is no motion for a spec.
 
     Parameters
     ----------
     sentences : str
-    duration : float, optional
-        s, which the move takes at least, where that alone is in the way.
+    reasons : iterable of Reason
+    suggestions : iterable of Suggestion
+        Each by itself gives a motion; those come first that the check is to pass.
     """
 
     exit_code = 3
 
-    def __init__(self, sentences: str, *, duration: float | None = None) -> None:
-        super().__init__(sentences)
-        self.duration = duration
+    def __init__(
+        self, *sentences: str, reasons: Iterable[Reason] = (), suggestions: Iterable[Suggestion] = ()
+    ) -> None:
+        super().__init__(*sentences)
+        self.reasons, self.suggestions = tuple(reasons), tuple(suggestions)
+
+    def __str__(self) -> str:
+        """Tell all in a row."""
+        return " ".join(self.sentences)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Why there is no motion, and what would help."""
+        return (*super().sentences, *_suggested(self.suggestions))
+
+    @property
+    def least_duration(self) -> float | None:
+        """Of the move in s, where the method is known to take that long."""
+        return next((one.allowed for one in self.reasons if one.code is Code.TOO_SHORT), None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nest plain values for JSON; see the command-line contract."""
+        return {
+            "reasons": [attrs.asdict(reason) for reason in self.reasons],
+            "suggestions": [suggestion.to_dict() for suggestion in self.suggestions],
+        }
 
 
-class SolverDiverged(GenProfileError):
+def _suggested(suggestions: Sequence[Suggestion]) -> Iterator[str]:
+    """Put suggestions into words."""
+    if passing := [str(one) for one in suggestions if one.passes]:
+        yield Phrase("It can be done with {changes}.", changes=alternatives(passing))
+    if others := [one for one in suggestions if not one.passes]:
+        template = "{change} ({times:.2g} times the residual sway allowed)"
+        changes = [Phrase(template, change=str(one), times=one.fraction) for one in others]
+        yield Phrase(
+            "With {changes} there is a motion, but the check will not pass.", changes=alternatives(changes)
+        )
+
+
+class InfeasibleProblem(NoMotion):
+    """No motion meets the requirements."""
+
+
+class SolverDiverged(NoMotion):
     """The solver did not find a motion."""
 
-    exit_code = 3
 
-
-class LimitViolation(GenProfileError):
+class LimitViolation(NoMotion):
     """The motion found breaks a limit."""
-
-    exit_code = 3
 
 
 class CheckFailed(GenProfileError):

@@ -19,36 +19,37 @@ sys.path.insert(0, str(Path(__file__).parent))
 from random_specs import random_spec
 
 from gen_profile.designs.plan import plan
-from gen_profile.errors import GenProfileError, SpecError
+from gen_profile.errors import GenProfileError, NoMotion, SpecError
 from gen_profile.spec.reading import overridden, spec_from_dict
-from gen_profile.studio.views import cures
 
 KILLED_AFTER = 60  # s of processor
 
 
 @attrs.frozen
 class Outcome:
-    """How a spec ended: a kind, in words, and the processor's time in s."""
+    """How a spec ended: a kind, in words, the processor's time in s, and what was suggested."""
 
     kind: str
     words: str
     seconds: float
+    suggestions: list[dict[str, Any]]
 
 
-def planned(document: dict[str, Any]) -> tuple[str, str]:
+def planned(document: dict[str, Any]) -> tuple[str, str, list[dict[str, Any]]]:
     """Plan a spec here."""
     try:
         spec = spec_from_dict(document)
     except SpecError as error:
-        return "spec fault", str(error)
+        return "spec fault", str(error), []
     try:
         found = plan(spec)
     except GenProfileError as error:
-        return type(error).__name__, str(error)
+        suggested = error.suggestions if isinstance(error, NoMotion) else ()
+        return type(error).__name__, str(error), [dict(one.values) for one in suggested]
     except Exception as error:
-        return "CRASHED", repr(error)
+        return "CRASHED", repr(error), []
     solution = found.solution
-    return "solved", "" if solution is None else f"{solution.method}, {solution.iterations} iterations"
+    return "solved", "" if solution is None else f"{solution.method}, {solution.iterations} iterations", []
 
 
 def outcome(document: dict[str, Any]) -> Outcome:
@@ -58,13 +59,12 @@ def outcome(document: dict[str, Any]) -> Outcome:
         if child == 0:
             resource.setrlimit(resource.RLIMIT_CPU, (KILLED_AFTER, KILLED_AFTER))
             signal.signal(signal.SIGINT, signal.SIG_DFL)
-            kind, words = planned(document)
-            os.write(answer.fileno(), f"{kind}\n{words}".encode())
+            os.write(answer.fileno(), json.dumps(planned(document)).encode())
             os._exit(0)
         _, _, usage = os.wait4(child, 0)
         answer.seek(0)
-        kind, _, words = answer.read().decode().partition("\n")
-    return Outcome(kind or "KILLED", words, usage.ru_utime + usage.ru_stime)
+        kind, words, suggestions = json.loads(answer.read() or '["KILLED", "", []]')
+    return Outcome(kind, words, usage.ru_utime + usage.ru_stime, suggestions)
 
 
 def main() -> None:
@@ -88,7 +88,7 @@ def main() -> None:
         kinds[found.kind] += 1
         slow.append((found.seconds, index, found.kind))
         print(f"{index}: {found.seconds:.1f} s, {found.kind}: {found.words!r}", flush=True)
-        for edits in cures(found.words):
+        for edits in found.suggestions:
             changes = [f"{place}={json.dumps(value)}" for place, value in edits.items()]
             cured = outcome(overridden(document, changes))
             works = "worked" if cured.kind == "solved" else "FAILED"

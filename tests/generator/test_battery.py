@@ -8,13 +8,12 @@ from generator.random_specs import random_spec
 
 from gen_profile.designs.plan import plan
 from gen_profile.errors import InfeasibleProblem
+from gen_profile.evaluation.motion_evaluation import keeps_residual_sway
 from gen_profile.problem.problem import problem_of
-from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.relaxation import Relaxation
 from gen_profile.spec.reading import overridden, spec_from_dict
-from gen_profile.studio.views import cures
 
 SOLVED = [3, 13, 19, 20, 25, 29, 35, 45]  # tower, joint, chain, double pendulum, tower, chain, tank, gantry
 ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
@@ -44,14 +43,16 @@ def test_efforts_that_do_not_see_the_highest_derivative_have_programs_that_can_b
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("index", [28])
-def test_what_is_refused_is_told_cures_that_work(index):
+@pytest.mark.parametrize(("index", "passing"), [(28, None), (36, [True, False])])
+def test_what_is_refused_is_told_values_that_work_and_whether_the_check_will_pass(index, passing):
     document = random_spec(f"now-{index}")
     with pytest.raises(InfeasibleProblem) as refusal:
         plan(spec_from_dict(document))
-    named = cures(str(refusal.value))
-    assert named
-    for edits in named:
-        changes = [f"{place}={json.dumps(value)}" for place, value in edits.items()]
-        problem = problem_of(spec_from_dict(overridden(document, changes)))
-        assert choice.keeps_limits(choice.attempt(problem))
+    if passing is not None:
+        assert [one.passes for one in refusal.value.suggestions] == passing
+        assert str(refusal.value).endswith("there is a motion, but the check will not pass.")
+    assert refusal.value.suggestions
+    for one in refusal.value.suggestions:
+        changes = [f"{place}={json.dumps(value)}" for place, value in one.values.items()]
+        assert one.spec == spec_from_dict(overridden(document, changes))
+        assert keeps_residual_sway(one.spec, plan(one.spec).evaluation) == one.passes

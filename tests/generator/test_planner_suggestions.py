@@ -34,7 +34,7 @@ def test_each_change_is_made_as_large_as_it_must_be(power):
     assert surer.values["check.uncertain.L1"] < 0.05
     assert set(slower.values) == {"limits.velocity", "limits.acceleration", "limits.jerk"}
     assert more.values["check.residual_sway"] > 0.05
-    assert all(suggestion.share <= 1.0 for suggestion in (surer, slower, more))
+    assert all(suggestion.fraction <= 1.0 for suggestion in (surer, slower, more))
 
 
 def test_nothing_is_named_that_does_not_help_or_cannot_be():

@@ -164,13 +164,14 @@ def test_faults_of_limits_by_axis(override, sentence):
 
 
 def test_an_axis_may_have_limits_of_its_own():
-    limits = preset_spec("single-pendulum-crane", [*HOISTING, "limits.acceleration=0.5"]).limits
+    spec = preset_spec("single-pendulum-crane", [*HOISTING, "limits.acceleration=0.5"])
+    limits = spec.limits
     cart, hoist = limits.of(0), limits.of(1)
     assert (cart.velocity, cart.acceleration) == (1.3, 0.5)
     assert (hoist.velocity, hoist.acceleration) == (0.45, 0.5)
-    changed = limits.changed({"limits.acceleration": 0.6, "limits.axis.hoist.velocity": 0.5})
+    changed = spec.changed({"limits.acceleration": 0.6, "limits.axis.hoist.velocity": 0.5}).limits
     assert (changed.of(0).acceleration, changed.of(1).acceleration, changed.of(1).velocity) == (0.6, 0.6, 0.5)
-    assert changed.changed(limits.stated()) == limits
+    assert spec.changed(limits.stated()) == spec
     again = preset_spec("single-pendulum-crane", [*HOISTING, "limits.acceleration=0.5"])
     assert spec_from_dict(again.to_dict()) == again
 
@@ -186,7 +187,7 @@ def test_every_axis_keeps_its_own_limits():
 def test_what_an_axis_breaks_is_named():
     spec = preset_spec("single-pendulum-crane", [*HOISTING, "limits.axis.hoist.travel=[1.0, 7.0]"])
     free = optimal_profile(indirect.solve(problem_of(spec)))
-    broken = {breach.limit: breach for breach in breaches(spec.limits, free, 0.0)}
+    broken = {breach.place: breach for breach in breaches(spec.limits, free, 0.0)}
     assert broken.keys() == {"limits.velocity", "limits.axis.hoist.velocity"}
     assert (
         broken["limits.axis.hoist.velocity"]

@@ -92,7 +92,7 @@ def test_every_crane_comes_to_rest(drawn):
         linear = quiet.raise_for_status().angle * 1e4
         if solution.status is Status.DIVERGED:
             assert linear > LARGE
-            assert "Allow more time" in solution.suggestion or "Lower cost.sway_weight" in solution.suggestion
+            assert "Allow more time" in solution.advice or "Lower cost.sway_weight" in solution.advice
             return
         assert solution.status is Status.SWINGS_TOO_FAR
         best = least_peak_angle(problem.parameters, problem.target[0], problem.duration)

@@ -92,7 +92,7 @@ def test_gives_way_to_the_sure_one(changes):
     quick, sure = indirect.solve(problem), solve_surely(problem)
     assert not is_quick(quick)
     assert quick.status is sure.status
-    assert quick.suggestion == sure.suggestion
+    assert quick.advice == sure.advice
 
 
 def test_too_many_controls_are_refused_before_any_work():

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from gen_profile.designs.plan import plan
-from gen_profile.designs.suggestions import OTHERWISE
 from gen_profile.errors import SpecError
 from gen_profile.spec.reading import parse_spec, preset_spec, preset_text, presets, spec_from_dict
 from gen_profile.studio.depth import depth
@@ -26,7 +25,7 @@ from gen_profile.studio.state import (
     preset_start,
     text_of,
 )
-from gen_profile.studio.views import cures, picture
+from gen_profile.studio.views import picture
 
 PAPER = preset_start("paper")
 LIMITED = {"limits.velocity": 0.3, "limits.acceleration": 0.8, "limits.jerk": 40.0}
@@ -212,24 +211,6 @@ def test_what_cannot_be_says_why_and_what_would_help():
     (cure,) = found["failure"]["cures"]
     healed = parts(picture(of("paper", {**edits, **cure})))
     assert "verdict" in healed and "failure" not in healed
-
-
-def test_cures_are_read_out_of_the_sentences():
-    text = (
-        "With these limits a duration of 3.03 s will do (move.duration). In 2 s it would do with "
-        "limits.axis.x.jerk = 4.5, or with limits.travel = [-0.1, 0.4] and limits.sway = 1e-02, "
-        'or with robustness.method = "none".'
-    )
-    assert cures(text) == [
-        {"move.duration": 3.03},
-        {"limits.axis.x.jerk": 4.5},
-        {"limits.travel": [-0.1, 0.4], "limits.sway": 0.01},
-        {"robustness.method": "none"},
-    ]
-    assert cures(f"{OTHERWISE}, which finds a motion.") == [{"solver.method": "auto"}]
-    assert cures(f"{OTHERWISE}. A duration of 3 s will do (move.duration).") == [
-        {"solver.method": "auto", "move.duration": 3.0}
-    ]
 
 
 @pytest.mark.parametrize(("travel", "share"), [([0.0, 0.6], 0.5), ([-0.3, 0.3], 0.5), ([-0.1, 0.35], 2 / 3)])

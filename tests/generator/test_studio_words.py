@@ -6,24 +6,19 @@ from importlib.resources import files
 
 import pytest
 
-from gen_profile.designs.suggestions import IN_VAIN, OTHERWISE
-from gen_profile.errors import SpecError
-from gen_profile.solvers.solution import WIDER, Status
+from gen_profile.designs.suggestions import IN_VAIN
+from gen_profile.errors import NoMotion, SpecError, Suggestion
+from gen_profile.phrase import Phrase
+from gen_profile.solvers.solution import LATER, LONGER, WIDER, Status
 from gen_profile.spec.plausibility import doubts
 from gen_profile.spec.reading import preset_spec, presets, spec_from_dict
 from gen_profile.studio.knobs import knobs
 from gen_profile.studio.state import document_of, preset_start
-from gen_profile.studio.views import SEARCHING, SENTENCES
+from gen_profile.studio.views import SEARCHING
 
 WORDS = json.loads((files("gen_profile.studio") / "assets" / "words.json").read_text("utf-8"))
 ENGLISH = re.compile(
     r"\b(the|of|than|and|or|must|be|found|at|is|are|which|only|with|from|to|by|did|state|no|it|that)\b"
-)
-REFUSAL = (
-    "move.duration: no duration keeps the limits and brings the load to rest. With these limits a duration "
-    "of 3.03 s will do (move.duration). In 2 s it would do with limits.axis.x.jerk = 4.5, or with "
-    f"limits.travel = [-0.1, 0.4] and limits.sway = 0.01. {WIDER} {IN_VAIN} "
-    f"{OTHERWISE}, which finds a motion."
 )
 ENDS = [end.value for end in Status if end != Status.CONVERGED]
 UNFIT = {
@@ -37,9 +32,18 @@ UNFIT = {
 
 
 def german(sentence):
-    """Translate as studio.js does."""
+    """Translate as words.js does."""
+    if isinstance(sentence, Phrase):
+        filled = {
+            name: german(value) if isinstance(value, str) else value
+            for name, value in sentence.values.items()
+        }
+        template = WORDS["messages"][sentence.template]
+        return Phrase(template, **filled)
     if sentence in WORDS["texts"]:
         return WORDS["texts"][sentence][1]
+    if sentence in WORDS["messages"]:
+        return WORDS["messages"][sentence]
     for pattern, translated in WORDS["patterns"]:
         if found := re.fullmatch(pattern, sentence):
             return re.sub(r"\$(\d)", lambda group: german(found[int(group[1])]), translated)
@@ -55,7 +59,17 @@ def told(document):
     return {sentence.partition(": ")[2] for sentence in sentences}
 
 
-@pytest.mark.parametrize("sentence", [*SENTENCES.split(REFUSAL), SEARCHING, *ENDS])
+SUGGESTED = [
+    Suggestion(values={place: 4.5}, spec=None, fraction=fraction, passes=fraction <= 1.0)
+    for place in ("move.duration", "limits.jerk")
+    for fraction in (0.5, 2.0)
+]
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [*NoMotion(WIDER, LONGER, LATER, IN_VAIN, suggestions=SUGGESTED).sentences, SEARCHING, *ENDS],
+)
 def test_why_there_is_no_motion(sentence):
     assert not ENGLISH.search(german(sentence))
 

@@ -48,7 +48,7 @@ def test_a_search_that_costs_too_much_is_given_up(monkeypatch):
     monkeypatch.setattr(choice, "DIRECTLY", 1e-4)
     solution = choice.attempt(crane_problem())
     assert solution.status is Status.GIVEN_UP
-    assert "units" in solution.suggestion
+    assert "units" in solution.advice
 
 
 def test_a_motion_on_the_first_mesh_will_do_where_bisecting_costs_too_much(monkeypatch):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from gen_profile.errors import CertificateError, CheckFailed, GenProfileError, OutputError
+from gen_profile.errors import CertificateError, CheckFailed, GenProfileError, NoMotion, OutputError
 
 if TYPE_CHECKING:
     from gen_profile.proof.verdict import Proof
@@ -79,7 +79,8 @@ def print_error(error: Exception, as_json: bool) -> int:
         case _:
             code, message = 1, f"Internal error ({type(error).__name__}: {error}). Run again with --debug."
     if as_json:
-        document = {"error": {"type": type(error).__name__, "message": message, "exit_code": code}}
+        told = error.to_dict() if isinstance(error, NoMotion) else {}
+        document = {"error": {"type": type(error).__name__, "message": message, "exit_code": code, **told}}
         with suppress(OSError):  # the error may be that stdout takes nothing
             click.echo(_json(document))
     if isinstance(error, click.ClickException):

@@ -130,7 +130,7 @@ def write(
         kept = "The block was kept." if outcome.files else f"Nothing was written{before}."
         if outcome.suggestions:
             tried = "; or with ".join(
-                f"{one} ({100.0 * one.share:.0f} % of the limit)" for one in outcome.suggestions
+                f"{one} ({100.0 * one.fraction:.0f} % of the limit)" for one in outcome.suggestions
             )
             kept = f"It would pass with {tried}.\n{kept}"
         fail(outcome.proof.reasons(), kept)

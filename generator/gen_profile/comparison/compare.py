@@ -134,8 +134,8 @@ def compare(
                 rows.append(_row(spec, candidate))
         except GenProfileError as error:
             left_out[candidate.method] = str(error)
-            if isinstance(error, InfeasibleProblem) and error.duration is not None:
-                too_slow[candidate.method] = error.duration
+            if isinstance(error, InfeasibleProblem) and error.least_duration is not None:
+                too_slow[candidate.method] = error.least_duration
             elif isinstance(error, InfeasibleProblem) and candidate.requirements:
                 impossible[candidate.requirements] = str(error)
     found = {row.method: row.figures for row in rows}

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import attrs
 
 from gen_profile.designs import transient_sway
 from gen_profile.designs.shape import shaped_motion
-from gen_profile.errors import CosimulationError
+from gen_profile.errors import Code, CosimulationError, InfeasibleProblem, Suggestion
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, share_of_residual_sway
 from gen_profile.motion.profile import Profile, grid_duration
-from gen_profile.problem.limits import SWAY_TOLERANCE
+from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches, rounded_up
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers.direct.relaxation import Relaxed
 from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
 
+ROOM = 2.0  # times a shaper's delay, which leaves the base move as much time
 WITHIN = 0.99  # fraction of the limits of residual sway, which leaves room for the setpoints' own errors
 
 
@@ -51,15 +54,22 @@ class Draft:
         return evaluate(self.spec, self.motion)
 
     @cached_property
+    def broken(self) -> tuple[Breach, ...]:
+        """The limits that the motion, which must be there, breaks on some machine."""
+        figures = self.evaluation.figures
+        sway = max(figures["sway_transient_peak_m"], figures["sway_transient_worst_m"] / SWAY_TOLERANCE)
+        return breaches(self.spec.limits, self.evaluation.command, sway)
+
+    @cached_property
     def excess_sway(self) -> float:
         """How much more sway it leaves than it should, as a logarithm; infinite without a motion.
 
         Also where the motion sways more on the way than it may, or no machine can follow it.
         """
-        if self.motion is None or self.solution is None:
+        if self.motion is None:
             return math.inf
         try:
-            evaluation, limit = self.evaluation, self.solution.problem.limits.sway
+            evaluation, limit = self.evaluation, self.spec.limits.sway
         except CosimulationError:
             return math.inf
         if limit is not None and evaluation.figures["sway_transient_worst_m"] > SWAY_TOLERANCE * limit:
@@ -79,15 +89,42 @@ def solved(
 ) -> Draft:
     """Solve a spec with a duration, or shape a move for it; `near` as in `transient_sway.attempt`."""
     if spec.solver.shaper is not None:
-        return Draft(spec=spec, solution=None, motion=shaped_motion(spec, spec.solver.shaper))
+        return _shaped(spec, spec.solver.shaper)
     began = time.perf_counter()
     solution = transient_sway.attempt(spec, progress, spread, near)
     return drafted(spec, solution, time.perf_counter() - began)
 
 
+def _shaped(spec: Spec, shaper: str) -> Draft:
+    """Shape a move; where that takes longer than the spec allows, try a duration that is long enough."""
+    try:
+        return Draft(spec=spec, solution=None, motion=shaped_motion(spec, shaper))
+    except InfeasibleProblem as error:
+        least = error.least_duration
+        if least is not None:
+            limited = any(one.code is Code.LIMIT_BROKEN for one in error.reasons)
+            duration = float(rounded_up(least if limited else ROOM * least, digits=4))
+            if duration > spec.move.duration:
+                error.suggestions = _longer_shaped(lasting(spec, duration), shaper)
+        raise
+
+
+def _longer_shaped(spec: Spec, shaper: str) -> tuple[Suggestion, ...]:
+    try:
+        return (suggested({"move.duration": spec.move.duration}, _shaped(spec, shaper)),)
+    except InfeasibleProblem as error:
+        return error.suggestions
+
+
+def suggested(values: Mapping[str, Any], found: Draft) -> Suggestion:
+    """Suggest values with which a motion was found."""
+    fraction = share_of_residual_sway(found.spec, found.evaluation)
+    return Suggestion(values=values, spec=found.spec, fraction=fraction, passes=found.excess_sway <= 0.0)
+
+
 def lasting(spec: Spec, duration: float) -> Spec:
     """Give a spec a duration in s."""
-    return attrs.evolve(spec, move=attrs.evolve(spec.move, duration=duration, shortest=False))
+    return spec.changed({"move.duration": duration})
 
 
 def in_cycles(spec: Spec, duration: float) -> float:

@@ -12,7 +12,6 @@ from gen_profile.designs.suggestions import explained, remedy
 from gen_profile.errors import LimitViolation
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.motion.profile import Profile
-from gen_profile.problem.limits import SWAY_TOLERANCE, breaches
 from gen_profile.problem.problem import problem_of
 from gen_profile.progress import Progress, no_progress
 from gen_profile.solvers import method_selection as choice
@@ -110,17 +109,19 @@ def judged(found: Draft, progress: Progress = no_progress) -> Plan:
         assert found.solution is not None  # a shaper has a motion, or raises
         progress(EXPLAINING)
         found = attrs.evolve(found, motion=optimal_profile(explained(spec, found.solution)))
-    evaluation, figures = found.evaluation, found.evaluation.figures
-    swing = max(figures["sway_transient_peak_m"], figures["sway_transient_worst_m"] / SWAY_TOLERANCE)
-    broken = breaches(spec.limits, evaluation.command, swing)
-    if broken:
-        sentences = [breach.sentence() for breach in broken]
+    if found.broken:
         progress(EXPLAINING)
-        raise LimitViolation("\n".join([*sentences, remedy(spec)]).strip())
+        better = remedy(spec)
+        raise LimitViolation(
+            *(one.sentence() for one in found.broken),
+            *filter(None, [better.advice]),
+            reasons=[one.reason() for one in found.broken],
+            suggestions=better.suggestions,
+        )
     return Plan(
         spec=spec,
         solution=found.solution,
         solver_time=found.solver_time,
-        evaluation=evaluation,
-        figures=figures,
+        evaluation=found.evaluation,
+        figures=found.evaluation.figures,
     )

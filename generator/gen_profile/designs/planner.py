@@ -12,7 +12,8 @@ import attrs
 from gen_profile.artefacts.manifest import PLANNER, Artefact, artefact_of
 from gen_profile.artefacts.writing import staged
 from gen_profile.designs.design import deliver_judged, file_entry
-from gen_profile.designs.planner_suggestions import PlannerSuggestion, planner_suggestions
+from gen_profile.designs.planner_suggestions import planner_suggestions
+from gen_profile.errors import Suggestion
 from gen_profile.planner.design import PlannerBlock, planner_block
 from gen_profile.planner.forms import block_files, block_in, is_c
 from gen_profile.planner.full_speed import slow_axes
@@ -36,7 +37,7 @@ class Deployment:
     folder : Path
     files : tuple of Artefact
         What was delivered; empty when the proof failed.
-    suggestions : tuple of PlannerSuggestion
+    suggestions : tuple of Suggestion
         Changes of a refused spec with which its block passes.
     warnings : tuple of str
         Sentences on axes that never reach the velocity of their limits; none where nothing was proved.
@@ -47,7 +48,7 @@ class Deployment:
     proof: Proof | None
     folder: Path
     files: tuple[Artefact, ...]
-    suggestions: tuple[PlannerSuggestion, ...] = ()
+    suggestions: tuple[Suggestion, ...] = ()
     warnings: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
@@ -63,7 +64,7 @@ class Deployment:
             "live": {name: list(ends) for name, ends in self.spec.planner.live.items()},
             "frequency_error": self.block.frequency_error,
             "proof": None if self.proof is None else self.proof.to_dict(),
-            "cures": [{"values": dict(one.values), "share": one.share} for one in self.suggestions],
+            "cures": [one.to_dict() for one in self.suggestions],
             "warnings": list(self.warnings),
         }
 
@@ -118,7 +119,7 @@ def deploy_planner(
             proof, warnings = prove_on(spec, text), slow_axes(spec, block)
         artefacts = tuple(artefact_of(PLANNER, name, content) for name, content in written.items())
         kept = deliver_judged(staging, spec, artefacts, proof, profile_sha256="", keep_failed=keep_failed)
-    found: tuple[PlannerSuggestion, ...] = ()
+    found: tuple[Suggestion, ...] = ()
     if proof is not None and not proof.passed and not keep_failed:
         progress("looking for what would pass")
         found = planner_suggestions(

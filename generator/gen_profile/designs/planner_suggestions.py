@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import attrs
 
-from gen_profile.errors import GenProfileError
+from gen_profile.errors import GenProfileError, Suggestion
 from gen_profile.planner.machine import planned_axes
 from gen_profile.problem.limits import rounded_down, rounded_up
 from gen_profile.proof.verdict import TAKEN_BACK, Proof
@@ -22,29 +22,7 @@ WHAT_MOVES = ("velocity", "acceleration", "jerk")
 Change = Callable[[Spec, float], tuple[Spec, dict[str, float]]]
 
 
-@attrs.frozen(kw_only=True)
-class PlannerSuggestion:
-    """Values with which a block passed its proof.
-
-    Attributes
-    ----------
-    values : mapping of str to float
-        By their places in the spec.
-    share : float
-        Of the limits of residual sway that the worst history took up then.
-    """
-
-    values: Mapping[str, float]
-    share: float
-
-    def __str__(self) -> str:
-        """Tell them as overrides of a spec."""
-        return ", ".join(f"{place} = {value:g}" for place, value in self.values.items())
-
-
-def planner_suggestions(
-    spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]
-) -> tuple[PlannerSuggestion, ...]:
+def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]) -> tuple[Suggestion, ...]:
     """Look for changes that help, where too much sway, or a promise taken back for it, is all that is wrong.
 
     Parameters
@@ -63,16 +41,16 @@ def planner_suggestions(
 
 def _tried(
     spec: Spec, failed: Proof, prove: Callable[[Spec], Proof], change: Change, power: float
-) -> PlannerSuggestion | None:
+) -> Suggestion | None:
     """Divide by a factor until the proof passes; the sway is taken to go with a power of it."""
-    passed: list[PlannerSuggestion] = []
+    passed: list[Suggestion] = []
 
     def excess(factor: float) -> float:
         changed, values = change(spec, 1.0 / factor)
         proof = failed if factor == 1.0 else prove(changed)
         fraction = proof.share(proof.worst)
         if proof.passed:
-            passed.append(PlannerSuggestion(values=values, share=fraction))
+            passed.append(Suggestion(values=values, spec=changed, fraction=fraction))
             return -math.inf
         return math.log(max(fraction, UNKNOWN))
 
@@ -88,14 +66,14 @@ def _slower(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
     stated, axes = spec.limits.stated(), planned_axes(spec)
     places = dict.fromkeys(spec.limits.place(axis, name) for axis in axes for name in WHAT_MOVES)
     values = {place: float(rounded_down(factor * stated[place], digits=2)) for place in places}
-    return attrs.evolve(spec, limits=spec.limits.changed(values)), values
+    return spec.changed(values), values
 
 
 def _surer(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
     stated = spec.robustness.uncertain if spec.check.uncertain is None else spec.check.uncertain
     errors = {name: float(rounded_down(factor * error, digits=2)) for name, error in stated.items()}
-    changed = attrs.evolve(spec, check=attrs.evolve(spec.check, uncertain=errors))
-    return changed, {f"check.uncertain.{name}": error for name, error in errors.items()}
+    values = {f"check.uncertain.{name}": error for name, error in errors.items()}
+    return spec.changed({"check.uncertain": errors}), values
 
 
 def _more_allowed(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
@@ -105,7 +83,7 @@ def _more_allowed(spec: Spec, factor: float) -> tuple[Spec, dict[str, float]]:
     values = {f"check.residual_sway.{load}": most for load, most in sway.items()}
     if len(set(sway.values())) == 1:
         values = {"check.residual_sway": next(iter(sway.values()))}
-    return attrs.evolve(spec, check=attrs.evolve(spec.check, residual_sway=sway)), values
+    return spec.changed({"check.residual_sway": sway}), values
 
 
 CHANGES: dict[Change, float] = {  # and the power of its factor that the sway goes with

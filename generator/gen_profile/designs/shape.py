@@ -8,14 +8,15 @@ from functools import partial
 import attrs
 
 from gen_profile.designs.transient_sway import sways
-from gen_profile.errors import InfeasibleProblem
+from gen_profile.errors import Code, InfeasibleProblem, Reason
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Profile, grid_duration
+from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import SWAY_TOLERANCE, Breach, breaches, rounded_up
 from gen_profile.problem.linearization import linearize
 from gen_profile.problem.problem import problem_of
 from gen_profile.shapers.base_moves import BASES
-from gen_profile.shapers.shaped_move import ShapedMove, shaped_move
+from gen_profile.shapers.shaped_move import ShapedMove, shaped_move, too_short
 from gen_profile.solvers.search import Search, least
 from gen_profile.spec.model import Spec
 
@@ -43,8 +44,9 @@ def shaped_motion(spec: Spec, name: str) -> Profile:
     move = spec.move
     if move.initial or not move.stops:
         cause = "move.initial" if move.initial else "move.final_velocity"
+        template = "{place}: a shaper moves from rest to rest only; take an optimal motion (solver.method)."
         raise InfeasibleProblem(
-            f"{cause}: a shaper moves from rest to rest only; take an optimal motion (solver.method)."
+            Phrase(template, place=cause), reasons=[Reason(code=Code.NOT_AT_REST, place=cause)]
         )
     # where the load would swing on; a shaper knows one frequency per mode, whatever the hoist does on the way
     linear = linearize(spec.machine(), spec.plant.parameters, move.target)
@@ -59,15 +61,20 @@ def shaped_motion(spec: Spec, name: str) -> Profile:
     if move.shortest:
         shortest = shortest_duration(spec, shaped)
         if shortest is None:
-            raise InfeasibleProblem("move.duration: no duration keeps the limits; widen them.")
+            raise InfeasibleProblem(
+                Phrase("move.duration: no duration keeps the limits; widen them."),
+                reasons=[Reason(code=Code.INFEASIBLE, place="move.duration")],
+            )
         return shaped.profile(shortest)
     motion = shaped.profile(move.duration)
-    sentences = [breach.sentence() for breach in _breaches(spec, motion)]
-    if sentences:
+    if broken := _breaches(spec, motion):
+        sentences, reasons = [one.sentence() for one in broken], [one.reason() for one in broken]
         shortest = shortest_duration(spec, shaped)
         if shortest is not None:
-            sentences.append(f"With this shaper the move takes at least {rounded_up(shortest, digits=4)} s.")
-        raise InfeasibleProblem(" ".join(sentences))
+            least = float(rounded_up(shortest, digits=4))
+            sentences.append(Phrase("With this shaper the move takes at least {least:g} s.", least=least))
+            reasons.append(too_short(move.duration, least))
+        raise InfeasibleProblem(*sentences, reasons=reasons)
     return motion
 
 

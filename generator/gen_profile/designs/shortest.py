@@ -10,8 +10,9 @@ import attrs
 from gen_profile.designs import transient_sway
 from gen_profile.designs.draft import Draft, drafted, in_cycles, lasting, solved
 from gen_profile.designs.shape import shaped_motion
-from gen_profile.designs.suggestions import sufficient_duration, suggestions
-from gen_profile.errors import InfeasibleProblem, SolverDiverged
+from gen_profile.designs.suggestions import remedy, sufficient_duration
+from gen_profile.errors import Code, InfeasibleProblem, Reason, SolverDiverged
+from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import rounded_up
 from gen_profile.problem.problem import Problem, problem_of
 from gen_profile.progress import Progress, no_progress
@@ -66,16 +67,20 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
             found = _within_sway(spec, *_within_limits(spec, progress), progress)
     except OutOfWork as error:
         spend(0.0)
-        duration = sufficient_duration(_slow(spec))
-        advice = f"Allow about {duration} s (move.duration)" if duration else "State a duration in s"
+        longer = sufficient_duration(_slow(spec))
         raise SolverDiverged(
-            "move.duration: the search for the shortest duration was given up, for it took too long. "
-            f"{advice}, or fewer limits."
+            Phrase("move.duration: the search for the shortest duration was given up, for it took too long."),
+            Phrase("State a duration in s, or fewer limits."),
+            reasons=[Reason(code=Code.GIVEN_UP, place="move.duration")],
+            suggestions=filter(None, [longer]),
         ) from error
     if found is None:
         raise InfeasibleProblem(
-            "check.residual_sway: no duration leaves so little sway on every machine of "
-            "robustness.uncertain; allow more, or narrow the ranges."
+            Phrase(
+                "check.residual_sway: no duration leaves so little sway on every machine of "
+                "robustness.uncertain; allow more, or narrow the ranges."
+            ),
+            reasons=[Reason(code=Code.RESIDUAL_SWAY, place="check.residual_sway")],
         )
     return found
 
@@ -94,12 +99,18 @@ def _within_limits(spec: Spec, progress: Progress) -> tuple[Problem, Relaxed]:
             problem = attrs.evolve(problem, sway_spread=more)
             found = choice.minimum_time(problem, progress, found)
     if found is None:
-        advice = (
-            suggestions(_slow(spec), in_time=True)
-            or "Widen the limits, or see whether all numbers of the spec are in its units."
-        )
+        slow = _slow(spec)
+        duration = {"move.duration": slow.move.duration}
+        better = [
+            attrs.evolve(one, values={**duration, **one.values})
+            for one in remedy(slow, in_time=True).suggestions
+        ]
+        advice = Phrase("Widen the limits, or see whether all numbers of the spec are in its units.")
         raise InfeasibleProblem(
-            f"move.duration: no duration keeps the limits and brings the load to rest. {advice}"
+            Phrase("move.duration: no duration keeps the limits and brings the load to rest."),
+            *([] if better else [advice]),
+            reasons=[Reason(code=Code.INFEASIBLE, place="move.duration")],
+            suggestions=better,
         )
     return problem, found
 

@@ -15,8 +15,9 @@ from typing import Any, TypeVar
 import attrs
 
 from gen_profile.designs import transient_sway
-from gen_profile.designs.draft import drafted, lasting
-from gen_profile.errors import SpecError
+from gen_profile.designs.draft import Draft, drafted, suggested
+from gen_profile.errors import CosimulationError, InfeasibleProblem, SpecError, Suggestion
+from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import SWAY_TOLERANCE, rounded_up
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
@@ -34,21 +35,31 @@ COARSE = Search(precision=math.log(1.05), close=0.0, stride=math.log(1.07))
 FINE = attrs.evolve(COARSE, close=math.inf)
 MOST = 4.2  # times the least value, up to which one is tried
 FAR = 64.0  # likewise a duration where the relaxation knows of no limit, so of no least one
-FARTHER = 1.7  # times the least value that works, up to which one is looked for that is preferred
+# times the least value that works, up to which one is looked for that passes the check; likewise a duration
+FARTHER, LATER = 1.7, 16.0
+CLOSE_BY = 1.2  # times the least value that passes on few intervals, up to which one is looked for on many
 AMPLE = math.log(1.3)  # step beyond a value that takes too much work: a smooth motion may do
 FRACTION = 0.5  # of the work that is left, which one suggestion may take, and one duration tried
 LONGEST = 0.8  # likewise a longer move, which nearly always works
 WIDEST = 4.0  # times as wide as they are, all limits together are worth naming
 NEAR = 1.05  # times the duration, from which on it is worth telling how long a move would take
 AT_ONCE = 1.0  # s of work, in which a motion without limits is found, or is not worth the while
-OTHERWISE = 'Set solver.method = "auto"'
-IN_VAIN = (
+IN_VAIN = Phrase(
     "Longer moves, wider limits and less robustness were tried as far as the work allows, and none was found "
     "to do. Not tried: fewer limits, or fewer parameters in robustness.uncertain. See whether all numbers of "
     "the spec are in its units."
 )
 
 Found = TypeVar("Found")
+Change = Callable[[float], Mapping[str, Any]]  # from a factor to values by their places in the spec
+
+
+@attrs.frozen(kw_only=True)
+class Remedy:
+    """What was found to help: changes that were tried, and advice where none of the duration was."""
+
+    suggestions: tuple[Suggestion, ...] = ()
+    advice: str = ""
 
 
 def solve(spec: Spec) -> Solution:
@@ -62,26 +73,16 @@ def solve(spec: Spec) -> Solution:
 
 def explained(spec: Spec, solution: Solution) -> Solution:
     """Find out what would help where a solve failed, unless the indirect method knows."""
-    known = solution.method == indirect.METHOD and not spec.limits.stated() and solution.suggestion != LONGER
+    known = solution.method == indirect.METHOD and not spec.limits.stated() and solution.advice != LONGER
     if solution.optimum is not None or known:
         return solution
-    return attrs.evolve(solution, suggestion=remedy(spec, solution.problem.sway_spread) or IN_VAIN)
+    found = remedy(spec, solution.problem.sway_spread)
+    advice = found.advice or ("" if found.suggestions else IN_VAIN)
+    return attrs.evolve(solution, advice=advice, suggestions=found.suggestions)
 
 
-def remedy(spec: Spec, spread: float = 1.0) -> str:
-    """Say which other values would let a spec's method find a motion; nothing where none will."""
-    if spec.solver.solver != "indirect" or spec.robustness.method == "range":
-        return suggestions(spec, spread)
-    with suppress(OutOfWork):
-        if choice.keeps_limits(tried(spec)):
-            return f"{OTHERWISE}, which finds a motion."
-        found = suggestions(spec, spread)
-        return found and f"{OTHERWISE}. {found}"
-    return ""
-
-
-def suggestions(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> str:
-    """Name what to change, each thing by itself, in one or two sentences; nothing where nothing was found.
+def remedy(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> Remedy:
+    """Find what to change so that there is a motion, each change by itself; those first that pass the check.
 
     Parameters
     ----------
@@ -92,37 +93,47 @@ def suggestions(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> st
     in_time : bool
         Look for what would do in the duration asked for only.
     """
+    if spec.solver.solver != "indirect" or spec.robustness.method == "range":
+        return _remedy(spec, {}, spread, in_time=in_time)
+    method = {"solver.method": "auto"}
+    with suppress(OutOfWork):
+        one = _tried(spec, method)
+        return Remedy(suggestions=(one,)) if one else _remedy(spec, method, spread, in_time=in_time)
+    return Remedy()
+
+
+def _remedy(spec: Spec, beside: Mapping[str, Any], spread: float, *, in_time: bool) -> Remedy:
     relaxation = _relaxation(spec, spread)
     problem = relaxation.problem
-    needed, duration, instead, sentences = None, None, list[str](), list[str]()
+    needed, longer, others = None, None, list[Suggestion | None]()
     stated = problem.limits.stated()
-    alone = [partial(_wider_limits, spec, relaxation, {place: value}) for place, value in stated.items()]
+    wider = partial(_wider_limits, spec, beside, relaxation)
+    alone = [partial(wider, {place: value}) for place, value in stated.items()]
     eased = {place: stated[place] for place in eased_by_time(problem)}
     families = [limits for limits in ([eased] if eased == stated else [eased, stated]) if len(limits) > 1]
-    together = [partial(_wider_limits, spec, relaxation, limits, WIDEST) for limits in families]
+    together = [partial(wider, limits, WIDEST) for limits in families]
     with suppress(OutOfWork):  # of the budget for the whole answer: name what was found so far
         if not in_time:
             needed = _in_time(partial(least_duration, relaxation))
-            duration = needed and _in_time(partial(_longer, spec, relaxation, needed), LONGEST)
-        instead += filter(None, map(_in_time, alone))
-        for last_resort in (*together, partial(_less_robust, spec)):
-            if not instead:
-                instead += filter(None, [_in_time(last_resort)])
-    if duration:
-        some = "With these limits a" if stated else "A"
-        sentences.append(f"{some} duration of {duration} s will do (move.duration).")
-    elif needed and needed > NEAR * problem.duration:
-        sentences.append(f"With these limits it would take some {float(f'{needed:.2g}'):g} s.")
-    if instead:
-        sentences.append(f"In {problem.duration:g} s it would do with {', or with '.join(instead)}.")
-    return " ".join(sentences)
+            if needed:
+                longer = _in_time(partial(_longer, spec, beside, relaxation, needed), LONGEST)
+        others += map(_in_time, alone)
+        for last_resort in (*together, partial(_less_robust, spec, beside)):
+            if not any(others):
+                others.append(_in_time(last_resort))
+    advice = ""
+    if needed and needed > NEAR * problem.duration and not longer:
+        template = "By an estimate that was not tried, it takes some {duration:g} s with these limits."
+        advice = Phrase(template, duration=float(f"{needed:.2g}"))
+    found = [one for one in (longer, *others) if one]
+    return Remedy(suggestions=tuple(sorted(found, key=lambda one: not one.passes)), advice=advice)
 
 
-def sufficient_duration(spec: Spec) -> str:
+def sufficient_duration(spec: Spec) -> Suggestion | None:
     """Find the least duration in s, no less than a spec's, that works, in most of the work that is left."""
     relaxation = _relaxation(spec, 1.0)
     needed = _in_time(partial(least_duration, relaxation), LONGEST)
-    return (needed and _in_time(partial(_longer, spec, relaxation, needed), LONGEST)) or ""
+    return _in_time(partial(_longer, spec, {}, relaxation, needed), LONGEST) if needed else None
 
 
 def tried(spec: Spec, *, coarse: bool = False) -> Solution:
@@ -160,97 +171,123 @@ def usual_spread(spec: Spec) -> float:
     return 1.0 if nearest is None else transient_sway.spread(spec, nearest.solution)
 
 
-def least_factor(
-    changed: Callable[[float], Spec], known_spread: float = 1.0, fraction: float = 1.0, most: float = MOST
-) -> float | None:
+def least_change(
+    spec: Spec,
+    change: Change,
+    known_spread: float = 1.0,
+    fraction: float = 1.0,
+    reach: tuple[float, float] = (MOST, FARTHER),
+) -> Suggestion | None:
     """Find the least factor of a change that works, as near as the work that is left allows.
 
     Parameters
     ----------
-    changed : float → Spec
+    spec : Spec
+    change : float → mapping of str to value
+        What a factor makes of the spec's values.
     known_spread : float
         How many times as much as the nominal machine the worst one is supposed to sway.
     fraction : float
         Of the work that is left, which one factor may take.
-    most : float
-        Factor, up to which one is tried.
+    reach : (float, float)
+        Up to which factor one is tried; and up to how many times the least factor that works one is looked
+        for that passes the check.
     """
+    most, farther = reach
 
     @cache
-    def solved(factor: float, *, coarse: bool) -> tuple[Spec, Solution | None]:
-        spec = changed(factor)
-        return spec, afford(partial(tried, spec, coarse=coarse), fraction * left())
+    def solved(factor: float, *, coarse: bool) -> Draft:
+        changed = spec.changed(change(factor))
+        solution = afford(partial(tried, changed, coarse=coarse), fraction * left())
+        return drafted(changed, solution or choice.given_up(problem_of(changed)))
 
     def excess(factor: float, *, coarse: bool) -> float:
-        _, solution = solved(factor, coarse=coarse)
-        if solution is None or solution.status is Status.GIVEN_UP:
+        draft = solved(factor, coarse=coarse)
+        solution = draft.solution
+        assert solution is not None
+        if solution.status is Status.GIVEN_UP:
             return AMPLE
-        if choice.keeps_limits(solution):
+        if choice.keeps_limits(solution) and (coarse or _stands(draft)):
             return -math.inf
         missing = math.log(solution.problem.sway_spread / known_spread)  # the spread may be to blame
         return missing if coarse and missing > 0.0 else math.inf
 
-    def preferred(factor: float) -> float:
+    def unsafe(factor: float, *, coarse: bool) -> float:
         """Prefer what leaves every machine little enough sway."""
-        spec, solution = solved(factor, coarse=True)
-        if solution is None or not choice.keeps_limits(solution):
-            return math.inf
-        return -math.inf if drafted(spec, solution).excess_sway <= 0.0 else math.inf
+        works = excess(factor, coarse=coarse) < 0.0
+        return -math.inf if works and solved(factor, coarse=coarse).excess_sway <= 0.0 else math.inf
 
-    nearest: float | None = None
+    nearest = passing = chosen = None
     with suppress(OutOfWork), budget(FRACTION * left()):
         nearest = least(partial(excess, coarse=True), FIRST, COARSE, most)
-        nearest = nearest and (least(preferred, nearest, COARSE, FARTHER * nearest) or nearest)
+        passing = nearest  # over a range few intervals tell nothing of the sway that is left
+        if nearest and spec.robustness.method != "range":
+            passing = least(partial(unsafe, coarse=True), nearest, COARSE, farther * nearest)
     spend(0.0)
-    return nearest and least(partial(excess, coarse=False), nearest, FINE, most)
+    with suppress(OutOfWork), budget(FRACTION * left()):
+        chosen = passing and least(partial(unsafe, coarse=False), passing, FINE, CLOSE_BY * passing)
+    spend(0.0)
+    start = chosen or passing or nearest
+    factor = start and least(partial(excess, coarse=False), start, FINE, max(most, start))
+    return suggested(change(factor), solved(factor, coarse=False)) if factor else None
 
 
-def _longer(spec: Spec, relaxation: Relaxation, needed: float) -> str:
-    """Find the least duration that works, in s, rounded up to three digits; empty where there is none."""
+def _stands(draft: Draft) -> bool:
+    """Whether the motion, if there is one, would be judged to keep all limits."""
+    try:
+        return draft.motion is not None and not draft.broken
+    except (CosimulationError, InfeasibleProblem):
+        return False
 
-    def changed(factor: float) -> Spec:
-        return lasting(spec, float(rounded_up(factor * needed)))
+
+def _longer(
+    spec: Spec, beside: Mapping[str, Any], relaxation: Relaxation, needed: float
+) -> Suggestion | None:
+    """Find the least duration that works, in s, rounded up to three digits."""
+
+    def change(factor: float) -> Mapping[str, Any]:
+        return {**beside, "move.duration": float(rounded_up(factor * needed))}
 
     most = MOST if eased_by_time(relaxation.problem) else FAR
-    factor = least_factor(changed, relaxation.problem.sway_spread, FRACTION, most)
-    return "" if factor is None else rounded_up(factor * needed)
+    return least_change(spec, change, relaxation.problem.sway_spread, FRACTION, (most, LATER))
 
 
 def _wider_limits(
-    spec: Spec, relaxation: Relaxation, limits: Mapping[str, Any], most: float = math.inf
-) -> str:
-    """Widen some limits as little as works, the others as they are; nothing where nothing works."""
+    spec: Spec,
+    beside: Mapping[str, Any],
+    relaxation: Relaxation,
+    limits: Mapping[str, Any],
+    most: float = math.inf,
+) -> Suggestion | None:
+    """Widen some limits as little as works, the others as they are."""
     nearest = relaxation.least(tuple(limits))
     if nearest is None or nearest.wider > most:
-        return ""
+        return None
     needed = max(nearest.wider, 1.0)
 
-    def wider(factor: float) -> dict[str, Any]:
-        return {place: _times(value, factor * needed) for place, value in limits.items()}
+    def change(factor: float) -> Mapping[str, Any]:
+        return {**beside, **{place: _times(value, factor * needed) for place, value in limits.items()}}
 
-    def changed(factor: float) -> Spec:
-        return attrs.evolve(spec, limits=spec.limits.changed(wider(factor)))
-
-    factor = least_factor(changed, relaxation.problem.sway_spread)
-    if factor is None:
-        return ""
-    return " and ".join(f"{place} = {_written(value)}" for place, value in wider(factor).items())
+    return least_change(spec, change, relaxation.problem.sway_spread)
 
 
-def _less_robust(spec: Spec) -> str:
-    """Ask for less robustness."""
+def _less_robust(spec: Spec, beside: Mapping[str, Any]) -> Suggestion | None:
+    """Ask for less robustness, but for no less than passes the check."""
     robustness = spec.robustness
     if robustness.method != "sensitivity":
-        return ""
-    changes = {'robustness.method = "none"': attrs.evolve(robustness, method="none", order=1)}
-    if robustness.order > 1:
-        changes = {"robustness.order = 1": attrs.evolve(robustness, order=1), **changes}
-    for words, less in changes.items():
-        changed = attrs.evolve(spec, robustness=less)
-        solution = tried(changed)
-        if choice.keeps_limits(solution) and drafted(changed, solution).excess_sway <= 0.0:
-            return words
-    return ""
+        return None
+    changes: list[dict[str, Any]] = [{"robustness.order": 1}] if robustness.order > 1 else []
+    weakest = {"robustness.method": "none", **({"robustness.order": 1} if changes else {})}
+    found = (_tried(spec, {**beside, **change}) for change in (*changes, weakest))
+    return next((one for one in found if one and one.passes), None)
+
+
+def _tried(spec: Spec, values: Mapping[str, Any]) -> Suggestion | None:
+    """Suggest values if they give a motion."""
+    changed = spec.changed(values)
+    solution = tried(changed)
+    draft = drafted(changed, solution)
+    return suggested(values, draft) if choice.keeps_limits(solution) and _stands(draft) else None
 
 
 def _in_time(find: Callable[[], Found], fraction: float = FRACTION) -> Found | None:
@@ -264,7 +301,3 @@ def _times(value: Any, factor: float) -> Any:
     low, high = value
     more = float(rounded_up((factor - 1.0) * (high - low)))
     return (float(f"{low - more:.9g}"), float(f"{high + more:.9g}"))
-
-
-def _written(value: Any) -> str:
-    return f"[{value[0]:.9g}, {value[1]:.9g}]" if isinstance(value, tuple) else f"{value:g}"

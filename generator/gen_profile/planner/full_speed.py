@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
-import attrs
 import numpy as np
 
 from gen_profile.planner.chebyshev import Array
@@ -52,7 +51,7 @@ def slow_axes(spec: Spec, block: PlannerBlock) -> tuple[str, ...]:
 def _sentences(spec: Spec, period: float) -> Iterator[str]:
     axes, limits, live = planned_axes(spec), spec.limits, spec.planner.live
     travel = {limits.place(number, "travel"): (-ROOM, ROOM) for number in axes}
-    planner = Planner(attrs.evolve(spec, limits=limits.changed(travel)))
+    planner = Planner(spec.changed(travel))
     corners = [dict(zip(live, ends, strict=True)) for ends in product(*live.values())]
     reached = [
         _reached(planner, [limits.of(number) for number in axes], corner, period) for corner in corners

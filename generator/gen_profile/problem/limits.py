@@ -7,8 +7,10 @@ from collections.abc import Iterator
 
 import attrs
 
+from gen_profile.errors import Code, Reason
 from gen_profile.motion.metrics import extremes, greatest
 from gen_profile.motion.profile import Profile
+from gen_profile.phrase import Phrase
 from gen_profile.spec.model import LimitsSpec
 
 SWAY_TOLERANCE = 1.01  # times limits.sway that machines off nominal may sway: searches find the worst so well
@@ -21,19 +23,24 @@ class Breach:
 
     Attributes
     ----------
-    limit : str
-        Its place in the spec, such as ``limits.velocity``.
+    place : str
+        In the spec, such as ``limits.velocity``.
     found, allowed : float
         What the motion needs, and what it may have.
     """
 
-    limit: str
+    place: str
     found: float
     allowed: float
 
     def sentence(self) -> str:
         """Say it."""
-        return f"{self.limit}: {self.allowed:g} is allowed, the motion needs {self.found:.4g}."
+        template = "{place}: {allowed:g} is allowed, the motion needs {found:.4g}."
+        return Phrase(template, **attrs.asdict(self))
+
+    def reason(self) -> Reason:
+        """Tell it to programs."""
+        return Reason(code=Code.LIMIT_BROKEN, **attrs.asdict(self))
 
 
 def breaches(limits: LimitsSpec, command: Profile, transient_sway: float) -> tuple[Breach, ...]:
@@ -72,12 +79,12 @@ def _demands(limits: LimitsSpec, command: Profile, sway: float) -> Iterator[Brea
             allowed = getattr(allowed_here, name)
             if allowed is not None:
                 found = (1.0 - ROUNDING) * greatest(command, order, column)
-                yield Breach(limit=limits.place(column, name), found=found, allowed=allowed)
+                yield Breach(place=limits.place(column, name), found=found, allowed=allowed)
         if allowed_here.travel is not None:
             (low, high), travel = allowed_here.travel, limits.place(column, "travel")
             rounding = ROUNDING * (high - low)
             bottom, top = extremes(command, 0, column)
-            yield Breach(limit=travel, found=top - rounding, allowed=high)
-            yield Breach(limit=travel, found=-bottom - rounding, allowed=-low)
+            yield Breach(place=travel, found=top - rounding, allowed=high)
+            yield Breach(place=travel, found=-bottom - rounding, allowed=-low)
     if limits.sway is not None:
-        yield Breach(limit="limits.sway", found=sway, allowed=limits.sway)
+        yield Breach(place="limits.sway", found=sway, allowed=limits.sway)

@@ -9,8 +9,9 @@ import attrs
 import numpy as np
 from numpy.polynomial import polynomial
 
-from gen_profile.errors import InfeasibleProblem
+from gen_profile.errors import Code, InfeasibleProblem, Reason
 from gen_profile.motion.profile import Array, Profile
+from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import rounded_up
 from gen_profile.shapers.base_moves import QUINTIC, BaseMove
 from gen_profile.shapers.impulses import SHAPERS, Impulses, convolve
@@ -58,18 +59,25 @@ class ShapedMove:
         delay = self.shaper.delay
         stretch = duration - delay
         if stretch < duration * SHORTEST_BASE:
-            least = rounded_up(delay, digits=4)
+            least = float(rounded_up(delay, digits=4))
+            template = (
+                "move.duration: the {name} shaper's delay is {delay:.4g} s for this machine, so "
+                "{duration:g} s leaves no time to move; state at least {least:g} s, or choose another method."
+            )
             raise InfeasibleProblem(
-                f"move.duration: the {self.name} shaper's delay is {delay:.4g} s for this machine, so "
-                f"{duration:g} s leaves no time to move; state at least {least} s, "
-                "or choose another method.",
-                duration=float(least),
+                Phrase(template, name=self.name, delay=delay, duration=duration, least=least),
+                reasons=[too_short(duration, least)],
             )
         knots = _knots(self.shaper, self.base, stretch, duration)
         first, last = np.asarray(self.start, dtype=np.float64), np.asarray(self.target, dtype=np.float64)
         coefficients = _shaped(self.shaper, self.base, stretch, knots)[:, :, None] * (last - first)
         coefficients[:, 0] += first
         return Profile(knots=knots, coefficients=coefficients, target=last, method=self.name)
+
+
+def too_short(duration: float, least: float) -> Reason:
+    """Say that a duration in s is below the least."""
+    return Reason(code=Code.TOO_SHORT, place="move.duration", found=duration, allowed=least)
 
 
 def shaped_move(

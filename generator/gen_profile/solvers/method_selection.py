@@ -71,8 +71,8 @@ def attempt(
 
 def given_up(problem: Problem) -> Solution:
     """Tell that a problem takes too much work."""
-    suggestion = "See whether all numbers of the spec are in its units; else change the duration or limits."
-    return Solution(status=Status.GIVEN_UP, method="none", problem=problem, suggestion=suggestion)
+    advice = "See whether all numbers of the spec are in its units; else change the duration or limits."
+    return Solution(status=Status.GIVEN_UP, method="none", problem=problem, advice=advice)
 
 
 def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution:
@@ -91,7 +91,7 @@ def _direct(problem: Problem, *, coarse: bool, near: Relaxed | None) -> Solution
 
 def _infeasible(problem: Problem, nearest: Relaxed) -> Solution:
     return attrs.evolve(
-        nearest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, suggestion=WIDER
+        nearest.solution, problem=problem, status=Status.INFEASIBLE, optimum=None, advice=WIDER
     )
 
 

@@ -6,12 +6,13 @@ from enum import Enum
 
 import attrs
 
-from gen_profile.errors import GenProfileError, InfeasibleProblem, SolverDiverged
+from gen_profile.errors import Code, InfeasibleProblem, NoMotion, Reason, SolverDiverged, Suggestion
 from gen_profile.motion.profile import Array
 from gen_profile.problem.problem import Problem
 
 LONGER = "Allow more time (move.duration), or shorten the move."
 WIDER = "Allow more time (move.duration), or wider limits."
+LATER = "Allow more time (move.duration)."
 
 
 class Status(Enum):
@@ -25,7 +26,7 @@ class Status(Enum):
     GIVEN_UP = "The search for a motion was given up, for it took too long."
 
 
-ERRORS: dict[Status, type[GenProfileError]] = {
+ERRORS: dict[Status, type[NoMotion]] = {
     Status.SWINGS_TOO_FAR: InfeasibleProblem,
     Status.INFEASIBLE: InfeasibleProblem,
     Status.NOT_CONTROLLABLE: InfeasibleProblem,
@@ -102,8 +103,10 @@ class Solution:
     worst_case_bound : float or None
         Residual sway of the end load in m below which no motion could bring the worst machine, as far as
         angles are small; None where the worst machine was not what counted.
-    suggestion : str
+    advice : str
         What to change, a sentence; empty on success.
+    suggestions : tuple of Suggestion
+        Changes that were tried and give a motion.
     """
 
     status: Status
@@ -114,7 +117,8 @@ class Solution:
     residual: float = float("inf")
     redundant: tuple[str, ...] = ()
     worst_case_bound: float | None = None
-    suggestion: str = ""
+    advice: str = ""
+    suggestions: tuple[Suggestion, ...] = ()
 
     @property
     def redundancy(self) -> str:
@@ -132,5 +136,9 @@ class Solution:
             With the status's sentence and what to change.
         """
         if self.optimum is None:
-            raise ERRORS[self.status](f"{self.status.value} {self.suggestion}".strip())
+            raise ERRORS[self.status](
+                *filter(None, [self.status.value, self.advice]),
+                reasons=[Reason(code=Code[self.status.name])],
+                suggestions=self.suggestions,
+            )
         return self.optimum

@@ -207,16 +207,6 @@ class LimitsSpec(Checked, table="limits"):
             if name != "axis" and (value := getattr(own, name, None)) is not None
         }
 
-    def changed(self, values: Mapping[str, Any]) -> LimitsSpec:
-        """Put other values in their places."""
-        limits = self
-        for place, value in values.items():
-            table, _, name = place.rpartition(".")
-            axis = table.removeprefix("limits").removeprefix(".axis.")
-            own = {axis: attrs.evolve(limits.axis[axis], **{name: value})} if axis else {}
-            limits = attrs.evolve(limits, **({"axis": {**limits.axis, **own}} if own else {name: value}))
-        return limits
-
 
 @attrs.frozen(kw_only=True)
 class ExternalFmu(Checked, table="check"):
@@ -412,6 +402,15 @@ class Spec(Checked):
         """Load the plant."""
         return find_plant(self.plant.type) if self.plant.file is None else plant_of_file(self.plant.file)
 
+    def changed(self, values: Mapping[str, Any]) -> Spec:
+        """Put other values in their places, such as ``limits.axis.x.jerk``; a duration stands."""
+        spec = attrs.evolve(self)
+        for place, value in values.items():
+            spec = _put(spec, place.split("."), value)
+            if place == "move.duration":
+                spec = _put(spec, ["move", "shortest"], False)
+        return spec
+
     def checked_ranges(self) -> dict[str, tuple[float, float]]:
         """Least and greatest value of every parameter that the check changes, in the machine's order."""
         shares = self.robustness.uncertain if self.check.uncertain is None else self.check.uncertain
@@ -463,6 +462,16 @@ class Spec(Checked):
         """Hash of the whole spec, defaults included, in hexadecimal."""
         text = json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=True)
         return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def _put(outer: Any, place: list[str], value: Any) -> Any:
+    """Copy a table or mapping with another value somewhere inside."""
+    if not place:
+        return value
+    key, *inner = place
+    if isinstance(outer, Mapping):
+        return {**outer, key: _put(outer.get(key), inner, value)}
+    return attrs.evolve(outer, **{key: _put(getattr(outer, key), inner, value)})
 
 
 def _plain(value: Any) -> Any:

@@ -6,8 +6,6 @@ Every part is a mapping of plain values with its name under ``"part"``. What tak
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -17,8 +15,7 @@ import numpy as np
 from gen_profile.charts.curves import motion_figure, select_machines, sway_figure
 from gen_profile.comparison.candidates import own_method
 from gen_profile.designs.plan import Plan, draft, judged
-from gen_profile.designs.suggestions import OTHERWISE
-from gen_profile.errors import GenProfileError, InfeasibleProblem, LimitViolation, SolverDiverged, SpecError
+from gen_profile.errors import GenProfileError, NoMotion, SpecError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
 from gen_profile.evaluation.phrases import machine, move, place_unit
 from gen_profile.motion.metrics import extremes, greatest, peak
@@ -44,11 +41,7 @@ FIGURES = {
     "sway": "sway_transient_peak_m",
     "residual": "sway_residual_worst_m",
 }
-NO_MOTION = (InfeasibleProblem, SolverDiverged, LimitViolation, OutOfWork)
 SEARCHING = "Looking for what would help …"
-CURE = re.compile(r"(\w+(?:\.\w+)+) = (\[[^]]*\]|\"[^\"]*\"|[-+0-9.e]*[0-9])")
-SENTENCES = re.compile(r"\n|(?<=\.) (?=[A-Z])")
-LONGER = re.compile(r"(?:duration of|about) ([0-9.e+]+) s (?:will do )?\((move\.duration)\)")
 
 Part = dict[str, Any]
 
@@ -169,36 +162,26 @@ def _verdict(found: Plan) -> Part:
 
 def _failure(question: Question, error: Exception) -> Iterator[Part]:
     """Say why there is no motion, what would help, and keep the knobs usable."""
-    if isinstance(error, SpecError):
-        answer, sentences = "faulty", str(error).splitlines()
-        yield {"part": "faults", "faults": [fault(sentence) for sentence in sentences]}
-        if question.state.edits:
-            return
-    else:
-        answer = "none" if isinstance(error, NO_MOTION) else "unanswered"
-        sentences = SENTENCES.split(str(error) or Status.GIVEN_UP.value)
-    yield failure(answer, sentences, cures(" ".join(sentences)))
+    match error:
+        case SpecError():
+            answer, sentences = "faulty", error.sentences
+            yield {"part": "faults", "faults": [fault(sentence) for sentence in sentences]}
+            if question.state.edits:
+                return
+        case NoMotion():
+            answer, sentences = "none", error.sentences
+        case GenProfileError():
+            answer, sentences = "unanswered", error.sentences
+        case _:
+            answer, sentences = "none", (Status.GIVEN_UP.value,)
+    suggestions = error.suggestions if isinstance(error, NoMotion) else ()
+    yield failure(answer, sentences, [one.values for one in suggestions])
 
 
 def fault(sentence: str) -> dict[str, str]:
     """Tell the place in a spec from what is wrong there."""
     place, colon, problem = sentence.partition(": ")
     return {"place": place, "sentence": problem} if colon else {"place": "", "sentence": sentence}
-
-
-def cures(text: str) -> list[dict[str, Any]]:
-    """Find what sentences of `gen_profile.solvers.method_selection` offer, as edits of the spec."""
-    found: list[dict[str, Any]] = []
-    if longer := LONGER.search(text):
-        found.append({longer[2]: float(longer[1])})
-    _, _, instead = text.partition("it would do with ")
-    for offer in re.split(r", or with ", instead):
-        edits = {place: tomllib.loads(f"v = {value}")["v"] for place, value in CURE.findall(offer)}
-        if edits:
-            found.append(edits)
-    if OTHERWISE in text:
-        return [{"solver.method": "auto", **edits} for edits in found or [{}]]
-    return found
 
 
 def point(method: str, figures: Mapping[str, float]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from typing import Any
 import attrs
 
 from gen_profile.one_thread import one_thread
+from gen_profile.phrase import plain
 
 # what can be asked, and what answers it, which only a worker loads
 ANSWERS = {
@@ -72,7 +73,12 @@ def failure(answer: str, sentences: Sequence[str], cures: Sequence[Mapping[str, 
     cures : sequence of mapping
         Edits of the spec.
     """
-    return {"part": "failure", "answer": answer, "sentences": [*sentences], "cures": [*cures]}
+    return {
+        "part": "failure",
+        "answer": answer,
+        "sentences": [plain(sentence) for sentence in sentences],
+        "cures": [dict(one) for one in cures],
+    }
 
 
 Hear = Callable[["Worker", Message], None]

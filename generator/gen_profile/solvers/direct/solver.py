@@ -29,7 +29,7 @@ from gen_profile.solvers.direct.refinement import bisected, switching
 from gen_profile.solvers.direct.set_up import Setup, set_up
 from gen_profile.solvers.direct.transcription import Iterate
 from gen_profile.solvers.direct.transient_sway import sway_on_the_way, within_sway
-from gen_profile.solvers.solution import WIDER, Optimum, Solution, Status
+from gen_profile.solvers.solution import LATER, LONGER, WIDER, Optimum, Solution, Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.work import OutOfWork, afford, left
 
@@ -280,13 +280,13 @@ def _stalled(step: float, before: float, *, exact: bool) -> bool:
 def conclude(found: ProgramSequence, iterations: int) -> Solution:
     """Turn the outcome of programs into a solution."""
     problem = found.setup.problem
-    status, suggestion = Status.CONVERGED, ""
+    status, advice = Status.CONVERGED, ""
     if found.verdict is ConicStatus.INFEASIBLE:
-        status, suggestion = Status.INFEASIBLE, WIDER
+        status, advice = Status.INFEASIBLE, WIDER
     elif found.verdict is not ConicStatus.SOLVED:
-        status, suggestion = Status.DIVERGED, "Allow more time (move.duration)."
+        status, advice = Status.DIVERGED, LATER
     elif greatest_angle(found) > HORIZONTAL:
-        status, suggestion = Status.SWINGS_TOO_FAR, "Allow more time (move.duration), or shorten the move."
+        status, advice = Status.SWINGS_TOO_FAR, LONGER
     return Solution(
         status=status,
         method=METHOD,
@@ -294,7 +294,7 @@ def conclude(found: ProgramSequence, iterations: int) -> Solution:
         optimum=_optimum(found) if status is Status.CONVERGED else None,
         iterations=iterations,
         residual=found.step,
-        suggestion=suggestion,
+        advice=advice,
     )
 
 

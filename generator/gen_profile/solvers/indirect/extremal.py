@@ -20,8 +20,8 @@ def judged(
 ) -> Solution:
     """Accept a solution where it stands up to a look between the mesh's points."""
     if weighted.missed(found) > TOLERATED_MISS:
-        suggestion = "Check the machine's equations and parameters."
-        return failure(problem, Status.NOT_CONTROLLABLE, iterations, suggestion)
+        advice = "Check the machine's equations and parameters."
+        return failure(problem, Status.NOT_CONTROLLABLE, iterations, advice)
     optimum = _optimum(weighted, found)
     if optimum.defect is not None and optimum.defect > UNRESOLVED:
         return too_steep(problem, iterations)
@@ -71,8 +71,6 @@ def too_steep(problem: Problem, iterations: int) -> Solution:
     return failure(problem, Status.DIVERGED, iterations, f"Lower cost.sway_weight{other}")
 
 
-def failure(problem: Problem, status: Status, iterations: int, suggestion: str) -> Solution:
+def failure(problem: Problem, status: Status, iterations: int, advice: str) -> Solution:
     """Say that there is no solution, and what would help."""
-    return Solution(
-        status=status, method=METHOD, problem=problem, iterations=iterations, suggestion=suggestion
-    )
+    return Solution(status=status, method=METHOD, problem=problem, iterations=iterations, advice=advice)

@@ -80,8 +80,8 @@ def _solve(problem: Problem, far: Callable[[], bool]) -> Solution:
     try:
         return solve_fully(problem, unweighted)
     except np.linalg.LinAlgError:
-        suggestion = "The end conditions contradict one another; allow more time."
-        return failure(problem, Status.DIVERGED, 1, suggestion)
+        advice = "The end conditions contradict one another; allow more time."
+        return failure(problem, Status.DIVERGED, 1, advice)
 
 
 def _solve_simply(problem: Problem, unweighted: BoundaryValueProblem) -> Solution | None:

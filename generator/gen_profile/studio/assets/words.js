@@ -1,16 +1,22 @@
-// The page's words in the reader's language, from a table of texts and of patterns of what the studio says in English.
+// The page's words in the reader's language, from tables: of texts by key, and of what the studio says in English by template.
 "use strict";
 const words = (() => {
   const LANGUAGES = ["en", "de"];
-  let table = { texts: {}, patterns: [] };
+  let table = { texts: {}, messages: {}, patterns: [] };
   const language = () => document.documentElement.lang;
   const other = () => LANGUAGES.find((one) => one !== language());
 
-  /** A text by its key, or a text that was written in English, in the reader's language. */
+  /** A template with its values, each of them in the reader's language, too. */
+  const told = ({ template, values }) =>
+    (language() === "de" ? (table.messages[template] ?? template) : template).replace(/\{\{|\}\}|\{(\w+)[^}]*\}/g, (part, name) => (name ? phrase(values[name]) : part[0]));
+
+  /** A text by its key, or a text or template that was written in English, in the reader's language. */
   function phrase(key, otherwise = key) {
+    if (typeof key === "object") return numbers.sentence(told(key));
     const column = LANGUAGES.indexOf(language());
     if (table.texts[key]) return table.texts[key][column];
     if (column === 0) return otherwise;
+    if (table.messages[key]) return numbers.sentence(table.messages[key]);
     for (const [pattern, translated] of table.patterns) {
       const found = key.match(new RegExp(`^${pattern}$`));
       if (found) return numbers.sentence(translated.replace(/\$(\d)/g, (_, group) => phrase(found[group])));
