@@ -6,9 +6,9 @@
     ├── SpecError            2   the spec, or the way it was asked for
     ├── OutputError          2   the output folder or a file cannot be read or written
     ├── NoMotion             3   there is no motion for the spec
-    │   ├── InfeasibleProblem    no such motion exists
-    │   ├── SolverDiverged       the solver found none
-    │   └── LimitViolation       the motion found breaks a limit of the spec
+    │   ├── InfeasibleProblem  3   no such motion exists
+    │   ├── SolverDiverged     3   the solver found none
+    │   └── LimitViolation     3   the motion found breaks a limit of the spec
     ├── CheckFailed          4   the written artefact leaves too much sway
     ├── CosimulationError    4   the check itself could not be carried out
     ├── CertificateError     4   a certificate cannot be made, or does not hold
@@ -28,7 +28,7 @@ from typing import Any, ClassVar
 
 import attrs
 
-from gen_profile.phrase import Phrase, alternatives
+from gen_profile.phrase import OR_WITH, Phrase, joined
 
 
 class GenProfileError(Exception):
@@ -37,9 +37,14 @@ class GenProfileError(Exception):
     Parameters
     ----------
     sentences : str
+    values
+        Of a single sentence, which is then a template, as `gen_profile.phrase.Phrase` takes them.
     """
 
     exit_code: ClassVar[int] = 1
+
+    def __init__(self, *sentences: str, **values: Any) -> None:
+        super().__init__(*([Phrase(sentences[0], **values)] if values else sentences))
 
     def __str__(self) -> str:
         """Join the sentences."""
@@ -158,9 +163,13 @@ class NoMotion(GenProfileError):
     exit_code = 3
 
     def __init__(
-        self, *sentences: str, reasons: Iterable[Reason] = (), suggestions: Iterable[Suggestion] = ()
+        self,
+        *sentences: str,
+        reasons: Iterable[Reason] = (),
+        suggestions: Iterable[Suggestion] = (),
+        **values: Any,
     ) -> None:
-        super().__init__(*sentences)
+        super().__init__(*sentences, **values)
         self.reasons, self.suggestions = tuple(reasons), tuple(suggestions)
 
     def __str__(self) -> str:
@@ -188,12 +197,12 @@ class NoMotion(GenProfileError):
 def _suggested(suggestions: Sequence[Suggestion]) -> Iterator[str]:
     """Put suggestions into words."""
     if passing := [str(one) for one in suggestions if one.passes]:
-        yield Phrase("It can be done with {changes}.", changes=alternatives(passing))
+        yield Phrase("It can be done with {changes}.", changes=joined(OR_WITH, passing))
     if others := [one for one in suggestions if not one.passes]:
         template = "{change} ({times:.2g} times the residual sway allowed)"
         changes = [Phrase(template, change=str(one), times=one.fraction) for one in others]
         yield Phrase(
-            "With {changes} there is a motion, but the check will not pass.", changes=alternatives(changes)
+            "With {changes} there is a motion, but the check will not pass.", changes=joined(OR_WITH, changes)
         )
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from string import Formatter
-from types import MappingProxyType
-from typing import Any, Self
+from typing import Any
+
+PLACED = "{place}: {problem}{end}"
+AND, OR_WITH = "{first} and {others}", "{first}, or with {others}"  # to join texts by
 
 
 class Phrase(str):
@@ -14,46 +16,53 @@ class Phrase(str):
     Parameters
     ----------
     template : str
-        As `str.format` takes it; a translation is another template with the same names.
+        As `str.format` takes it; a translation is another template with the same fields.
     values
-        By name: numbers, texts, or further phrases.
+        By name: numbers, texts, further phrases, or what has them as attributes.
     """
 
-    __slots__ = ("template", "values")
     template: str
-    values: Mapping[str, Any]
+    values: Mapping[str, str]
 
-    def __new__(cls, template: str, /, **values: Any) -> Self:
-        """Fill in the values."""
-        made = super().__new__(cls, template.format(**values))
-        made.template, made.values = template, MappingProxyType(values)
-        return made
+    def __new__(cls, template: str, /, **values: Any) -> Phrase:
+        """Fill in the values; they are kept as texts."""
+        texts: dict[str, str] = {}
+        for _, field, spec, conversion in Formatter().parse(template):
+            value = Formatter().get_field(field, (), values)[0] if field else ""
+            if field:
+                text = format(repr(value) if conversion else value, spec or "")
+                texts[field] = value if isinstance(value, Phrase) else text
+        return _phrase(template.format(**values), template, texts)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Make it again elsewhere."""
-        return _phrase, (self.template, dict(self.values))
+        return _phrase, (str(self), self.template, self.values)
 
 
-def _phrase(template: str, values: Mapping[str, Any]) -> Phrase:
-    return Phrase(template, **values)
+def _phrase(text: str, template: str, values: Mapping[str, str]) -> Phrase:
+    made = str.__new__(Phrase, text)
+    made.template, made.values = template, values
+    return made
 
 
-def alternatives(texts: Sequence[str]) -> str:
-    """Write ``a, or with b, or with c``."""
+def placed(place: str, problem: str) -> Phrase:
+    """Tell where a problem is, as a sentence."""
+    end = "" if problem.endswith(("?", ".")) else "."
+    return Phrase(PLACED, place=place, problem=problem, end=end)
+
+
+def joined(template: str, texts: Sequence[str]) -> str:
+    """Join texts by a template of ``{first}`` and ``{others}``."""
     first, *others = texts
-    return Phrase("{first}, or with {others}", first=first, others=alternatives(others)) if others else first
+    return Phrase(template, first=first, others=joined(template, others)) if others else first
 
 
-def plain(text: str) -> str | dict[str, Any]:
-    """Nest plain values for JSON: a text as it is, or a phrase's template and its values, each as a text."""
-    if not isinstance(text, Phrase):
-        return text
-    values = text.values
-    shown = {name: spec or "" for _, name, spec, _ in Formatter().parse(text.template) if name}
-    return {
-        "template": text.template,
-        "values": {
-            name: plain(values[name]) if isinstance(values[name], str) else format(values[name], spec)
-            for name, spec in shown.items()
-        },
-    }
+def plain(value: Any) -> Any:
+    """Nest plain values for JSON: of phrases their templates, and their values as texts."""
+    if isinstance(value, Mapping):
+        return {key: plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    if not isinstance(value, Phrase):
+        return value
+    return {"template": value.template, "values": plain(value.values)}

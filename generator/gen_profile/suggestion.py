@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from gen_profile.phrase import Phrase
+
 MOST = 3  # names to suggest
 ALIKE = 0.65  # difflib's ratio from which on a word is a misspelling of another
 # other words for what is called so here, in the languages and the products that users come from
@@ -58,13 +60,15 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     """End a sentence: ``; did you mean 'x'?`` where something similar is known, else the list of what is."""
     known = list(known)
     near = meant(word, known)
-    return f"; did you mean {listed(near)}?" if near else f" (known: {', '.join(known) or 'none'})."
+    if near:
+        return Phrase("; did you mean {names}?", names=listed(near))
+    return Phrase(" (known: {names}).", names=", ".join(known) or "none")
 
 
 def listed(names: Iterable[str]) -> str:
     """Write ``'a', 'b' or 'c'``."""
     *others, last = (repr(name) for name in names)
-    return f"{', '.join(others)} or {last}" if others else last
+    return Phrase("{others} or {last}", others=", ".join(others), last=last) if others else last
 
 
 def meant(word: str, known: Iterable[str]) -> list[str]:
@@ -101,11 +105,11 @@ def number_meant(text: str) -> str:
     """Continue a sentence about a text in a number's place: ``; write a decimal point: 6.0``."""
     text = text.strip()
     if comma := re.fullmatch(r"([+-]?[0-9]+),([0-9]+)", text):
-        return f"; write a decimal point: {comma[1]}.{comma[2]}"
+        return Phrase("; write a decimal point: {number}", number=f"{comma[1]}.{comma[2]}")
     if re.fullmatch(r"[+-]?[0-9.]+,[0-9]+|[+-]?[0-9,]+\.[0-9]+", text) and "," in text:
         return "; write a decimal point, and nothing between thousands"
     if share := re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*%", text):
-        return f"; write a share: {float(share[1]) / 100.0:g}"
+        return Phrase("; write a share: {share:g}", share=float(share[1]) / 100.0)
     if re.fullmatch(r"[+-]?(\.[0-9]+|[0-9]+\.)", text):
         return "; write a digit on both sides of the decimal point"
     if re.fullmatch(r"[+-]?[0-9.,]+\s*[A-Za-zµμ°][^0-9]*[23²³]?", text):

@@ -164,15 +164,15 @@ def test_what_is_more_than_a_step_of_the_grid_away_is_no_answer(library, tmp_pat
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--move.distance=0.3", "--plant.L1=0.3"], "--solver.method: state it, auto, zv were swept."),
-        (["--solver.method=auto", "--plant.L1=0.3"], "--move.distance: state it, 0.3 to 0.4 were swept."),
+        (["--move.distance=0.3", "--plant.L1=0.3"], "solver.method: state it, auto, zv were swept."),
+        (["--solver.method=auto", "--plant.L1=0.3"], "move.distance: state it, 0.3 to 0.4 were swept."),
         (["--solver.method=aut", "--move.distance=0.3", "--plant.L1=0.3"], "did you mean 'auto'?"),
         (["--solver.method=auto", "--move.distance=far", "--plant.L1=0.3"], "must be a finite number"),
         (["--solver.method=auto", "--move.distance=nan", "--plant.L1=0.3"], "must be a finite number"),
         (["--plant.L2=0.3"], "--plant.L2: the sweep did not vary this; did you mean 'plant.L1'?"),
         (["--solver.method=auto", "--move.distance=0.3", "--plant.L1=-7"], "plant.L1: must be a number from"),
         (["--solver.method=auto", "--plant.L1=0,3"], "found '0,3'; write a decimal point: 0.3."),
-        (["--solver.method=aut", "--plant.L1=x"], "--move.distance: state it"),
+        (["--solver.method=aut", "--plant.L1=x"], "move.distance: state it"),
         (["--plant.L1"], "--plant.L1 needs a value"),
         (["--plant.L1", "--move.distance", "0.3"], "--plant.L1 needs a value"),
         (["--plant.L1=0.3", "--plant.L1=0.35"], "--plant.L1 is stated twice"),

@@ -53,6 +53,13 @@ def test_a_spec_from_keyword_values_is_the_one_of_the_file(tmp_path):
     assert longer.move.duration == 10.0
 
 
+def test_a_limit_of_all_axes_replaces_that_of_one():
+    spec = gp.preset_spec("gantry-crane", ["limits.axis.y={velocity=0.3, jerk=2.0}", "limits.velocity=0.5"])
+    changed = gp.evolve_spec(spec, limits={"velocity": 0.4})
+    assert [changed.limits.of(axis).velocity for axis in (0, 1)] == [0.4, 0.4]
+    assert changed.limits.of(1).jerk == 2.0
+
+
 def test_evolving_keeps_what_is_not_named_and_takes_away_what_is_none():
     spec = gp.preset_spec("paper", limits={"velocity": 0.3, "jerk": 20.0})
     changed = gp.evolve_spec(spec, limits={"jerk": None}, move={"start": (0.1,), "target": (0.4,)})

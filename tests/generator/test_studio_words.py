@@ -1,8 +1,10 @@
 """What the studio's page says in German of sentences that are written in English."""
 
+import ast
 import json
 import re
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 
@@ -14,13 +16,16 @@ from gen_profile.spec.plausibility import doubts
 from gen_profile.spec.reading import preset_spec, presets, spec_from_dict
 from gen_profile.studio.knobs import knobs
 from gen_profile.studio.state import document_of, preset_start
-from gen_profile.studio.views import SEARCHING
+from gen_profile.studio.views import SEARCHING, fault
 
 WORDS = json.loads((files("gen_profile.studio") / "assets" / "words.json").read_text("utf-8"))
 ENGLISH = re.compile(
     r"\b(the|of|than|and|or|must|be|found|at|is|are|which|only|with|from|to|by|did|state|no|it|that)\b"
 )
 ENDS = [end.value for end in Status if end != Status.CONVERGED]
+PART = re.compile(r"\{\{|\}\}|\{([^{}:!]+)[^}]*\}")  # as in words.js
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("generator", "exporters", "fmu")
 UNFIT = {
     "number": (-1.0, 0.0, 1e3, 1e5, 1e9),
     "interval": (0.95,),
@@ -34,20 +39,38 @@ UNFIT = {
 def german(sentence):
     """Translate as words.js does."""
     if isinstance(sentence, Phrase):
-        filled = {
-            name: german(value) if isinstance(value, str) else value
-            for name, value in sentence.values.items()
-        }
-        template = WORDS["messages"][sentence.template]
-        return Phrase(template, **filled)
-    if sentence in WORDS["texts"]:
-        return WORDS["texts"][sentence][1]
-    if sentence in WORDS["messages"]:
-        return WORDS["messages"][sentence]
-    for pattern, translated in WORDS["patterns"]:
-        if found := re.fullmatch(pattern, sentence):
-            return re.sub(r"\$(\d)", lambda group: german(found[int(group[1])]), translated)
-    return sentence
+        template, values = WORDS["messages"][sentence.template], sentence.values
+        return PART.sub(lambda part: german(values[part[1]]) if part[1] else part[0][0], template)
+    return WORDS["texts"].get(sentence, ["", WORDS["messages"].get(sentence, sentence)])[1]
+
+
+def templates():
+    """Find every template in the code, and where it is."""
+    for file in (file for package in PACKAGES for file in (ROOT / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            match node:
+                case ast.Call(func=ast.Name(id="Phrase" | "Words"), args=[first, *_]):
+                    said = first
+                case ast.Raise(exc=ast.Call(args=[first], keywords=[ast.keyword(), *_])):
+                    said = first
+                case ast.Assign(targets=[ast.Name(id="template" | "PLACED")]):
+                    said = node.value
+                case _:
+                    continue
+            parts = (said.body, said.orelse) if isinstance(said, ast.IfExp) else (said,)
+            yield from ((part.value, file.name) for part in parts if isinstance(part, ast.Constant))
+
+
+def fields(template):
+    return sorted(part[1] for part in PART.finditer(template) if part[1])
+
+
+@pytest.mark.parametrize(("template", "file"), sorted(set(templates())))
+def test_every_template_has_a_translation_with_the_same_fields(template, file):
+    assert template in WORDS["messages"], file
+    translated = WORDS["messages"][template]
+    assert set(fields(translated)) <= set(fields(template))
+    assert translated == template or not ENGLISH.search(PART.sub("", translated).removeprefix("at:"))
 
 
 def told(document):
@@ -55,8 +78,8 @@ def told(document):
     try:
         sentences = doubts(spec_from_dict(document))
     except SpecError as error:
-        sentences = str(error).splitlines()
-    return {sentence.partition(": ")[2] for sentence in sentences}
+        sentences = error.faults
+    return {fault(sentence)["sentence"] for sentence in sentences}
 
 
 SUGGESTED = [

@@ -15,6 +15,7 @@ from gen_profile.evaluation.simulation import Response
 from gen_profile.evaluation.spectrum import DECADES, natural_frequencies, spectrum
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, Profile
+from gen_profile.phrase import Phrase
 from gen_profile.spec.model import Spec
 
 SAMPLES = 800
@@ -70,11 +71,14 @@ def motion_figure(spec: Spec, evaluation: MotionEvaluation, samples: int = SAMPL
             if order == 0:
                 lines = [attrs.evolve(line, y=factor * line.y) for line in lines]
                 levels = tuple(attrs.evolve(level, value=factor * level.value) for level in levels)
+            template = "{quantity} ({unit})"
             panels.append(
                 Panel(
-                    title=f"{quantity} of {axis.name}",
+                    title=Phrase("{quantity} of {name}", quantity=quantity, name=axis.name),
                     x_label=TIME,
-                    y_label=f"{quantity.lower()} ({unit.format(axis.unit if order else place)})",
+                    y_label=Phrase(
+                        template, quantity=quantity.lower(), unit=unit.format(axis.unit if order else place)
+                    ),
                     lines=lines,
                     levels=levels,
                 )
@@ -117,7 +121,7 @@ def sway_figure(
         caption=f"Dotted: the arrival. Dashed in red: what is allowed from then on.{more}",
         panels=[
             Panel(
-                title=f"Sway of the {load}",
+                title=Phrase("Sway of the {load}", load=load),
                 x_label=TIME,
                 y_label="sway (mm)",
                 lines=[
@@ -202,9 +206,9 @@ def spectrum_panel(
     frequencies = natural.span(FREQUENCIES)
     ranges = zip(natural.lowest.tolist(), natural.highest.tolist(), strict=True)
     return Panel(
-        title=f"Spectrum of the acceleration of {first.name}",
+        title=Phrase("Spectrum of the acceleration of {name}", name=first.name),
         x_label="frequency (rad/s)",
-        y_label=f"magnitude ({first.unit}/s)",
+        y_label=Phrase("magnitude ({unit}/s)", unit=first.unit),
         lines=[
             Line(name=name, x=frequencies, y=spectrum(motion, frequencies), style=styles[name])
             for name, motion in motions.items()

@@ -10,6 +10,7 @@ from gen_profile.charts.curves import TIME
 from gen_profile.charts.figure import INK, PALETTE, Band, Figure, Line, Panel, Style
 from gen_profile.identification.identify import Identification
 from gen_profile.identification.misfit import spectrum
+from gen_profile.phrase import Phrase
 from gen_profile.problem.linearization import linearize
 
 LOGGED, FOUND = Style(colour=PALETTE[1], dash="points"), Style(colour=PALETTE[0], width=1.0)
@@ -30,9 +31,11 @@ def identification_figure(found: Identification) -> Figure:
         columns=1,
         panels=[
             Panel(
-                title=f"Swing of the {log.load}",
+                title=Phrase("Swing of the {load}", load=log.load),
                 x_label=TIME,
-                y_label=f"{log.quantity} of {log.load} ({log.unit})",
+                y_label=Phrase(
+                    "{quantity} of {load} ({unit})", quantity=log.quantity, load=log.load, unit=log.unit
+                ),
                 lines=[
                     Line(name="logged", x=log.times, y=log.values, style=LOGGED),
                     Line(name="machine found", x=log.times, y=swing, style=FOUND),
@@ -41,13 +44,13 @@ def identification_figure(found: Identification) -> Figure:
             Panel(
                 title="What is left of the log",
                 x_label=TIME,
-                y_label=f"left of it ({log.unit})",
+                y_label=Phrase("left of it ({unit})", unit=log.unit),
                 lines=[Line(name="left", x=log.times, y=left, style=LEFT)],
             ),
             Panel(
                 title="Spectrum of what is left",
                 x_label="frequency (rad/s)",
-                y_label=f"amplitude ({log.unit})",
+                y_label=Phrase("amplitude ({unit})", unit=log.unit),
                 lines=[
                     Line(name="left", x=shown.frequencies, y=amplitude, style=LEFT),
                     Line(name="noise stays below", x=shown.frequencies, y=chance, style=CHANCE),

@@ -8,6 +8,7 @@ from gen_profile.charts.figure import Band, Figure, Level, Line, Map, Panel, Sty
 from gen_profile.charts.method_styles import method_styles
 from gen_profile.comparison.robustness import Robustness
 from gen_profile.errors import OutputError
+from gen_profile.phrase import Phrase
 
 COLUMNS = 4  # of maps
 
@@ -49,7 +50,9 @@ def maps_figure(found: Robustness) -> Figure:
         columns=min(COLUMNS, len(found.residual)),
         panels=[
             Map(
-                title=f"{method} over {across} and {upwards}",
+                title=Phrase(
+                    "{method} over {across} and {upwards}", method=method, across=across, upwards=upwards
+                ),
                 x_label=_off(found, across),
                 y_label=_off(found, upwards),
                 unit="%",
@@ -72,7 +75,7 @@ def _curves(name: str, found: Robustness, styles: Mapping[str, Style]) -> Panel:
         for method in found.residual
     ]
     return Panel(
-        title=f"Residual sway of the {spec.machine().end_load_name} over {name}",
+        title=Phrase("Residual sway of the {load} over {name}", load=spec.machine().end_load_name, name=name),
         x_label=_off(found, name),
         y_label="residual sway (mm)",
         lines=lines,
@@ -85,4 +88,4 @@ def _curves(name: str, found: Robustness, styles: Mapping[str, Style]) -> Panel:
 def _off(found: Robustness, name: str) -> str:
     nominal = found.spec.plant.parameters[name]
     (unit,) = (known.unit for known in found.spec.machine().parameters if known.name == name)
-    return f"{name} off {nominal:g} {unit} by (%)"
+    return Phrase("{name} off {nominal:g} {unit} by (%)", name=name, nominal=nominal, unit=unit)

@@ -102,7 +102,7 @@ def _as_typed(message: str) -> str:
     typed = {word.partition("=")[0] for word in sys.argv if word.startswith("--")}
 
     def flag(found: re.Match[str]) -> str:
-        option = f"--{found[0].replace('_', '-')}"
-        return option if option in typed else found[0]
+        options = (f"--{found[0]}", f"--{found[0].replace('_', '-')}")
+        return next((option for option in options if option in typed), found[0])
 
-    return re.sub(r"^[a-z_]+(?=[: ,])", flag, message, flags=re.MULTILINE)
+    return re.sub(r"^[\w.]+(?=[: ,])", flag, message, flags=re.MULTILINE)

@@ -14,6 +14,7 @@ from gen_profile.errors import GenProfileError, InfeasibleProblem
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate, keeps_residual_sway
 from gen_profile.evaluation.phrases import mm
 from gen_profile.motion.profile import Profile
+from gen_profile.phrase import Phrase, joined
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
@@ -77,13 +78,19 @@ class Comparison:
         by_time: dict[float, list[str]] = {}
         for method, least in self.too_slow.items():
             by_time.setdefault(least, []).append(method)
-        slow = "; ".join(f"{', '.join(methods)} (at least {s:g} s)" for s, methods in by_time.items())
-        others = [
-            f"{name}: {' '.join(reason.splitlines())}"
+        slow = [
+            Phrase("{methods} (at least {duration:g} s)", methods=", ".join(methods), duration=duration)
+            for duration, methods in by_time.items()
+        ]
+        missing = [
+            Phrase("{method}: {reason}", method=name, reason=reason)
             for name, reason in self.left_out.items()
             if name not in self.too_slow
         ]
-        return (*([f"Need more than {self.spec.move.duration:g} s: {slow}"] if slow else []), *others)
+        if slow:
+            template, duration = "Need more than {duration:g} s: {methods}", self.spec.move.duration
+            missing.insert(0, Phrase(template, duration=duration, methods=joined("{first}; {others}", slow)))
+        return tuple(missing)
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
@@ -133,11 +140,11 @@ def compare(
             else:
                 rows.append(_row(spec, candidate))
         except GenProfileError as error:
-            left_out[candidate.method] = str(error)
+            left_out[candidate.method] = joined("{first} {others}", error.sentences)
             if isinstance(error, InfeasibleProblem) and error.least_duration is not None:
                 too_slow[candidate.method] = error.least_duration
             elif isinstance(error, InfeasibleProblem) and candidate.requirements:
-                impossible[candidate.requirements] = str(error)
+                impossible[candidate.requirements] = left_out[candidate.method]
     found = {row.method: row.figures for row in rows}
     return Comparison(
         spec=spec,

@@ -10,7 +10,7 @@ import attrs
 from gen_profile.designs import transient_sway
 from gen_profile.designs.draft import Draft, drafted, in_cycles, lasting, solved
 from gen_profile.designs.shape import shaped_motion
-from gen_profile.designs.suggestions import remedy, sufficient_duration
+from gen_profile.designs.suggestions import beside, remedy, sufficient_duration
 from gen_profile.errors import Code, InfeasibleProblem, Reason, SolverDiverged
 from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import rounded_up
@@ -101,10 +101,7 @@ def _within_limits(spec: Spec, progress: Progress) -> tuple[Problem, Relaxed]:
     if found is None:
         slow = _slow(spec)
         duration = {"move.duration": slow.move.duration}
-        better = [
-            attrs.evolve(one, values={**duration, **one.values})
-            for one in remedy(slow, in_time=True).suggestions
-        ]
+        better = beside(duration, remedy(slow, in_time=True).suggestions)
         advice = Phrase("Widen the limits, or see whether all numbers of the spec are in its units.")
         raise InfeasibleProblem(
             Phrase("move.duration: no duration keeps the limits and brings the load to rest."),

@@ -7,7 +7,7 @@ least, on few even intervals first, and then tried as the next run will try it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import cache, partial
 from typing import Any, TypeVar
@@ -93,21 +93,19 @@ def remedy(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> Remedy:
     in_time : bool
         Look for what would do in the duration asked for only.
     """
-    if spec.solver.solver != "indirect" or spec.robustness.method == "range":
-        return _remedy(spec, {}, spread, in_time=in_time)
-    method = {"solver.method": "auto"}
-    with suppress(OutOfWork):
-        one = _tried(spec, method)
-        return Remedy(suggestions=(one,)) if one else _remedy(spec, method, spread, in_time=in_time)
-    return Remedy()
-
-
-def _remedy(spec: Spec, beside: Mapping[str, Any], spread: float, *, in_time: bool) -> Remedy:
+    if spec.solver.solver == "indirect" and spec.robustness.method != "range":
+        method = {"solver.method": "auto"}
+        with suppress(OutOfWork):
+            if one := _tried(spec, method):
+                return Remedy(suggestions=(one,))
+            known = remedy(spec.changed(method), spread, in_time=in_time)
+            return attrs.evolve(known, suggestions=beside(method, known.suggestions))
+        return Remedy()
     relaxation = _relaxation(spec, spread)
     problem = relaxation.problem
     needed, longer, others = None, None, list[Suggestion | None]()
     stated = problem.limits.stated()
-    wider = partial(_wider_limits, spec, beside, relaxation)
+    wider = partial(_wider_limits, spec, relaxation)
     alone = [partial(wider, {place: value}) for place, value in stated.items()]
     eased = {place: stated[place] for place in eased_by_time(problem)}
     families = [limits for limits in ([eased] if eased == stated else [eased, stated]) if len(limits) > 1]
@@ -116,9 +114,9 @@ def _remedy(spec: Spec, beside: Mapping[str, Any], spread: float, *, in_time: bo
         if not in_time:
             needed = _in_time(partial(least_duration, relaxation))
             if needed:
-                longer = _in_time(partial(_longer, spec, beside, relaxation, needed), LONGEST)
+                longer = _in_time(partial(_longer, spec, relaxation, needed), LONGEST)
         others += map(_in_time, alone)
-        for last_resort in (*together, partial(_less_robust, spec, beside)):
+        for last_resort in (*together, partial(_less_robust, spec)):
             if not any(others):
                 others.append(_in_time(last_resort))
     advice = ""
@@ -129,11 +127,16 @@ def _remedy(spec: Spec, beside: Mapping[str, Any], spread: float, *, in_time: bo
     return Remedy(suggestions=tuple(sorted(found, key=lambda one: not one.passes)), advice=advice)
 
 
+def beside(values: Mapping[str, Any], suggestions: Iterable[Suggestion]) -> tuple[Suggestion, ...]:
+    """Name further values with which suggestions were tried."""
+    return tuple(attrs.evolve(one, values={**values, **one.values}) for one in suggestions)
+
+
 def sufficient_duration(spec: Spec) -> Suggestion | None:
     """Find the least duration in s, no less than a spec's, that works, in most of the work that is left."""
     relaxation = _relaxation(spec, 1.0)
     needed = _in_time(partial(least_duration, relaxation), LONGEST)
-    return _in_time(partial(_longer, spec, {}, relaxation, needed), LONGEST) if needed else None
+    return _in_time(partial(_longer, spec, relaxation, needed), LONGEST) if needed else None
 
 
 def tried(spec: Spec, *, coarse: bool = False) -> Solution:
@@ -240,13 +243,11 @@ def _stands(draft: Draft) -> bool:
         return False
 
 
-def _longer(
-    spec: Spec, beside: Mapping[str, Any], relaxation: Relaxation, needed: float
-) -> Suggestion | None:
+def _longer(spec: Spec, relaxation: Relaxation, needed: float) -> Suggestion | None:
     """Find the least duration that works, in s, rounded up to three digits."""
 
     def change(factor: float) -> Mapping[str, Any]:
-        return {**beside, "move.duration": float(rounded_up(factor * needed))}
+        return {"move.duration": float(rounded_up(factor * needed))}
 
     most = MOST if eased_by_time(relaxation.problem) else FAR
     return least_change(spec, change, relaxation.problem.sway_spread, FRACTION, (most, LATER))
@@ -254,7 +255,6 @@ def _longer(
 
 def _wider_limits(
     spec: Spec,
-    beside: Mapping[str, Any],
     relaxation: Relaxation,
     limits: Mapping[str, Any],
     most: float = math.inf,
@@ -266,19 +266,19 @@ def _wider_limits(
     needed = max(nearest.wider, 1.0)
 
     def change(factor: float) -> Mapping[str, Any]:
-        return {**beside, **{place: _times(value, factor * needed) for place, value in limits.items()}}
+        return {place: _times(value, factor * needed) for place, value in limits.items()}
 
     return least_change(spec, change, relaxation.problem.sway_spread)
 
 
-def _less_robust(spec: Spec, beside: Mapping[str, Any]) -> Suggestion | None:
+def _less_robust(spec: Spec) -> Suggestion | None:
     """Ask for less robustness, but for no less than passes the check."""
     robustness = spec.robustness
     if robustness.method != "sensitivity":
         return None
     changes: list[dict[str, Any]] = [{"robustness.order": 1}] if robustness.order > 1 else []
     weakest = {"robustness.method": "none", **({"robustness.order": 1} if changes else {})}
-    found = (_tried(spec, {**beside, **change}) for change in (*changes, weakest))
+    found = (_tried(spec, change) for change in (*changes, weakest))
     return next((one for one in found if one and one.passes), None)
 
 

@@ -19,6 +19,7 @@ from gen_profile.identification.misfit import Misfit, explanations, misfits
 from gen_profile.identification.swing_model import swing_model
 from gen_profile.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.motion.profile import Array
+from gen_profile.phrase import AND, OR_WITH, Phrase, joined
 from gen_profile.progress import Progress, untold
 
 CONFIDENCE = 0.99
@@ -159,19 +160,32 @@ def _require_unexplained(fit: Fit, found: Sequence[Misfit | None]) -> None:
         return
     model, left = next((m, one) for m, one in zip(fit.models, found, strict=True) if one is not None)
     units = {q.name: q.unit for q in fit.machine.plant.parameters}
+    template = "another {freed} than the spec's ({values})"
     others = [
-        f"another {' and '.join(one.freed)} than the spec's "
-        f"({', '.join(f'{name} {value:.4g} {units[name]}' for name, value in one.values.items())})"
+        Phrase(
+            template,
+            freed=joined(AND, one.freed),
+            values=", ".join(f"{name} {value:.4g} {units[name]}" for name, value in one.values.items()),
+        )
         for one in explained
     ]
-    freed = " and ".join(explained[0].freed)
-    cure = f"free {freed}, too, or measure {'it' if len(explained[0].freed) == 1 else 'them'} directly"
+    freed = joined(AND, explained[0].freed)
+    template = "free {freed}, too, or measure {which} directly"
+    cure: str = Phrase(template, freed=freed, which="it" if len(explained[0].freed) == 1 else "them")
     if len(others) > 1:
         cure = "the log cannot tell which: measure one of them directly, or free one that is not certain"
+    template = (
+        "The log of {model.log.load} is not of this machine: a swing of {left.rms:.2g} "
+        "{model.log.unit} RMS, {ratio:.2g} times the noise, is left of it, strongest at "
+        "{left.frequency:.3g} rad/s. Nothing is left with {others}; {cure}."
+    )
     raise InfeasibleProblem(
-        f"The log of {model.log.load} is not of this machine: a swing of {left.rms:.2g} {model.log.unit} "
-        f"RMS, {left.rms / left.noise:.2g} times the noise, is left of it, strongest at "
-        f"{left.frequency:.3g} rad/s. Nothing is left with {', or with '.join(others)}; {cure}."
+        template,
+        model=model,
+        left=left,
+        ratio=left.rms / left.noise,
+        others=joined(OR_WITH, others),
+        cure=cure,
     )
 
 

@@ -19,6 +19,7 @@ from gen_profile.errors import CosimulationError, InfeasibleProblem
 from gen_profile.identification.measurements import DirectReading, Period
 from gen_profile.identification.swing_model import STEP, SwingModel
 from gen_profile.motion.profile import Array
+from gen_profile.phrase import AND, joined
 from gen_profile.plants.plant import Plant
 from gen_profile.problem.linearization import linearize
 
@@ -150,11 +151,12 @@ class Fit:
             max_nfev=STEPS,
         )
         if solution.status == 0:
-            raise InfeasibleProblem(
-                f"The search for {' and '.join(self.names)} does not come to rest: no such machine swings "
-                "like the measurements; look for a wrong unit or signal, or start from a nearer "
-                "value of the spec."
+            template = (
+                "The search for {names} does not come to rest: no such machine swings like the "
+                "measurements; look for a wrong unit or signal, or start from a nearer value of the "
+                "spec."
             )
+            raise InfeasibleProblem(template, names=joined(AND, self.names))
         return np.asarray(solution.x)
 
     def residuals(self, unknowns: Array, noise: Array, until: float = np.inf) -> tuple[Array, Array]:

@@ -29,6 +29,7 @@ from gen_profile.identification.measurements import (
 from gen_profile.identification.swing_model import shortened
 from gen_profile.identification.uncertainty import WIDEST
 from gen_profile.one_thread import one_thread
+from gen_profile.phrase import AND, Phrase, joined
 from gen_profile.plants.plant import Plant
 from gen_profile.progress import Progress, untold
 from gen_profile.spec.model import Spec
@@ -66,7 +67,10 @@ class Identification:
         logs = (sentence for row in self.to_dict()["logs"] for sentence in _doubts(row))
         if (factor := self.estimate.contradiction) == 1.0:
             return tuple(logs)
-        return (*logs, f"the readings contradict one another; ranges widened {factor:.2g} times")
+        return (
+            *logs,
+            Phrase("the readings contradict one another; ranges widened {factor:.2g} times", factor=factor),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -227,9 +231,12 @@ def identify(
     _require_known(plant, readings, asked)
     stood = tuple(spec.move.target if q_a is None else q_a)
     if len(stood) != len(plant.actuated):
-        raise SpecError(f"at: must hold one position per axis ({len(plant.actuated)}), found {len(stood)}.")
+        template = "at: must hold one position per axis ({axes}), found {found}."
+        raise SpecError(template, axes=len(plant.actuated), found=len(stood))
     if not all(abs(place) <= GREATEST for place in stood):
-        raise SpecError(f"at: must be places in m or rad, found {', '.join(f'{x:g}' for x in stood)}.")
+        raise SpecError(
+            "at: must be places in m or rad, found {places}.", places=", ".join(f"{x:g}" for x in stood)
+        )
     logs = tuple(
         shortened(log, plant, spec.plant.parameters, stood)
         for log in measurements
@@ -276,21 +283,24 @@ def write_spec(spec: Spec, path: Path, text: str | None = None) -> None:
 
 def _doubts(row: Mapping[str, Any]) -> Iterator[str]:
     """Say what is wrong with a logged swing."""
-    name, unit = f"the log of {row['load']}", row["unit"]
+    name, unit = Phrase("the log of {load}", load=row["load"]), row["unit"]
     if row["unrest"] > UNREST:
-        yield (
-            f"{name} is {row['unrest']:.2g} times farther off the model at first; "
-            "leave out what was logged before the axes stood still"
+        template = (
+            "{name} is {row[unrest]:.2g} times farther off the model at first; leave out what was logged "
+            "before the axes stood still"
         )
+        yield (Phrase(template, name=name, row=row))
     if (left := row["misfit"]) is not None:
-        yield (
-            f"a swing of {left['rms']:.2g} {unit} RMS at {left['frequency_rad_per_s']:.3g} rad/s is left of "
-            f"{name}, which no parameter of this machine explains; ranges that follow from it are "
-            f"{left['widened']:.2g} times wider"
+        template = (
+            "a swing of {left[rms]:.2g} {unit} RMS at {left[frequency_rad_per_s]:.3g} rad/s is left of "
+            "{name}, which no parameter of this machine explains; ranges that follow from it are "
+            "{left[widened]:.2g} times wider"
         )
+        yield (Phrase(template, left=left, unit=unit, name=name))
     if row["noise"] > NOISY * row["swing"]:
         share = row["noise"] / row["swing"]
-        yield f"the noise in {name} is {share:.0%} of the swing; are unit and signal right?"
+        template = "the noise in {name} is {share:.0%} of the swing; are unit and signal right?"
+        yield Phrase(template, name=name, share=share)
 
 
 def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], asked: set[str]) -> None:
@@ -328,13 +338,19 @@ def _identified(spec: Spec, found: Estimate) -> Spec:
     }
     wide = {name: share for name, share in shares.items() if share > WIDEST}
     if wide:
-        words = " and ".join(f"{name} to ±{100.0 * share:.0f} % only" for name, share in wide.items())
+        template = "{name} to ±{percent:.0f} % only"
+        words = joined(
+            AND, [Phrase(template, name=name, percent=100.0 * share) for name, share in wide.items()]
+        )
         if found.contradiction > 1.0:
-            raise InfeasibleProblem(
-                f"The measurements contradict one another by {found.contradiction:.2g} times their "
-                f"uncertainties, so they determine {words}; look for the wrong one."
+            template = (
+                "The measurements contradict one another by {contradiction:.2g} times their "
+                "uncertainties, so they determine {words}; look for the wrong one."
             )
-        raise InfeasibleProblem(f"The measurements determine {words}; measure better, or take it as known.")
+            raise InfeasibleProblem(template, contradiction=found.contradiction, words=words)
+        raise InfeasibleProblem(
+            "The measurements determine {words}; measure better, or take it as known.", words=words
+        )
     values = {name: _rounded(value, found.standard_uncertainty[name]) for name, value in found.values.items()}
     robustness = spec.robustness
     robust = robustness.method if robustness.uncertain else "sensitivity"

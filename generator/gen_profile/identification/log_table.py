@@ -19,6 +19,7 @@ import numpy as np
 from gen_profile.bounded_file import read_bounded
 from gen_profile.errors import OutputError
 from gen_profile.motion.profile import Array
+from gen_profile.phrase import Phrase
 from gen_profile.suggestion import suggestion
 
 SEPARATORS = ";\t,"  # the first that half of all lines hold: where it is no comma, that is a decimal sign
@@ -95,8 +96,14 @@ class LogTable:
             return names.index(column)
         if column.isdecimal() and 1 <= int(column) <= len(self.rows[head]):
             return int(column) - 1
-        known = suggestion(column, names) if names else f"; there are {len(self.rows[head])}, without names."
-        raise OutputError(f"{source}: there is no column {column!r}{known}")
+        hint = (
+            suggestion(column, names)
+            if names
+            else Phrase("; there are {rows}, without names.", rows=len(self.rows[head]))
+        )
+        raise OutputError(
+            "{source}: there is no column {column!r}{hint}", source=source, column=column, hint=hint
+        )
 
     def unit(self, head: int, place: int) -> str:
         """Read a column's unit off its name or off the cell below that; empty where neither tells one."""
@@ -134,10 +141,13 @@ class LogTable:
             found = [self.seconds(row, time), *(self.number(row, place) for place in places[1:])]
             for place, text, value in zip(places, held, found, strict=True):
                 if not abs(value) <= GREATEST:
-                    name = self.cell(head, place) if self.is_head(head) else f"column {place + 1}"
-                    raise OutputError(
-                        f"{source}, row {row + 1}: {name} holds {text[:40]!r}, which is no number of a log."
+                    name = (
+                        self.cell(head, place)
+                        if self.is_head(head)
+                        else Phrase("column {number}", number=place + 1)
                     )
+                    template = "{source}, row {row}: {name} holds {text!r}, which is no number of a log."
+                    raise OutputError(template, source=source, row=row + 1, name=name, text=text[:40])
             values.extend(found)
         table = np.array(values).reshape(-1, len(places))
         if len(table) and math.isnan(self.number(first, time)):  # a date
@@ -174,7 +184,7 @@ def decoded(content: bytes, source: str) -> str:
     """
     for mark, words in OTHERS.items():
         if content.startswith(mark):
-            raise OutputError(f"{source}: this is {words}.")
+            raise OutputError("{source}: this is {words}.", source=source, words=words)
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return content.decode("utf-16", errors="replace")
     try:
@@ -199,7 +209,7 @@ def read_table(text: str, source: str) -> LogTable:
     """
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
-        raise OutputError(f"{source}: the log is empty.")
+        raise OutputError("{source}: the log is empty.", source=source)
     separator = next(
         (known for known in SEPARATORS if 2 * sum(known in line for line in lines) >= len(lines)), ","
     )
@@ -221,6 +231,7 @@ class _Rows(Sequence[Sequence[str]]):
             try:
                 cells = next(csv.reader([self._lines[row]], delimiter=self._separator))
             except csv.Error as error:
-                raise OutputError(f"{self._source}, row {row + 1}: it is no table ({error}).") from error
+                template = "{source}, row {row}: it is no table ({problem})."
+                raise OutputError(template, source=self._source, row=row + 1, problem=error) from error
             self._split = (row, [cell.strip() for cell in cells])
         return self._split[1]

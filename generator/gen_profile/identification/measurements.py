@@ -12,6 +12,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError, SpecError
+from gen_profile.phrase import Phrase
 from gen_profile.identification.log_table import read_table
 from gen_profile.motion.profile import Array, read_only
 from gen_profile.units import units_of
@@ -211,11 +212,14 @@ def _per_stated(name: str, unit: str, source: str, measured: str, units: Mapping
     """Say how many of the unit that a column states, if it does, make an SI unit."""
     if unit and unit not in units:
         others = [other for other, si in SI_UNITS.items() if unit in units_of(si)]
-        cure = f"take it for a log of the {others[0]} (signal)" if others else "name another column"
-        raise OutputError(
-            f"{source}: column {name!r} is in {unit}, which measures no {measured}; {cure}, or state the "
+        cure: str = "name another column"
+        if others:
+            cure = Phrase("take it for a log of the {quantity} (signal)", quantity=others[0])
+        template = (
+            "{source}: column {name!r} is in {unit}, which measures no {measured}; {cure}, or state the "
             "unit if the name is wrong."
         )
+        raise OutputError(template, source=source, name=name, unit=unit, measured=measured, cure=cure)
     return units[unit] if unit else 1.0
 
 
@@ -242,12 +246,13 @@ def cut_swing(
     """
     times, values = times[times >= after], values[times >= after]
     if len(times) < LEAST_SAMPLES:
-        raise OutputError(f"{source}: a swing needs at least {LEAST_SAMPLES} samples, found {len(times)}.")
+        template = "{source}: a swing needs at least {least} samples, found {count}."
+        raise OutputError(template, source=source, least=LEAST_SAMPLES, count=len(times))
     if not (np.diff(times) > 0.0).all():
-        raise OutputError(f"{source}: the times must rise from row to row.")
+        raise OutputError("{source}: the times must rise from row to row.", source=source)
     if quantity == "angle" and (span := float(np.ptp(values))) > np.pi:
         raise SpecError(
-            f"unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?"
+            "unit: the log's angle goes over {span:.3g} rad, more than half a turn; is it in deg?", span=span
         )
     return SwingLog(times=times - times[0], values=values, quantity=quantity, load=load)
 

@@ -144,10 +144,12 @@ def swing_model(
     period = 2.0 * np.pi / float(linearize(plant, parameters, q_a).frequencies[0])
     lasts, between = float(log.times[-1]), float(np.median(np.diff(log.times)))
     if lasts < period / 2.0 or between > period / 4.0:
-        raise InfeasibleProblem(
-            f"The log lasts {lasts:.3g} s with a sample every {between:.3g} s, and this machine swings once "
-            f"in {period:.3g} s: look at the unit of the log's times, log more of it, or mend the spec."
+        template = (
+            "The log lasts {lasts:.3g} s with a sample every {between:.3g} s, and this machine "
+            "swings once in {period:.3g} s: look at the unit of the log's times, log more of it, "
+            "or mend the spec."
         )
+        raise InfeasibleProblem(template, lasts=lasts, between=between, period=period)
     _require_swing(plant, parameters, q_a, log)
     size = np.linalg.norm(_linear_answers(plant, parameters, q_a, log), axis=0)
     shown = np.flatnonzero(size > SHOWN * size.max())
@@ -183,15 +185,15 @@ def _require_swing(
     mode = int(np.argmax(np.abs(seen)))
     swing = float(np.ptp(log.values)) / 2.0
     if swing < STILL:
-        raise InfeasibleProblem(
-            f"The log's {log.quantity} does not swing; look at its columns, and at when it begins (after)."
-        )
+        template = "The log's {quantity} does not swing; look at its columns, and at when it begins (after)."
+        raise InfeasibleProblem(template, quantity=log.quantity)
     angle = swing * abs(angles[mode] / seen[mode]) if seen[mode] else 0.0
     if angle > WIDEST_SWING:
-        raise InfeasibleProblem(
-            f"The log's {log.quantity} goes {swing:.3g} {log.unit} to either side, a swing of "
-            f"{math.degrees(angle):.0f}°: look at its unit, and at what it is of (signal)."
+        template = (
+            "The log's {log.quantity} goes {swing:.3g} {log.unit} to either side, a swing of "
+            "{angle:.0f}°: look at its unit, and at what it is of (signal)."
         )
+        raise InfeasibleProblem(template, log=log, swing=swing, angle=math.degrees(angle))
 
 
 def _linear_answers(

@@ -24,6 +24,7 @@ from gen_profile.errors import InfeasibleProblem
 from gen_profile.identification.fit import Fit
 from gen_profile.identification.measurements import DirectReading
 from gen_profile.motion.profile import Array
+from gen_profile.phrase import AND, joined
 
 WIDEST = 0.9  # relative half-range beyond which it is of no use: a spec cannot state it
 IMPOSSIBLE = 10.0  # standard deviations off a reading, which no chance brings about
@@ -206,9 +207,11 @@ def _require_determined(names: Sequence[str], slopes: Array) -> None:
             return
         worst = np.abs(directions[-1])
         blind = [name for name, share in zip(names, worst, strict=True) if share > 0.1]
+    template = (
+        "The measurements do not determine {blind}; measure {which} directly, or another mode's period."
+    )
     raise InfeasibleProblem(
-        f"The measurements do not determine {' and '.join(blind)}; measure "
-        f"{'it' if len(blind) == 1 else 'one of them'} directly, or another mode's period."
+        template, blind=joined(AND, blind), which="it" if len(blind) == 1 else "one of them"
     )
 
 
@@ -221,10 +224,11 @@ def _require_possible(fit: Fit, unknowns: Array, residuals: Array) -> None:
         for name, at in zip(fit.names, np.isclose(values, bounds, rtol=1e-6, atol=1e-9), strict=True):
             if at:
                 edge = float((bounds * fit.scale)[fit.names.index(name)])
-                raise InfeasibleProblem(
-                    f"With no {name} would the machine show these readings, not even with {edge:g}, the "
-                    f"{word} that it takes; look for a wrong reading, or a wrong unit."
+                template = (
+                    "With no {name} would the machine show these readings, not even with {edge:g}, the "
+                    "{word} that it takes; look for a wrong reading, or a wrong unit."
                 )
+                raise InfeasibleProblem(template, name=name, edge=edge, word=word)
 
 
 def _birge_ratio(residuals: Array, freedom: int) -> float:

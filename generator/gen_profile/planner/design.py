@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
+from gen_profile.phrase import Phrase, placed
 from gen_profile.planner.chebyshev import Array, same_terms
 from gen_profile.planner.machine import (
     LiveModes,
@@ -84,10 +85,14 @@ def planner_block(spec: Spec) -> PlannerBlock:
     period = 2.0 * np.pi / max(_rates(found, point)[0][0] for point in corners(found.live))
     if period / (SLOTS_PER_PERIOD * spec.export.cycle_time) < FEWEST_CYCLES:
         most = period / (SLOTS_PER_PERIOD * FEWEST_CYCLES)
-        raise SpecError(f"export.cycle_time: at most {most:.2g} s for a machine that swings this fast.")
+        problem = Phrase("at most {most:.2g} s for a machine that swings this fast", most=most)
+        raise SpecError(placed("export.cycle_time", problem))
     least = ZONED_OPERATIONS if spec.planner.zones else OPERATIONS
     if spec.planner.operations and spec.planner.operations < least:
-        raise SpecError(f"planner.operations: at least {least} with zones, found {spec.planner.operations}.")
+        template = "at least {least} with zones, found {found}"
+        raise SpecError(
+            placed("planner.operations", Phrase(template, least=least, found=spec.planner.operations))
+        )
     exponents, (rates, others) = same_terms(found.interpolant, found.others)
     constants = PlannerConstants(
         name=spec.name,
@@ -121,7 +126,8 @@ def planner_block(spec: Spec) -> PlannerBlock:
     text = block_text(constants)
     declared = Counter(name.lower() for name in DECLARED.findall(text))  # the language has one case only
     if taken := [name for name in found.live if declared[f"f{name}".lower()] > 1]:
-        raise SpecError(*(f"planner.live.{name}: the block has an f{name} of its own." for name in taken))
+        problems = {name: Phrase("the block has an {own} of its own", own=f"f{name}") for name in taken}
+        raise SpecError(*(placed(f"planner.live.{name}", problem) for name, problem in problems.items()))
     return PlannerBlock(
         filename=f"{spec.name}.st",
         text=text,
@@ -152,18 +158,21 @@ def target_range(spec: Spec, axis: int) -> tuple[float, float]:
 def _faults(spec: Spec, number: int, suffix: str) -> list[str]:
     """Say which limits of an axis are not stated, or above those of its quick stop."""
     own, quick, quick_jerk = spec.limits.of(number), spec.planner.quick_stop, spec.planner.quick_stop_jerk
-    of = f" of {spec.machine().actuated[number].name}" if suffix else ""
-    faults = [
-        f"limits.{name}: required{of} for a planner block, which keeps it in every motion."
+    of = Phrase(" of {axis}", axis=spec.machine().actuated[number].name) if suffix else ""
+    template = "required{of} for a planner block, which keeps it in every motion"
+    faults: list[str] = [
+        placed(f"limits.{name}", Phrase(template, of=of))
         for name in ("velocity", "acceleration", "jerk", "travel")
         if getattr(own, name) is None
     ]
     if quick and own.acceleration and quick < own.acceleration:
-        least = f"at least limits.acceleration{of}, {own.acceleration:g}"
-        faults.append(f"planner.quick_stop: must be {least}, found {quick:g}.")
+        template = "must be at least limits.acceleration{of}, {least:g}, found {found:g}"
+        problem = Phrase(template, of=of, least=own.acceleration, found=quick)
+        faults.append(placed("planner.quick_stop", problem))
     if quick_jerk and own.jerk and quick_jerk < own.jerk:
-        least = f"at least limits.jerk{of}, {own.jerk:g}"
-        faults.append(f"planner.quick_stop_jerk: must be {least}, found {quick_jerk:g}.")
+        template = "must be at least limits.jerk{of}, {least:g}, found {found:g}"
+        problem = Phrase(template, of=of, least=own.jerk, found=quick_jerk)
+        faults.append(placed("planner.quick_stop_jerk", problem))
     return faults
 
 

@@ -17,6 +17,7 @@ from functools import cache
 from itertools import pairwise
 from types import SimpleNamespace
 
+from gen_profile.phrase import Phrase
 from gen_profile.plants.plant import (
     Coordinate,
     Equations,
@@ -43,11 +44,12 @@ def member(masses: int) -> Plant:
     if not 1 <= masses <= LARGEST:
         raise KeyError(masses)
     numbers = range(1, masses + 1)
+    template = (
+        "springs and masses behind a driven axis, {masses} of each (or another number: it ends the type)"
+    )
     return Plant(
         type=f"mass-spring-chain-{masses}",
-        summary=(
-            f"springs and masses behind a driven axis, {masses} of each (or another number: it ends the type)"
-        ),
+        summary=(Phrase(template, masses=masses)),
         parameters=tuple(_parameters(numbers)),
         actuated=(Coordinate(name="axis", unit="m"),),
         unactuated=tuple(Coordinate(name=f"d{number}", unit="m") for number in numbers),
@@ -61,11 +63,15 @@ def member(masses: int) -> Plant:
 
 def _parameters(numbers: range) -> Iterator[Parameter]:
     for i in numbers:
-        yield Parameter(f"m{i}", "kg", f"mass {i}", nominal=1.0, lower=1e-6, upper=1e6)
+        yield Parameter(f"m{i}", "kg", Phrase("mass {i}", i=i), nominal=1.0, lower=1e-6, upper=1e6)
     for i in numbers:
-        yield Parameter(f"k{i}", "N/m", f"spring before mass {i}", nominal=100.0, lower=1e-6, upper=1e12)
+        yield Parameter(
+            f"k{i}", "N/m", Phrase("spring before mass {i}", i=i), nominal=100.0, lower=1e-6, upper=1e12
+        )
     for i in numbers:
-        yield Parameter(f"c{i}", "N s/m", f"damper beside spring {i}", nominal=0.0, lower=0.0, upper=1e9)
+        yield Parameter(
+            f"c{i}", "N s/m", Phrase("damper beside spring {i}", i=i), nominal=0.0, lower=0.0, upper=1e9
+        )
 
 
 def _equations(masses: int) -> Callable[..., Equations]:

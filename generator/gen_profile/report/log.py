@@ -130,12 +130,12 @@ def parse_log(text: str, source: str, spec: Spec, columns: str | None = None) ->
     }
     times = signals.pop(("time", ""))
     if len(times) < LEAST_SAMPLES:
-        raise OutputError(f"{where}: needs at least {LEAST_SAMPLES} samples, found {len(times)}.")
+        template = "{where}: needs at least {least} samples, found {count}."
+        raise OutputError(template, where=where, least=LEAST_SAMPLES, count=len(times))
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
-        raise OutputError(
-            f"{where}: the times must rise from row to row, and do not after {times[back[0]]:.6g} s."
-        )
+        template = "{where}: the times must rise from row to row, and do not after {time:.6g} s."
+        raise OutputError(template, where=where, time=times[back[0]])
     by_quantity: dict[str, dict[str, Array]] = {"position": {}, "sway": {}, "angle": {}}
     for (quantity, owner), values in signals.items():
         by_quantity[quantity][owner] = read_only(values)
@@ -179,10 +179,11 @@ def _in_stated_unit(meaning: str, unit: str, where: str) -> str:
     if found is None or found["unit"] or not unit:
         return meaning
     if not _COLUMN.fullmatch(f"time_{unit}"):
-        raise OutputError(
-            f"{where}: the column of {meaning} is in {unit}, which measures no {found['quantity']}; choose "
+        template = (
+            "{where}: the column of {meaning} is in {unit}, which measures no {quantity}; choose "
             "another one, or say the unit behind the meaning if the name is wrong."
         )
+        raise OutputError(template, where=where, meaning=meaning, unit=unit, quantity=found["quantity"])
     return f"{meaning}_{unit}"
 
 
@@ -228,9 +229,10 @@ def _chosen(columns: str) -> dict[str, str]:
     """Read ``time_ms=Zeit,payload_sway_mm=4``: what is meant, and the column that holds it."""
     pairs = [part.partition("=") for part in columns.split(",")]
     if not all(meaning.strip() and column.strip() for meaning, _, column in pairs):
-        raise OutputError(
-            f"columns {columns!r}: write MEANING=COLUMN for each, such as time_ms=Zeit,payload_sway_mm=4."
+        template = (
+            "columns {columns!r}: write MEANING=COLUMN for each, such as time_ms=Zeit,payload_sway_mm=4."
         )
+        raise OutputError(template, columns=columns)
     return {meaning.strip(): column.strip() for meaning, _, column in pairs}
 
 
@@ -240,11 +242,11 @@ def _required(meaning: str, spec: Spec, where: str) -> _Column:
     found, step = _column(plain, spec, where), float(counted["step"]) if counted else 1.0
     if found is None or step == 0.0:
         plant = spec.machine()
-        raise OutputError(
-            f"columns: {meaning!r} is nothing of this machine; write time_s, "
-            f"{plant.actuated[0].name}_position, "
-            f"{plant.loads[-1]}_sway or {plant.loads[-1]}_angle, with a unit behind such as _mm or _deg."
+        template = (
+            "columns: {meaning!r} is nothing of this machine; write time_s, {axis}_position, "
+            "{load}_sway or {load}_angle, with a unit behind such as _mm or _deg."
         )
+        raise OutputError(template, meaning=meaning, axis=plant.actuated[0].name, load=plant.loads[-1])
     return attrs.evolve(found, divisor=found.divisor / step)
 
 
@@ -302,7 +304,8 @@ def _column(name: str, spec: Spec, where: str) -> _Column | None:
     si = plant.actuated[owners.index(owner)].unit if quantity == "position" else SI_UNITS[quantity]
     divisor = _divisor(spec, owner if quantity == "position" else "", unit or "", si)
     if divisor is None:
-        raise OutputError(f"{where}: column {name!r} is in {unit}, which does not measure it.")
+        template = "{where}: column {name!r} is in {unit}, which does not measure it."
+        raise OutputError(template, where=where, name=name, unit=unit)
     return _Column(quantity=quantity, owner=owner, divisor=divisor)
 
 
@@ -327,20 +330,24 @@ def _require(known: Mapping[str, _Column], names: Sequence[str], spec: Spec, whe
     """Hold the columns to what a comparison needs: a time, and something that was measured, each once."""
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise OutputError(f"{where}: two columns are called {twice!r}; rename one.")
+        raise OutputError("{where}: two columns are called {twice!r}; rename one.", where=where, twice=twice)
     held = [(column.quantity, column.owner) for column in known.values()]
     for name, column in known.items():
         if held.count((column.quantity, column.owner)) > 1:
-            raise OutputError(f"{where}: column {name!r} is there twice, in two units; remove one.")
+            raise OutputError(
+                "{where}: column {name!r} is there twice, in two units; remove one.", where=where, name=name
+            )
     plant = spec.machine()
     examples = f"{plant.actuated[0].name}_position, {plant.loads[-1]}_sway, {plant.loads[-1]}_angle"
     if ("time", "") not in held:
-        raise OutputError(
-            f"{where}: there is no column time_s (or time_ms); found {', '.join(names)[:200]}; "
-            "name the column of times, as columns time_s=1 does."
+        template = (
+            "{where}: there is no column time_s (or time_ms); found {names}; name the column of "
+            "times, as columns time_s=1 does."
         )
+        raise OutputError(template, where=where, names=", ".join(names)[:200])
     if len(held) < 2:
-        raise OutputError(
-            f"{where}: there is no column of this machine ({examples}, with units behind "
-            f"such as _mm or _deg); found {', '.join(names)[:200]}."
+        template = (
+            "{where}: there is no column of this machine ({examples}, with units behind such as "
+            "_mm or _deg); found {names}."
         )
+        raise OutputError(template, where=where, examples=examples, names=", ".join(names)[:200])

@@ -211,10 +211,11 @@ def _the_move(evaluation: MotionEvaluation, log: MeasuredLog, start: float) -> M
     until = evaluation.motion.duration + evaluation.watch
     kept = (log.times >= start) & (log.times <= start + until)
     if kept.sum() < 2 or log.times[kept][-1] < start + evaluation.motion.duration:
-        raise OutputError(
-            f"measured {log.source}: the log ends before the move that begins at {start:.4g} s in it does; "
-            "log on until the load is at rest, or state when it starts (measured_start)."
+        template = (
+            "measured {source}: the log ends before the move that begins at {start:.4g} s in it "
+            "does; log on until the load is at rest, or state when it starts (measured_start)."
         )
+        raise OutputError(template, source=log.source, start=start)
 
     def cut(signals: Mapping[str, Array]) -> dict[str, Array]:
         return {name: values[kept] for name, values in signals.items()}

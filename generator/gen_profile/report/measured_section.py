@@ -11,6 +11,7 @@ from gen_profile.charts.figure import PALETTE, Band, Figure, Level, Line, Panel,
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import machine, mm, number, place_unit
 from gen_profile.motion.profile import Array
+from gen_profile.phrase import Phrase
 from gen_profile.report.content import Section, Share, Table, TableRow, Verdict
 from gen_profile.report.measured import Measured, MeasuredSway, Signal
 from gen_profile.spec.model import Spec
@@ -25,37 +26,55 @@ def measured_verdict(measured: Measured) -> Verdict:
     """Say whether the machine did as it should."""
     judged = {load: sway for load, sway in measured.sways.items() if sway.residual is not None}
     if not judged:
-        alone = measured.angles and not measured.sways
+        template = "{source} tells no sway for as long as one slow swing after the arrival."
+        if measured.angles and not measured.sways:
+            template = (
+                "{source} tells no sway for as long as one slow swing after the arrival, nor do the angles "
+                "in it alone: log those of all ropes."
+            )
         return Verdict(
             word="Measured, not judged.",
             passed=None,
-            sentences=(
-                f"{measured.log.source} tells no sway for as long as one slow swing after the arrival"
-                + (", nor do the angles in it alone: log those of all ropes." if alone else "."),
-            ),
+            sentences=(Phrase(template, source=measured.log.source),),
         )
     load, worst = max(judged.items(), key=lambda pair: _share(pair[1]))
     passed = bool(measured.passed)
     others = [name for name in measured.loads if name not in judged]
+    template = (
+        "On the machine the {load} swings by {residual} after the arrival, and {limit} are "
+        "allowed ({source})."
+    )
     return Verdict(
         word="Measured: kept." if passed else "Measured: exceeded.",
         passed=passed,
         sentences=(
-            f"On the machine the {load} swings by {mm(worst.residual or 0.0)} after the arrival, "
-            f"and {mm(worst.limit)} are allowed ({measured.log.source}).",
-            *([f"Not measured: the sway of the {' and the '.join(others)}."] if others else []),
+            Phrase(
+                template,
+                load=load,
+                residual=mm(worst.residual or 0.0),
+                limit=mm(worst.limit),
+                source=measured.log.source,
+            ),
+            *(
+                [Phrase("Not measured: the sway of the {others}.", others=" and the ".join(others))]
+                if others
+                else []
+            ),
         ),
     )
 
 
 def measured_section(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Section:
     """Draw what was measured over what was planned, with the deviations."""
+    template = "The move begins at {start} s in {source}."
     words = [
-        f"The move begins at {number(measured.start)} s in {measured.log.source}.",
+        Phrase(template, start=number(measured.start), source=measured.log.source),
         *_likeness(evaluation, measured),
     ]
     if measured.log.ignored:
-        words.append(f"Columns that were left alone: {', '.join(measured.log.ignored)}.")
+        words.append(
+            Phrase("Columns that were left alone: {ignored}.", ignored=", ".join(measured.log.ignored))
+        )
     figure = Figure(
         caption="Measured over planned. Dotted: the arrival; dashed in red: what is allowed from then on.",
         panels=[*_panels(spec, evaluation, measured)],
@@ -67,10 +86,11 @@ def _likeness(evaluation: MotionEvaluation, measured: Measured) -> Iterator[str]
     """Say which of the machines that were tried the real one is most like."""
     if measured.nearest is not None and len(evaluation.machines) > 1:
         nearest = machine(evaluation.machines[measured.nearest].name)
-        yield f"Of the machines tried, {nearest} swings most like it."
+        yield Phrase("Of the machines tried, {nearest} swings most like it.", nearest=nearest)
     computed = [load for load, sway in measured.sways.items() if sway.from_angles]
     if computed:
-        yield f"Sway computed from the ropes' angles and nominal lengths: {', '.join(computed)}."
+        template = "Sway computed from the ropes' angles and nominal lengths: {computed}."
+        yield Phrase(template, computed=", ".join(computed))
 
 
 def _table(measured: Measured) -> Table:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from gen_profile.bounded_file import read_bounded
+from gen_profile.phrase import Phrase
 from gen_profile.plants.plant import Plant
 from gen_profile.spec.model import ExternalFmu
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of
@@ -19,7 +20,7 @@ TIME_LIMIT = 60.0  # s
 FILE = Annotated[
     str,
     Pattern(r"(?is).+\.fmu", "the name of an FMU"),
-    Words("must name an FMU, such as customer.fmu, found FOUND"),
+    Words("must name an FMU, such as customer.fmu, found {found}"),
 ]
 
 
@@ -63,22 +64,28 @@ def _sha256(path: Path, stated: Any, faults: Faults) -> str:
     try:
         actual = hashlib.sha256(read_bounded(path)).hexdigest()
     except (OSError, ValueError) as error:
-        faults.add("check.fmu", f"{path} cannot be read ({getattr(error, 'strerror', error)})")
+        faults.add(
+            "check.fmu",
+            Phrase("{path} cannot be read ({problem})", path=path, problem=getattr(error, "strerror", error)),
+        )
         return ""
     if stated is not None and stated != actual:
-        faults.add("check.fmu", f"{path} is not the FMU that was checked with; its SHA-256 differs")
+        faults.add(
+            "check.fmu", Phrase("{path} is not the FMU that was checked with; its SHA-256 differs", path=path)
+        )
     return actual
 
 
 def _inputs(table: Any, plant: Plant, structurer: Structurer) -> tuple[str, tuple[str, ...]]:
     """Read which quantity goes in, and the variable of each axis."""
     if not isinstance(table, Mapping) or len(table) != 1 or next(iter(table)) not in INPUTS:
-        problem = f'must name the inputs by one of {", ".join(INPUTS)}, such as {{ acceleration = "u" }}'
+        template = 'must name the inputs by one of {names}, such as {{ acceleration = "u" }}'
+        problem = Phrase(template, names=", ".join(INPUTS))
         structurer.faults.add("check.input", problem)
         return INPUTS[0], ()
     ((quantity, names),) = table.items()
     axes = len(plant.actuated)
-    words = Words(f"must name one variable of the FMU per axis ({axes})")
+    words = Words("must name one variable of the FMU per axis ({axes})", axes=axes)
     one_per_axis: Any = Annotated[tuple.__class_getitem__((str,) * axes), words]
     listed = [names] if isinstance(names, str) else names
     return quantity, structurer.fit(listed, one_per_axis, f"check.input.{quantity}", ())

@@ -10,7 +10,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import attrs
 
@@ -52,7 +52,7 @@ LiveRate = Annotated[str, Named("parameter", of="rate", reorder=False)]
 Span = Annotated[tuple[float, float], Rising()]
 SwingState = Annotated[str, Named("coordinate")]
 Shares = Annotated[Mapping[ParameterName, RelativeRange], example("NAME = 0.2")]
-Sway = Annotated[float, Bounds(above=0.0), Words("must be a finite number greater than 0, found FOUND")]
+Sway = Annotated[float, Bounds(above=0.0), Words("must be a finite number greater than 0, found {found}")]
 
 
 @attrs.frozen(kw_only=True)
@@ -122,6 +122,7 @@ class RobustnessSpec(Checked, table="robustness"):
     order: Literal[1, 2] = 1
     nominal_zero: bool = False  # with method "range": the nominal machine comes to rest exactly all the same
     uncertain: Shares = NONE
+    OF_METHOD: ClassVar = {"order": "sensitivity", "nominal_zero": "range"}  # keys for one robust method only
 
 
 @attrs.frozen(kw_only=True)
@@ -176,7 +177,7 @@ class LimitsSpec(Checked, table="limits"):
     jerk: Positive | None = None
     sway: Positive | None = None
     travel: Travel | None = None
-    axis: Annotated[Mapping[AxisName, AxisLimitsSpec], Words("must be a table by axis, found FOUND")] = NONE
+    axis: Annotated[Mapping[AxisName, AxisLimitsSpec], Words("must be a table by axis, found {found}")] = NONE
 
     def own(self, column: int) -> tuple[str, AxisLimitsSpec]:
         """Name of an axis that has limits of its own, and those."""
@@ -238,7 +239,7 @@ class ExternalFmu(Checked, table="check"):
     inputs: tuple[str, ...]
     sway: Mapping[LoadName, str]
     parameters: Annotated[Mapping[ParameterName, str], example('L1 = "rope"')]
-    time_limit: Annotated[float, Bounds(above=0.0), Words("must be a positive time in s, found FOUND")]
+    time_limit: Annotated[float, Bounds(above=0.0), Words("must be a positive time in s, found {found}")]
 
     def to_dict(self) -> dict[str, Any]:
         """Write the keys of ``[check]``."""
@@ -338,7 +339,7 @@ class ExportSpec(Checked, table="export"):
     plc_layout: Literal["segments", "samples", "counts"] = "segments"
     csv_dialect: Literal["rfc4180", "excel-de", "sew", "kollmorgen", "lenze"] = "rfc4180"
     csv_columns: Annotated[
-        tuple[Column, ...], Words('must be a list such as ["position", "velocity"], found FOUND')
+        tuple[Column, ...], Words('must be a list such as ["position", "velocity"], found {found}')
     ] = ("position", "velocity", "acceleration", "jerk")
 
 

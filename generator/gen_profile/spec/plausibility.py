@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_profile.errors import SpecError
+from gen_profile.phrase import Phrase, placed
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import RESIDUAL_SHARE, Spec
 
@@ -41,10 +42,16 @@ LOOSE = 0.5  # of the longest move, that an axis may be away from its setpoint
 
 @attrs.frozen(kw_only=True)
 class Doubt:
-    """A value that is hardly meant, or cannot be; a sentence with its place and the cure."""
+    """A value that is hardly meant, or cannot be: its place, what is wrong and the cure."""
 
-    sentence: str
+    place: str
+    problem: str
     refused: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """Tell the place, too."""
+        return placed(self.place, self.problem)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -95,17 +102,20 @@ def _doubts(spec: Spec) -> Iterator[Doubt]:
     yield from _drive(spec)
 
 
-def _thousandth(value: float, what: str) -> str:
+def _thousandth(value: float, what: str) -> Phrase:
     """End a sentence by what a value means if it is in thousandths, as one below 1 hardly is."""
-    return f"{what}; did you mean {value / 1e3:.4g}?" if value >= 1.0 else f"{what}; state less."
+    template = "{what}; did you mean {meant:.4g}?" if value >= 1.0 else "{what}; state less."
+    return Phrase(template, what=what, meant=value / 1e3)
 
 
-def _fast(value: float, unit: str, kind: str, sentence: str, cure: str) -> Iterator[Doubt]:
+def _fast(value: float, unit: str, place: str, problem: str, cure: str) -> Iterator[Doubt]:
     """Doubt a speed or acceleration."""
+    kind = "acceleration" if place.endswith("acceleration") else "velocity"
     hardly, never = FAST[unit, kind]
     if value > hardly:
         verdict = "which no such machine reaches" if value > never else "which few machines reach"
-        yield Doubt(sentence=f"{sentence}, {verdict}; {cure}", refused=value > never)
+        problem = Phrase("{problem}, {verdict}; {cure}", problem=problem, verdict=verdict, cure=cure)
+        yield Doubt(place=place, problem=problem, refused=value > never)
 
 
 def _move(spec: Spec) -> Iterator[Doubt]:
@@ -116,26 +126,33 @@ def _move(spec: Spec) -> Iterator[Doubt]:
     ):
         unit = axis.unit
         meant = distance / 1e3 if unit == "m" else math.radians(distance)
-        cure = f"distances are in {unit} and durations in s; did you mean {meant:.4g} {unit}?"
-        said = f"{axis.name} moves {distance:g} {unit}"
+        template = "distances are in {unit} and durations in s; did you mean {meant:.4g} {unit}?"
+        cure = Phrase(template, unit=unit, meant=meant)
+        said = Phrase("{name} moves {distance:g} {unit}", name=axis.name, distance=distance, unit=unit)
         if not move.shortest:
             mean = distance / move.duration
-            found = f"move.duration: {said} in {move.duration:g} s, at {mean:.3g} {unit}/s on average"
-            hurried = list(_fast(mean, unit, "velocity", found, cure))
+            template = "{said} in {duration:g} s, at {mean:.3g} {unit}/s on average"
+            found = Phrase(template, said=said, duration=move.duration, mean=mean, unit=unit)
+            hurried = list(_fast(mean, unit, "move.duration", found, cure))
             yield from hurried
             if hurried:
                 continue
         if unit == "m" and distance > LONG_WAY:
-            yield Doubt(sentence=f"move.distance: {said}, farther than any crane's runway; {cure}")
+            problem = Phrase("{said}, farther than any crane's runway; {cure}", said=said, cure=cure)
+            yield Doubt(place="move.distance", problem=problem)
         elif unit == "rad" and distance > MANY_TURNS:
             turns = distance / (2.0 * math.pi)
-            yield Doubt(sentence=f"move.distance: {said}, which are {turns:.3g} turns; {cure}")
-        found = f"move.final_velocity: {axis.name} ends at {speed:g} {unit}/s"
-        yield from _fast(speed, unit, "velocity", found, _thousandth(speed, f"speeds are in {unit}/s"))
+            problem = Phrase("{said}, which are {turns:.3g} turns; {cure}", said=said, turns=turns, cure=cure)
+            yield Doubt(place="move.distance", problem=problem)
+        found = Phrase("{name} ends at {speed:g} {unit}/s", name=axis.name, speed=speed, unit=unit)
+        cure = _thousandth(speed, Phrase("speeds are in {unit}/s", unit=unit))
+        yield from _fast(speed, unit, "move.final_velocity", found, cure)
     longest = max(map(abs, move.distance))
     if not move.shortest and move.duration >= LONG_TIME and 0.0 < longest < SLOW * move.duration:
         cure = _thousandth(move.duration, "durations are in s")
-        yield Doubt(sentence=f"move.duration: {move.duration:g} s for {longest:g} m (or rad) is slow; {cure}")
+        template = "{duration:g} s for {longest:g} m (or rad) is slow; {cure}"
+        problem = Phrase(template, duration=move.duration, longest=longest, cure=cure)
+        yield Doubt(place="move.duration", problem=problem)
 
 
 def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
@@ -146,19 +163,22 @@ def _limits(spec: Spec, scale: Scale) -> Iterator[Doubt]:
         unit = units[table[-1]] if len(table) > 1 else max(units.values(), key="m".__eq__)
         if (unit, kind) in FAST:
             per = f"{unit}/s" if kind == "velocity" else f"{unit}/s²"
-            cure = _thousandth(value, f"limits are in {per}")
-            yield from _fast(value, unit, kind, f"{place}: allows {value:g} {per}", cure)
+            cure = _thousandth(value, Phrase("limits are in {per}", per=per))
+            yield from _fast(value, unit, place, Phrase("allows {value:g} {per}", value=value, per=per), cure)
         if unit == "m" and kind == "travel" and (far := max(map(abs, value))) > LONG_WAY:
             cure = _thousandth(far, "lengths are in m")
-            yield Doubt(sentence=f"{place}: reaches {far:g} m, farther than any crane's runway; {cure}")
+            problem = Phrase("reaches {far:g} m, farther than any crane's runway; {cure}", far=far, cure=cure)
+            yield Doubt(place=place, problem=problem)
     for name, rate in spec.planner.live_rate.items():
-        found = f"planner.live_rate.{name}: hoists at {rate:g} m/s"
-        yield from _fast(rate, "m", "velocity", found, _thousandth(rate, "rates are in m/s"))
+        found = Phrase("hoists at {rate:g} m/s", rate=rate)
+        yield from _fast(rate, "m", f"planner.live_rate.{name}", found, _thousandth(rate, "rates are in m/s"))
     sway, depth = spec.limits.sway, scale.depth[-1]
     if sway is not None and sway > (depth or FAR * max(scale.way[-1], *scale.depth)) > 0.0:
-        what = f"the ropes' {depth:.4g} m" if depth else f"{FAR:g} times the move"
+        template = "the ropes' {depth:.4g} m" if depth else "{times:g} times the move"
+        what = Phrase(template, depth=depth, times=FAR)
         cure = _thousandth(sway, "lengths are in m")
-        yield Doubt(sentence=f"limits.sway: {sway:g} m are more than {what}; {cure}", refused=True)
+        problem = Phrase("{sway:g} m are more than {what}; {cure}", sway=sway, what=what, cure=cure)
+        yield Doubt(place="limits.sway", problem=problem, refused=True)
 
 
 def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
@@ -178,16 +198,23 @@ def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
         depth, way, sway = (float(of[directions].max()) for of in (scale.depth, scale.way, scale.sway))
         cure = _thousandth(limit, "lengths are in m")
         if depth and limit > RESIDUAL_OF_ROPE * depth:
-            found = f"{limit:g} m are more than half of the {depth:.4g} m by which the {load} hangs"
-            yield Doubt(sentence=f"{place}: {found}; {cure}", refused=True)
+            template = "{limit:g} m are more than half of the {depth:.4g} m by which the {load} hangs; {cure}"
+            problem = Phrase(template, limit=limit, depth=depth, load=load, cure=cure)
+            yield Doubt(place=place, problem=problem, refused=True)
         elif from_rest and not depth and limit > FAR * way > 0.0:
-            found = f"{limit:g} m are more than {FAR:g} times the {way:.4g} m that the move takes the {load}"
-            yield Doubt(sentence=f"{place}: {found}; {cure}", refused=True)
-        elif load in ends and from_rest and limit > max(sway, RESIDUAL_OF_MOVE * way) > 0.0:
-            found = (
-                f"{limit:g} m are more than the {sway:.2g} m that almost any motion of this length and time"
+            template = (
+                "{limit:g} m are more than {times:g} times the {way:.4g} m that the move takes the "
+                "{load}; {cure}"
             )
-            yield Doubt(sentence=f"{place}: {found} leaves, so the check tells nothing; state less.")
+            problem = Phrase(template, limit=limit, times=FAR, way=way, load=load, cure=cure)
+            yield Doubt(place=place, problem=problem, refused=True)
+        elif load in ends and from_rest and limit > max(sway, RESIDUAL_OF_MOVE * way) > 0.0:
+            template = (
+                "{limit:g} m are more than the {sway:.2g} m that almost any motion of this length "
+                "and time leaves, so the check tells nothing; state less."
+            )
+            problem = Phrase(template, limit=limit, sway=sway)
+            yield Doubt(place=place, problem=problem)
         else:
             continue
         if alike:
@@ -198,9 +225,12 @@ def _swing(spec: Spec, scale: Scale) -> Iterator[Doubt]:
     """Doubt moves that swing a load out of the range in which it behaves like a spring."""
     angle = float(np.max(scale.angle, initial=0.0))
     if not spec.move.shortest and angle > LARGE_SWING:
-        found = f"the move swings the load by some {math.degrees(angle):.0f}°, far beyond small angles"
-        units = "distances are in m and durations in s"
-        yield Doubt(sentence=f"move.duration: {found}; {units}, so allow more than {spec.move.duration:g} s.")
+        template = (
+            "the move swings the load by some {angle:.0f}°, far beyond small angles; distances "
+            "are in m and durations in s, so allow more than {duration:g} s."
+        )
+        problem = Phrase(template, angle=math.degrees(angle), duration=spec.move.duration)
+        yield Doubt(place="move.duration", problem=problem)
 
 
 def _drive(spec: Spec) -> Iterator[Doubt]:
@@ -208,13 +238,15 @@ def _drive(spec: Spec) -> Iterator[Doubt]:
     tau = spec.actuator.tau
     if tau is not None and not spec.move.shortest and tau > spec.move.duration:
         cure = _thousandth(tau, "time constants are in s")
-        yield Doubt(sentence=f"actuator.tau: {tau:g} s are longer than the whole move; {cure}")
+        problem = Phrase("{tau:g} s are longer than the whole move; {cure}", tau=tau, cure=cure)
+        yield Doubt(place="actuator.tau", problem=problem)
     longest = spec.move.longest(spec.machine()) or math.inf
     for name in ("start_tolerance", "following_error"):
         value, usual = getattr(spec.can, name), getattr(CanSpec(), name)
         if value is not None and value != usual and value > LOOSE * longest:
             cure = _thousandth(value, "tolerances are in m")
-            yield Doubt(sentence=f"can.{name}: {value:g} m are more than half of the move; {cure}")
+            problem = Phrase("{value:g} m are more than half of the move; {cure}", value=value, cure=cure)
+            yield Doubt(place=f"can.{name}", problem=problem)
 
 
 def _scale(spec: Spec) -> Scale:

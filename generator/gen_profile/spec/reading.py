@@ -297,9 +297,10 @@ def _fill(document: Table, tables: Mapping[str, Any]) -> None:
                 table.pop(key, None)
             else:
                 _set(table, (name, key), value)
-                for inner in table.values():  # said of all axes, it replaces what was said of one
-                    if isinstance(inner, dict):
-                        inner.pop(key, None)
+                axes = table if name == "axis" else table.get("axis", {})
+                for axis in axes.values():  # said of all axes, it replaces what was said of one
+                    if isinstance(axis, dict):
+                        axis.pop(key, None)
 
 
 def _override_value(text: str) -> Any:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from types import SimpleNamespace
 
+from gen_profile.phrase import Phrase
 from gen_profile.plants.plant import Coordinate, Parameter, Plant
-from gen_profile.spec.model import Spec
+from gen_profile.spec.model import RobustnessSpec, Spec
 from gen_profile.spec.structure import place
 from gen_profile.suggestion import suggestion
 from gen_profile.units import UNITS
@@ -51,15 +52,21 @@ def _drive(spec: Spec) -> Iterator[Fault]:
 
 
 def _robustness(spec: Spec) -> Iterator[Fault]:
-    own = spec.robustness
-    if own.method != "none" and not own.uncertain:
+    own, usual = spec.robustness, RobustnessSpec()
+    if own.method == usual.method:
+        return
+    if not own.uncertain:
         names = [*spec.plant.parameters]
         one = next((name for name in names if name.startswith("L")), [*names, "L1"][0])  # ropes are
-        yield "robustness.uncertain", f'required with method = "{own.method}", such as {{ {one} = 0.2 }}'
-    if own.nominal_zero and own.method != "range":
-        yield "robustness.nominal_zero", 'only with method = "range"; elsewhere it is so anyway'
-    if own.order == 2 and own.method == "range":
-        yield "robustness.order", 'only with method = "sensitivity"'
+        yield (
+            "robustness.uncertain",
+            Phrase(
+                'required with method = "{method}", such as {{ {one} = 0.2 }}', method=own.method, one=one
+            ),
+        )
+    for key, method in own.OF_METHOD.items():
+        if own.method != method and getattr(own, key) != getattr(usual, key):
+            yield f"robustness.{key}", Phrase('only with method = "{method}"', method=method)
 
 
 def _move(spec: Spec) -> Iterator[Fault]:
@@ -67,7 +74,10 @@ def _move(spec: Spec) -> Iterator[Fault]:
     if not any(move.distance) and move.stops and not any(move.initial.values()):
         yield "move.distance", "must not be zero on every axis"
     if any(0.0 < abs(way) < SHORTEST_MOVE for way in move.distance):
-        yield "move.distance", f"must be zero, or at least {SHORTEST_MOVE:g} m (or rad)"
+        yield (
+            "move.distance",
+            Phrase("must be zero, or at least {least:g} m (or rad)", least=SHORTEST_MOVE),
+        )
     limits, limited = ("velocity", "acceleration", "jerk"), " ".join(spec.limits.stated())
     if move.shortest and not any(name in limited for name in limits):
         problem = '"minimum" needs a limit: state limits.acceleration, or velocity or jerk'
@@ -97,9 +107,10 @@ def _csv_columns(spec: Spec) -> Iterator[Fault]:
 def _can(spec: Spec) -> Iterator[Fault]:
     can = spec.can
     if can.feed_forward in ("torque", "both") and can.torque_per_acceleration is None:
+        template = 'required with feed_forward = "{feed_forward}" (‰ of the rated torque per m/s²)'
         yield (
             "can.torque_per_acceleration",
-            f'required with feed_forward = "{can.feed_forward}" (‰ of the rated torque per m/s²)',
+            Phrase(template, feed_forward=can.feed_forward),
         )
     if can.mode != "csp" and can.feed_forward != "none":
         yield "can.feed_forward", 'only with mode = "csp"; remove it or set the mode'
@@ -109,7 +120,10 @@ def _can(spec: Spec) -> Iterator[Fault]:
     taken: dict[int, str] = {}
     for axis, node in can.nodes.items():
         if taken.setdefault(node, axis) != axis:
-            yield place("can.nodes", axis), f"{node} is the node of the axis {taken[node]} already"
+            yield (
+                place("can.nodes", axis),
+                Phrase("{node} is the node of the axis {taken} already", node=node, taken=taken[node]),
+            )
 
 
 def _all_axes(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -117,7 +131,10 @@ def _all_axes(spec: Spec, plant: Plant) -> Iterator[Fault]:
     for what, stated in (("nodes", spec.can.nodes), ("channels", spec.can.channels)):
         for axis in plant.actuated:
             if stated and axis.name not in stated:
-                yield place(f"can.{what}", axis.name), f"required beside the other axes' {what}"
+                yield (
+                    place(f"can.{what}", axis.name),
+                    Phrase("required beside the other axes' {what}", what=what),
+                )
 
 
 def _at_start(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -125,7 +142,10 @@ def _at_start(spec: Spec, plant: Plant) -> Iterator[Fault]:
     angles = {q.name for q in plant.unactuated if q.unit == "rad"}
     for name, value in spec.move.initial.items():
         if name in angles and abs(value) > LARGEST_ANGLE:
-            yield place("move.initial", name), f"must be from -{LARGEST_ANGLE:g} to {LARGEST_ANGLE:g} rad"
+            yield (
+                place("move.initial", name),
+                Phrase("must be from -{angle:g} to {angle:g} rad", angle=LARGEST_ANGLE),
+            )
 
 
 def _at_end(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -157,11 +177,17 @@ def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
                 continue
             where, value = place(f"{table}.uncertain", parameter.name), spec.plant.parameters[parameter.name]
             if value == 0.0:
-                yield where, f"its value is 0, so a relative range is empty{cures[table]}"
+                yield where, Phrase("its value is 0, so a relative range is empty{cure}", cure=cures[table])
             for end in (value * (1.0 + sign * shares[parameter.name]) for sign in (-1.0, 1.0)):
                 if not parameter.lower <= end <= parameter.upper:
-                    bounds = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
-                    yield where, f"reaches {end:.6g}, and the machine takes {bounds}"
+                    template = "{lower:g} to {upper:g} {unit}"
+                    bounds = Phrase(
+                        template, lower=parameter.lower, upper=parameter.upper, unit=parameter.unit
+                    )
+                    yield (
+                        where,
+                        Phrase("reaches {end:.6g}, and the machine takes {bounds}", end=end, bounds=bounds),
+                    )
 
 
 def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -169,10 +195,13 @@ def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
     del plant
     changed = spec.checked_ranges()
     if len(changed) > MOST_CORNERS:
+        template = (
+            "{count} parameters have 2^{count} corners; name at most {most} in "
+            "check.uncertain, widen theirs, and let check.samples draw"
+        )
         yield (
             "check.uncertain",
-            f"{len(changed)} parameters have 2^{len(changed)} corners; name at most {MOST_CORNERS} in "
-            "check.uncertain, widen theirs, and let check.samples draw",
+            Phrase(template, count=len(changed), most=MOST_CORNERS),
         )
     if spec.check.foreign is None:
         return
@@ -190,14 +219,18 @@ def _axis_limits(spec: Spec, plant: Plant) -> Iterator[Fault]:
     for column, _ in enumerate(plant.actuated):
         own = limits.of(column)
         if own.velocity is not None and abs(move.final_velocity[column]) > own.velocity:
-            problem = f"must keep limits.velocity ({own.velocity:g}), found {list(move.final_velocity)}"
+            template = "must keep limits.velocity ({velocity:g}), found {found}"
+            problem = Phrase(template, velocity=own.velocity, found=list(move.final_velocity))
             yield "move.final_velocity", problem
         if own.travel is None:
             continue
         low, high = own.travel
         for key, ends in (("start", move.start), ("target", move.target)):
             if not low <= ends[column] <= high:
-                yield limits.place(column, "travel"), f"must contain the move's {key}, found {[low, high]}"
+                yield (
+                    limits.place(column, "travel"),
+                    Phrase("must contain the move's {key}, found {found}", key=key, found=[low, high]),
+                )
 
 
 def _units(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -205,7 +238,10 @@ def _units(spec: Spec, plant: Plant) -> Iterator[Fault]:
     for axis in plant.actuated:
         unit = spec.axis[axis.name].unit if axis.name in spec.axis else axis.unit
         if unit in UNITS and UNITS[unit][0] != axis.unit:
-            yield f"axis.{axis.name}.unit", f"{unit!r} does not measure an axis that moves in {axis.unit}"
+            yield (
+                f"axis.{axis.name}.unit",
+                Phrase("{unit} does not measure an axis that moves in {own}", unit=repr(unit), own=axis.unit),
+            )
 
 
 def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -214,13 +250,13 @@ def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:
     for name, (low, high) in spec.planner.live.items():
         least = {one.name: one.lower for one in known}[name]
         if low < least > 1e-3 * high:
-            problem = f"begins below the least that the machine takes, {least:g}"
+            problem = Phrase("begins below the least that the machine takes, {least:g}", least=least)
             yield place("planner.live", name), problem
     live = spec.planner.live
     for key in ("live_rate", "live_noise"):
         for name in getattr(spec.planner, key):
             if name not in live:
-                problem = f"not among planner.live{suggestion(name, live)}"
+                problem = Phrase("not among planner.live{hint}", hint=suggestion(name, live))
                 yield place(f"planner.{key}", name), problem, place("planner.live", name)
 
 

@@ -15,7 +15,8 @@ from typing import Annotated, Any, ClassVar, Union, get_args, get_origin, get_ty
 import attrs
 
 from gen_profile.errors import SpecError
-from gen_profile.spec.values import NONE, Named, Words, found
+from gen_profile.phrase import Phrase, placed
+from gen_profile.spec.values import NONE, Named, Words
 from gen_profile.suggestion import suggestion
 
 Kind = Any  # an annotation
@@ -44,7 +45,7 @@ class Faults:
         It is no fault of its own where something is wrong at its causes, which are places, too.
         """
         if not any(self._told(one) for one in (place, *causes)):
-            self._sentences[place] = f"{place}: {problem}{'' if problem.endswith(('?', '.')) else '.'}"
+            self._sentences[place] = placed(place, problem)
 
     def _told(self, place: str) -> bool:
         """Whether something is wrong at a place, around it or inside it."""
@@ -79,7 +80,9 @@ class Structurer:
     faults: Faults
     names: Mapping[str, Mapping[str, Kind]] = NONE
 
-    def fit(self, value: Any, kind: Kind, where: str, otherwise: Any = MISFIT, words: str = "") -> Any:
+    def fit(
+        self, value: Any, kind: Kind, where: str, otherwise: Any = MISFIT, words: Words | None = None
+    ) -> Any:
         """Hold a value to an annotation.
 
         Parameters
@@ -91,8 +94,8 @@ class Structurer:
             The value's place in the spec.
         otherwise
             Stands in for a value that does not fit.
-        words : str
-            What to say of it, as `Words` does.
+        words : Words, optional
+            What to say of it.
         """
         origin: Any = get_origin(kind)
         if origin in (Union, UnionType):
@@ -110,26 +113,31 @@ class Structurer:
         """Leave out what has other names than these, and tell."""
         names = list(names)
         for key in sorted(set(table).difference(names)):
-            self.faults.add(place(where, key), f"unknown {word}{suggestion(key, names)}")
+            self.faults.add(
+                place(where, key),
+                Phrase("unknown {word}{hint}", word=word, hint=suggestion(key, names)),
+            )
         return {key: value for key, value in table.items() if key in names}
 
-    def _misfit(self, where: str, problem: str, value: Any) -> Any:
-        self.faults.add(where, problem.replace("FOUND", found(value)))
+    def _misfit(self, where: str, words: Words | None, form: str, value: Any) -> Any:
+        """Say that a value does not fit, by words of its own or by the form that it must have."""
+        self.faults.add(where, (words or Words("must be {form}, found {found}", form=form)).of(value))
         return MISFIT
 
-    def _constrained(self, value: Any, inner: tuple[Any, ...], where: str, words: str) -> Any:
+    def _constrained(self, value: Any, inner: tuple[Any, ...], where: str, words: Words | None) -> Any:
         kind, *constraints = inner
-        words = next((one.sentence for one in constraints if isinstance(one, Words)), words)
+        words = next((one for one in constraints if isinstance(one, Words)), words)
         fitted = self.fit(value, kind, where, words=words)
         for one in constraints:
             if fitted is not MISFIT and hasattr(one, "problem") and (problem := one.problem(fitted, value)):
-                return self._misfit(where, words or problem, value)
+                self.faults.add(where, words.of(value) if words else problem)
+                return MISFIT
         return fitted
 
-    def _mapping(self, value: Any, kinds: tuple[Kind, ...], where: str, words: str) -> Any:
+    def _mapping(self, value: Any, kinds: tuple[Kind, ...], where: str, words: Words | None) -> Any:
         """Fit what is stated by names of the machine."""
         if not isinstance(value, Mapping):
-            return self._misfit(where, words or "must be a table, found FOUND", value)
+            return self._misfit(where, words, FORMS[Mapping], value)
         key, kind = kinds
         (named,) = (one for one in key.__metadata__ if isinstance(one, Named))
         names = self.names.get(named.of or named.word, dict.fromkeys(value))
@@ -138,30 +146,30 @@ class Structurer:
         fitted = {name: self.fit(stated[name], names[name] or kind, place(where, name)) for name in order}
         return MappingProxyType({name: one for name, one in fitted.items() if one is not MISFIT})
 
-    def _tuple(self, value: Any, kinds: tuple[Kind, ...], where: str, words: str) -> Any:
+    def _tuple(self, value: Any, kinds: tuple[Kind, ...], where: str, words: Words | None) -> Any:
         value = value.tolist() if hasattr(value, "tolist") else value
         many = Ellipsis in kinds
         if not isinstance(value, list | tuple) or (not many and len(value) != len(kinds)):
-            form = "an array" if many else f"an array of {len(kinds)} numbers"
-            return self._misfit(where, words or f"must be {form}, found FOUND", value)
+            form = "an array" if many else Phrase("an array of {kinds} numbers", kinds=len(kinds))
+            return self._misfit(where, words, form, value)
         if many:
             fitted = [self.fit(one, kinds[0], place(where, index)) for index, one in enumerate(value)]
         else:
             fitted = [self.fit(one, kind, where, words=words) for one, kind in zip(value, kinds, strict=True)]
         return MISFIT if MISFIT in fitted else tuple(fitted)
 
-    def _choice(self, value: Any, choices: tuple[Any, ...], where: str, _: str) -> Any:
+    def _choice(self, value: Any, choices: tuple[Any, ...], where: str, _: Words | None) -> Any:
         if any(type(choice) is type(value) and choice == value for choice in choices):
             return value
-        problem = f"unknown value, found FOUND{suggestion(str(value), map(str, choices))}"
-        return self._misfit(where, problem, value)
+        hint = suggestion(str(value), map(str, choices))
+        return self._misfit(where, Words("unknown value, found {found}{hint}", hint=hint), "", value)
 
     def _table(self, value: Any, kind: Kind, where: str) -> Any:
         """Make an instance of one of the spec's classes; fields that do not fit take their defaults."""
         if isinstance(value, kind):
             return value
         if not isinstance(value, Mapping):
-            value = self._misfit(where, "must be a table, found FOUND", value) and {}
+            value = self._misfit(where, None, FORMS[Mapping], value) and {}
         kinds = kinds_of(kind)
         stated = self.known(value, kinds, where)
         for key in sorted(required(kind) - stated.keys()):
@@ -170,13 +178,13 @@ class Structurer:
         sound = {key: one for key, one in fitted.items() if one is not MISFIT}
         return kind(**sound) if required(kind) <= sound.keys() else MISFIT
 
-    def _scalar(self, value: Any, kind: type, where: str, words: str) -> Any:
+    def _scalar(self, value: Any, kind: type, where: str, words: Words | None) -> Any:
         value = value.tolist() if hasattr(value, "tolist") else value  # NumPy's
         is_one = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
         fitted = finite(value) if kind is float else value if is_one else None
         if fitted is None:
             form = FORMS.get(kind, f"a {kind.__name__}")
-            return self._misfit(where, words or f"must be {form}, found FOUND", value)
+            return self._misfit(where, words, form, value)
         return fitted
 
 

@@ -5,7 +5,6 @@ Here stands how things may be stated, and whatever the machine fills in: its par
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,6 +12,7 @@ from typing import Annotated, Any
 import attrs
 
 from gen_profile.errors import SpecError
+from gen_profile.phrase import Phrase
 from gen_profile.plants.machine_file import MachineFile, plant_of_file, read_machine_file
 from gen_profile.plants.plant import Coordinate, Parameter, Plant
 from gen_profile.plants.registry import find_plant, plant_types
@@ -21,7 +21,7 @@ from gen_profile.spec.external_fmu import external_fmu
 from gen_profile.spec.model import RESIDUAL_SHARE, AxisSpec, CheckSpec, MoveSpec, PlantSpec, Spec, Sway
 from gen_profile.spec.rules import broken_rules
 from gen_profile.spec.structure import MISFIT, Faults, Structurer, kinds_of, place
-from gen_profile.spec.values import NONE, Bounds, Distance, Duration, Positive, Rising, Words, found
+from gen_profile.spec.values import NONE, Bounds, Distance, Duration, Positive, Rising, Words, between, found
 from gen_profile.suggestion import listed, meant, suggestion
 
 Table = dict[str, Any]
@@ -58,7 +58,9 @@ def structure(document: Mapping[str, Any], folder: Path) -> Spec:
     faults = Faults()
     for key in REQUIRED:
         if key not in document:
-            faults.add(key, f"the spec must state [{key}]; a real machine has no default here")
+            faults.add(
+                key, Phrase("the spec must state [{key}]; a real machine has no default here", key=key)
+            )
     plain = Structurer(faults)
     written = {key: dict(plain.fit(document.get(key, {}), Mapping, key, NONE)) for key in TABLES}
     file, plant = _machine(written["plant"], folder, faults)
@@ -103,7 +105,9 @@ def _misplaced(document: Mapping[str, Any], plant: Plant | None, faults: Faults)
             if key in parameters and table in ("robustness", "check"):
                 homes = [f"{table}.uncertain.{key}"]
             if homes and key not in (keys[table] if table else ("name", *TABLES)):
-                faults.add(place(table, key), f"unknown key; did you mean {listed(homes)}?")
+                faults.add(
+                    place(table, key), Phrase("unknown key; did you mean {names}?", names=listed(homes))
+                )
 
 
 def _machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | None, Plant | None]:
@@ -113,14 +117,16 @@ def _machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | 
         try:
             if isinstance(type_, str):
                 return None, find_plant(type_)
-            problem = f"must name a machine, found {found(type_)}{suggestion('', plant_types())}"
+            template = "must name a machine, found {found}{hint}"
+            problem = Phrase(template, found=found(type_), hint=suggestion("", plant_types()))
         except KeyError:
-            problem = f"unknown machine {str(type_)[:60]!r}{suggestion(str(type_), plant_types())}"
+            template = "unknown machine {name}{hint}"
+            problem = Phrase(template, name=repr(str(type_)[:60]), hint=suggestion(str(type_), plant_types()))
         faults.add("plant.type", problem)
     elif not isinstance(name, str):
-        faults.add("plant.file", f"must name a Python file, found {found(name)}")
+        faults.add("plant.file", Phrase("must name a Python file, found {found}", found=found(name)))
     elif not isinstance(sha256, str | None):
-        faults.add("plant.file_sha256", f"must be text, found {found(sha256)}")
+        faults.add("plant.file_sha256", Phrase("must be text, found {found}", found=found(sha256)))
     else:
         try:
             file = read_machine_file(folder / name, sha256)
@@ -129,7 +135,8 @@ def _machine(table: Table, folder: Path, faults: Faults) -> tuple[MachineFile | 
             faults.add("plant.file", str(error).removeprefix("plant.file: ").removesuffix("."))
             return None, None
         if table.get("type", plant.type) != plant.type:
-            problem = f"{file.name} holds a machine of type {plant.type!r}, found {found(type_)}"
+            template = "{name} holds a machine of type {type}, found {found}"
+            problem = Phrase(template, name=file.name, type=repr(plant.type), found=found(type_))
             faults.add("plant.type", problem)
         return file, plant
     return None, None
@@ -154,16 +161,18 @@ def _span_within(parameter: Parameter) -> Any:
     """Say what the ends of a parameter's range may be."""
     low, high = parameter.lower, parameter.upper
     end = Annotated[float, Bounds(least=low, most=high)]
-    words = f"must be two rising numbers from {low:g} to {high:g} {parameter.unit}"
-    return Annotated[tuple[end, end], Rising(), Words(words)]
+    template = "must be two rising numbers from {low:g} to {high:g} {unit}"
+    words = Words(template, low=low, high=high, unit=parameter.unit)
+    return Annotated[tuple[end, end], Rising(), words]
 
 
 def _live_within(known: Parameter | Coordinate) -> Any:
     """Say what the ends of a range at run time may be; a rule judges by how little the first is too small."""
     low = Annotated[float, Bounds(least=min(0.0, known.lower))]
     high = Annotated[float, Bounds(above=known.lower, most=known.upper)]
-    words = f"must be two rising numbers from {known.lower:g} to {known.upper:g}, found FOUND"
-    return Annotated[tuple[low, high], Rising(strict=True), Words(words)]
+    template = "must be two rising numbers from {low:g} to {high:g}, found {found}"
+    words = Words(template, low=known.lower, high=known.upper)
+    return Annotated[tuple[low, high], Rising(strict=True), words]
 
 
 def _plant(table: Table, file: MachineFile | None, plant: Plant | None, structurer: Structurer) -> PlantSpec:
@@ -175,8 +184,9 @@ def _plant(table: Table, file: MachineFile | None, plant: Plant | None, structur
     values = {}
     for parameter in plant.parameters:
         name, low, high = parameter.name, parameter.lower, parameter.upper
-        words = f"must be a number from {low:g} to {high:g} {parameter.unit}, found FOUND"
-        kind = Annotated[float, Bounds(least=low, most=high), Words(words)]
+        template = "must be a number from {low:g} to {high:g} {unit}, found {found}"
+        words = Words(template, low=low, high=high, unit=parameter.unit)
+        kind = Annotated[float, Bounds(least=low, most=high), words]
         value = given.get(name, parameter.nominal)
         values[name] = structurer.fit(value, kind, f"plant.{name}", parameter.nominal)
     defaults = tuple(name for name in values if name not in given)
@@ -209,7 +219,17 @@ def _move(table: Table, plant: Plant | None, structurer: Structurer) -> MoveSpec
         for axis, value in zip(plant.actuated if plant else (), values, strict=False):
             if not axis.lower <= value <= axis.upper:
                 cure = "; a distance begins at 0, so state start and target" * (key == "distance")
-                faults.add(f"move.{key}", f"{axis.name} must be {_between(axis)}, found {value:g}{cure}")
+                template = "{name} must be {form}, found {found:g}{cure}"
+                faults.add(
+                    f"move.{key}",
+                    Phrase(
+                        template,
+                        name=axis.name,
+                        form=between({"at least": axis.lower, "at most": axis.upper}, axis.unit),
+                        found=value,
+                        cure=cure,
+                    ),
+                )
     kinds = kinds_of(MoveSpec)
     return MoveSpec(
         start=start,
@@ -222,12 +242,6 @@ def _move(table: Table, plant: Plant | None, structurer: Structurer) -> MoveSpec
     )
 
 
-def _between(axis: Coordinate) -> str:
-    """Say where an axis may be."""
-    limits = {"at least": axis.lower, "at most": axis.upper}
-    return " and ".join(f"{word} {at:g} {axis.unit}" for word, at in limits.items() if math.isfinite(at))
-
-
 def _duration(table: Table, structurer: Structurer) -> Table:
     """Tell whether the duration is to be found; its place is then held by a number."""
     duration, shortest = table.get("duration"), False
@@ -235,8 +249,9 @@ def _duration(table: Table, structurer: Structurer) -> Table:
         structurer.faults.add("move.duration", "required, but missing")
     elif isinstance(duration, str):
         shortest = duration == "minimum"
-        near = "; did you mean 'minimum'?" * bool(meant(duration, ["minimum"]))
-        problem = f'must be a number of seconds, or "minimum", found {found(duration)}{near}'
+        near = Phrase("; did you mean {names}?", names="'minimum'") if meant(duration, ["minimum"]) else ""
+        template = 'must be a number of seconds, or "minimum", found {found}{near}'
+        problem = Phrase(template, found=found(duration), near=near)
         if not shortest:
             structurer.faults.add("move.duration", problem)
         duration = PLACEHOLDER_DURATION
@@ -251,7 +266,9 @@ def _per_axis(
     values = value if isinstance(value, list | tuple) else [value]
     harmless = (otherwise,) * len(axes or values)
     if axes is not None and len(values) != len(axes):
-        problem = f"must hold one number per axis ({', '.join(axes)}), found {len(values)}"
+        problem = Phrase(
+            "must hold one number per axis ({axes}), found {count}", axes=", ".join(axes), count=len(values)
+        )
         structurer.faults.add(where, problem)
         return harmless
     numbers = [structurer.fit(one, float, where) for one in values]
@@ -321,7 +338,7 @@ def _named(axis: str, table: Table, faults: Faults) -> Table:
     if not bare or not isinstance(own, Mapping):
         return table
     for key in sorted(bare.keys() & own.keys()):
-        faults.add(place("axis", key), f"stands in axis.{axis}, too; state one of them")
+        faults.add(place("axis", key), Phrase("stands in axis.{axis}, too; state one of them", axis=axis))
     return {**{key: value for key, value in table.items() if key not in bare}, axis: {**bare, **own}}
 
 
@@ -330,7 +347,7 @@ def _of_several(axes: Sequence[str], table: Table, faults: Faults) -> Table:
     bare = table.keys() & {*kinds_of(AxisSpec)} - {*axes}
     for key in sorted(bare):
         places = ", ".join(place(place("axis", axis), key) for axis in axes)
-        faults.add(place("axis", key), f"state it of each axis: {places}")
+        faults.add(place("axis", key), Phrase("state it of each axis: {places}", places=places))
     return {key: value for key, value in table.items() if key not in bare}
 
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 import attrs
 
+from gen_profile.phrase import Phrase
 from gen_profile.suggestion import number_meant
 
 NONE: Mapping[str, Any] = MappingProxyType({})  # a default
@@ -31,9 +32,9 @@ class Bounds:
         """Say what a number must be; nothing where it is."""
         if value > self.above and self.least <= value <= self.most:
             return ""
-        words = {"greater than": self.above, "at least": self.least, "at most": self.most}
-        stated = [f"{word} {bound:g}" for word, bound in words.items() if math.isfinite(bound)]
-        return f"must be {' and '.join(stated)}{self.meaning and f' {self.meaning}'}, found {found(value)}"
+        bounds = between({"greater than": self.above, "at least": self.least, "at most": self.most})
+        form = Phrase("{bounds} {meaning}", bounds=bounds, meaning=self.meaning) if self.meaning else bounds
+        return Phrase("must be {form}, found {found}", form=form, found=found(value))
 
 
 @attrs.frozen
@@ -46,7 +47,7 @@ class Pattern:
     def problem(self, value: str, _: object) -> str:
         """Say what a text must be; nothing where it is."""
         fits = re.fullmatch(self.expression, value)
-        return "" if fits else f"must be {self.meaning}, found {found(value)}"
+        return "" if fits else Phrase("must be {form}, found {found}", form=self.meaning, found=found(value))
 
 
 @attrs.frozen
@@ -61,20 +62,24 @@ class Rising:
         low, high = value
         if low < high or (low == high and not self.strict):
             return ""
-        meaning = self.meaning or f"numbers, such as {[high, low]}"
-        return f"must be two rising {meaning}, found {list(written)}"
+        meaning = self.meaning or Phrase("numbers, such as {example}", example=[high, low])
+        return Phrase("must be two rising {meaning}, found {found}", meaning=meaning, found=list(written))
 
 
-@attrs.frozen
 class Words:
-    """What to say of whatever does not fit; ``FOUND`` in it stands for the value."""
+    """What to say of whatever does not fit: a template with its values, besides ``{found}``."""
 
-    sentence: str
+    def __init__(self, template: str, **values: Any) -> None:
+        self._template, self._values = template, values
+
+    def of(self, value: object) -> Phrase:
+        """Say it of a value."""
+        return Phrase(self._template, **self._values, found=found(value))
 
 
 def example(toml: str) -> Words:
     """Show what a table may hold, in TOML, to who states something else."""
-    return Words(f"must be a table such as {{ {toml} }}, found FOUND")
+    return Words("must be a table such as {{ {toml} }}, found {found}", toml=toml)
 
 
 @attrs.frozen
@@ -84,6 +89,14 @@ class Named:
     word: str  # such as "axis"
     of: str = ""  # what is stated by these names, where the machine says what that may be
     reorder: bool = True  # into the machine's order, so that the one they are written in means nothing
+
+
+def between(limits: Mapping[str, float], unit: str = "") -> str:
+    """Say what a number must be, such as ``at least 1 m and at most 2 m``, by limits that are finite."""
+    template = "{word} {bound:g} {unit}" if unit else "{word} {bound:g}"
+    finite = {word: bound for word, bound in limits.items() if math.isfinite(bound)}
+    stated = [Phrase(template, word=word, bound=bound, unit=unit) for word, bound in finite.items()]
+    return stated[0] if len(stated) == 1 else Phrase("{low} and {high}", low=stated[0], high=stated[1])
 
 
 def found(value: object) -> str:
@@ -98,7 +111,7 @@ def found(value: object) -> str:
         case int() | float():
             return repr(value)
         case str():
-            return f"text {value[:60]!r}{number_meant(value)}"
+            return Phrase("text {text}{hint}", text=repr(value[:60]), hint=number_meant(value))
         case Mapping():
             return "a table"
         case list() | tuple():

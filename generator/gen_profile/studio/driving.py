@@ -42,7 +42,7 @@ def drive(asked: DriveQuestion) -> Iterator[Part]:
     try:
         yield _going(asked).moment(asked)
     except GenProfileError as error:
-        yield {"part": "undriven", "faults": [fault(sentence) for sentence in str(error).splitlines()]}
+        yield {"part": "undriven", "faults": [fault(sentence) for sentence in error.sentences]}
 
 
 _drives: dict[int, Drive] = {}  # the one that this process is at, by its number

@@ -34,7 +34,7 @@ def files(order: Order) -> Iterator[Part]:
         try:
             told.put(_made(order, tell))
         except GenProfileError as error:
-            told.put({"part": "made", "passed": False, "sentences": str(error).splitlines(), "file": None})
+            told.put({"part": "made", "passed": False, "sentences": error.sentences, "file": None})
         except Exception as error:
             sentence = f"Internal error ({type(error).__name__}: {error})."
             told.put({"part": "made", "passed": False, "sentences": [sentence], "file": None})

@@ -22,6 +22,7 @@ from gen_profile.identification.measurements import SwingLog, cut_swing
 from gen_profile.report.log import MeasuredLog, column_meanings, parse_log
 from gen_profile.report.measured import compare_measured
 from gen_profile.report.measured_section import measured_section, measured_verdict
+from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import Spec
 from gen_profile.studio.curves_json import curves_json
 from gen_profile.studio.orders import LogQuestion
@@ -45,16 +46,16 @@ def log(asked: LogQuestion) -> Iterator[Part]:
             read = parse_log(text, asked.name, spec, asked.columns)
         except OutputError as error:
             yield _reading(asked, spec, columns, asked.use or "swing")
-            yield {"part": "unread", "sentences": [str(error)]}
+            yield {"part": "unread", "sentences": error.sentences}
             return
         use = asked.use or ("move" if _is_move(spec, read) else "swing")
         yield _reading(asked, spec, columns, use)
         places = _places(asked.columns, columns)
         yield _move(asked, spec, read) if use == "move" else _swing(asked, spec, read, places)
     except OutOfWork:
-        yield {"part": "unread", "sentences": ["The search for a motion was given up, for it took too long."]}
+        yield {"part": "unread", "sentences": [Status.GIVEN_UP.value]}
     except GenProfileError as error:
-        yield {"part": "unread", "sentences": str(error).splitlines()}
+        yield {"part": "unread", "sentences": error.sentences}
 
 
 def _is_move(spec: Spec, read: MeasuredLog) -> bool:
@@ -113,7 +114,8 @@ def _only_swing(read: MeasuredLog, after: float) -> SwingLog:
     for quantity, signals in (("angle", read.angles), ("sway", read.sways)):
         for load, values in signals.items():
             return cut_swing(read.times, values, read.source, after=after, quantity=quantity, load=load)
-    raise OutputError(f"{read.source}: no column is told to be a sway or an angle of a load; choose one.")
+    template = "{source}: no column is told to be a sway or an angle of a load; choose one."
+    raise OutputError(template, source=read.source)
 
 
 def _places(chosen: str | None, columns: Sequence[tuple[str, str]]) -> dict[str, str]:

@@ -19,6 +19,7 @@ from gen_profile.errors import GenProfileError, NoMotion, SpecError
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation, keeps_residual_sway, sketch
 from gen_profile.evaluation.phrases import machine, move, place_unit
 from gen_profile.motion.metrics import extremes, greatest, peak
+from gen_profile.phrase import PLACED, Phrase
 from gen_profile.problem.limits import ROUNDING
 from gen_profile.report.actors import animation
 from gen_profile.solvers.method_selection import ANSWER
@@ -178,10 +179,12 @@ def _failure(question: Question, error: Exception) -> Iterator[Part]:
     yield failure(answer, sentences, [one.values for one in suggestions])
 
 
-def fault(sentence: str) -> dict[str, str]:
+def fault(sentence: str) -> Part:
     """Tell the place in a spec from what is wrong there."""
-    place, colon, problem = sentence.partition(": ")
-    return {"place": place, "sentence": problem} if colon else {"place": "", "sentence": sentence}
+    if not isinstance(sentence, Phrase) or sentence.template != PLACED:
+        return {"place": "", "sentence": sentence}
+    rest = {name: value for name, value in sentence.values.items() if name != "place"}
+    return {"place": sentence.values["place"], "sentence": Phrase("{problem}{end}", **rest)}
 
 
 def point(method: str, figures: Mapping[str, float]) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def failure(answer: str, sentences: Sequence[str], cures: Sequence[Mapping[str, 
     return {
         "part": "failure",
         "answer": answer,
-        "sentences": [plain(sentence) for sentence in sentences],
+        "sentences": [*sentences],
         "cures": [dict(one) for one in cures],
     }
 
@@ -224,7 +224,7 @@ def _answer(connection: Connection, job: Job) -> None:
     connection.send(Message(number=job.number, kind=job.kind, name=BEGUN))
     for part in _parts(job):
         file, told = part.get("file"), {**part, "of": job.kind, "serial": job.number}
-        text = json.dumps(told if file is None else {**told, "file": None}, separators=(",", ":"))
+        text = json.dumps(plain(told if file is None else {**told, "file": None}), separators=(",", ":"))
         connection.send(Message(number=job.number, kind=job.kind, name=part["part"], text=text, file=file))
         if connection.poll(FRAME if part["part"] == "curves" else 0.0):
             return

@@ -168,7 +168,7 @@ def _wanted(grid: Grid, asked: Mapping[str, str]) -> dict[str, Any]:
     """Read what was asked for, as the table's cells hold it."""
     axes = {axis.key: axis for axis in grid.axes}
     faults = [
-        f"--{key}: the sweep did not vary this{suggestion(key, axes)}" for key in asked if key not in axes
+        f"{key}: the sweep did not vary this{suggestion(key, axes)}" for key in asked if key not in axes
     ]
     wanted = {}
     for key, axis in axes.items():
@@ -183,18 +183,18 @@ def _wanted(grid: Grid, asked: Mapping[str, str]) -> dict[str, Any]:
 
 def _value(axis: GridAxis, text: str | None) -> float | str:
     if text is None:
-        raise SpecError(f"--{axis.key}: state it, {_range(axis)} were swept.")
+        raise SpecError(f"{axis.key}: state it, {_range(axis)} were swept.")
     if not axis.numeric:
         known = [str(cell(axis, value)) for value in axis.values]
         if text not in known:
-            raise SpecError(f"--{axis.key}: not among the values swept{suggestion(text, known)}")
+            raise SpecError(f"{axis.key}: not among the values swept{suggestion(text, known)}")
         return text
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise SpecError(f"--{axis.key}: must be a finite number, found {text[:60]!r}{number_meant(text)}.")
+        raise SpecError(f"{axis.key}: must be a finite number, found {text[:60]!r}{number_meant(text)}.")
     return value
 
 
@@ -227,7 +227,7 @@ def _near(grid: Grid, table: Table, wanted: Mapping[str, Any]) -> tuple[list[int
 def _require_within(grid: Grid, wanted: Mapping[str, Any], nearest: Mapping[str, Any]) -> None:
     """Refuse what lies beyond the values swept: however near the last of them is, it is another."""
     beyond = [
-        f"--{axis.key} {wanted[axis.key]:g}: beyond the grid, {_range(axis)} were swept."
+        f"{axis.key} {wanted[axis.key]:g}: beyond the grid, {_range(axis)} were swept."
         for axis in grid.axes
         if axis.numeric and not min(axis.values) <= wanted[axis.key] <= max(axis.values)
     ]

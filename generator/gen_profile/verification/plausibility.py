@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gen_profile.motion.profile import Array, SampledProfile
+from gen_profile.phrase import Phrase
 from gen_profile.spec.model import Spec
 
 TARGET_TOLERANCE = 1e-6  # of the axis' move, beside the artefact's own resolution
@@ -61,10 +62,11 @@ def _missed_ends(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
     ):
         for axis, at, due, tolerance in zip(spec.machine().actuated, found, asked, allowed, strict=True):
             if abs(at - due) > tolerance:
-                yield (
-                    f"Axis {axis.name} {word} at {at:.9g} {axis.unit}, "
-                    f"and the spec asks for {due:.9g} {axis.unit}."
+                template = (
+                    "Axis {axis.name} {word} at {at:.9g} {axis.unit}, and the spec asks for {due:.9g} "
+                    "{axis.unit}."
                 )
+                yield (Phrase(template, axis=axis, word=word, at=at, due=due))
 
 
 def _missed_time(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
@@ -100,10 +102,11 @@ def _contradiction(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
     worst, column = np.unravel_index(apart.argmax(), apart.shape)
     found, axis = apart[worst, column], spec.machine().actuated[column]
     if found > VELOCITY_TOLERANCE * size + noise + _missed_by_central(setpoints.velocity, central):
-        yield (
-            f"The velocity at {setpoints.times[worst + 1]:.6g} s contradicts the positions around it by "
-            f"{found:.3g} {axis.unit}/s: the artefact was altered; export it again."
+        template = (
+            "The velocity at {time:.6g} s contradicts the positions around it by {found:.3g} "
+            "{unit}/s: the artefact was altered; export it again."
         )
+        yield (Phrase(template, time=setpoints.times[worst + 1], found=found, unit=axis.unit))
 
 
 def _central(spec: Spec, setpoints: SampledProfile) -> Array:
@@ -140,11 +143,12 @@ def _off_their_places(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
         )
         if bend[worst] > STANDS_OUT * usual + unsure:
             there, elsewhere = bend[worst] / setpoints.cycle_time, usual / setpoints.cycle_time
-            yield (
-                f"The setpoint of {axis.name} at {setpoints.times[worst]:.6g} s lies off the others: the "
-                f"velocity changes there by {there:.3g} {axis.unit}/s in a cycle, elsewhere by "
-                f"{elsewhere:.3g} {axis.unit}/s at most; the artefact was altered: export it again."
+            template = (
+                "The setpoint of {axis.name} at {time:.6g} s lies off the others: the velocity "
+                "changes there by {there:.3g} {axis.unit}/s in a cycle, elsewhere by {elsewhere:.3g} "
+                "{axis.unit}/s at most; the artefact was altered: export it again."
             )
+            yield (Phrase(template, axis=axis, time=setpoints.times[worst], there=there, elsewhere=elsewhere))
 
 
 def _exceeded_limits(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
@@ -163,9 +167,20 @@ def _exceeded_limits(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
             found = float(played[worst, column])
             if allowed is not None and found > (1.0 + overshoot) * allowed + rounding[column]:
                 unit = f"{axis.unit}/s" if order == 1 else f"{axis.unit}/s²"
+                template = (
+                    "The setpoints ask {name} for {found:.4g} {unit} at {time:.6g} s, and {place} "
+                    "allows {allowed:.4g} {unit}."
+                )
                 yield (
-                    f"The setpoints ask {axis.name} for {found:.4g} {unit} at {times[worst]:.6g} s, and "
-                    f"{spec.limits.place(column, name)} allows {allowed:.4g} {unit}."
+                    Phrase(
+                        template,
+                        name=axis.name,
+                        found=found,
+                        unit=unit,
+                        time=times[worst],
+                        place=spec.limits.place(column, name),
+                        allowed=allowed,
+                    )
                 )
 
 

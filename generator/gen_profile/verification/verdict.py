@@ -10,6 +10,7 @@ import numpy as np
 
 from gen_profile.errors import CheckFailed
 from gen_profile.evaluation.scenarios import GROUPS, SEARCH, TIMING, Scenario
+from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import SWAY_TOLERANCE
 
 QUANTILES = (0.5, 0.9, 0.99)
@@ -157,7 +158,10 @@ class Check(Examination):
     def warnings(self) -> tuple[str, ...]:
         """Say what is wrong without counting: doubtful values, faults of timing."""
         timing = () if self.strict else self.groups.get(TIMING, ())
-        late = (f"{sentence} It counts where the check is strict." for sentence in self._sentences(timing))
+        late = (
+            Phrase("{sentence} It counts where the check is strict.", sentence=sentence)
+            for sentence in self._sentences(timing)
+        )
         return (*self.doubts, *late)
 
     def _sentences(self, findings: Sequence[Finding]) -> Iterator[str]:
@@ -166,18 +170,36 @@ class Check(Examination):
             return
         load, finding = self.worst_of(findings)
         if self._share_after(finding, load) > 1.0:
+            template = (
+                "The {load} sways by {found:.4g} mm after the move ({name}), and {limit:.4g} mm "
+                "are allowed (check.residual_sway; numerical error up to {error})."
+            )
             yield (
-                f"The {load} sways by {1e3 * finding.residual[load]:.4g} mm after the move "
-                f"({finding.scenario.name}), and {1e3 * self.limit[load]:.4g} mm are allowed "
-                f"(check.residual_sway; numerical error up to {self._error()})."
+                Phrase(
+                    template,
+                    load=load,
+                    found=1e3 * finding.residual[load],
+                    name=finding.scenario.name,
+                    limit=1e3 * self.limit[load],
+                    error=self._error(),
+                )
             )
         swaying = max(findings, key=self._share_on_the_way)
         if self.sway_limit is not None and self._share_on_the_way(swaying) > 1.0:
+            template = (
+                "The {load} sways by {found:.4g} mm on the way ({name}), and "
+                "{limit:.4g} mm are allowed (limits.sway; numerical error up to {error}); allow "
+                "more, take more time, or narrow the ranges."
+            )
             yield (
-                f"The {self._end_load_name()} sways by {1e3 * (swaying.on_the_way or 0.0):.4g} mm on the way "
-                f"({swaying.scenario.name}), and {1e3 * self.sway_limit:.4g} mm are allowed "
-                f"(limits.sway; numerical error up to {self._error()}); "
-                "allow more, take more time, or narrow the ranges."
+                Phrase(
+                    template,
+                    load=self._end_load_name(),
+                    found=1e3 * (swaying.on_the_way or 0.0),
+                    name=swaying.scenario.name,
+                    limit=1e3 * self.sway_limit,
+                    error=self._error(),
+                )
             )
 
     def _error(self) -> str:

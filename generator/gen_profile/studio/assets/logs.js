@@ -143,7 +143,7 @@ const logs = (() => {
 
   // what it tells -------------------------------------------------------------------------------------------
 
-  const sentences = (list, kind = "") => list.map((one) => element("p", { class: kind }, one));
+  const sentences = (list, kind = "") => list.map((one) => element("p", { class: kind }, page.phrase(one)));
 
   function tell(...parts) {
     $("tells").replaceChildren(...parts);
@@ -170,12 +170,12 @@ const logs = (() => {
     identified(part) {
       const button = element("button", { type: "button", class: "main" }, page.phrase("field.take"));
       button.addEventListener("click", () => page.edit(part.edits));
-      tell(...listed(part), ...sentences(part.warnings.map((one) => `${page.phrase("beware")}: ${one}.`)), button, command(part.command));
+      tell(...listed(part), ...sentences(part.warnings.map((one) => `${page.phrase("beware")}: ${page.phrase(one)}.`)), button, command(part.command));
       curves.draw($("logged"), part.panels, page.drawing({ alone: true }));
     },
     measured(part) {
       const [verdict, ...others] = part.sentences;
-      tell(element("p", { class: part.passed === null ? "" : part.passed ? "good" : "bad" }, verdict), ...sentences(others), command(part.command));
+      tell(element("p", { class: part.passed === null ? "" : part.passed ? "good" : "bad" }, page.phrase(verdict)), ...sentences(others), command(part.command));
       curves.draw($("logged"), part.panels, page.drawing());
     },
     unread(part) {

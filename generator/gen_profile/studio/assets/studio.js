@@ -3,7 +3,7 @@
 (async () => {
   const $ = (id) => document.getElementById(id);
   const { element } = knobs;
-  const { phrase, filled, placed, loaded, reason } = words;
+  const { phrase, filled, placed, loaded } = words;
   await words.load();
   const COME_BACK = 2000; // ms between looks whether the studio is there again
   const ONCE = new Set(["hello", "state", "opened", "consent"]); // parts that do something: no other language shows them again
@@ -158,7 +158,7 @@
   /** Give the limits' places to the panels that show them, so that they can be dragged. */
   function withLimits(panels, margins) {
     return panels.map((panel) => {
-      const margin = margins.find((one) => panel.title.toLowerCase().startsWith(one.quantity) && (!one.axis || panel.title.endsWith(` ${one.axis}`)));
+      const margin = margins.find((one) => panel.title.values?.quantity?.toLowerCase() === one.quantity && (!one.axis || panel.title.values.name === one.axis));
       return { ...panel, limit: margin && margin.allowed !== null ? { path: margin.place, factor: 1 } : null };
     });
   }
@@ -171,7 +171,7 @@
   }
 
   const ghosts = (panel) => pins.flatMap((pin) => {
-    const same = pin.panels.find((one) => one.title === panel.title);
+    const same = pin.panels.find((one) => JSON.stringify(one.title) === JSON.stringify(panel.title));
     if (!same) return [];
     const [{ y }] = same.curves;
     const at = (time) => {
@@ -274,7 +274,7 @@
     comparison({ missing }) {
       cards.come("comparison", phrase);
       $("missing").hidden = !missing.length;
-      $("missing").querySelector("ul").replaceChildren(...missing.map((one) => element("li", {}, reason(one))));
+      $("missing").querySelector("ul").replaceChildren(...missing.map((one) => element("li", {}, phrase(one))));
       listDesigns();
     },
     consent({ files, changed }) {
@@ -294,7 +294,7 @@
       $("stop").hidden = true;
       const link = file ? [element("a", { href: file.link, download: file.name, class: "main" }, `${file.name} (${Math.ceil(file.bytes / 1024)} kB)`)] : [];
       const verdict = element("p", { class: passed ? "good" : "bad" }, passed ? filled("checked", { scenarios }) : phrase("unchecked"));
-      $("outcome").replaceChildren(verdict, ...sentences.map((one) => element("p", {}, one)), ...link);
+      $("outcome").replaceChildren(verdict, ...sentences.map((one) => element("p", {}, phrase(one))), ...link);
     },
   };
 
