@@ -5,10 +5,8 @@ from __future__ import annotations
 import logging
 import signal
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import Any
 
 import dask
 from distributed import Client, LocalCluster
@@ -16,6 +14,7 @@ from tornado.ioloop import PeriodicCallback
 
 from gen_profile.artefacts.manifest import versions
 from gen_profile.errors import SpecError
+from gen_profile.interrupts import interrupts_collected
 
 # else workers look at their own stack every 10 ms, and remember it for 1000 s: 80 MB; and all look at their
 # event loops every 20 ms, and at the whole computer twice a second
@@ -39,7 +38,7 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
     try:
         cluster: LocalCluster | str
         if scheduler is None:
-            with _undisturbed():
+            with interrupts_collected():  # Dask cannot end processes that are about to start
                 cluster = stack.enter_context(_local_cluster(workers))
             _keep_up(cluster, workers, stack)
         else:
@@ -53,7 +52,7 @@ def client_of(scheduler: str | None, workers: int) -> Iterator[Client]:
             client.run(_ignore_interrupts)  # a terminal sends Ctrl-C to them, too; this process ends them
         yield client
     finally:
-        with _undisturbed():
+        with interrupts_collected():
             stack.close()
 
 
@@ -80,24 +79,6 @@ def _keep_up(cluster: LocalCluster, workers: int, stack: ExitStack) -> None:
     renewal = PeriodicCallback(lambda: cluster.scale(workers), RENEWAL)
     cluster.loop.add_callback(renewal.start)
     stack.callback(cluster.loop.add_callback, renewal.stop)
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Put interruptions off until the block is done: Dask cannot end processes that are about to start."""
-    came: list[int] = []
-    before: dict[int, Any] = {}
-    if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGINT, signal.SIGTERM):
-            if callable(signal.getsignal(number)):
-                before[number] = signal.signal(number, lambda number, _: came.append(number))
-    try:
-        yield
-    finally:
-        for stopping, handler in before.items():
-            signal.signal(stopping, handler)
-        for first in came[:1]:
-            signal.raise_signal(first)
 
 
 def _ignore_interrupts() -> None:

@@ -1,11 +1,12 @@
-"""What other distributions bring along by entry points."""
+"""What other distributions bring along: by entry points, and libraries that extras need."""
 
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint
+from importlib.util import find_spec
 from typing import TypeVar
 
-from gen_profile.errors import SpecError
+from gen_profile.errors import OutputError, SpecError
 
 CURE = "update or uninstall the package that provides it."
 
@@ -38,3 +39,23 @@ def load_plugin(entry: EntryPoint, kind: type[Kind], where: str) -> Kind:
             f"{where} {entry.name!r}: {entry.value} is no {kind.__module__}.{kind.__qualname__}; {CURE}"
         )
     return found
+
+
+def require_installed(what: str, extra: str, *modules: str) -> None:
+    """Refuse what takes libraries that are not installed.
+
+    Parameters
+    ----------
+    what : str
+        Begins the sentence, such as ``"Streaming needs canopen"``.
+    extra : str
+        Of this distribution, that brings them.
+    modules : str
+
+    Raises
+    ------
+    OutputError
+        With the command that installs what is missing.
+    """
+    if any(find_spec(module) is None for module in modules):
+        raise OutputError(f"{what}: pip install 'gen-profile[{extra}]'.")

@@ -14,6 +14,3 @@ class Progress(Protocol):
 
 def no_progress(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
     """Report nothing."""
-
-
-untold = no_progress  # its former name, where it is still imported

@@ -252,7 +252,7 @@ INSTALL = "Error: --plot needs Matplotlib: pip install 'gen-profile[plot]'."
 
 
 def test_without_matplotlib_the_sentence_tells_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setattr("gen_profile.charts.picture.find_spec", lambda _: None)
+    monkeypatch.setattr("gen_profile.plugins.find_spec", lambda _: None)
     outcome = run_here("compare", *FEW, "--plot", tmp_path / "picture.png")
     assert (outcome.code, outcome.errors) == (2, [INSTALL])
 

@@ -331,7 +331,7 @@ def test_a_folder_is_no_file_to_write(tmp_path):
 
 @pytest.mark.parametrize("missing", NEEDED)
 def test_without_its_libraries_the_sentence_tells_what_to_install(monkeypatch, missing):
-    monkeypatch.setattr("gen_profile.report.page.find_spec", lambda name: None if name == missing else name)
+    monkeypatch.setattr("gen_profile.plugins.find_spec", lambda name: None if name == missing else name)
     with pytest.raises(OutputError, match=r"pip install 'gen-profile\[report\]'"):
         require_pages()
 

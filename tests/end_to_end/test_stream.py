@@ -19,6 +19,7 @@ import pytest
 from command_line import PROGRAM, run_here, run_process
 from exporters.can.bench import MS, FakeClock, HastyClock, RigidLoad
 
+from gen_profile import plugins
 from gen_profile.artefacts import writing as delivery
 from gen_profile.artefacts.manifest import parse_manifest
 from gen_profile.streaming import stream as workflow
@@ -344,7 +345,7 @@ def test_a_machine_that_cannot_hold_the_cycle(deployed, monkeypatch):
 
 def test_the_missing_extra_is_a_sentence(deployed, monkeypatch):
     monkeypatch.setattr(
-        workflow, "find_spec", lambda name: None if name == "canopen" else util.find_spec(name)
+        plugins, "find_spec", lambda name: None if name == "canopen" else util.find_spec(name)
     )
     outcome = run_here("stream", deployed / "paper.log", "--dry-run")
     assert (outcome.code, "pip install 'gen-profile[can]'" in outcome.err) == (2, True)

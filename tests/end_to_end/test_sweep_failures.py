@@ -13,11 +13,10 @@ import pytest
 from command_line import run_here
 from distributed import KilledWorker, LocalCluster
 
-from gen_profile import cluster
+from gen_profile import cluster, plugins
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.spec.reading import preset_text
 from gen_profile.sweep import case as sweep_case
-from gen_profile.sweep import plan as sweep_plan
 from gen_profile.sweep import run as workflow
 from gen_profile.sweep.case import failed, run_case
 from gen_profile.sweep.grid import parse_grid
@@ -116,9 +115,7 @@ def test_a_senseless_sweep_is_refused_before_any_work(tmp_path, arguments, sente
 
 
 def test_names_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        sweep_plan, "find_spec", lambda name: None if name == "distributed" else find_spec(name)
-    )
+    monkeypatch.setattr(plugins, "find_spec", lambda name: None if name == "distributed" else find_spec(name))
     outcome = run_here("sweep", *QUICK, "--vary", "plant.L1=1,2", "--out", tmp_path)
     assert (outcome.code, outcome.errors) == (
         2,

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import polynomial
 
 from gen_profile.designs.shape import shaped_motion, shortest_duration
-from gen_profile.errors import InfeasibleProblem, SpecError
+from gen_profile.errors import InfeasibleProblem, OutputError, SpecError
 from gen_profile.motion.metrics import greatest
 from gen_profile.shapers.base_moves import BASES, QUINTIC, SEPTIC, jerk_limited
 from gen_profile.shapers.impulses import SHAPERS
@@ -80,8 +80,8 @@ def test_a_jerk_limited_move_needs_a_limit():
 
 
 def test_without_ruckig_the_sentence_tells_what_to_install(monkeypatch):
-    monkeypatch.setattr("gen_profile.shapers.base_moves.find_spec", lambda _: None)
-    with pytest.raises(SpecError, match=r"pip install 'gen-profile\[ruckig\]'"):
+    monkeypatch.setattr("gen_profile.plugins.find_spec", lambda _: None)
+    with pytest.raises(OutputError, match=r"pip install 'gen-profile\[ruckig\]'"):
         jerk_limited(LimitsSpec(jerk=1.0), [1.0])
 
 

@@ -7,11 +7,11 @@ import pytest
 from generator.crane_problems import crane_problem
 from scipy import sparse
 
+from gen_profile.interrupts import interrupts_collected
 from gen_profile.solvers import method_selection as choice
 from gen_profile.solvers.direct import set_up
 from gen_profile.solvers.direct import solver as direct
 from gen_profile.solvers.direct.conic import ConicProgram
-from gen_profile.solvers.interrupts import interrupts_collected
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import LimitsSpec
 from gen_profile.work import OutOfWork, budget, left, spend

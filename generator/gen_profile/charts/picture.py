@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
@@ -27,6 +26,7 @@ from gen_profile.charts.figure import (
     Style,
 )
 from gen_profile.errors import OutputError
+from gen_profile.plugins import require_installed
 
 # suffix → metadata that keeps the clock out of the file
 METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
@@ -46,8 +46,7 @@ def require_drawable(path: Path) -> None:
     """
     if path.suffix.lower() not in METADATA:
         raise OutputError(f"plot {path}: name a file that ends in {', '.join(METADATA)}.")
-    if find_spec("matplotlib") is None:
-        raise OutputError("plot needs Matplotlib: pip install 'gen-profile[plot]'.")
+    require_installed("plot needs Matplotlib", "plot", "matplotlib")
     require_place(path)
 
 

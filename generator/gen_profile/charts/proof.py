@@ -11,7 +11,7 @@ from gen_profile.charts.curves import TIME
 from gen_profile.charts.figure import INK, PALETTE, Band, Figure, Level, Line, Map, Panel, Style
 from gen_profile.charts.picture import save
 from gen_profile.motion.profile import Array
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.trace import Trace, trace
 from gen_profile.proof.verdict import JudgedHistory, Proof
@@ -23,7 +23,7 @@ COMMAND = Style(colour=PALETTE[1], dash="dash")
 SETPOINT = Style(colour=PALETTE[0])
 
 
-def draw(spec: Spec, text: str, proof: Proof, path: Path, progress: Progress = untold) -> None:
+def draw(spec: Spec, text: str, proof: Proof, path: Path, progress: Progress = no_progress) -> None:
     """Draw the worst history, and the worst residual sway by live parameters where more were judged.
 
     Parameters

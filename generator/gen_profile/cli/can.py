@@ -71,9 +71,9 @@ def list_(interface: str | None, channel: str | None, bitrate: int, as_json: boo
 
 
 def _nodes(port: Port, bitrate: int) -> tuple[IdentifiedNode, ...]:
-    from gen_profile.streaming.stream import require_extra
+    from gen_profile.plugins import require_installed
 
-    require_extra()
+    require_installed("Streaming needs canopen", "can", "canopen")
     from gen_profile_exporters.can.host.clock import SystemClock
     from gen_profile_exporters.can.streaming.discovery import discover
     from gen_profile_exporters.can.streaming.link import Link

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -29,6 +28,7 @@ from gen_profile.cli.options import (
 from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
 from gen_profile.cli.signing import require_signature, sign, sign_option, signed_by_option, signing_key
 from gen_profile.errors import CertificateError, OutputError, SpecError
+from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -345,8 +345,7 @@ def studio(
     as_json: bool,
 ) -> None:
     """Turn every knob of a spec in the browser, and see the swing at once."""
-    if find_spec("tornado") is None:
-        raise OutputError("gen-profile studio needs Tornado: pip install 'gen-profile[studio]'.")
+    require_installed("gen-profile studio needs Tornado", "studio", "tornado")
     from gen_profile.studio.state import changed_start
 
     text, source, folder = chosen.text()

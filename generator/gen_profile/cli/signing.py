@@ -5,13 +5,12 @@ The key is named by the user alone: a spec may be a stranger's.
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import click
 
 from gen_profile.cli.options import InputFile
-from gen_profile.errors import OutputError
+from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,7 +32,7 @@ def signing_key(path: Path | None) -> Key | None:
     """Read the key before there is any work to lose."""
     if path is None:
         return None
-    _require_package()
+    require_installed("Signatures need the package cryptography", "sign", "cryptography")
     from gen_profile.artefacts.signature import secret_key
 
     return secret_key(path)
@@ -50,14 +49,9 @@ def sign(folder: Path, key: Key | None) -> None:
 def require_signature(artefact: Path, public_path: Path | None) -> None:
     """Refuse an artefact that no manifest vouches for which the key has signed."""
     if public_path is not None:
-        _require_package()
+        require_installed("Signatures need the package cryptography", "sign", "cryptography")
         from gen_profile.artefacts.signature import public_key, require_signed
 
         key = public_key(public_path)
         require_signed(artefact, key)
         click.echo(f"Signed by {key.identity}.", err=True)
-
-
-def _require_package() -> None:
-    if find_spec("cryptography") is None:
-        raise OutputError("Signatures need the package cryptography: pip install 'gen-profile[sign]'.")

@@ -15,7 +15,7 @@ from gen_profile.evaluation.motion_evaluation import MotionEvaluation, evaluate,
 from gen_profile.evaluation.phrases import mm
 from gen_profile.motion.profile import Profile
 from gen_profile.phrase import Phrase, joined
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
 
@@ -114,7 +114,7 @@ class Comparison:
 
 
 def compare(
-    spec: Spec | Path | str, progress: Progress = untold, *, own: Sequence[Profile] = ()
+    spec: Spec | Path | str, progress: Progress = no_progress, *, own: Sequence[Profile] = ()
 ) -> Comparison:
     """Try every shaper and variants of the optimal motion on the machines of a spec.
 

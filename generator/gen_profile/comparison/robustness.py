@@ -18,7 +18,7 @@ from gen_profile.evaluation.residual_sway import SHORTEST_WATCH, STANDSTILL
 from gen_profile.motion.actuator import lag_compensated
 from gen_profile.motion.profile import Array, Profile, grid_length, grid_times, read_only
 from gen_profile.problem.linearization import linearize
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
@@ -147,7 +147,7 @@ def robustness(
     own: Sequence[Profile] = (),
     points: int | None = None,
     half_range: float | None = None,
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Robustness:
     """Try shapers and variants of the optimal motion over errors of one or two parameters.
 

@@ -20,7 +20,7 @@ from gen_profile.identification.swing_model import swing_model
 from gen_profile.identification.uncertainty import Uncertainty, uncertainty
 from gen_profile.motion.profile import Array
 from gen_profile.phrase import AND, OR_WITH, Phrase, joined
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 
 CONFIDENCE = 0.99
 UNREST = 2.0  # times farther off at first, from which on the axes may still have moved then
@@ -75,7 +75,7 @@ def estimate(
     names: Sequence[str],
     readings: Sequence[DirectReading | Period],
     logs: Sequence[SwingLog] = (),
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Estimate:
     """Identify parameters.
 

@@ -31,7 +31,7 @@ from gen_profile.identification.uncertainty import WIDEST
 from gen_profile.one_thread import one_thread
 from gen_profile.phrase import AND, Phrase, joined
 from gen_profile.plants.plant import Plant
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
@@ -200,7 +200,7 @@ def identify(
     measurements: Sequence[Measurement],
     free: Sequence[str] | str = (),
     q_a: Sequence[float] | None = None,
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Identification:
     """Identify parameters of a spec's machine, and put them and their ranges into the spec.
 

@@ -15,11 +15,10 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Mechanics, Plant
 
-Array = NDArray[np.float64]
 NEARBY = 1e-6  # for first differences, in m or rad
 APART = 1e-4  # for second ones
 ROUGH = 1e-4  # of the terms' size: what differences may err by

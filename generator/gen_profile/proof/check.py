@@ -14,7 +14,7 @@ from gen_profile.artefacts.reading import read_artefact
 from gen_profile.errors import ExportError, OutputError, SpecError
 from gen_profile.planner.design import planner_block
 from gen_profile.planner.forms import block_in, is_planner, refuse_c, refuse_wrapper
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.numbering import Numbering
 from gen_profile.proof.prove import HISTORIES, prove, replay
@@ -90,7 +90,7 @@ def check_block(
     histories: int | None = None,
     history: int | None = None,
     scheduler: str | None = None,
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> BlockJudgement:
     """Prove a file again, or replay one history of its proof, and compare it with its manifest.
 

@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from gen_profile.errors import OutputError
-from gen_profile.progress import Progress, untold
+from gen_profile.plugins import require_installed
+from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories
 from gen_profile.proof.judging import Judge, judge_run
@@ -33,7 +33,7 @@ def prove(
     histories: int = HISTORIES,
     workers: int | None = None,
     scheduler: str | None = None,
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Proof:
     """Prove a written block on many histories, which the spec's `check.seed` draws.
 
@@ -78,7 +78,9 @@ def prove(
         return _verdict(spec, loop, numbering, judged, progress)
 
 
-def replay(spec: Spec, text: str, numbering: Numbering, number: int, progress: Progress = untold) -> Proof:
+def replay(
+    spec: Spec, text: str, numbering: Numbering, number: int, progress: Progress = no_progress
+) -> Proof:
     """Run one history again.
 
     Parameters
@@ -127,10 +129,9 @@ def _on_cluster(
     spec: Spec, text: str, histories: Histories, scheduler: str, progress: Progress
 ) -> AbstractContextManager[Judge]:
     """Let the workers of a Dask scheduler judge."""
-    try:
-        from gen_profile.proof.on_cluster import judged_on_cluster  # noqa: PLC0415  # Dask is an extra
-    except ModuleNotFoundError as error:
-        raise OutputError("A scheduler needs Dask: pip install 'gen-profile[sweep]'.") from error
+    require_installed("A scheduler needs Dask", "sweep", "dask", "distributed")
+    from gen_profile.proof.on_cluster import judged_on_cluster  # noqa: PLC0415  # Dask is an extra
+
     return judged_on_cluster(spec, text, histories, scheduler, progress)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_profile.motion.metrics import length
 from gen_profile.motion.profile import Array
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.closed_loop import ClosedLoop
 from gen_profile.proof.histories import Histories, History
 from gen_profile.spec.model import Spec
@@ -41,7 +41,7 @@ class Trace:
 
 
 def trace(
-    spec: Spec, text: str, histories: Histories, history: History, progress: Progress = untold
+    spec: Spec, text: str, histories: Histories, history: History, progress: Progress = no_progress
 ) -> Trace:
     """Follow a history, and the same commands on other machines.
 

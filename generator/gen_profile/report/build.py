@@ -15,7 +15,7 @@ from gen_profile.comparison.compare import Comparison, compare
 from gen_profile.designs.design import Design, design
 from gen_profile.errors import OutputError
 from gen_profile.evaluation.phrases import move, uncertain
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.report.content import Page
 from gen_profile.report.log import read_log
 from gen_profile.report.measured import Measured, compare_measured
@@ -82,7 +82,7 @@ def report(
     log_columns: str | None = None,
     compared: bool = True,
     fields: Sequence[tuple[str, str]] = (),
-    progress: Progress = untold,
+    progress: Progress = no_progress,
 ) -> Report:
     """Design, check and compare, and put what was found on one page.
 

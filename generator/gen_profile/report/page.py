@@ -6,11 +6,10 @@ import base64
 import hashlib
 import json
 from importlib.resources import files
-from importlib.util import find_spec
 from typing import Any
 
 from gen_profile.charts.plotly_json import figure_json
-from gen_profile.errors import OutputError
+from gen_profile.plugins import require_installed
 from gen_profile.report.content import Page
 
 ASSETS = files("gen_profile.report") / "assets"
@@ -28,8 +27,7 @@ def require_pages() -> None:
     OutputError
         A library is not installed.
     """
-    if any(find_spec(name) is None for name in NEEDED):
-        raise OutputError("gen-profile report needs Jinja2 and Plotly: pip install 'gen-profile[report]'.")
+    require_installed("gen-profile report needs Jinja2 and Plotly", "report", *NEEDED)
 
 
 def render(page: Page) -> bytes:

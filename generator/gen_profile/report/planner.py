@@ -16,7 +16,7 @@ from gen_profile.charts.proof import history_figure, map_figure
 from gen_profile.evaluation.phrases import MANIFEST_WORDS, mm, number
 from gen_profile.planner.commands import Command
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.proof.check import BlockJudgement, check_block
 from gen_profile.proof.histories import Histories, History
 from gen_profile.proof.trace import Trace, trace
@@ -44,7 +44,7 @@ class PlannerReport:
 
 
 def planner_report(
-    path: Path, *, fields: Sequence[tuple[str, str]] = (), progress: Progress = untold
+    path: Path, *, fields: Sequence[tuple[str, str]] = (), progress: Progress = no_progress
 ) -> PlannerReport:
     """Prove a written planner block again, and put what was found on one page.
 

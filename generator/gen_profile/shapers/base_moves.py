@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 
 import attrs
 import numpy as np
 
 from gen_profile.errors import SpecError
 from gen_profile.motion.profile import Array, read_only
+from gen_profile.plugins import require_installed
 from gen_profile.spec.model import LimitsSpec
 
 
@@ -57,8 +57,7 @@ def jerk_limited(limits: LimitsSpec, distance: Sequence[float]) -> BaseMove:
         raise SpecError(
             "limits.jerk: a jerk-limited base move needs it; state it, or take another base move."
         )
-    if find_spec("ruckig") is None:
-        raise SpecError("A jerk-limited base move needs Ruckig: pip install 'gen-profile[ruckig]'.")
+    require_installed("A jerk-limited base move needs Ruckig", "ruckig", "ruckig")
     from ruckig import InputParameter, Ruckig, Trajectory  # noqa: PLC0415  # an extra
 
     demand, trajectory = InputParameter(1), Trajectory(1)

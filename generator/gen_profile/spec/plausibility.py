@@ -12,14 +12,12 @@ from types import SimpleNamespace
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from gen_profile.errors import SpecError
+from gen_profile.motion.profile import Array
 from gen_profile.phrase import Phrase, placed
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import RESIDUAL_SHARE, Spec
-
-Array = NDArray[np.float64]
 
 STEP = 1e-6  # m (or rad), for differences of forces and outputs about rest
 # (unit of the axis, what) → beyond which it is hardly meant, and cannot be

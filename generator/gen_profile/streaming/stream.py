@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ import attrs
 
 from gen_profile.artefacts.manifest import FILENAME, PLANNER, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
-from gen_profile.errors import CheckFailed, OutputError, SpecError, StreamAborted
+from gen_profile.errors import CheckFailed, SpecError, StreamAborted
 from gen_profile.progress import Progress
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import Spec
@@ -46,17 +45,6 @@ if TYPE_CHECKING:
 Tell = Callable[[str], None]
 SELF_TEST = 20.0  # s
 SPIN = 200_000  # ns before each cycle, where a processor can be spared for it
-
-
-def require_extra() -> None:
-    """Refuse to go on without what only streaming needs.
-
-    Raises
-    ------
-    OutputError
-    """
-    if find_spec("canopen") is None:
-        raise OutputError("Streaming needs canopen: pip install 'gen-profile[can]'.")
 
 
 def require_rest(spec: Spec) -> None:

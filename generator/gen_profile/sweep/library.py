@@ -15,7 +15,7 @@ from gen_profile.artefacts.writing import staged
 from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import ExportError, SpecError
 from gen_profile.evaluation.phrases import named
-from gen_profile.progress import Progress, untold
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.sweep.case import PASSED
 from gen_profile.sweep.reading import case_files, case_folder, swept_table
@@ -67,7 +67,7 @@ class Library:
         }
 
 
-def write_library(folder: Path | str, path: Path | str, progress: Progress = untold) -> Library:
+def write_library(folder: Path | str, path: Path | str, progress: Progress = no_progress) -> Library:
     """Put the PLC blocks of all cases that passed into one, and make sure that it issues the same.
 
     Parameters

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from gen_profile.artefacts.manifest import versions
-from gen_profile.errors import OutputError, SpecError
+from gen_profile.errors import SpecError
+from gen_profile.plugins import require_installed
 from gen_profile.sweep.case import Recipe
 from gen_profile.sweep.grid import Grid
 from gen_profile.sweep.store import Store
@@ -25,8 +25,7 @@ def require_libraries() -> None:
     OutputError
         With the command that installs what is missing.
     """
-    if any(find_spec(name) is None for name in LIBRARIES):
-        raise OutputError("Sweeps need Dask and PyArrow: pip install 'gen-profile[sweep]'.")
+    require_installed("Sweeps need Dask and PyArrow", "sweep", *LIBRARIES)
 
 
 def prepare(

@@ -16,6 +16,7 @@ from gen_profile.cli.planner import planner_options
 from gen_profile.cli.progress import progress
 from gen_profile.cli.streaming.words import at_start, outcome_words, plan_words, units
 from gen_profile.errors import OutputError, StreamAborted
+from gen_profile.plugins import require_installed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,7 +85,7 @@ def stream(table: Path | None, as_json: bool, **options: Any) -> None:
     from gen_profile.cli.streaming.request import StreamRequest
     from gen_profile.streaming import stream as run
 
-    run.require_extra()
+    require_installed("Streaming needs canopen", "can", "canopen")
     request = StreamRequest(**options)
     request.require_sense()
     with progress() as tell:
@@ -142,7 +143,7 @@ def drive_sim(
     """
     from gen_profile.streaming import stream as run
 
-    run.require_extra()
+    require_installed("Streaming needs canopen", "can", "canopen")
     from gen_profile.artefacts.writing import deliver
     from gen_profile.cli.streaming.request import chosen_port
     from gen_profile.evaluation.phrases import mm, number

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from gen_profile.interrupts import interrupts_collected
 from gen_profile.motion.profile import Array
-from gen_profile.solvers.interrupts import interrupts_collected
 from gen_profile.work import spend
 
 Matrix = Any  # scipy.sparse matrix or array

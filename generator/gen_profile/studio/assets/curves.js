@@ -116,7 +116,7 @@ const curves = (() => {
 
   function make(host, holder, options) {
     const { panel } = holder;
-    const timed = panel.x_label.startsWith("time") && !options.alone;
+    const timed = /^time/.test(panel.x_label) && !options.alone;
     const series = [...panel.curves, ...holder.ghosts].map((curve) => ({
       label: options.phrase(curve.name), stroke: curve.colour === "ghost" ? () => colour("--quiet") : curve.colour, width: curve.width,
       dash: LINE[curve.dash] ?? [], points: { show: false },
