@@ -20,6 +20,7 @@ from gen_profile.evaluation.scenarios import further_scenarios, scenarios
 from gen_profile.evaluation.simulation import PlantSimulation
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import SampledProfile, sample
+from gen_profile.progress import no_progress
 from gen_profile.spec.reading import preset_spec
 from gen_profile.verification.check import _verdict, check_artefact
 from gen_profile.verification.monte_carlo import standstill
@@ -306,7 +307,7 @@ def test_draws_of_any_machine_agree_with_the_exact_motion(overrides):
     setpoints = sample(motion, spec.export.cycle_time)
     machines = scenarios(spec)
     rows = (*machines, *further_scenarios(spec, machines))
-    check = _verdict(spec, setpoints, rows, None, lambda _, __: None)
+    check = _verdict(spec, setpoints, rows, no_progress)
     drawn, still = check.groups["samples"], standstill(spec, setpoints)
     watched = np.linspace(still, still + observation_time(spec), 8001)
     drawn_machines = [finding.scenario.parameters for finding in drawn]

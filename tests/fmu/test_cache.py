@@ -30,10 +30,10 @@ def builds(crane):
         count = 0
 
         def get(self):
-            def on_build():
+            def progress(_):
                 self.count += 1
 
-            return plant_fmu(crane, on_build)
+            return plant_fmu(crane, progress)
 
     return Builds()
 

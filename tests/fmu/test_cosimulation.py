@@ -201,9 +201,9 @@ def test_tells_before_it_compiles(crane, tmp_path, cache, monkeypatch):
     monkeypatch.setenv("GEN_PROFILE_CACHE", str(tmp_path))
     builds = []
     for _ in range(2):
-        with PlantCosimulation(crane, on_build=lambda: builds.append("build")):
+        with PlantCosimulation(crane, progress=builds.append):
             pass
-    assert builds == ["build"]
+    assert builds == ["compiling the plant's FMU, once"]
 
 
 def test_a_library_that_does_not_load_is_a_sentence(crane, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 
 from gen_profile.private_folder import temporary_folder
@@ -54,10 +55,7 @@ def build_fmu(
     for name in platforms:
         platform = PLATFORMS[name]
         compiler = find_compiler(None if name == host_platform() else name)
-
-        def tell(name: str = name) -> None:
-            progress(f"compiling for {name}")
-
+        tell = partial(progress, f"compiling for {name}")
         library = _cached_library(made, compiler, model.identifier + platform.extension, tell)
         binaries.setdefault(platform.library(version, model.identifier), []).append(library)
     joined: Mapping[str, bytes] = {
@@ -67,14 +65,11 @@ def build_fmu(
     return archive(fmu_files(made, joined))
 
 
-def _cached_library(made: Sources, compiler: Compiler, name: str, on_build: Callable[[], None]) -> bytes:
-    entry = cached(
-        f"library-{sources_key(made, compiler)}",
-        lambda cache: {
-            name: compile_texts(made.compiled, SOURCE_FILE, compiler, name, cache, on_build=on_build)
-        },
-    )
-    return (entry / name).read_bytes()
+def _cached_library(made: Sources, compiler: Compiler, name: str, tell: Callable[[], None]) -> bytes:
+    def make(cache: Path) -> dict[str, bytes]:
+        return {name: compile_texts(made.compiled, SOURCE_FILE, compiler, name, cache, tell=tell)}
+
+    return (cached(f"library-{sources_key(made, compiler)}", make) / name).read_bytes()
 
 
 def sources_key(made: Sources, compiler: Compiler) -> str:
@@ -89,7 +84,7 @@ def compile_texts(
     name: str,
     cache: Path,
     *,
-    on_build: Callable[[], None] | None = None,
+    tell: Callable[[], None] = lambda: None,
 ) -> bytes:
     """Compile a library in a folder that is gone afterwards; its bytes.
 
@@ -104,7 +99,7 @@ def compile_texts(
         Of the library.
     cache : Path
         Folder in which it is done, and in which Zig keeps what it needs again.
-    on_build : callable, optional
+    tell : callable
         Called before it begins.
 
     Raises
@@ -114,8 +109,7 @@ def compile_texts(
     """
     zig_cache = own_folder(cache / "zig", within=cache)
     with temporary_folder(cache, "build-") as folder:
-        if on_build is not None:
-            on_build()
+        tell()
         for file, text in texts.items():
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
         compile_library(compiler, folder, source, name, zig_cache=zig_cache)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import attrs
 import fmpy
 
 from gen_profile.plants.plant import Plant
+from gen_profile.progress import Progress, no_progress
 from gen_profile_fmu.building.build import compile_texts, sources_key
 from gen_profile_fmu.building.cache import cached
 from gen_profile_fmu.building.compiler import Compiler, find_compiler
@@ -41,14 +41,14 @@ class PlantFmu:
     variables: VariableTable
 
 
-def plant_fmu(plant: Plant, on_build: Callable[[], None] | None = None) -> PlantFmu:
+def plant_fmu(plant: Plant, progress: Progress = no_progress) -> PlantFmu:
     """Build the FMI 2.0 FMU of a plant that follows setpoints, or find it in the cache.
 
     Parameters
     ----------
     plant : Plant
-    on_build : callable, optional
-        Called before a compilation, which takes seconds.
+    progress : callable
+        Told of a compilation, which takes seconds.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def plant_fmu(plant: Plant, on_build: Callable[[], None] | None = None) -> Plant
         When there is no compiler, it fails, or no cache folder can be written.
     """
     compiler = find_compiler()
-    return _cached(*_plant_sources(plant, compiler), compiler, on_build)
+    return _cached(*_plant_sources(plant, compiler), compiler, progress)
 
 
 @cache
@@ -76,15 +76,15 @@ def cached_fmu(model: Model, version: Version) -> PlantFmu:
     return _cached(made, sources_key(made, compiler), compiler)
 
 
-def _cached(
-    made: Sources, key: str, compiler: Compiler, on_build: Callable[[], None] | None = None
-) -> PlantFmu:
+def _cached(made: Sources, key: str, compiler: Compiler, progress: Progress = no_progress) -> PlantFmu:
     model, version = made.model, made.version
     library = model.identifier + fmpy.sharedLibraryExtension
     platform = fmpy.platform if version is Version.FMI2 else fmpy.platform_tuple
 
+    tell = partial(progress, "compiling the plant's FMU, once")
+
     def make(cache: Path) -> dict[str, bytes]:
-        binary = compile_texts(made.compiled, SOURCE_FILE, compiler, library, cache, on_build=on_build)
+        binary = compile_texts(made.compiled, SOURCE_FILE, compiler, library, cache, tell=tell)
         laid = fmu_files(made, {f"binaries/{platform}/{library}": binary}, with_extras=False)
         return {**laid, f"{model.identifier}.fmu": archive(laid)}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import POINTER, Structure, byref, c_double, c_size_t, c_uint, sizeof
 from typing import Any, Self
@@ -16,6 +16,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.evaluation.simulation import AT_REST, Response
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.plants.plant import Plant
+from gen_profile.progress import Progress, no_progress
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.description.fmu_files import Version
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
@@ -71,8 +72,8 @@ class PlantCosimulation:
     Parameters
     ----------
     plant : Plant
-    on_build : callable, optional
-        Called before the FMU is compiled, when it is not in the cache.
+    progress : callable
+        Told of a compilation, which takes seconds.
 
     Raises
     ------
@@ -80,9 +81,9 @@ class PlantCosimulation:
         When the FMU cannot be built or loaded.
     """
 
-    def __init__(self, plant: Plant, on_build: Callable[[], None] | None = None) -> None:
+    def __init__(self, plant: Plant, progress: Progress = no_progress) -> None:
         self._plant = plant
-        self._fmu = plant_fmu(plant, on_build)
+        self._fmu = plant_fmu(plant, progress)
         self._instance: Instance | None = instance(self._fmu, Version.FMI2)
         self._slave, self._messages = self._instance.slave, self._instance.messages
         self._called = called(self._slave, Version.FMI2)

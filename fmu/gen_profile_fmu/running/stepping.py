@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import attrs
 import numpy as np
 
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.plants.plant import Plant
+from gen_profile.progress import Progress, no_progress
 from gen_profile_fmu.model.plant_variables import MAX_STEP, TAU
 from gen_profile_fmu.running.cosimulation import PlantCosimulation, Steps
 
@@ -43,8 +44,8 @@ class SteppedPlant(PlantCosimulation):
         Lag of the drives in s; 0 for ideal ones.
     max_step : float
         Longest integration step in s.
-    on_build : callable, optional
-        Called before the FMU is compiled, when it is not in the cache.
+    progress : callable
+        Told of a compilation, which takes seconds.
 
     Raises
     ------
@@ -60,9 +61,9 @@ class SteppedPlant(PlantCosimulation):
         *,
         tau: float,
         max_step: float,
-        on_build: Callable[[], None] | None = None,
+        progress: Progress = no_progress,
     ) -> None:
-        super().__init__(plant, on_build)
+        super().__init__(plant, progress)
         rest = SampledProfile(cycle_time=1.0, position=[position, position])
         self._begin(rest, parameters, {TAU: tau, MAX_STEP: max_step})
         self._time = 0.0

@@ -270,9 +270,8 @@ def _check_motion(
         judgement = check_artefact(
             artefact,
             spec,
-            lambda: tell("compiling the plant's FMU, once"),
             row=scenario,
-            progress=lambda done, total: tell("checking by co-simulation", done, total),
+            progress=tell,
             **options,
         )
     if table_path is not None:

@@ -28,6 +28,7 @@ from gen_profile.cli.options import (
 from gen_profile.cli.outcome import beware, fail, print_outcome, warn
 from gen_profile.cli.signing import sign, sign_option, signing_key
 from gen_profile.errors import OutputError, SpecError
+from gen_profile.progress import Progress
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -308,13 +309,14 @@ def planned(
 
 
 @contextmanager
-def status_line() -> Iterator[Callable[[str], None]]:
+def status_line() -> Iterator[Progress]:
     """Keep one line of the terminal for what is said."""
     import shutil
 
-    def tell(words: str) -> None:
+    def tell(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
+        del done, total, remark
         width = shutil.get_terminal_size().columns - 1
-        click.echo(f"{CLEARED}{words[:width]}", err=True, nl=False)
+        click.echo(f"{CLEARED}{stage[:width]}", err=True, nl=False)
 
     try:
         yield tell

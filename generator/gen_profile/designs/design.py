@@ -23,7 +23,7 @@ from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.verification.cosimulation import cosimulate, judge, judged_from, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
-from gen_profile.verification.monte_carlo import with_further
+from gen_profile.verification.monte_carlo import CHECKING, with_further
 from gen_profile.verification.verdict import Check
 from gen_profile.verification.worst_machines import worst_machines
 from gen_profile_exporters.exporter import Exporter, target_of
@@ -233,13 +233,12 @@ def _export(
 
 def _check(planned: Plan, replayed: Sequence[SampledProfile], *, by_fmpy: bool, progress: Progress) -> Check:
     """Judge all artefacts against the continuous motion, and keep the verdict on the worst."""
-    progress("checking by co-simulation")
+    progress(CHECKING)
     spec, machines = planned.spec, planned.evaluation.machines
     known = [*machines, *further_scenarios(spec, machines)]
-    compiling = partial(progress, "compiling the plant's FMU, once")
     checks = []
     for setpoints in replayed:
-        worst = worst_machines(spec, setpoints, known, compiling)
+        worst = worst_machines(spec, setpoints, known, progress)
         rows = [*known, *worst.machines]
         if spec.check.foreign is not None:
             check = judge_external(spec, spec.check.foreign, setpoints, rows)
@@ -249,7 +248,6 @@ def _check(planned: Plan, replayed: Sequence[SampledProfile], *, by_fmpy: bool, 
                 planned.evaluation,
                 setpoints,
                 rows,
-                compiling=compiling,
                 by_fmpy=by_fmpy,
                 progress=progress,
             )
@@ -263,18 +261,17 @@ def _judged(
     setpoints: SampledProfile,
     rows: Sequence[Scenario],
     *,
-    compiling: Callable[[], None],
     by_fmpy: bool,
     progress: Progress,
 ) -> Check:
     """Judge one artefact in all its scenarios, of which the evaluation's machines are the first."""
     machines, spacing = [row for row in rows if row.followed], sample_spacing(spec, setpoints)
-    found = cosimulate(spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, on_build=compiling)
+    found = cosimulate(spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, progress=progress)
     compared = found[0].times[found[0].times >= judged_from(spec, setpoints)]
     expected = evaluation.followed(compared, machines[len(evaluation.machines) :])
     check = judge(spec, setpoints, machines, found, expected)
     further = [row for row in rows if not row.followed]
-    return with_further(spec, setpoints, check, further, partial(progress, "checking by co-simulation"))
+    return with_further(spec, setpoints, check, further, progress)
 
 
 def _after_earlier_ones(manifest: Manifest, earlier: bytes | None) -> Manifest:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from queue import SimpleQueue
@@ -46,8 +46,6 @@ class ClosedLoop:
         Of the spec.
     workers : int
         Instances of the FMU that share the runs: compiled code, they run side by side.
-    on_build : callable, optional
-        Called before the FMU is compiled, when it is not in the cache.
 
     Raises
     ------
@@ -64,7 +62,6 @@ class ClosedLoop:
         histories: Histories,
         *,
         workers: int = 1,
-        on_build: Callable[[], None] | None = None,
     ) -> None:
         self._spec, self._histories = spec, histories
         self._block = BlockInstance(text)
@@ -75,7 +72,7 @@ class ClosedLoop:
         self._open = ExitStack()
         self._followers: SimpleQueue[BlockFollower] = SimpleQueue()
         self._machine = histories.machine
-        fmu = plant_fmu(self._machine, on_build)
+        fmu = plant_fmu(self._machine)
         for _ in range(workers):
             self._followers.put(self._open.enter_context(BlockFollower(fmu)))
 

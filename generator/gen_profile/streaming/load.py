@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -11,6 +11,7 @@ from gen_profile.errors import CosimulationError
 from gen_profile.evaluation.residual_sway import RESIDUAL_SAMPLES, STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import scenarios
 from gen_profile.motion.metrics import length, peak
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.verification.cosimulation import max_step
 from gen_profile_fmu.running.stepping import SteppedPlant
@@ -22,15 +23,15 @@ class CraneLoad:
     Parameters
     ----------
     spec : Spec
-    on_build : callable, optional
-        Called before the FMU is compiled.
+    progress : callable
+        Told of a compilation, which takes seconds.
 
     Raises
     ------
     CosimulationError
     """
 
-    def __init__(self, spec: Spec, on_build: Callable[[], None] | None = None) -> None:
+    def __init__(self, spec: Spec, progress: Progress = no_progress) -> None:
         if spec.move.initial:
             raise CosimulationError(
                 "move.initial: the simulated crane would swing on while its drives start up, and nobody "
@@ -47,7 +48,7 @@ class CraneLoad:
             machines[0].parameters,
             tau=tau,
             max_step=max_step(spec, machines[0]),
-            on_build=on_build,
+            progress=progress,
         )
 
     def __enter__(self) -> Self:

@@ -15,7 +15,7 @@ import attrs
 from gen_profile.artefacts.manifest import FILENAME, PLANNER, sha256
 from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import CheckFailed, SpecError, StreamAborted
-from gen_profile.progress import Progress
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.can import CanSpec
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant
     from gen_profile_exporters.can.streaming.record import Book, Record
 
-Tell = Callable[[str], None]
 SELF_TEST = 20.0  # s
 SPIN = 200_000  # ns before each cycle, where a processor can be spared for it
 
@@ -135,7 +134,7 @@ def designed(spec: Spec, tell: Progress) -> Source:
         return verified(Path(folder) / outcome.artefacts[0].path)
 
 
-def standing(source: Source, port: Port, tell: Tell) -> tuple[float, ...]:
+def standing(source: Source, port: Port, tell: Progress) -> tuple[float, ...]:
     """Ask the drives where their axes stand, in m (or rad); changes nothing.
 
     Raises
@@ -216,7 +215,7 @@ def stream(
     simulate_drive: bool = False,
     reset_fault: bool = False,
     notes: tuple[str, ...] = (),
-    tell: Tell = lambda _: None,
+    tell: Progress = no_progress,
     book: Book | None = None,
 ) -> StreamOutcome:
     """Stream a motion, and stop the axes whatever happens.
@@ -348,7 +347,7 @@ def _stalls(stalled: int) -> tuple[str, ...]:
 
 
 @contextmanager
-def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
+def _simulated(source: Source, port: Port, tell: Progress) -> Iterator[_Simulation]:
     """Have simulated drives work on the bus whenever the streamer sleeps."""
     from gen_profile.streaming.load import CraneLoad  # noqa: PLC0415  # FMPy and CasADi, 0.5 s
     from gen_profile_exporters.can.simulation.drive_dictionary import DriveVariant  # noqa: PLC0415  # canopen is an extra
@@ -356,7 +355,7 @@ def _simulated(source: Source, port: Port, tell: Tell) -> Iterator[_Simulation]:
 
     period = frames.period_microseconds(source.spec.can) * 1000
     with (
-        CraneLoad(source.spec, lambda: tell("compiling the plant's FMU, once")) as load,
+        CraneLoad(source.spec, tell) as load,
         opened(port, target_of(source.spec)) as bus,
     ):
         clock = SharedClock(longest=period // 4)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from gen_profile.artefacts.reading import read_artefact
 from gen_profile.bounded_file import DOCUMENT
 from gen_profile.errors import CheckFailed, SpecError
 from gen_profile.evaluation.phrases import named
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import overridden, spec_from_dict
 from gen_profile.suggestion import number_meant, suggestion
@@ -100,7 +101,7 @@ class LookupResult:
 def lookup(
     folder: Path | str,
     asked: Mapping[str, Any],
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = no_progress,
     *,
     out: Path | None = None,
 ) -> LookupResult:
@@ -148,7 +149,7 @@ def lookup(
     progress("checking by co-simulation")
     passed_over: dict[int, str] = {}
     for row in rows:
-        judgement = _judge(folder, row, wanted, lambda: progress("compiling the plant's FMU, once"))
+        judgement = _judge(folder, row, wanted, progress)
         if judgement.check.passed:
             if out is not None:
                 take_out(folder, row, out)
@@ -240,12 +241,10 @@ def _named(row: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     return f"The nearest profile that passed is case {row['case']} ({values})."
 
 
-def _judge(
-    folder: Path, row: Mapping[str, Any], wanted: Mapping[str, Any], on_build: Callable[[], None]
-) -> Judgement:
+def _judge(folder: Path, row: Mapping[str, Any], wanted: Mapping[str, Any], progress: Progress) -> Judgement:
     name = row["artefacts"][0]["path"]
     with case_folder(folder, row) as case:
-        judgement = check_artefact(case / name, _spec_there(folder, row, case, wanted), on_build)
+        judgement = check_artefact(case / name, _spec_there(folder, row, case, wanted), progress=progress)
     return attrs.evolve(judgement, path=folder / row["folder"] / name)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -12,6 +12,7 @@ import attrs
 
 from gen_profile.motion.profile import Array
 from gen_profile.plants.plant import Plant
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile_fmu.building.plant_fmu import plant_fmu
 from gen_profile_fmu.description.fmu_files import Version
@@ -48,9 +49,9 @@ def on_processors(count: int) -> Iterator[None]:
 
 
 @contextmanager
-def many_machines(plant: Plant, on_build: Callable[[], None] | None = None) -> Iterator[ManyRuns]:
+def many_machines(plant: Plant, progress: Progress = no_progress) -> Iterator[ManyRuns]:
     """Load the plant's FMU once for every processor that this process may use."""
-    with ManyRuns(plant_fmu(plant, on_build), Version.FMI2, workers=processors()) as runs:
+    with ManyRuns(plant_fmu(plant, progress), Version.FMI2, workers=processors()) as runs:
         yield runs
 
 

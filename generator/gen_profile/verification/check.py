@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -15,11 +15,12 @@ from gen_profile.artefacts.reading import manifest_beside, read_artefact
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenarios
 from gen_profile.motion.profile import SampledProfile
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import spec_from_dict
 from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
-from gen_profile.verification.monte_carlo import Progress, with_further
+from gen_profile.verification.monte_carlo import with_further
 from gen_profile.verification.motion_variant import parse_variant, varied
 from gen_profile.verification.verdict import Check
 from gen_profile.verification.worst_machines import worst_machines
@@ -69,7 +70,6 @@ class Judgement:
 def check_artefact(
     path: Path | str,
     spec: Spec | None = None,
-    on_build: Callable[[], None] | None = None,
     *,
     samples: int | None = None,
     row: int | None = None,
@@ -77,7 +77,7 @@ def check_artefact(
     scale: Sequence[str] = (),
     mirror: Sequence[str] = (),
     offset: Sequence[str] = (),
-    progress: Progress = lambda _, __: None,
+    progress: Progress = no_progress,
 ) -> Judgement:
     """Replay a file, co-simulate it, and compare it with its manifest.
 
@@ -87,8 +87,6 @@ def check_artefact(
         Any artefact that the exporters write; its format is told by its suffix.
     spec : Spec, optional
         Taken from ``manifest.json`` beside the file when not given.
-    on_build : callable, optional
-        Called before the plant's FMU is compiled.
     samples : int, optional
         Draws in place of those that the spec asks for.
     row : int, optional
@@ -98,7 +96,7 @@ def check_artefact(
     scale, mirror, offset : sequences of str
         A variant to judge, see `gen_profile.verification.motion_variant.parse_variant`.
     progress : callable
-        Told how many scenarios beyond the machines are done, and of how many.
+        Told of a compilation, and how many scenarios beyond the machines are done, and of how many.
 
     Raises
     ------
@@ -119,8 +117,8 @@ def check_artefact(
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
     judged = varied(spec, setpoints, variant) if variant.told() else (spec, setpoints)
-    rows, searched = _rows(*judged, row, on_build)
-    check = _verdict(*judged, rows, on_build, progress)
+    rows, searched = _rows(*judged, row, progress)
+    check = _verdict(*judged, rows, progress)
     faults = (*check.faults, *alterations(path, standing))
     check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
     return Judgement(
@@ -129,14 +127,14 @@ def check_artefact(
 
 
 def _rows(
-    spec: Spec, setpoints: SampledProfile, row: int | None, on_build: Callable[[], None] | None
+    spec: Spec, setpoints: SampledProfile, row: int | None, progress: Progress
 ) -> tuple[tuple[Scenario, ...], int]:
     """List all scenarios, or the one of a number, and say how many machines were looked at for the worst."""
     machines = scenarios(spec)
     rows = (*machines, *further_scenarios(spec, machines))
     if row is not None and 0 <= row < len(rows):
         return (rows[row],), 0
-    worst = worst_machines(spec, setpoints, rows, on_build)
+    worst = worst_machines(spec, setpoints, rows, progress)
     rows = (*rows, *worst.machines)
     if row is None:
         return rows, worst.tried
@@ -149,7 +147,6 @@ def _verdict(
     spec: Spec,
     setpoints: SampledProfile,
     rows: Sequence[Scenario],
-    on_build: Callable[[], None] | None,
     progress: Progress,
 ) -> Check:
     """Judge setpoints by themselves.
@@ -165,7 +162,7 @@ def _verdict(
     machines = [row for row in rows if row.followed] or scenarios(spec)[:1]
     spacing = sample_spacing(spec, setpoints)
     followed = _of_even_cycles(setpoints, spec)
-    found = cosimulate(spec, followed, machines, output_step=spacing, on_build=on_build)
+    found = cosimulate(spec, followed, machines, output_step=spacing, progress=progress)
     expected = cosimulate(spec, _every_other(followed), machines, output_step=spacing, by_fmpy=False)
     check = judge(spec, setpoints, machines, found, expected, followed=followed)
     check = attrs.evolve(check, error_bound=check.error_bound + resolution)

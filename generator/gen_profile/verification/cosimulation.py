@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from types import SimpleNamespace
 
 import attrs
@@ -20,6 +20,7 @@ from gen_profile.evaluation.simulation import Response, Sway
 from gen_profile.motion.metrics import length, peak
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.problem.linearization import linearize
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.plausibility import doubts
 from gen_profile.verification.plausibility import implausibilities
@@ -39,7 +40,7 @@ def cosimulate(
     *,
     output_step: float,
     by_fmpy: bool = True,
-    on_build: Callable[[], None] | None = None,
+    progress: Progress = no_progress,
 ) -> tuple[Response, ...]:
     """Let the plant's FMU follow setpoints, once with every machine, in a compiled loop.
 
@@ -53,8 +54,8 @@ def cosimulate(
         Spacing of samples in s, at most the cycle.
     by_fmpy : bool
         Whether FMPy drives the first one, too, and must find the same to the last bit.
-    on_build : callable, optional
-        Called before the FMU is compiled.
+    progress : callable
+        Told of a compilation, which takes seconds.
 
     Returns
     -------
@@ -68,7 +69,7 @@ def cosimulate(
     """
     tau = spec.actuator.tau or 0.0
     settle = STANDSTILL * tau + observation_time(spec)
-    with PlantCosimulation(spec.machine(), on_build) as fmu:
+    with PlantCosimulation(spec.machine(), progress) as fmu:
 
         def run(machine: Scenario, *, by_fmpy: bool = False) -> Response:
             return fmu.run(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
@@ -11,6 +11,7 @@ from gen_profile.evaluation.residual_sway import STANDSTILL, observation_time
 from gen_profile.evaluation.scenarios import Scenario, scenarios
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.problem.dynamics import parameter_rows
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
 from gen_profile.verification.cosimulation import STEP_PHASE, longest_step
@@ -18,11 +19,10 @@ from gen_profile.verification.setpoint_path import delay, followed_up, follows_e
 from gen_profile.verification.verdict import Check, Finding
 from gen_profile_fmu.running.many_runs import ManyRuns
 
+CHECKING = "checking by co-simulation"
 BATCH = 50  # rows between two signs of life
 SAMPLE_PHASE = 0.02  # rad of the fastest mode between two samples of a residual
 CURVATURE = 1.2  # of a sway between samples, relative to a harmonic one's of the same peak
-
-Progress = Callable[[int, int], None]
 
 
 def standstill(spec: Spec, setpoints: SampledProfile) -> float:
@@ -37,7 +37,7 @@ def with_further(
     setpoints: SampledProfile,
     check: Check,
     rows: Sequence[Scenario],
-    progress: Progress = lambda _, __: None,
+    progress: Progress = no_progress,
 ) -> Check:
     """Try more scenarios on setpoints that were judged on the machines.
 
@@ -73,7 +73,7 @@ def with_further(
             error = max(error, apart)
             findings += [_finding(spec, row, found) for row, found in zip(batch, peaks, strict=True)]
             if 10 * first.stop // len(rows) > 10 * first.start // len(rows):
-                progress(first.stop, len(rows))
+                progress(CHECKING, first.stop, len(rows))
     return attrs.evolve(check, findings=tuple(findings), error_bound=check.error_bound + error)
 
 

@@ -6,7 +6,7 @@ integration steps that are only as close as the modes need. What it finds is the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import attrs
 import numpy as np
@@ -15,6 +15,7 @@ from gen_profile.evaluation.scenarios import LAG, SEARCH, Scenario, named
 from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.problem.linearization import eigenvalues_at
 from gen_profile.problem.parameter_box import Box, start, worst_places
+from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
 from gen_profile.verification.monte_carlo import standstill, watched
@@ -78,7 +79,7 @@ def worst_machines(
     spec: Spec,
     setpoints: SampledProfile,
     rows: Sequence[Scenario],
-    on_build: Callable[[], None] | None = None,
+    progress: Progress = no_progress,
 ) -> RangeSearch:
     """Search the ranges of a check, and of the drives' lag, for the machines that setpoints suit least.
 
@@ -89,8 +90,8 @@ def worst_machines(
         Replayed from an artefact.
     rows : sequence of Scenario
         All others of the check; those found are numbered after them.
-    on_build : callable, optional
-        Called before the FMU is compiled.
+    progress : callable
+        Told of a compilation, which takes seconds.
 
     Raises
     ------
@@ -103,7 +104,7 @@ def worst_machines(
         return RangeSearch()
     machines: list[Scenario] = []
     tried = 0
-    with many_machines(spec.machine(), on_build) as runs:
+    with many_machines(spec.machine(), progress) as runs:
         for way in ways:
             places, looked_at = _searched(way, setpoints, runs)
             tried += looked_at

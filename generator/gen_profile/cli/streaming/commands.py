@@ -160,7 +160,7 @@ def drive_sim(
     port = chosen_port(interface, channel, spec.can, simulated=False)
     with (
         progress() as tell,
-        CraneLoad(spec, lambda: tell("compiling the plant's FMU, once")) as load,
+        CraneLoad(spec, tell) as load,
         joint_bus.opened(port, target_of(spec)) as bus,
     ):
         bank = run.drive_bank(spec, bus, load, make)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from gen_profile.cli.planner import planned, require_no_others, require_planner,
 from gen_profile.cli.progress import progress
 from gen_profile.cli.streaming.words import lateness_words
 from gen_profile.errors import SpecError
+from gen_profile.progress import Progress, no_progress
 
 if TYPE_CHECKING:
     from gen_profile.progress import Progress
@@ -150,7 +151,7 @@ class StreamRequest:
         return (found,)
 
     @contextmanager
-    def shown(self, source: Source) -> Iterator[tuple[Callable[[str], None], Book | None]]:
+    def shown(self, source: Source) -> Iterator[tuple[Progress, Book | None]]:
         """Show a stream: by its phases, and by curves, which need the terminal for themselves."""
         from gen_profile.streaming import live_page, live_terminal
         from gen_profile.streaming.live import watched
@@ -160,7 +161,7 @@ class StreamRequest:
                 yield tell, None
         elif self.live == "terminal":
             with watched(source, live_terminal.show) as book:
-                yield lambda _: None, book
+                yield no_progress, book
         elif self.live == "browser":
             with progress() as tell, watched(source, live_page.show) as book:
                 yield tell, book
