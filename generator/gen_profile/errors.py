@@ -146,7 +146,7 @@ def _written(value: Any) -> str:
     """Write a value as TOML."""
     if isinstance(value, str):
         return f'"{value}"'
-    return f"{value:.9g}" if isinstance(value, float) else f"[{', '.join(map(_written, value))}]"
+    return f"{value:.9g}" if isinstance(value, int | float) else f"[{', '.join(map(_written, value))}]"
 
 
 class NoMotion(GenProfileError):

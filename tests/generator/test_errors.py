@@ -45,13 +45,17 @@ def test_a_specs_faults_are_lines():
 
 def test_errors_are_the_same_in_another_process():
     reason = Reason(code=Code.LIMIT_BROKEN, place="limits.jerk", found=2.0, allowed=1.0)
-    suggestion = Suggestion(values={"limits.jerk": 2.5}, spec=None, fraction=0.5)
+    suggestion = Suggestion(values={"limits.jerk": 2.5, "robustness.order": 1}, spec=None, fraction=0.5)
     template = "{one.place}: {found:.1f} and {text!r}"
     error = InfeasibleProblem(
         template, one=reason, found=2.0, text="{x}", reasons=[reason], suggestions=[suggestion]
     )
     again = pickle.loads(pickle.dumps(error))
-    assert str(again) == str(error) == "limits.jerk: 2.0 and '{x}' It can be done with limits.jerk = 2.5."
+    assert (
+        str(again)
+        == str(error)
+        == "limits.jerk: 2.0 and '{x}' It can be done with limits.jerk = 2.5, robustness.order = 1."
+    )
     assert again.reasons == error.reasons
     assert plain(again.sentences[0]) == {
         "template": template,
