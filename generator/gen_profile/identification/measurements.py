@@ -12,9 +12,9 @@ import attrs
 import numpy as np
 
 from gen_profile.errors import OutputError, SpecError
-from gen_profile.phrase import Phrase
 from gen_profile.identification.log_table import read_table
 from gen_profile.motion.profile import Array, read_only
+from gen_profile.phrase import Phrase
 from gen_profile.units import units_of
 
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?"
