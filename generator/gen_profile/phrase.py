@@ -7,7 +7,8 @@ from string import Formatter
 from typing import Any
 
 PLACED = "{place}: {problem}{end}"
-AND, OR_WITH = "{first} and {others}", "{first}, or with {others}"  # to join texts by
+AND, AND_THE = "{first} and {others}", "{first} and the {others}"  # to join texts by
+OR_WITH = "{first}, or with {others}"
 
 
 class Phrase(str):

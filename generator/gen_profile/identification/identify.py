@@ -289,14 +289,14 @@ def _doubts(row: Mapping[str, Any]) -> Iterator[str]:
             "{name} is {row[unrest]:.2g} times farther off the model at first; leave out what was logged "
             "before the axes stood still"
         )
-        yield (Phrase(template, name=name, row=row))
+        yield Phrase(template, name=name, row=row)
     if (left := row["misfit"]) is not None:
         template = (
             "a swing of {left[rms]:.2g} {unit} RMS at {left[frequency_rad_per_s]:.3g} rad/s is left of "
             "{name}, which no parameter of this machine explains; ranges that follow from it are "
             "{left[widened]:.2g} times wider"
         )
-        yield (Phrase(template, left=left, unit=unit, name=name))
+        yield Phrase(template, left=left, unit=unit, name=name)
     if row["noise"] > NOISY * row["swing"]:
         share = row["noise"] / row["swing"]
         template = "the noise in {name} is {share:.0%} of the swing; are unit and signal right?"

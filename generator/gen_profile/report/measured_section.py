@@ -11,7 +11,7 @@ from gen_profile.charts.figure import PALETTE, Band, Figure, Level, Line, Panel,
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
 from gen_profile.evaluation.phrases import machine, mm, number, place_unit
 from gen_profile.motion.profile import Array
-from gen_profile.phrase import Phrase
+from gen_profile.phrase import AND_THE, Phrase, joined
 from gen_profile.report.content import Section, Share, Table, TableRow, Verdict
 from gen_profile.report.measured import Measured, MeasuredSway, Signal
 from gen_profile.spec.model import Spec
@@ -40,23 +40,19 @@ def measured_verdict(measured: Measured) -> Verdict:
     load, worst = max(judged.items(), key=lambda pair: _share(pair[1]))
     passed = bool(measured.passed)
     others = [name for name in measured.loads if name not in judged]
+    residual, limit = mm(worst.residual or 0.0), mm(worst.limit)
     template = (
-        "On the machine the {load} swings by {residual} after the arrival, and {limit} are "
-        "allowed ({source})."
+        "On the machine the {load} swings by {residual} after the arrival, and {limit} are allowed "
+        "({source})."
     )
+
     return Verdict(
         word="Measured: kept." if passed else "Measured: exceeded.",
         passed=passed,
         sentences=(
-            Phrase(
-                template,
-                load=load,
-                residual=mm(worst.residual or 0.0),
-                limit=mm(worst.limit),
-                source=measured.log.source,
-            ),
+            Phrase(template, load=load, residual=residual, limit=limit, source=measured.log.source),
             *(
-                [Phrase("Not measured: the sway of the {others}.", others=" and the ".join(others))]
+                [Phrase("Not measured: the sway of the {others}.", others=joined(AND_THE, others))]
                 if others
                 else []
             ),
@@ -123,16 +119,16 @@ def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Ite
         times, position, planned, deviation = _thinned(signal)
         unit, factor = place_unit(spec, names.index(axis))
         yield Panel(
-            title=f"Position of {axis}",
+            title=Phrase("Position of {axis}", axis=axis),
             x_label=TIME,
-            y_label=f"position ({unit})",
+            y_label=Phrase("position ({unit})", unit=unit),
             lines=[_planned(times, factor * planned), _measured(times, factor * position)],
             bands=[arrival],
         )
         yield Panel(
-            title=f"Deviation of {axis}",
+            title=Phrase("Deviation of {axis}", axis=axis),
             x_label=TIME,
-            y_label=f"deviation (m{signal.unit})",
+            y_label=Phrase("deviation (m{unit})", unit=signal.unit),
             lines=[_measured(times, 1e3 * deviation)],
             bands=[arrival],
         )
@@ -143,13 +139,15 @@ def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Ite
         if measured.nearest:
             like = evaluation.swing.at(times)[measured.nearest].sway[:, loads.index(load)]
             name = machine(evaluation.machines[measured.nearest].name)
-            lines.append(Line(name=f"planned, {name}", x=times, y=1e3 * like, style=NEAREST))
+            lines.append(
+                Line(name=Phrase("planned, {name}", name=name), x=times, y=1e3 * like, style=NEAREST)
+            )
         levels = sway_levels(spec, load, measured.arrival, float(times[-1]))
-        yield _swinging(f"Sway of the {load}", "sway (mm)", lines, levels, arrival)
+        yield _swinging(Phrase("Sway of the {load}", load=load), "sway (mm)", lines, levels, arrival)
     for load, signal in measured.angles.items():
         times, found, planned, _ = _thinned(signal)
         lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * found)]
-        yield _swinging(f"Angle of the {load}", "angle (mrad)", lines, [], arrival)
+        yield _swinging(Phrase("Angle of the {load}", load=load), "angle (mrad)", lines, [], arrival)
 
 
 def _swinging(title: str, label: str, lines: list[Line], levels: list[Level], arrival: Band) -> Panel:

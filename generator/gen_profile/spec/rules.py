@@ -58,12 +58,10 @@ def _robustness(spec: Spec) -> Iterator[Fault]:
     if not own.uncertain:
         names = [*spec.plant.parameters]
         one = next((name for name in names if name.startswith("L")), [*names, "L1"][0])  # ropes are
-        yield (
-            "robustness.uncertain",
-            Phrase(
-                'required with method = "{method}", such as {{ {one} = 0.2 }}', method=own.method, one=one
-            ),
+        problem = Phrase(
+            'required with method = "{method}", such as {{ {one} = 0.2 }}', method=own.method, one=one
         )
+        yield "robustness.uncertain", problem
     for key, method in own.OF_METHOD.items():
         if own.method != method and getattr(own, key) != getattr(usual, key):
             yield f"robustness.{key}", Phrase('only with method = "{method}"', method=method)
@@ -74,10 +72,8 @@ def _move(spec: Spec) -> Iterator[Fault]:
     if not any(move.distance) and move.stops and not any(move.initial.values()):
         yield "move.distance", "must not be zero on every axis"
     if any(0.0 < abs(way) < SHORTEST_MOVE for way in move.distance):
-        yield (
-            "move.distance",
-            Phrase("must be zero, or at least {least:g} m (or rad)", least=SHORTEST_MOVE),
-        )
+        problem: str = Phrase("must be zero, or at least {least:g} m (or rad)", least=SHORTEST_MOVE)
+        yield "move.distance", problem
     limits, limited = ("velocity", "acceleration", "jerk"), " ".join(spec.limits.stated())
     if move.shortest and not any(name in limited for name in limits):
         problem = '"minimum" needs a limit: state limits.acceleration, or velocity or jerk'
@@ -108,10 +104,8 @@ def _can(spec: Spec) -> Iterator[Fault]:
     can = spec.can
     if can.feed_forward in ("torque", "both") and can.torque_per_acceleration is None:
         template = 'required with feed_forward = "{feed_forward}" (‰ of the rated torque per m/s²)'
-        yield (
-            "can.torque_per_acceleration",
-            Phrase(template, feed_forward=can.feed_forward),
-        )
+        problem: str = Phrase(template, feed_forward=can.feed_forward)
+        yield "can.torque_per_acceleration", problem
     if can.mode != "csp" and can.feed_forward != "none":
         yield "can.feed_forward", 'only with mode = "csp"; remove it or set the mode'
     if can.mode == "csv" and can.following_error is None:
@@ -120,10 +114,8 @@ def _can(spec: Spec) -> Iterator[Fault]:
     taken: dict[int, str] = {}
     for axis, node in can.nodes.items():
         if taken.setdefault(node, axis) != axis:
-            yield (
-                place("can.nodes", axis),
-                Phrase("{node} is the node of the axis {taken} already", node=node, taken=taken[node]),
-            )
+            problem = Phrase("{node} is the node of the axis {taken} already", node=node, taken=taken[node])
+            yield place("can.nodes", axis), problem
 
 
 def _all_axes(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -131,10 +123,8 @@ def _all_axes(spec: Spec, plant: Plant) -> Iterator[Fault]:
     for what, stated in (("nodes", spec.can.nodes), ("channels", spec.can.channels)):
         for axis in plant.actuated:
             if stated and axis.name not in stated:
-                yield (
-                    place(f"can.{what}", axis.name),
-                    Phrase("required beside the other axes' {what}", what=what),
-                )
+                problem = Phrase("required beside the other axes' {what}", what=what)
+                yield place(f"can.{what}", axis.name), problem
 
 
 def _at_start(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -142,10 +132,8 @@ def _at_start(spec: Spec, plant: Plant) -> Iterator[Fault]:
     angles = {q.name for q in plant.unactuated if q.unit == "rad"}
     for name, value in spec.move.initial.items():
         if name in angles and abs(value) > LARGEST_ANGLE:
-            yield (
-                place("move.initial", name),
-                Phrase("must be from -{angle:g} to {angle:g} rad", angle=LARGEST_ANGLE),
-            )
+            problem = Phrase("must be from -{angle:g} to {angle:g} rad", angle=LARGEST_ANGLE)
+            yield place("move.initial", name), problem
 
 
 def _at_end(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -180,14 +168,9 @@ def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
                 yield where, Phrase("its value is 0, so a relative range is empty{cure}", cure=cures[table])
             for end in (value * (1.0 + sign * shares[parameter.name]) for sign in (-1.0, 1.0)):
                 if not parameter.lower <= end <= parameter.upper:
-                    template = "{lower:g} to {upper:g} {unit}"
-                    bounds = Phrase(
-                        template, lower=parameter.lower, upper=parameter.upper, unit=parameter.unit
-                    )
-                    yield (
-                        where,
-                        Phrase("reaches {end:.6g}, and the machine takes {bounds}", end=end, bounds=bounds),
-                    )
+                    bounds = Phrase("{own.lower:g} to {own.upper:g} {own.unit}", own=parameter)
+                    template = "reaches {end:.6g}, and the machine takes {bounds}"
+                    yield where, Phrase(template, end=end, bounds=bounds)
 
 
 def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -199,10 +182,7 @@ def _checked_machines(spec: Spec, plant: Plant) -> Iterator[Fault]:
             "{count} parameters have 2^{count} corners; name at most {most} in "
             "check.uncertain, widen theirs, and let check.samples draw"
         )
-        yield (
-            "check.uncertain",
-            Phrase(template, count=len(changed), most=MOST_CORNERS),
-        )
+        yield "check.uncertain", Phrase(template, count=len(changed), most=MOST_CORNERS)
     if spec.check.foreign is None:
         return
     problem = "required, as it is uncertain; name the FMU's variable for it"
@@ -227,10 +207,8 @@ def _axis_limits(spec: Spec, plant: Plant) -> Iterator[Fault]:
         low, high = own.travel
         for key, ends in (("start", move.start), ("target", move.target)):
             if not low <= ends[column] <= high:
-                yield (
-                    limits.place(column, "travel"),
-                    Phrase("must contain the move's {key}, found {found}", key=key, found=[low, high]),
-                )
+                problem = Phrase("must contain the move's {key}, found {found}", key=key, found=[low, high])
+                yield limits.place(column, "travel"), problem
 
 
 def _units(spec: Spec, plant: Plant) -> Iterator[Fault]:
@@ -238,10 +216,10 @@ def _units(spec: Spec, plant: Plant) -> Iterator[Fault]:
     for axis in plant.actuated:
         unit = spec.axis[axis.name].unit if axis.name in spec.axis else axis.unit
         if unit in UNITS and UNITS[unit][0] != axis.unit:
-            yield (
-                f"axis.{axis.name}.unit",
-                Phrase("{unit} does not measure an axis that moves in {own}", unit=repr(unit), own=axis.unit),
+            problem = Phrase(
+                "{unit} does not measure an axis that moves in {own}", unit=repr(unit), own=axis.unit
             )
+            yield f"axis.{axis.name}.unit", problem
 
 
 def _live(spec: Spec, plant: Plant) -> Iterator[Fault]:

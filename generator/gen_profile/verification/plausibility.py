@@ -66,7 +66,7 @@ def _missed_ends(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
                     "Axis {axis.name} {word} at {at:.9g} {axis.unit}, and the spec asks for {due:.9g} "
                     "{axis.unit}."
                 )
-                yield (Phrase(template, axis=axis, word=word, at=at, due=due))
+                yield Phrase(template, axis=axis, word=word, at=at, due=due)
 
 
 def _missed_time(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
@@ -106,7 +106,7 @@ def _contradiction(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
             "The velocity at {time:.6g} s contradicts the positions around it by {found:.3g} "
             "{unit}/s: the artefact was altered; export it again."
         )
-        yield (Phrase(template, time=setpoints.times[worst + 1], found=found, unit=axis.unit))
+        yield Phrase(template, time=setpoints.times[worst + 1], found=found, unit=axis.unit)
 
 
 def _central(spec: Spec, setpoints: SampledProfile) -> Array:
@@ -148,7 +148,7 @@ def _off_their_places(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
                 "changes there by {there:.3g} {axis.unit}/s in a cycle, elsewhere by {elsewhere:.3g} "
                 "{axis.unit}/s at most; the artefact was altered: export it again."
             )
-            yield (Phrase(template, axis=axis, time=setpoints.times[worst], there=there, elsewhere=elsewhere))
+            yield Phrase(template, axis=axis, time=setpoints.times[worst], there=there, elsewhere=elsewhere)
 
 
 def _exceeded_limits(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:

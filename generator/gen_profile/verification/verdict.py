@@ -158,10 +158,8 @@ class Check(Examination):
     def warnings(self) -> tuple[str, ...]:
         """Say what is wrong without counting: doubtful values, faults of timing."""
         timing = () if self.strict else self.groups.get(TIMING, ())
-        late = (
-            Phrase("{sentence} It counts where the check is strict.", sentence=sentence)
-            for sentence in self._sentences(timing)
-        )
+        template = "{sentence} It counts where the check is strict."
+        late = (Phrase(template, sentence=sentence) for sentence in self._sentences(timing))
         return (*self.doubts, *late)
 
     def _sentences(self, findings: Sequence[Finding]) -> Iterator[str]:
@@ -171,36 +169,22 @@ class Check(Examination):
         load, finding = self.worst_of(findings)
         if self._share_after(finding, load) > 1.0:
             template = (
-                "The {load} sways by {found:.4g} mm after the move ({name}), and {limit:.4g} mm "
-                "are allowed (check.residual_sway; numerical error up to {error})."
+                "The {load} sways by {found:.4g} mm after the move ({name}), and {limit:.4g} mm are allowed "
+                "(check.residual_sway; numerical error up to {error})."
             )
-            yield (
-                Phrase(
-                    template,
-                    load=load,
-                    found=1e3 * finding.residual[load],
-                    name=finding.scenario.name,
-                    limit=1e3 * self.limit[load],
-                    error=self._error(),
-                )
-            )
-        swaying = max(findings, key=self._share_on_the_way)
+            yield self._exceeded(template, finding, load, finding.residual[load], self.limit[load])
+        swaying, load = max(findings, key=self._share_on_the_way), self._end_load_name()
         if self.sway_limit is not None and self._share_on_the_way(swaying) > 1.0:
             template = (
-                "The {load} sways by {found:.4g} mm on the way ({name}), and "
-                "{limit:.4g} mm are allowed (limits.sway; numerical error up to {error}); allow "
-                "more, take more time, or narrow the ranges."
+                "The {load} sways by {found:.4g} mm on the way ({name}), and {limit:.4g} mm are allowed "
+                "(limits.sway; numerical error up to {error}); allow more, take more time, or narrow the "
+                "ranges."
             )
-            yield (
-                Phrase(
-                    template,
-                    load=self._end_load_name(),
-                    found=1e3 * (swaying.on_the_way or 0.0),
-                    name=swaying.scenario.name,
-                    limit=1e3 * self.sway_limit,
-                    error=self._error(),
-                )
-            )
+            yield self._exceeded(template, swaying, load, swaying.on_the_way or 0.0, self.sway_limit)
+
+    def _exceeded(self, template: str, finding: Finding, load: str, found: float, limit: float) -> Phrase:
+        name, error = finding.scenario.name, self._error()
+        return Phrase(template, load=load, found=1e3 * found, name=name, limit=1e3 * limit, error=error)
 
     def _error(self) -> str:
         micrometres = float(f"{1e6 * self.error_bound:.2g}")
