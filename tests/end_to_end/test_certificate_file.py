@@ -4,7 +4,6 @@ import base64
 import json
 import shutil
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -110,8 +109,40 @@ def limit_on_the_way_raised(document):
     document["on_the_way"]["limit_m"] *= 2.0
 
 
-def stated_share(document):
-    document["share_proved"] = 0.5
+def stated_more(document):
+    document["largest_met_m"] = {"payload": 0.0}
+
+
+def limits_of_axes_left_out(document):
+    del document["setpoints"]
+
+
+def limits_of_axes_denied(document):
+    document["setpoints"] = None
+
+
+def way_denied(document):
+    document["on_the_way"] = None
+
+
+def sooner(document):
+    document["until_s"] -= 0.5
+
+
+def longer(document):
+    document["until_s"] += 1e-9
+
+
+def bound_of_no_load(document):
+    document["bounds_m"]["hook"] = 0.0
+
+
+def bound_left_out(document):
+    document["bounds_m"].clear()
+
+
+def met_on_the_way(document):
+    document["on_the_way"]["largest_met_m"] = 0.0
 
 
 def a_part_of_the_box(document):
@@ -177,7 +208,15 @@ TAMPERED = {
     stated_lower_on_the_way: "does not prove what it says",
     asked_less: "does not prove what it says of the setpoints",
     limit_on_the_way_raised: "does not cover all machines and limits",
-    stated_share: "does not cover all machines",
+    stated_more: "largest_met_m missing, or of no certificate",
+    limits_of_axes_left_out: "setpoints missing, or of no certificate",
+    limits_of_axes_denied: "does not prove what it says of the setpoints",
+    way_denied: "does not cover all machines and limits",
+    sooner: "about another time",
+    longer: "about another time",
+    bound_of_no_load: "is damaged",
+    bound_left_out: "is damaged",
+    met_on_the_way: "is damaged",
     a_part_of_the_box: "does not cover all machines",
     limits_raised: "does not cover all machines",
     narrower: "does not cover all machines",
@@ -218,20 +257,15 @@ def test_what_is_no_certificate_or_of_something_else_is_refused(copied):
         gp.check_certificate(artefact, beside)
 
 
-def test_a_certificate_of_the_first_release_that_wrote_them_still_holds():
-    """Its series had as many terms in each parameter, and errors were measured alike for all machines."""
-    first = Path(__file__).parent / "first_certificate" / "single-pendulum-crane.csv"
-    found = gp.check_certificate(first, first.with_name(f"{first.name}.certificate.json"))
-    assert found.proved and found.terms == (8,) and found.scales.shape[-1] == 1
-
-
-def test_a_certificate_from_before_more_than_residual_sway_was_proved_still_holds(copied):
+def test_limits_that_the_file_breaks_are_not_proved_by_a_certificate_that_is_silent_of_them(copied):
+    """Of a spec without these limits, with the other spec's hash written into it."""
     artefact, beside = copied
+    stricter = gp.preset_spec(PRESET, [CYCLE, "limits.velocity=0.5", "limits.acceleration=0.1"])
     document = json.loads(beside.read_text())
-    del document["on_the_way"], document["setpoints"]
-    beside.write_text(json.dumps(document))
-    found = gp.check_certificate(artefact, beside)
-    assert found.proved and found.on_the_way is None and found.to_dict()["on_the_way"] is None
+    silent = {**document, "spec_sha256": stricter.sha256(), "on_the_way": None, "setpoints": {}}
+    beside.write_text(json.dumps(silent))
+    with pytest.raises(CertificateError, match=r"ask cart for 1\.468 m/s"):
+        gp.check_certificate(artefact, beside, stricter)
 
 
 def test_ranges_that_are_too_wide_for_a_certificate_are_refused(copied):

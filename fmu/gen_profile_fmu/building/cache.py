@@ -22,6 +22,7 @@ import platformdirs
 
 from gen_profile.errors import CosimulationError
 from gen_profile.private_folder import is_private, make_private, others_may_write, temporary_folder
+from gen_profile.strict_json import parse_json
 
 ENVIRONMENT_VARIABLE = "GEN_PROFILE_CACHE"
 _CHECKSUMS = "checksums.json"
@@ -125,7 +126,7 @@ def is_intact(entry: Path) -> bool:
     try:
         if (known := _known_intact.get(entry)) and known == _stamps(entry, known):
             return True
-        checksums = json.loads((entry / _CHECKSUMS).read_text(encoding="utf-8"))
+        checksums = parse_json((entry / _CHECKSUMS).read_text(encoding="utf-8"))
         if any(others_may_write(entry / name, entry.parent) for name in (_CHECKSUMS, *checksums)):
             return False
         stamps = _stamps(entry, (_CHECKSUMS, *checksums))

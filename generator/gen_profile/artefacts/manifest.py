@@ -13,6 +13,7 @@ import attrs
 from attrs.validators import instance_of
 
 from gen_profile.errors import OutputError
+from gen_profile.strict_json import parse_json
 
 FILENAME = "manifest.json"
 FORMAT = "gen-profile manifest"
@@ -150,7 +151,7 @@ def parse_manifest(content: bytes, source: str) -> Manifest:
         It is none, of another version, or was altered.
     """
     try:
-        document = json.loads(content.decode("utf-8"))
+        document = parse_json(content.decode("utf-8"))
         seal, found = document.pop(SEAL, None), _seal(document)
         if (document.pop("format"), document.pop("format_version")) != (FORMAT, FORMAT_VERSION):
             raise ValueError("another format")

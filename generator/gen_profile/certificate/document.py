@@ -6,7 +6,7 @@ import binascii
 import json
 import zlib
 from collections.abc import Iterator, Mapping
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +20,14 @@ from gen_profile.certificate.boxes import DyadicBox
 from gen_profile.certificate.packing import Motions, pack, unpack
 from gen_profile.certificate.sway_limits import ProvedSway, SwayLimit
 from gen_profile.errors import CertificateError
+from gen_profile.strict_json import parse_json
 
 SUFFIX = ".certificate.json"
 FORMAT = "gen-profile certificate 1"
 MOST_HALVINGS = 50  # of a range, up to which shares of it are exact
-FIRST_TERMS = (1, 8, 6, 5, 4)  # in each of so many parameters, where it is not stated
+CLAIMS = ("bounds_m", "limits_m", "on_the_way", "setpoints", "ranges", "from_s", "until_s")
+MATERIAL = ("axes", "parts", "terms", "motions", "scales")  # of the proof
+KEYS = {"format", "spec_sha256", "artefact_sha256", *CLAIMS, *MATERIAL}
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -41,8 +44,8 @@ class Certificate:
         Time in s in which the sway is bounded.
     sways : tuple of ProvedSway
         Of every load after the move, and of the end load on the way where that is limited.
-    asked : mapping or None
-        Of the axes, see `gen_profile.certificate.axes.setpoint_limits.asked_of_axes`; None in the first ones.
+    asked : mapping
+        Of the axes, see `gen_profile.certificate.axes.setpoint_limits.asked_of_axes`.
     share : float
         Of the ranges' box, of which the bounds are proved.
     axes : AxisMotion
@@ -61,7 +64,7 @@ class Certificate:
     arrival: float
     until: float
     sways: tuple[ProvedSway, ...]
-    asked: Asked | None
+    asked: Asked
     share: float
     axes: AxisMotion
     boxes: tuple[DyadicBox, ...]
@@ -148,7 +151,7 @@ def certificate_path(path: Path) -> Path:
 
 
 def encode(certificate: Certificate) -> bytes:
-    """Write a certificate.
+    """Write a certificate: what it claims and the proof's material, and nothing that is not proved again.
 
     Raises
     ------
@@ -157,12 +160,14 @@ def encode(certificate: Certificate) -> bytes:
     """
     if not certificate.proved:
         raise CertificateError("Nothing is proved, so there is no certificate to write.")
-    axes = certificate.axes
+    axes, said = certificate.axes, certificate.to_dict()
+    if said["on_the_way"] is not None:
+        del said["on_the_way"]["largest_met_m"]
     document = {
         "format": FORMAT,
         "spec_sha256": certificate.spec_sha256,
         "artefact_sha256": certificate.artefact_sha256,
-        **certificate.to_dict(),
+        **{name: said[name] for name in CLAIMS},
         "axes": {
             name: getattr(axes, name).tolist() for name in ("knots", "position", "velocity", "acceleration")
         },
@@ -175,19 +180,20 @@ def encode(certificate: Certificate) -> bytes:
 
 
 def parse(content: bytes) -> Certificate:
-    """Read a certificate, without believing it.
+    """Read a certificate, without believing it: as one that proves all it claims, of all machines.
 
     Raises
     ------
     CertificateError
-        It is none, or damaged.
+        It is none, or damaged, or claims what is not proved again.
     """
     try:
-        document = json.loads(content)
+        document = parse_json(content)
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise CertificateError(f"This is no certificate that can be read here ({FORMAT!r}).")
+        if wrong := sorted(KEYS ^ document.keys()):
+            raise ValueError(f"{', '.join(wrong)} missing, or of no certificate")
         axes = {name: np.array(document["axes"][name], dtype=np.float64) for name in document["axes"]}
-        scales = unpack(document["scales"], "<f8", 2)
         return Certificate(
             spec_sha256=str(document["spec_sha256"]),
             artefact_sha256=str(document["artefact_sha256"]),
@@ -195,13 +201,16 @@ def parse(content: bytes) -> Certificate:
             arrival=float(document["from_s"]),
             until=float(document["until_s"]),
             sways=tuple(_sways(document)),
-            asked=document.get("setpoints"),
-            share=float(document["share_proved"]),
+            asked=document["setpoints"],
+            share=1.0,
             axes=AxisMotion(**axes),
             boxes=tuple(tuple(_part(*part) for part in box) for box in document["parts"]),
-            terms=_terms(document),
-            motions=tuple(_motions(document)),
-            scales=scales if scales.ndim == 5 else scales[..., None],
+            terms=tuple(int(count) for count in document["terms"]),
+            motions=tuple(
+                Motions(quanta=tuple(one["quanta"]), packed={key: one[key] for key in ("shape", "zlib")})
+                for one in document["motions"]
+            ),
+            scales=unpack(document["scales"], "<f8", 2),
         )
     except (
         ValueError,
@@ -209,7 +218,6 @@ def parse(content: bytes) -> Certificate:
         TypeError,
         AttributeError,
         OverflowError,
-        RecursionError,
         binascii.Error,
         zlib.error,
     ) as error:
@@ -221,25 +229,6 @@ def damaged(error: Exception) -> CertificateError:
     return CertificateError(f"The certificate is damaged ({error}); certify the file again.")
 
 
-def _terms(document: Mapping[str, Any]) -> tuple[int, ...]:
-    """Tell how many terms series have in each parameter; the first certificates did not state it."""
-    if "terms" in document:
-        return tuple(int(count) for count in document["terms"])
-    ranges = len(document["ranges"])
-    return (FIRST_TERMS[min(ranges, len(FIRST_TERMS) - 1)],) * ranges
-
-
-def _motions(document: Mapping[str, Any]) -> Iterator[Motions]:
-    """List the motions of every box; the first certificates held them all in one array of 32 bits."""
-    if "motions" in document:
-        for one in document["motions"]:
-            yield Motions(quanta=tuple(one["quanta"]), packed={key: one[key] for key in ("shape", "zlib")})
-    else:
-        quanta = np.array(document["quanta"], dtype=np.float64)[:, None, None]
-        for whole in unpack(document["coefficients"], "<i4", 2):
-            yield Motions.of(whole * quanta)
-
-
 def _part(level: int, index: int) -> tuple[int, int]:
     if not (isinstance(level, int) and isinstance(index, int) and 0 <= level <= MOST_HALVINGS):
         raise ValueError("a box of no such kind")
@@ -247,12 +236,13 @@ def _part(level: int, index: int) -> tuple[int, int]:
 
 
 def _sways(document: Mapping[str, Any]) -> Iterator[ProvedSway]:
-    """List what is proved; the first certificates did not tell of the way."""
-    for load, allowed in document["limits_m"].items():
+    """List the bounds that are claimed; what was met is for the proof to tell."""
+    limits, bounds, way = (document[name] for name in ("limits_m", "bounds_m", "on_the_way"))
+    if limits.keys() != bounds.keys() or (way is not None and way.keys() != {"load", "limit_m", "bound_m"}):
+        raise ValueError("bounds of other loads than the limits'")
+    for load, allowed in limits.items():
         limit = SwayLimit(load=load, allowed=float(allowed))
-        bound, seen = (float(document[name][load]) for name in ("bounds_m", "largest_met_m"))
-        yield ProvedSway(limit=limit, bound=bound, seen=seen)
-    if (way := document.get("on_the_way")) is not None:
-        allowed, bound, seen = (float(way[name]) for name in ("limit_m", "bound_m", "largest_met_m"))
-        limit = SwayLimit(load=str(way["load"]), allowed=allowed, on_the_way=True)
-        yield ProvedSway(limit=limit, bound=bound, seen=seen)
+        yield ProvedSway(limit=limit, bound=float(bounds[load]), seen=nan)
+    if way is not None:
+        limit = SwayLimit(load=str(way["load"]), allowed=float(way["limit_m"]), on_the_way=True)
+        yield ProvedSway(limit=limit, bound=float(way["bound_m"]), seen=nan)

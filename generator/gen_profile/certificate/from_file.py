@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Sequence
 from functools import partial
+from math import isclose
 from pathlib import Path
 
 import attrs
@@ -18,9 +19,10 @@ from gen_profile.certificate.axes.setpoint_limits import Asked, asked_of_axes
 from gen_profile.certificate.boxes import covers
 from gen_profile.certificate.certify import SLACK, Attempt, Progress, attempt
 from gen_profile.certificate.document import Certificate, certificate_path, damaged, encode, parse
+from gen_profile.certificate.enclosure import SwayBounds
 from gen_profile.certificate.in_order import in_order
 from gen_profile.certificate.sway_limits import ProvedSway, limits_of
-from gen_profile.certificate.theorem import Theorem, ranges_of
+from gen_profile.certificate.theorem import SAME_TIME, Theorem, ranges_of
 from gen_profile.errors import CertificateError
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.spec.model import Spec
@@ -111,12 +113,13 @@ def check_certificate(
     artefact = _read(Path(path), spec)
     found = parse(read_artefact(Path(certificate)))
     theorem = _require_about(found, artefact)
-    bounds, stated = np.zeros(len(found.sways)), np.array([sway.bound for sway in found.sways])
-    done = 0
+    stated = np.array([sway.bound for sway in found.sways])
+    bounds, seen, done = np.zeros(len(stated)), np.zeros(len(stated)), 0
     for count, again in in_order(
         partial(_bound_again, theorem, found, stated), theorem.batches(range(len(found.boxes)))
     ):
-        bounds = np.maximum(bounds, again)  # which keeps nan
+        bounds = np.maximum(bounds, again.sway.max(axis=0))  # which keeps nan
+        seen = np.fmax(seen, again.seen.max(axis=0))
         done += count
         progress(done, len(found.boxes))
     for sway, said, bound in zip(found.sways, stated.tolist(), bounds.tolist(), strict=True):
@@ -125,13 +128,14 @@ def check_certificate(
                 f"The certificate does not prove what it says: the {sway.limit.load} is bounded by "
                 f"{1e3 * bound:.4g} mm, and it states {1e3 * said:.4g} mm."
             )
-    return found
+    met = zip(found.sways, seen.tolist(), strict=True)
+    return attrs.evolve(found, sways=tuple(attrs.evolve(sway, seen=most) for sway, most in met))
 
 
 def _bound_again(
     theorem: Theorem, found: Certificate, enough: Array, rows: Sequence[int]
-) -> tuple[int, Array]:
-    """Carry the proof out again for some boxes: how many, and bounds for all of them.
+) -> tuple[int, SwayBounds]:
+    """Carry the proof out again for some boxes: how many, and their bounds.
 
     Raises
     ------
@@ -143,8 +147,7 @@ def _bound_again(
     except (ValueError, TypeError, KeyError, zlib.error) as error:
         raise damaged(error) from error
     theorem.require_shapes(boxes, coefficients, np.array(scales))
-    again = theorem.enclosure(boxes, coefficients, np.array(scales)).bounds(enough)
-    return len(boxes), np.asarray(again.sway.max(axis=0))
+    return len(boxes), theorem.enclosure(boxes, coefficients, np.array(scales)).bounds(enough)
 
 
 def _read(path: Path, spec: Spec | None) -> _Artefact:
@@ -203,15 +206,14 @@ def _require_about(found: Certificate, artefact: _Artefact) -> Theorem:
         axes=found.axes,
         terms=found.terms,
     )
-    if found.asked is not None and found.asked != asked_of_axes(artefact.spec, artefact.setpoints):
+    if found.asked != asked_of_axes(artefact.spec, artefact.setpoints):
         raise CertificateError("The certificate does not prove what it says of the setpoints.")
     if not len(found.boxes) == len(found.motions) == len(found.scales):
         raise CertificateError("The certificate is damaged: its arrays do not fit together.")
-    whole = found.share == 1.0 and dict(found.ranges) == _named(theorem) and covers(found.boxes)
-    limits = limits_of(artefact.spec)
-    of_the_spec = theorem.limits in (limits, tuple(limit for limit in limits if not limit.on_the_way))
-    if not (whole and of_the_spec and found.proved):
+    whole = dict(found.ranges) == _named(theorem) and covers(found.boxes)
+    if not (whole and theorem.limits == limits_of(artefact.spec) and found.proved):
         raise CertificateError("The certificate does not cover all machines and limits of the spec.")
-    if found.until > theorem.until or found.arrival != theorem.arrival:
+    watched = isclose(found.until, theorem.until, rel_tol=SAME_TIME) and found.until <= found.axes.knots[-1]
+    if not watched or found.arrival != theorem.arrival:
         raise CertificateError("The certificate is about another time.")
     return theorem

@@ -20,6 +20,7 @@ import tornado.websocket
 
 from gen_profile.errors import GenProfileError, OutputError, SpecError
 from gen_profile.spec.reading import presets
+from gen_profile.strict_json import parse_json
 from gen_profile.studio.desk import Desk
 from gen_profile.studio.entrance import PATIENCE, BoundedServer, Entering, Entrance, Guarded, started_browser
 from gen_profile.studio.orders import DriveQuestion, LogQuestion, Order, Question
@@ -216,7 +217,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             self.close(code=1009)
             return
         try:
-            said = json.loads(head)
+            said = parse_json(head)
             act: dict[str, Callable[[dict[str, Any]], None]] = {
                 "open": self._begin,
                 "show": self._show,
@@ -233,7 +234,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         except GenProfileError as error:
             answer = "faulty" if isinstance(error, SpecError) else "unanswered"
             self._tell(failure(answer, str(error).splitlines()))
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        except (ValueError, KeyError, TypeError, AttributeError):
             self._tell(failure("unanswered", ["The page said something unheard of."]))
 
     def on_close(self) -> None:

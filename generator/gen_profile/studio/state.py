@@ -19,6 +19,7 @@ import tomlkit
 from gen_profile.errors import SpecError
 from gen_profile.spec.reading import overridden, parse_toml, preset_text
 from gen_profile.spec.values import NONE
+from gen_profile.strict_json import parse_json
 
 MOST_EDITS = 200
 MOST_TEXT = 200  # characters of a value
@@ -197,8 +198,8 @@ class StudioState:
         try:
             packed = base64.urlsafe_b64decode(text[:MOST_ADDRESS] + "=" * (-len(text) % 4))
             unpacker = zlib.decompressobj(wbits=-15)
-            document = json.loads(unpacker.decompress(packed, MOST_STATE))
-        except (ValueError, zlib.error, RecursionError) as error:
+            document = parse_json(unpacker.decompress(packed, MOST_STATE))
+        except (ValueError, zlib.error) as error:
             raise SpecError(
                 "The state in the address is damaged; the page shows what it starts with."
             ) from error

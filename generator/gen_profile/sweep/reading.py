@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ from gen_profile.artefacts.manifest import FILENAME, sha256
 from gen_profile.artefacts.writing import staged
 from gen_profile.bounded_file import read_bounded
 from gen_profile.errors import OutputError
+from gen_profile.strict_json import parse_json
 from gen_profile.sweep.archive import is_archive, read_archive
 from gen_profile.sweep.grid import Grid
 from gen_profile.sweep.store import RECORD
@@ -42,12 +42,15 @@ def swept_table(
             raise OutputError(f"{path}: finish the sweep first (the same gen-profile sweep goes on).")
         names = archive.columns() if columns is None else list(columns)
         rows = archive.rows(names, cases)
-    decoded = [_decoded(dict(zip(names, row, strict=True))) for row in rows]
+    try:
+        decoded = [_decoded(dict(zip(names, row, strict=True))) for row in rows]
+    except ValueError as error:
+        raise OutputError(f"{path}: damaged; sweep again.") from error
     return columns_of(decoded, names)
 
 
 def _decoded(row: dict[str, Any]) -> dict[str, Any]:
-    return row | {"artefacts": json.loads(row["artefacts"])} if "artefacts" in row else row
+    return row | {"artefacts": parse_json(row["artefacts"])} if "artefacts" in row else row
 
 
 def case_files(path: Path, row: Mapping[str, Any]) -> dict[str, bytes]:

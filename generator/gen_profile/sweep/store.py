@@ -27,6 +27,7 @@ from gen_profile.artefacts.reading import read_artefact
 from gen_profile.artefacts.writing import deliver, staged
 from gen_profile.bounded_file import DOCUMENT, read_bounded
 from gen_profile.errors import OutputError
+from gen_profile.strict_json import parse_json
 from gen_profile.sweep.archive import Archive, is_archive, read_archive, written_archive
 from gen_profile.sweep.case import CaseOutcome, Recipe
 from gen_profile.sweep.grid import Grid, GridAxis
@@ -124,8 +125,8 @@ class Store:
     def _record(self, case: int) -> dict[str, Any] | None:
         """Read a case's record, if it is there and one of this case."""
         try:
-            record = json.loads(read_bounded(self.case_folder(case) / RECORD, DOCUMENT))
-        except (OSError, ValueError, RecursionError):
+            record = parse_json(read_bounded(self.case_folder(case) / RECORD, DOCUMENT))
+        except (OSError, ValueError):
             return None
         own = {"case": case, "values": self.grid[case]}
         if not isinstance(record, dict) or any(record.get(key) != value for key, value in own.items()):
@@ -175,7 +176,11 @@ class _ArchiveKeeper:
         if case not in self._finished:
             return False
         ((artefacts,),) = self._archive.rows(["artefacts"], [case])
-        return _is_whole(json.loads(artefacts or "[]"), self._archive.files(str(case_path(case))))
+        try:
+            listed = parse_json(artefacts or "[]")
+        except ValueError:
+            return False
+        return _is_whole(listed, self._archive.files(str(case_path(case))))
 
     def keep(self, case: int, outcome: CaseOutcome) -> None:
         self._archive.keep(self._store.grid, outcome)
@@ -272,10 +277,10 @@ def grid_of(path: Path) -> Grid:
 def _parsed(path: Path, description: bytes | str) -> dict[str, Any]:
     place = path if is_archive(path) else path / DESCRIPTION
     try:
-        document = json.loads(description)
+        document = parse_json(description)
         if (document["format"], document["format_version"]) != (FORMAT, FORMAT_VERSION):
             raise ValueError("another format")
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError) as error:
         raise OutputError(f"{place}: not a sweep of this version of gen-profile.") from error
     vary = document.get("vary")
     values = vary.values() if isinstance(vary, dict) else ()
