@@ -9,7 +9,7 @@ import pytest
 from numpy.polynomial import chebyshev as series
 
 from gen_profile.certificate.arithmetic import balls, chebyshev
-from gen_profile.certificate.arithmetic.affine import Affine
+from gen_profile.certificate.arithmetic.affine import Affine, constant
 from gen_profile.certificate.arithmetic.balls import Ball, ball, matmul, shared
 from gen_profile.certificate.boxes import Ranges, covers, halves, whole
 from gen_profile.certificate.equations import OPERATIONS, Enclosed, over_sinh
@@ -61,10 +61,42 @@ def random_balls(random):
     return Ball(mid, rad), rim
 
 
-def require_inside(found, exact):
-    mid, rad = np.broadcast_to(found.mid, POINTS), np.broadcast_to(found.rad, POINTS)
+SIZES = [
+    5e-324,
+    1.5e-323,
+    3e-310,
+    2.2250738585072014e-308,
+    1e-300,
+    1e-160,
+    1e-17,
+    0.7,
+    1.0,
+    1e17,
+    1e160,
+    1e300,
+]
+ANGLES = [30.0, 400.0, 755.0, 800.0]  # and as far as functions go
+SHARES = [0.0, 5e-324, 1e-310, 2.0**-53, 1e-3, 0.9, 1.0 - 2.0**-53, 1.0]  # of a midpoint
+
+
+def adversarial_balls(random, count):
+    """Balls that underflow, nearly overflow or nearly hold zero, and a point on each rim."""
+    mid = random.choice([*SIZES, *ANGLES], count) * random.choice([-1.0, 1.0], count)
+    mid = mid * random.choice([1.0, 1.0 + 2.0**-52, 1.7], count)
+    rad = np.abs(mid) * random.choice(SHARES, count)
+    rad = np.where(random.random(count) < 0.2, random.choice(SIZES, count), rad)
+    turn = random.choice([-1.0, 1.0], count)
+    rim = [
+        flint.acb(m) + flint.acb(r) * flint.acb(t)
+        for m, r, t in zip(mid.tolist(), rad.tolist(), turn.tolist(), strict=True)
+    ]
+    return Ball(mid, rad), rim
+
+
+def require_inside(found, exact, share=0.5):
+    mid, rad = (np.broadcast_to(part, len(exact)) for part in (found.mid, found.rad))
     known = np.isfinite(mid) & np.isfinite(rad)
-    assert known.mean() > 0.5
+    assert known.mean() > share
     for m, r, value in zip(mid[known].tolist(), rad[known].tolist(), np.array(exact)[known], strict=True):
         assert abs(value - flint.acb(m)) <= flint.arb(r)
 
@@ -81,6 +113,34 @@ def test_operations_enclose_all_complex_values_around(enclosed, exact):
     (x, rim), (y, other) = (random_balls(np.random.default_rng(seed)) for seed in (2, 3))
     with np.errstate(all="ignore"):
         require_inside(enclosed(x, y), [exact(a, b) for a, b in zip(rim, other, strict=True)])
+
+
+@pytest.mark.parametrize(("enclosed", "exact"), UNARY.values(), ids=UNARY.keys())
+def test_functions_enclose_what_underflows_or_nearly_overflows(enclosed, exact):
+    with np.errstate(all="ignore"), flint.ctx.workprec(2300):
+        x, rim = adversarial_balls(np.random.default_rng(11), 9000)
+        require_inside(enclosed(x), [exact(z) for z in rim], 0.15)
+
+
+@pytest.mark.parametrize(("enclosed", "exact"), BINARY.values(), ids=BINARY.keys())
+@pytest.mark.parametrize("affine", [False, True], ids=["balls", "affine"])
+def test_operations_enclose_what_underflows_or_nearly_overflows(enclosed, exact, affine):
+    random = np.random.default_rng(12)
+    with np.errstate(all="ignore"), flint.ctx.workprec(2300):
+        (x, rim), (y, other) = (adversarial_balls(random, 4000) for _ in range(2))
+        first, second = (constant(one, REACH) for one in (x, y)) if affine else (x, y)
+        found = enclosed(first, second)
+        exact_ones = [exact(a, b) for a, b in zip(rim, other, strict=True)]
+        require_inside(found.ball if affine else found, exact_ones, 0.1)
+
+
+def test_the_upper_end_of_a_ball_is_no_lower_than_it_is():
+    x, _ = adversarial_balls(np.random.default_rng(13), 4000)
+    with np.errstate(all="ignore"), flint.ctx.workprec(2300):
+        ends = zip(x.mid.tolist(), x.rad.tolist(), x.upper.tolist(), x.most.tolist(), strict=True)
+        for mid, rad, upper, most in ends:
+            assert flint.arb(mid) + flint.arb(rad) <= flint.arb(upper)
+            assert abs(flint.arb(mid)) + flint.arb(rad) <= flint.arb(most)
 
 
 @pytest.mark.parametrize("numerator", [lambda x: 1.0, lambda x: 3.0 * x])

@@ -89,9 +89,10 @@ class Affine:
         b = self._like(other)
         mid, size, off = self.mid / b.mid, np.abs(b.mid), b.off
         slopes = {k: s / b.mid for k, s in _sum(self.slopes, 1.0, b.slopes, -mid).items()}
-        rest = self.rad + np.abs(mid) * b.rad + 4.0 * UNIT * np.abs(self.mid)
+        rest = self.rad + np.abs(mid) * b.rad + 4.0 * UNIT * np.abs(self.mid) + LEAST
         whole = rest + self._turned({k: s * b.mid for k, s in slopes.items()})
-        missed = np.where(off < size, rest / size + whole * off / (size * (size - off)), np.inf)
+        share = np.where(off < size, off / (size - off) + LEAST, np.inf)
+        missed = rest / size + whole / size * share
         return self._made(mid, slopes, missed, np.abs(mid) + (self.off + np.abs(mid) * off) / size)
 
     def __rtruediv__(self, other: AffineOperand) -> Affine:
@@ -126,7 +127,8 @@ def sine_like(value: Callable[[Array], Array], slope: Callable[[Array], Array]) 
 
     def enclosed(x: Affine) -> Affine:
         mid, along, off = value(x.mid), slope(x.mid), x.off
-        bent = np.abs(mid) * 2.0 * np.sinh(0.5 * off) ** 2 + np.abs(along) * off**3 / 6.0 * np.cosh(off)
+        sizes = (np.abs(one) + LEAST for one in (mid, along))  # which may have vanished
+        bent = next(sizes) * 2.0 * np.sinh(0.5 * off) ** 2 + next(sizes) * off**3 / 6.0 * np.cosh(off)
         slopes = {k: one * along for k, one in x.slopes.items()}
         return x._made(mid, slopes, np.abs(along) * x.rad + bent, np.abs(mid) + np.abs(along) * off)
 

@@ -67,7 +67,7 @@ class Ball:
         b = ball(other)
         mid = self.mid / b.mid
         away = np.abs(b.mid) - b.rad
-        missed = self.rad + np.abs(mid) * b.rad + UNIT * np.abs(self.mid)
+        missed = self.rad + np.abs(mid) * b.rad + UNIT * np.abs(self.mid) + LEAST  # before it is divided
         return _rounded(mid, _shared(np.where(away > 0.0, missed / away, np.inf), self.rad, b.rad))
 
     def __neg__(self) -> Ball:
@@ -101,7 +101,7 @@ class Ball:
     @property
     def upper(self) -> Array:
         """Upper bound of the value."""
-        return np.asarray(self.mid + self.rad + UNIT * np.abs(self.mid))
+        return np.asarray(self.mid + self.rad * UPWARD + UNIT * np.abs(self.mid))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -193,7 +193,7 @@ cosh = _sine_like(np.cosh, np.sinh)
 def exp(x: Ball) -> Ball:
     """Enclose e to the power: |e^d − 1| ≤ e^|d| − 1."""
     mid = np.exp(x.mid)
-    return _evaluated(mid, mid * np.expm1(x.rad), x)
+    return _evaluated(mid, (mid + LEAST) * np.expm1(x.rad), x)
 
 
 def sqrt(x: Ball) -> Ball:
