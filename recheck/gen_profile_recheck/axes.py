@@ -1,0 +1,103 @@
+"""The axes: straight lines between setpoints, and how far they are from the certificate's smooth motion.
+
+On every piece the difference of positions is ε = ε̄ + ψ', where ε̄ is its mean and ψ vanishes at both ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from flint import arb, arb_poly
+
+FINER = 4  # parts of a cycle, between whose ends bounds are by the greatest acceleration
+
+
+@dataclass(frozen=True)
+class AxisPiece:
+    """One axis on a piece of time: its smooth position as a polynomial of −1 … 1, and bounds of what it is off.
+
+    `gap` bounds |ε| in m (or rad), `rate` its rate, `mean` |ε̄|, and `swing` |ψ|; `first` is |ε| where it begins.
+    """
+
+    smooth: arb_poly
+    gap: arb
+    rate: arb
+    mean: arb
+    swing: arb
+    first: arb
+
+
+def magnitude(values: Sequence[arb]) -> arb:
+    """Bound the absolute values of all."""
+    found = arb(0)
+    for one in values:
+        found = found.max(one.abs_upper())
+    return found
+
+
+def quintic(half: arb, positions: Sequence[float], speeds: Sequence[float], bends: Sequence[float]) -> arb_poly:
+    """Give the polynomial on −1 … 1 with position, velocity and acceleration at both ends."""
+    (p, q), (u, v), (b, c) = positions, [half * one for one in speeds], [half * half * one for one in bends]
+    p, q, x = arb(p), arb(q), arb_poly([0, 1])
+    even, odd = (p + q) / 2, (q - p) / 2  # of value, then slope and bend, that are odd where it is even
+    slope, other = (v - u) / 2, (v + u) / 2
+    bend, twist = (b + c) / 2, (c - b) / 2
+    square = x * x - 1
+    lead = (other - odd) / 2  # of x (x² − 1), whose slope at 1 is 2 and bend 6
+    fifth = (twist - 6 * lead) / 8  # of x (x² − 1)², whose bend at 1 is 8
+    fourth = (bend - slope) / 8  # of (x² − 1)², whose bend at 1 is 8, beside slope/2 (x² − 1)
+    return even + odd * x + slope / 2 * square + lead * x * square + (fourth + fifth * x) * square * square
+
+
+def axis_pieces(
+    knots: Sequence[float],
+    smooth: Sequence[arb_poly],
+    times: Sequence[float],
+    positions: Sequence[float],
+    velocity: float,
+) -> Iterator[AxisPiece]:
+    """Bound how far an axis is from a smooth motion, piece by piece; its knots are times of setpoints."""
+    place = {time: number for number, time in enumerate(times)}
+    for (begin, end), polynomial in zip(pairwise(knots), smooth, strict=True):
+        if begin < times[-1]:
+            rows = range(place[begin], place[end] + 1)
+            corners = [(arb(times[row]), arb(positions[row])) for row in rows]
+        else:
+            since = [arb(time) - times[-1] for time in (begin, end)]
+            corners = [(one + times[-1], positions[-1] + one * velocity) for one in since]
+        yield _piece(polynomial, list(_finer(corners)))
+
+
+def _finer(corners: Sequence[tuple[arb, arb]]) -> Iterator[tuple[arb, arb]]:
+    for (time, position), (later, farther) in pairwise(corners):
+        for part in range(FINER):
+            yield time + (later - time) * part / FINER, position + (farther - position) * part / FINER
+    yield corners[-1]
+
+
+def _piece(smooth: arb_poly, points: Sequence[tuple[arb, arb]]) -> AxisPiece:
+    begin, end = points[0][0], points[-1][0]
+    half, primitive, slope = (end - begin) / 2, smooth.integral(), smooth.derivative()
+    bend = sum((abs(one) for one in slope.derivative().coeffs()), start=arb(0)) / half**2
+    local = [(time - begin) / half - 1 for time, _ in points]
+    off = [position - smooth(x) for (_, position), x in zip(points, local, strict=True)]
+    rates, area, areas, longest = [], arb(0), [arb(0)], arb(0)
+    for ((time, position), (later, farther)), (x, y) in zip(pairwise(points), pairwise(local), strict=True):
+        step = later - time
+        rates.append((farther - position) / step - slope((x + y) / 2) / half)
+        area += step * (position + farther) / 2 - half * (primitive(y) - primitive(x))
+        areas.append(area)
+        longest = longest.max(step.abs_upper())
+    mean = area / (end - begin)
+    swings = [one - mean * (time - begin) for one, (time, _) in zip(areas, points, strict=True)]
+    rate = magnitude(rates) + bend * longest / 2
+    return AxisPiece(
+        smooth=smooth,
+        gap=magnitude(off) + bend * longest**2 / 8,
+        rate=rate,
+        mean=magnitude([mean]),
+        swing=magnitude(swings) + rate * longest**2 / 8,
+        first=magnitude(off[:1]),
+    )

@@ -1,0 +1,383 @@
+"""How far every machine of a box is from its approximate motion, and how much it sways.
+
+With G = ∂f/∂v and P = ∂f/∂x G + ∂f/∂a − dG/dt along the smooth motion of the axes, z = x − G ε − P ψ follows
+ż = f(z, smooth axes) + r, where every term of r has ε̄, ψ or two factors of ε and its rate; the error e = z − x̃ obeys
+d|S e|/dt ≤ μ |S e| + |S| (|x̃' − f(x̃)| + |r|), μ the logarithmic norm of S (∂f/∂x) S⁻¹ (docs/certificate.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from flint import acb_mat, arb, arb_mat, arb_poly
+
+from gen_profile_recheck.boxes import Box, Enclosed, Piece, State, Values, _t, powers, wide
+from gen_profile_recheck.jets import along, moved
+
+TERMS, FEW_TERMS = 30, 16  # of power series in time: for the defect and sway, and for μ
+MORE, FEWER, FEWEST = 2, 3, 4  # nodes than terms in each parameter, likewise; and at least so many
+ATTEMPTS, WIDER = 12, 2
+HALVINGS = 24  # of pieces or ranges, to bound a sway
+
+
+@dataclass(frozen=True)
+class Watch:
+    """A sway that is to be bounded: of which loads together, from which piece on, and by how much."""
+
+    loads: slice
+    first: int
+    bound: float
+
+
+class NotProvedError(Exception):
+    """A sentence that says why nothing is proved."""
+
+
+class BoxProof:
+    """The proof for one box: pieces one after another."""
+
+    def __init__(self, box: Box, pieces: Sequence[Piece], scales: Sequence[Any], start: Sequence[float]) -> None:
+        self.box, self.pieces, self.start = box, pieces, start
+        self.scales = [ScaleMatrix(box, one) for one in scales]
+        self.fine = tuple(count + MORE for count in box.terms)
+        self.coarse = tuple(max(FEWEST, count - FEWER) for count in box.terms)
+
+    def require(self, watches: Sequence[Watch]) -> None:
+        """Prove the bounds of all sways.
+
+        Raises
+        ------
+        NotProvedError
+        """
+        error, fed, before = arb(0), arb(0), None
+        for number, piece in enumerate(self.pieces):
+            scale = self.scales[number if len(self.scales) > 1 else 0]
+            error = error * (arb(1) if before is scale or before is None else scale.change(before))
+            leap = self._leap(number)
+            error += norm(scale.sizes_of(leap))
+            if number == 0:
+                error += norm(scale.sizes_of(_first_gap(piece, leap)))
+            sides = [watch for watch in watches if number >= watch.first]
+            outputs = piece.enclosed(
+                lambda s, sides=sides: self._defect_and_sways(s, sides), TERMS, self.fine, [0] * len(self.start)
+            )
+            defect, sways = outputs[: len(self.start)], outputs[len(self.start) :]
+            source = norm(scale.sizes_of([one.size for one in defect]))
+            error, greatest, fed, shift, tube = self._step(piece, scale, error, source, fed)
+            for watch, sway in zip(sides, sways, strict=True):
+                self._require_sway(piece, scale, watch, sway, greatest, shift, tube)
+            before = scale
+
+    def _defect_and_sways(self, s: State, sides: Sequence[Watch]) -> Values:
+        machine, (a, v, *_) = self.box.machine, s.axes
+        found = [one - two for one, two in zip(s.slope, machine.rate(s.x, a, v, s.k), strict=True)]
+        sways = machine.sway(s.x[: len(s.x) // 2], a, s.k) if sides else []
+        for watch in sides:
+            seen = sways[watch.loads]
+            found.append(seen[0] if len(seen) == 1 else sum(one * one for one in seen))
+        return found
+
+    def _leap(self, number: int) -> list[arb]:
+        """Bound by how much the approximate motion leaps where a piece begins."""
+        found = []
+        for row, series in enumerate(self.pieces[number].series):
+            signs = arb_mat(1, series.nrows(), [(-1) ** k for k in range(series.nrows())])
+            off = (signs * series).entries()
+            if number:
+                last = self.pieces[number - 1].series[row]
+                ends = (arb_mat(1, last.nrows(), [1] * last.nrows()) * last).entries()
+            else:
+                ends = [arb(self.start[row])] + [arb(0)] * (len(off) - 1)
+            found.append(sum((abs(a - b) for a, b in zip(off, ends, strict=True)), start=arb(0)))
+        return found
+
+    def _step(self, piece: Piece, scale: ScaleMatrix, error: arb, source: arb, fed: arb) -> Any:
+        """Assume that errors keep below something, and prove it; the error at the end, and the greatest."""
+        time = 2 * piece.half
+        reach = ((error + source * time + fed) * 5 / 4 + arb(10) ** -14).abs_upper()
+        for _ in range(ATTEMPTS):
+            tube = [(reach * row).abs_upper() for row in scale.rows]
+            growth = self._growth(piece, scale, tube)
+            found = Disturbance(piece, tube)
+            added = norm(scale.sizes_of(found.sizes))
+            factor = (growth * time).exp()
+            most = factor.max(arb(1))
+            step = (source + added) * time * most
+            greatest = (error * most + step).abs_upper()
+            if greatest <= reach:
+                return (error * factor + step).abs_upper(), greatest, added * time, found.shift, tube
+            if not greatest.is_finite():
+                break
+            reach = (greatest * WIDER).abs_upper()
+        raise NotProvedError("errors of the approximate motion cannot be bounded")
+
+    def _growth(self, piece: Piece, scale: ScaleMatrix, tube: Sequence[arb]) -> arb:
+        """Bound the logarithmic norm by Gershgorin's circles of the symmetric part."""
+        n = len(tube)
+
+        def symmetric(s: State) -> Values:
+            jacobian = self._jacobian(s)
+            to, back = scale.at(s.places)
+            turned = [
+                [
+                    sum(
+                        to[i, a] * jacobian[a][b] * back[b, j]
+                        for a in range(n)
+                        for b in range(n)
+                        if scale.used[i][a] and scale.used_back[b][j] and not _nothing(jacobian[a][b])
+                    )
+                    for j in range(n)
+                ]
+                for i in range(n)
+            ]
+            return [(turned[i][j] + turned[j][i]) / 2 for i in range(n) for j in range(i + 1)]
+
+        found = piece.enclosed(symmetric, FEW_TERMS, self.coarse, tube)
+        entry = {(i, j): one for (i, j), one in zip([(i, j) for i in range(n) for j in range(i + 1)], found, strict=True)}
+        rows = []
+        for i in range(n):
+            sides = (entry[max(i, j), min(i, j)].size for j in range(n) if j != i)
+            rows.append(sum(sides, start=entry[i, i].ball.upper()))
+        growth = rows[0]
+        for row in rows[1:]:
+            growth = growth.max(row)
+        return growth
+
+    def _jacobian(self, s: State) -> list[Values]:
+        a, v = s.axes[:2]
+        columns = []
+        for chosen in range(len(s.x)):
+            unit = [1 if row == chosen else 0 for row in range(len(s.x))]
+            columns.append([along(one, 1) for one in self.box.machine.rate(moved(s.x, unit, 1), a, v, s.k)])
+        return [list(row) for row in zip(*columns, strict=True)]
+
+    def _require_sway(
+        self, piece: Piece, scale: ScaleMatrix, watch: Watch, sway: Enclosed, greatest: arb, shift: Any, tube: Any
+    ) -> None:
+        machine, off = self.box.machine, [a + b for a, b in zip(tube, shift, strict=True)]
+        s, n = piece.everywhere(off), len(tube) // 2
+        axes = [one + wide(gap.gap) for one, gap in zip(s.axes[0], piece.axes, strict=True)]
+        aways = [arb(0)] * len(machine.loads[watch.loads])
+        gains: list[list[arb]] = [[] for _ in aways]
+        for chosen in range(n):
+            unit = [1 if row == chosen else 0 for row in range(n)]
+            seen = machine.sway(moved(s.x[:n], unit, 1), axes, s.k)[watch.loads]
+            for row, one in enumerate(seen):
+                gains[row].append(arb(along(one, 1)))
+                aways[row] += abs(gains[row][-1]) * shift[chosen]
+        for chosen, gap in enumerate(piece.axes):
+            unit = [1 if row == chosen else 0 for row in range(len(axes))]
+            for row, one in enumerate(machine.sway(s.x[:n], moved(axes, unit, 1), s.k)[watch.loads]):
+                aways[row] += abs(arb(along(one, 1))) * gap.gap
+        for row, gain in enumerate(gains):
+            turned = [sum(g * scale.back[i][j] for i, g in enumerate(gain)) for j in range(2 * n)]
+            aways[row] += norm(turned) * greatest
+        room = watch.bound - norm(aways)
+        allowed = room if len(aways) == 1 else room * room
+        if not (room > 0 and keeps(sway, allowed.lower(), HALVINGS)):
+            raise NotProvedError(f"a sway is not bounded by {1e3 * watch.bound:.6g} mm")
+
+
+class ScaleMatrix:
+    """S, by which errors are measured: a polynomial of the parameters; entries as lists of coefficients."""
+
+    def __init__(self, box: Box, entries: Sequence[Sequence[Sequence[float]]]) -> None:
+        size = len(entries[0][0])
+        self.entries, self.counts = entries, tuple(1 if size == 1 else min(3, count) for count in box.terms)
+        self.box, n = box, len(entries)
+        self.nodes = tuple(4 if count == 1 else 8 for count in self.counts)
+        self.used = [[any(one) for one in row] for row in entries]
+        self.most = [[sum((abs(arb(one)) for one in entry), start=arb(0)) for entry in row] for row in entries]
+        self._known: dict[Any, Any] = {}
+        flat = box.over_parameters(lambda places: self.at(places)[1].entries(), self.nodes)
+        self.back = [flat[n * i : n * i + n] for i in range(n)]
+        self.used_back = [[not one.is_zero() for one in row] for row in self.back]
+        self.rows = [norm(row) for row in self.back]
+
+    def at(self, places: Sequence[Any]) -> Any:
+        """Give S and its inverse at places of the parameters; without bounds where it may be singular."""
+        key = tuple(map(str, places))
+        if key not in self._known:
+            basis = [_product(_t(d, u) for d, u in zip(degrees, places, strict=True)) for degrees in self._degrees]
+            rows = [
+                [sum((a * b for a, b in zip(entry, basis, strict=True)), start=arb(0)) for entry in row]
+                for row in self.entries
+            ]
+            kind = arb_mat if all(isinstance(u, arb) for u in places) else acb_mat
+            matrix = kind(rows)
+            try:
+                inverse = matrix.inv()
+            except ZeroDivisionError:
+                inverse = kind(len(rows), len(rows), [arb("nan")] * len(rows) ** 2)
+            self._known[key] = matrix, inverse
+        return self._known[key]
+
+    @property
+    def _degrees(self) -> list[tuple[int, ...]]:
+        return list(product(*map(range, self.counts)))
+
+    def sizes_of(self, sizes: Sequence[arb]) -> list[arb]:
+        """Bound the entries of S times a vector whose entries have at most these sizes."""
+        return [sum((a * b for a, b in zip(row, sizes, strict=True)), start=arb(0)) for row in self.most]
+
+    def change(self, before: ScaleMatrix) -> arb:
+        """Bound the norm of this S times the inverse of another."""
+        turned = self.box.over_parameters(
+            lambda places: (self.at(places)[0] * before.at(places)[1]).entries(), self.nodes
+        )
+        n = len(self.entries)
+        sizes = [[abs(one) for one in turned[n * i : n * i + n]] for i in range(n)]
+        rows, columns = ([sum(row, start=arb(0)) for row in kind] for kind in (sizes, zip(*sizes, strict=True)))
+        return (_largest(rows) * _largest(columns)).sqrt().abs_upper()
+
+
+class Disturbance:
+    """What setpoints beside the smooth motion add: bounds of r in `sizes`, and of x − z in `shift`."""
+
+    def __init__(self, piece: Piece, tube: Sequence[arb]) -> None:
+        self.piece, self.machine = piece, piece.box.machine
+        self.gaps = [one.gap for one in piece.axes]
+        self._at(tube, [arb(0)] * len(tube))
+        guess = [2 * one + arb(10) ** -30 for one in self.shift]
+        self._at(tube, guess)
+        if not all(one <= most for one, most in zip(self.shift, guess, strict=True)):
+            raise NotProvedError("the setpoints are too far from the smooth motion")
+        self.sizes = self._sizes()
+
+    def _at(self, tube: Sequence[arb], guess: Sequence[arb]) -> None:
+        s = self.piece.everywhere([a + b for a, b in zip(tube, guess, strict=True)])
+        self.x, self.k, (self.a, self.v, self.bend, self.jerk) = s.x, s.k, s.axes
+        self.lifts = self.lift(self.x, self.a, self.v)
+        self.pulls = [self.pull(chosen, self.x, self.a, self.v, self.bend) for chosen in range(len(self.a))]
+        lifted = _summed(zip(self.lifts, self.gaps, strict=True), len(self.x))
+        pulled = _summed(zip(self.pulls, (one.swing for one in self.piece.axes), strict=True), len(self.x))
+        self.lifted, self.shift = lifted, [a + b for a, b in zip(lifted, pulled, strict=True)]
+
+    def rate(self, x: Values, a: Values, v: Values) -> Values:
+        """Give f."""
+        return self.machine.rate(x, a, v, self.k)
+
+    def lift(self, x: Values, a: Values, v: Values) -> list[Values]:
+        """List the columns of G."""
+        found = []
+        for chosen in range(len(v)):
+            unit = [1 if row == chosen else 0 for row in range(len(v))]
+            found.append([along(one, 1) for one in self.rate(x, a, moved(v, unit, 1))])
+        return found
+
+    def pull(self, chosen: int, x: Values, a: Values, v: Values, bend: Values) -> Values:
+        """Give a column of P."""
+        unit = [1 if row == chosen else 0 for row in range(len(v))]
+        lift = [along(one, 1) for one in self.rate(x, a, moved(v, unit, 1))]
+        beside = [along(one, 1) for one in self.rate(moved(x, lift, 1), moved(a, unit, 1), v)]
+        flow = self.rate(x, a, v)
+        later = moved(v, bend, 2)
+        turned = self.rate(moved(x, flow, 2), moved(a, v, 2), moved(later, unit, 1))
+        return [one - along(along(two, 1), 2) for one, two in zip(beside, turned, strict=True)]
+
+    def _sizes(self) -> list[arb]:
+        n, pieces = len(self.x), self.piece.axes
+        nothing = [0] * len(self.a)
+        near_a = [one + wide(gap) for one, gap in zip(self.a, self.gaps, strict=True)]
+        near_v = [one + wide(gap.rate) for one, gap in zip(self.v, pieces, strict=True)]
+        by_a, by_v = [wide(gap) for gap in self.gaps], [wide(gap.rate) for gap in pieces]
+        squares = self.rate(self.x, moved(moved(near_a, by_a, 1), by_a, 2), moved(moved(near_v, by_v, 1), by_v, 2))
+        second = [abs(arb(along(along(one, 1), 2))) / 2 for one in squares]
+        first = [abs(arb(along(one, 1))) for one in self.rate(self.x, moved(near_a, by_a, 1), moved(near_v, by_v, 1))]
+        faster = [wide(one) for one in first]
+        true = [one + two for one, two in zip(self.rate(self.x, self.a, self.v), faster, strict=True)]
+        found = second
+        moving = moved(self.x, true, 4), moved(self.a, self.v, 4), moved(self.v, self.bend, 4), moved(self.bend, self.jerk, 4)
+        for chosen, (axis, pull) in enumerate(zip(pieces, self.pulls, strict=True)):
+            unit = [1 if row == chosen else 0 for row in range(len(self.v))]
+            changed = [along(one, 4) for one in self.pull(chosen, *moving)]
+            passed = [along(one, 1) for one in self.rate(moved(self.x, pull, 1), self.a, self.v)]
+            turned = self.rate(moved(self.x, faster, 1), self.a, moved(self.v, unit, 2))
+            for row in range(n):
+                found[row] += abs(arb(pull[row])) * axis.mean + abs(arb(along(along(turned[row], 1), 2))) * axis.gap
+                found[row] += (abs(arb(changed[row])) + abs(arb(passed[row]))) * axis.swing
+        whole, lifted = [wide(one) for one in self.shift], [wide(one) for one in self.lifted]
+        bent = self.rate(moved(moved(self.x, whole, 1), lifted, 2), self.a, self.v)
+        return [(one + abs(arb(along(along(two, 1), 2)))).abs_upper() for one, two in zip(found, bent, strict=True)]
+
+
+def _first_gap(piece: Piece, leap: Sequence[arb]) -> list[arb]:
+    """Bound what the smooth motion's first position is off, as the state sees it."""
+    found = Disturbance(piece, leap)
+    return _summed(zip(found.lifts, (one.first for one in piece.axes), strict=True), len(piece.series))
+
+
+def _summed(columns: Any, size: int) -> list[arb]:
+    found = [arb(0)] * size
+    for column, weight in columns:
+        found = [one + abs(arb(entry)) * weight for one, entry in zip(found, column, strict=True)]
+    return [one.abs_upper() for one in found]
+
+
+def norm(values: Sequence[Any]) -> arb:
+    """Bound a vector's length."""
+    return sum((abs(one) ** 2 for one in values), start=arb(0)).sqrt().abs_upper()
+
+
+def _largest(values: Sequence[arb]) -> arb:
+    found = values[0]
+    for one in values[1:]:
+        found = found.max(one)
+    return found
+
+
+def _product(values: Any) -> Any:
+    found: Any = arb(1)
+    for one in values:
+        found = found * one
+    return found
+
+
+def _nothing(value: Any) -> bool:
+    return isinstance(value, int) and value == 0
+
+
+def keeps(one: Enclosed, allowed: arb, halvings: int) -> bool:
+    """Tell whether a function's absolute value is proved to be at most so much, halving time or a parameter."""
+    if one.size <= allowed:
+        return True
+    if halvings == 0 or not abs(one.coefficients[0, 0]).is_finite() or not one.rest < allowed:
+        return False
+    axis = _steepest(one)
+    return all(keeps(_half(one, axis, side), allowed, halvings - 1) for side in (-1, 1))
+
+
+def _steepest(one: Enclosed) -> int:
+    """Choose the variable whose own terms are greatest."""
+    sums = [arb(0)] * len(one.counts)
+    for degrees, entry in zip(product(*map(range, one.counts)), one.coefficients.entries(), strict=True):
+        for axis, degree in enumerate(degrees):
+            sums[axis] += abs(entry) * degree * degree
+    return max(range(len(sums)), key=lambda axis: float(sums[axis].mid()))
+
+
+def _half(one: Enclosed, axis: int, side: int) -> Enclosed:
+    if axis == 0:
+        return Enclosed(_halving(one.counts[0], side) * one.coefficients, one.counts, one.rest)
+    matrix = arb_mat(1, 1, [1])
+    for number, count in enumerate(one.counts[1:], start=1):
+        unit = arb_mat(count, count, [int(i == j) for i in range(count) for j in range(count)])
+        matrix = _kronecker(matrix, _halving(count, side) if number == axis else unit)
+    return Enclosed(one.coefficients * matrix.transpose(), one.counts, one.rest)
+
+
+def _kronecker(a: arb_mat, b: arb_mat) -> arb_mat:
+    first, second = a.tolist(), b.tolist()
+    return arb_mat([[x * y for x in row for y in other] for row in first for other in second])
+
+
+def _halving(count: int, side: int) -> arb_mat:
+    """Matrix from Chebyshev coefficients on −1 … 1 to those on a half of it."""
+    inner, columns = arb_poly([arb(side) / 2, arb(1) / 2]), []
+    for k in range(count):
+        poly = _t(k, arb_poly([0, 1]))(inner) if k else arb_poly([1])
+        columns.append([poly[row] for row in range(count)])
+    return powers(count) * arb_mat(columns).transpose()
