@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from itertools import product
-from math import log, pi, prod
+from math import isfinite, log, pi, prod
 from types import SimpleNamespace
 from typing import Any
 
@@ -21,8 +21,8 @@ from flint import acb, arb, arb_mat, arb_poly, arb_series, ctx
 from gen_profile_recheck.axes import AxisPiece
 from gen_profile_recheck.machines import Machine
 
-DISCS = (1.6, 2.0, 2.6, 3.4)  # R
-ELLIPSES = (2.0, 3.5, 6.0, 10.0, 16.0)  # ρ
+DISCS = (1.3, 1.6, 2.0, 2.5, 3.1, 3.8, 4.8)  # R
+ELLIPSES = (1.5, 2.0, 2.8, 3.8, 4.8, 5.8, 6.8, 8.0, 9.5, 12.0, 16.0, 24.0)  # ρ
 Values = list[Any]
 
 
@@ -35,6 +35,7 @@ class State:
     axes: Sequence[Values]  # position, velocity, acceleration, jerk
     k: SimpleNamespace
     places: Values
+    key: Any  # of these places
 
 
 Function = Callable[[State], Values]
@@ -147,6 +148,7 @@ class Box:
     parts: Sequence[tuple[int, int]]
     terms: tuple[int, ...]
     _constants: dict[Any, SimpleNamespace] = field(default_factory=dict)
+    _best: dict[Any, int] = field(default_factory=dict)
 
     def constants(self, places: Sequence[Any], key: Any) -> SimpleNamespace:
         """Give the machine's constants at places of its parameters."""
@@ -170,33 +172,41 @@ class Box:
             for number in range(len(self.terms))
         ]
 
-    def missed(self, counts: tuple[int, ...], first: arb, at: Callable[[int, float], arb]) -> arb:
+    def missed(self, counts: tuple[int, ...], first: Sequence[arb], key: Any, at: Callable[[int, float], Values]) -> list[arb]:
         """Bound what interpolation misses of functions that are off by `first` at nodes, and at most `at` around."""
-        found, amplified = arb(0), arb(1)
+        found, amplified = [arb(0)] * len(first), arb(1)
         for number, count in enumerate(counts):
-            bounds = (4 * at(number, rho) / arb(rho) ** count / (1 - 1 / arb(rho)) for rho in ELLIPSES)
-            found += amplified * least(bounds)
+            bounds = self.least(
+                (key, number),
+                ELLIPSES,
+                lambda rho, number=number, count=count: [
+                    4 * size_of(one) / arb(rho) ** count / (1 - 1 / arb(rho)) for one in at(number, rho)
+                ],
+            )
+            found = [one + amplified * bound for one, bound in zip(found, bounds, strict=True)]
             amplified *= 1 + 2 / pi * log(count) + 1e-9
-        return found + amplified * first
+        return [one + amplified * late for one, late in zip(found, first, strict=True)]
 
-    def over_parameters(self, function: Callable[[Values], Values], counts: tuple[int, ...]) -> list[arb]:
-        """Enclose functions of the parameters' places alone."""
-        at_nodes = [function(list(places)) for places in self.grid(counts)]
-        around = {
-            (number, rho): function(self.ellipse(number, rho))
-            for number in range(len(counts))
-            for rho in ELLIPSES
-        }
-        found = []
-        for row, values in enumerate(zip(*at_nodes, strict=True)):
-            matrix = arb_mat(1, len(values), list(values)) * interpolation(counts)
-            rest = self.missed(counts, arb(0), lambda number, rho, row=row: size_of(around[number, rho][row]))
-            found.append(Enclosed(matrix, (1, *counts), rest).ball)
-        return found
+    def least(self, key: Any, choices: Sequence[float], bounds: Callable[[float], list[arb]]) -> list[arb]:
+        """Bound functions by the best of some choices: of those beside the one that was best the last time."""
+        place = self._best.get(key, len(choices) // 2)
+        while True:
+            tried = {n: bounds(choices[n]) for n in range(max(0, place - 1), min(place + 2, len(choices)))}
+            sums = {n: sum(map(float, listed)) for n, listed in tried.items()}
+            known = [n for n, total in sums.items() if isfinite(total)]
+            if known or 0 in tried:
+                self._best[key] = min(known, key=sums.__getitem__) if known else 0
+                return [_least(row) for row in zip(*tried.values(), strict=True)]
+            place -= 2
+
+    def polynomials(self, function: Callable[[Values, Any], Values], counts: tuple[int, ...]) -> list[arb_mat]:
+        """Expand polynomials of the parameters, of degrees below these, a row of coefficients each."""
+        at_nodes = [function(list(u), (counts, number)) for number, u in enumerate(self.grid(counts))]
+        rows = zip(*at_nodes, strict=True)
+        return [arb_mat(1, len(row), [arb(one) for one in row]) * interpolation(counts) for row in rows]
 
 
-def least(bounds: Any) -> arb:
-    """Choose the least bound that is one."""
+def _least(bounds: Sequence[arb]) -> arb:
     known = [one.abs_upper() for one in bounds if one.is_finite()]
     return min(known, key=float) if known else arb("inf")
 
@@ -254,7 +264,8 @@ class Piece:
             return _disc(poly[0], rest)
 
         k = self.box.constants(places, "all, complex")
-        return State([_disc(*one) for one in x], [_disc(0, one) for one in slope], self._axes_at(kind), k, places)
+        states, slopes = [_disc(*one) for one in x], [_disc(0, one) for one in slope]
+        return State(states, slopes, self._axes_at(kind), k, places, "all, complex")
 
     def on_ellipse(self, chosen: int, rho: float, tube: Sequence[Any]) -> State:
         """Take one parameter on an ellipse, all others and time real."""
@@ -264,7 +275,8 @@ class Piece:
         places, real = self.box.ellipse(chosen, rho), self._axes_at(_range)
         k = self.box.constants(places, (chosen, rho))
         axes = [[acb(one) for one in row] for row in real]
-        return State([_disc(*one) for one in x], [_disc(0, one) for one in slope], axes, k, places)
+        states, slopes = [_disc(*one) for one in x], [_disc(0, one) for one in slope]
+        return State(states, slopes, axes, k, places, (chosen, rho))
 
     def everywhere(self, tube: Sequence[Any]) -> State:
         """Take all times and parameters at once, in real balls."""
@@ -274,7 +286,7 @@ class Piece:
         places = [wide(1) for _ in self.box.terms]
         k = self.box.constants(places, "all")
         states = [center + wide(rest) for center, rest in x]
-        return State(states, [wide(one) for one in slope], self._axes_at(_range), k, places)
+        return State(states, [wide(one) for one in slope], self._axes_at(_range), k, places, "all")
 
     def enclosed(self, function: Function, terms: int, counts: tuple[int, ...], tube: Sequence[Any]) -> list[Enclosed]:
         """Enclose functions of the motions, and of all that is off them by a tube, over time and parameters."""
@@ -291,27 +303,27 @@ class Piece:
                 x.append(arb_series([values[0] + wide(off), *values[1:]], terms))
                 slope.append(arb_series(slopes, terms))
             k = self.box.constants(places, (counts, number))
-            found = function(State(x, slope, axes, k, list(places)))
+            found = function(State(x, slope, axes, k, list(places), (counts, number)))
             rows.append([_padded(one, terms) for one in found])
-        discs = [(radius, function(self.on_disc(radius, tube))) for radius in DISCS]
-        around = {
-            (number, rho): function(self.on_ellipse(number, rho, tube))
-            for number in range(len(counts))
-            for rho in ELLIPSES
-        }
+        late = self.box.least(
+            (terms, len(rows[0])),
+            DISCS,
+            lambda r: [
+                size_of(one) / arb(r) ** terms / (1 - 1 / arb(r)) for one in function(self.on_disc(r, tube))
+            ],
+        )
+        rests = self.box.missed(
+            counts, late, (terms, len(rows[0])), lambda number, rho: function(self.on_ellipse(number, rho, tube))
+        )
         result = []
-        for output in range(len(rows[0])):
+        for output, rest in enumerate(rests):
             matrix = arb_mat([row[output] for row in rows]).transpose()
-            late = least(size_of(values[output]) / arb(r) ** terms / (1 - 1 / arb(r)) for r, values in discs)
-            rest = self.box.missed(
-                counts, late, lambda number, rho, output=output: size_of(around[number, rho][output])
-            )
             result.append(Enclosed(powers(terms) * matrix * interpolation(counts), (terms, *counts), rest))
         return result
 
 
 def _padded(value: Any, terms: int) -> list[arb]:
-    if not isinstance(value, arb_series):
+    if not isinstance(value, arb_series):  # what does not depend on time
         return [arb(value)] + [arb(0)] * (terms - 1)
     return [value[row] for row in range(terms)]
 

@@ -18,7 +18,7 @@ from gen_profile_recheck.jets import along, moved
 from gen_profile_recheck.machines import MACHINES, Machine
 from gen_profile_recheck.reading import CLAIMS, FORMAT, KEYS, Proof, Setpoints, ranges_of, read_json, read_setpoints, spec_of
 
-PRECISION = 72  # bits of balls
+PRECISION = 64  # bits of balls
 SAME = 1e-9  # relative, by which what is stated may be off for rounding
 OVERSHOOT = {"velocity": 0.02, "acceleration": 0.4}  # of limits of the axes, which the check allows beside rounding
 KINDS = {"velocity": "s", "acceleration": "s²", "jerk": "s³"}

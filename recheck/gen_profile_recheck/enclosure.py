@@ -12,14 +12,15 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from flint import acb_mat, arb, arb_mat, arb_poly
+from flint import arb, arb_mat, arb_poly
 
 from gen_profile_recheck.boxes import Box, Enclosed, Piece, State, Values, _t, powers, wide
-from gen_profile_recheck.jets import along, moved
+from gen_profile_recheck.jets import SINGLE, along, moved
 
-TERMS, FEW_TERMS = 30, 16  # of power series in time: for the defect and sway, and for μ
-MORE, FEWER, FEWEST = 2, 3, 4  # nodes than terms in each parameter, likewise; and at least so many
+TERMS, FEW_TERMS = 24, 14  # of power series in time: for the defect and sway, and for μ
+MORE, FEWER, FEWEST = 2, 1, 4  # nodes than terms in each parameter, likewise; and at least so many
 ATTEMPTS, WIDER = 12, 2
+INVERSE = 7  # terms of V in each parameter
 HALVINGS = 24  # of pieces or ranges, to bound a sway
 
 
@@ -120,23 +121,14 @@ class BoxProof:
 
         def symmetric(s: State) -> Values:
             jacobian = self._jacobian(s)
-            to, back = scale.at(s.places)
-            turned = [
-                [
-                    sum(
-                        to[i, a] * jacobian[a][b] * back[b, j]
-                        for a in range(n)
-                        for b in range(n)
-                        if scale.used[i][a] and scale.used_back[b][j] and not _nothing(jacobian[a][b])
-                    )
-                    for j in range(n)
-                ]
-                for i in range(n)
-            ]
-            return [(turned[i][j] + turned[j][i]) / 2 for i in range(n) for j in range(i + 1)]
+            to, back = scale.at(s.places, s.key)
+            turned = matrix_product(matrix_product(to, jacobian), back)
+            whole = [one for row in turned for one in row]
+            return [(turned[i][j] + turned[j][i]) / arb(2) for i in range(n) for j in range(i + 1)] + whole
 
         found = piece.enclosed(symmetric, FEW_TERMS, self.coarse, tube)
-        entry = {(i, j): one for (i, j), one in zip([(i, j) for i in range(n) for j in range(i + 1)], found, strict=True)}
+        pairs = [(i, j) for i in range(n) for j in range(i + 1)]
+        entry = dict(zip(pairs, found[: len(pairs)], strict=True))
         rows = []
         for i in range(n):
             sides = (entry[max(i, j), min(i, j)].size for j in range(n) if j != i)
@@ -144,15 +136,15 @@ class BoxProof:
         growth = rows[0]
         for row in rows[1:]:
             growth = growth.max(row)
-        return growth
+        whole = norm([one.size for one in found[len(pairs) :]])
+        return growth + whole * (scale.slack - 1)
 
     def _jacobian(self, s: State) -> list[Values]:
         a, v = s.axes[:2]
-        columns = []
-        for chosen in range(len(s.x)):
-            unit = [1 if row == chosen else 0 for row in range(len(s.x))]
-            columns.append([along(one, 1) for one in self.box.machine.rate(moved(s.x, unit, 1), a, v, s.k)])
-        return [list(row) for row in zip(*columns, strict=True)]
+        x, n = s.x, len(s.x)
+        for chosen in range(n):
+            x = moved(x, [1 if row == chosen else 0 for row in range(n)], SINGLE << chosen)
+        return [[along(one, SINGLE << column) for column in range(n)] for one in self.box.machine.rate(x, a, v, s.k)]
 
     def _require_sway(
         self, piece: Piece, scale: ScaleMatrix, watch: Watch, sway: Enclosed, greatest: arb, shift: Any, tube: Any
@@ -172,9 +164,10 @@ class BoxProof:
             unit = [1 if row == chosen else 0 for row in range(len(axes))]
             for row, one in enumerate(machine.sway(s.x[:n], moved(axes, unit, 1), s.k)[watch.loads]):
                 aways[row] += abs(arb(along(one, 1))) * gap.gap
+        back = scale.at(s.places, s.key)[1]
         for row, gain in enumerate(gains):
-            turned = [sum(g * scale.back[i][j] for i, g in enumerate(gain)) for j in range(2 * n)]
-            aways[row] += norm(turned) * greatest
+            turned = [sum((g * back[i][j] for i, g in enumerate(gain)), start=arb(0)) for j in range(2 * n)]
+            aways[row] += norm(turned) * scale.slack * greatest
         room = watch.bound - norm(aways)
         allowed = room if len(aways) == 1 else room * room
         if not (room > 0 and keeps(sway, allowed.lower(), HALVINGS)):
@@ -182,42 +175,61 @@ class BoxProof:
 
 
 class ScaleMatrix:
-    """S, by which errors are measured: a polynomial of the parameters; entries as lists of coefficients."""
+    """S, by which errors are measured, and V, nearly its inverse: polynomials of the parameters.
+
+    With |S V − I| ≤ σ < ½, the inverse of S is V (I + F) with |F| ≤ 2 σ; `slack` is 1 + 2 σ.
+    """
 
     def __init__(self, box: Box, entries: Sequence[Sequence[Sequence[float]]]) -> None:
-        size = len(entries[0][0])
-        self.entries, self.counts = entries, tuple(1 if size == 1 else min(3, count) for count in box.terms)
-        self.box, n = box, len(entries)
-        self.nodes = tuple(4 if count == 1 else 8 for count in self.counts)
-        self.used = [[any(one) for one in row] for row in entries]
-        self.most = [[sum((abs(arb(one)) for one in entry), start=arb(0)) for entry in row] for row in entries]
-        self._known: dict[Any, Any] = {}
-        flat = box.over_parameters(lambda places: self.at(places)[1].entries(), self.nodes)
-        self.back = [flat[n * i : n * i + n] for i in range(n)]
-        self.used_back = [[not one.is_zero() for one in row] for row in self.back]
-        self.rows = [norm(row) for row in self.back]
+        self.box, self.size, count = box, len(entries), len(entries[0][0])
+        self.counts = tuple(1 if count == 1 else min(3, terms) for terms in box.terms)
+        self.nodes = tuple(1 if terms == 1 else INVERSE for terms in self.counts)
+        self.entries = [[[arb(one) for one in entry] for entry in row] for row in entries]
+        self.known: dict[Any, Any] = {}
+        inverses = box.polynomials(lambda u, _: _inverse(self._evaluated(self.entries, self.counts, u)), self.nodes)
+        self.inverse = self._square([[one.mid() for one in row.entries()] for row in inverses])
+        self.most, self.rows = _sizes(self.entries), [norm(row) for row in _sizes(self.inverse)]
+        off = _norm_of(self._product_with(self, unit=1))
+        if not off < 0.5:
+            raise NotProvedError("the certificate's scales are singular")
+        self.slack = 1 + 2 * off
+        self.rows = [row * self.slack for row in self.rows]
 
-    def at(self, places: Sequence[Any]) -> Any:
-        """Give S and its inverse at places of the parameters; without bounds where it may be singular."""
-        key = tuple(map(str, places))
-        if key not in self._known:
-            basis = [_product(_t(d, u) for d, u in zip(degrees, places, strict=True)) for degrees in self._degrees]
-            rows = [
-                [sum((a * b for a, b in zip(entry, basis, strict=True)), start=arb(0)) for entry in row]
-                for row in self.entries
+    def _square(self, flat: Sequence[Any]) -> list[list[Any]]:
+        return [list(flat[self.size * i : self.size * (i + 1)]) for i in range(self.size)]
+
+    def _evaluated(self, entries: Any, counts: tuple[int, ...], places: Sequence[Any]) -> list[list[Any]]:
+        degrees = product(*map(range, counts))
+        basis = [_product(_t(d, u) for d, u in zip(each, places, strict=True)) for each in degrees]
+
+        def value(entry: Sequence[arb]) -> Any:
+            return sum((a * b for a, b in zip(entry, basis, strict=True) if not a.is_zero()), start=0)
+
+        return [[value(entry) for entry in row] for row in entries]
+
+    def at(self, places: Sequence[Any], key: Any) -> Any:
+        """Give S and V at places of the parameters; entries that are nothing are 0."""
+        if key not in self.known:
+            self.known[key] = (
+                self._evaluated(self.entries, self.counts, places),
+                self._evaluated(self.inverse, self.nodes, places),
+            )
+        return self.known[key]
+
+    def _product_with(self, other: ScaleMatrix, unit: int) -> list[list[arb]]:
+        """Bound the entries of this S times another's V, less a multiple of the unit matrix."""
+        counts = tuple(one + two for one, two in zip(self.counts, self.nodes, strict=True))
+
+        def entries(u: Values, key: Any) -> Values:
+            to, back = self.at(u, key)[0], other.at(u, key)[1]
+            return [
+                sum(a * b for a, b in zip(row, column, strict=True)) - unit * (i == j)
+                for i, row in enumerate(to)
+                for j, column in enumerate(zip(*back, strict=True))
             ]
-            kind = arb_mat if all(isinstance(u, arb) for u in places) else acb_mat
-            matrix = kind(rows)
-            try:
-                inverse = matrix.inv()
-            except ZeroDivisionError:
-                inverse = kind(len(rows), len(rows), [arb("nan")] * len(rows) ** 2)
-            self._known[key] = matrix, inverse
-        return self._known[key]
 
-    @property
-    def _degrees(self) -> list[tuple[int, ...]]:
-        return list(product(*map(range, self.counts)))
+        found = self.box.polynomials(entries, counts)
+        return self._square([sum((abs(one) for one in row.entries()), start=arb(0)) for row in found])
 
     def sizes_of(self, sizes: Sequence[arb]) -> list[arb]:
         """Bound the entries of S times a vector whose entries have at most these sizes."""
@@ -225,13 +237,24 @@ class ScaleMatrix:
 
     def change(self, before: ScaleMatrix) -> arb:
         """Bound the norm of this S times the inverse of another."""
-        turned = self.box.over_parameters(
-            lambda places: (self.at(places)[0] * before.at(places)[1]).entries(), self.nodes
-        )
-        n = len(self.entries)
-        sizes = [[abs(one) for one in turned[n * i : n * i + n]] for i in range(n)]
-        rows, columns = ([sum(row, start=arb(0)) for row in kind] for kind in (sizes, zip(*sizes, strict=True)))
-        return (_largest(rows) * _largest(columns)).sqrt().abs_upper()
+        return _norm_of(self._product_with(before, unit=0)) * before.slack
+
+
+def _inverse(rows: Sequence[Values]) -> Values:
+    try:
+        return arb_mat([[arb(one) for one in row] for row in rows]).inv().entries()
+    except ZeroDivisionError as error:
+        raise NotProvedError("the certificate's scales are singular") from error
+
+
+def _sizes(entries: Sequence[Sequence[Sequence[arb]]]) -> list[list[arb]]:
+    return [[sum((abs(one) for one in entry), start=arb(0)) for entry in row] for row in entries]
+
+
+def _norm_of(sizes: Sequence[Sequence[arb]]) -> arb:
+    """Bound the norm of a matrix whose entries have at most these sizes."""
+    rows, columns = ([sum(row, start=arb(0)) for row in kind] for kind in (sizes, zip(*sizes, strict=True)))
+    return (_largest(rows) * _largest(columns)).sqrt().abs_upper()
 
 
 class Disturbance:
@@ -320,6 +343,17 @@ def _summed(columns: Any, size: int) -> list[arb]:
 def norm(values: Sequence[Any]) -> arb:
     """Bound a vector's length."""
     return sum((abs(one) ** 2 for one in values), start=arb(0)).sqrt().abs_upper()
+
+
+def matrix_product(a: Sequence[Values], b: Sequence[Values]) -> list[Values]:
+    """Multiply matrices many of whose entries are 0."""
+    columns = list(zip(*b, strict=True))
+
+    def entry(row: Values, column: Values) -> Any:
+        pairs = zip(row, column, strict=True)
+        return sum((x * y for x, y in pairs if not (_nothing(x) or _nothing(y))), start=0)
+
+    return [[entry(row, column) for column in columns] for row in a]
 
 
 def _largest(values: Sequence[arb]) -> arb:

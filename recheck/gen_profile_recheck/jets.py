@@ -14,6 +14,9 @@ from typing import Any
 Scalar = Any  # of python-flint: arb, acb, arb_series; or a number of Python's
 
 
+SINGLE = 1 << 9  # the first of units of which no two are multiplied: all slopes at once
+
+
 class Jet:
     """Parts by the bits of their units."""
 
@@ -34,7 +37,7 @@ class Jet:
         parts: dict[int, Scalar] = {}
         for one, first in self.parts.items():
             for two, second in _parts(other).items():
-                if not one & two:
+                if not (one & two or (one >= SINGLE <= two)):
                     product = first * second
                     parts[one | two] = parts[one | two] + product if one | two in parts else product
         return Jet(parts)
@@ -106,7 +109,9 @@ def sine_type(order: int, like: Scalar) -> Scalar:
 def moved(values: Sequence[Scalar], directions: Sequence[Scalar], unit: int) -> list[Scalar]:
     """Add directions times a unit to values."""
     return [
-        Jet({**_parts(one), **{key | unit: value for key, value in _parts(way).items()}})
+        one
+        if isinstance(way, int) and way == 0
+        else Jet({**_parts(one), **{key | unit: value for key, value in _parts(way).items()}})
         for one, way in zip(values, directions, strict=True)
     ]
 
