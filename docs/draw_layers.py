@@ -9,7 +9,12 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-SOURCES = {"gen_profile": "generator", "gen_profile_fmu": "fmu", "gen_profile_exporters": "exporters"}
+SOURCES = {
+    "gen_profile": "generator",
+    "gen_profile_fmu": "fmu",
+    "gen_profile_exporters": "exporters",
+    "gen_profile_recheck": "recheck",
+}
 
 
 def layers() -> list[list[str]]:

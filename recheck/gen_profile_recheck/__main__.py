@@ -1,22 +1,33 @@
-"""`python -m gen_profile_recheck ARTEFACT CERTIFICATE SPEC`: SPEC is the manifest, or the spec in it, as JSON."""
+"""Prove again what a certificate says.
+
+    python -m gen_profile_recheck ARTEFACT CERTIFICATE SPEC
+
+SPEC is the manifest beside the artefact, or the spec in it, as JSON. The exit code is 0 where everything is
+proved, 4 where it is not, and 2 where a file cannot be read.
+"""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-from gen_profile_recheck.check import TRUST, check
-from gen_profile_recheck.enclosure import NotProvedError
+MISSING = "The re-checker needs python-flint: pip install 'gen-profile[recheck]' or pip install python-flint."
 
 
 def main(arguments: list[str]) -> int:
-    """Say whether a certificate is proved, and why not; 0 where it is, 4 where not, 2 for wrong arguments."""
+    """Say whether a certificate is proved, and why not; give the exit code."""
     if len(arguments) != 3:
         print(__doc__, file=sys.stderr)
         return 2
     try:
+        from gen_profile_recheck.check import TRUST, check  # noqa: PLC0415
+        from gen_profile_recheck.enclosure import NotProvedError  # noqa: PLC0415
+    except ImportError:
+        print(MISSING, file=sys.stderr)
+        return 2
+    try:
         artefact, certificate, spec = (Path(one).read_bytes() for one in arguments)
-        print(check(artefact, spec, certificate))
+        print(check(artefact, spec, certificate, _report))
     except OSError as error:
         print(f"Cannot read {error.filename}: {error.strerror}.", file=sys.stderr)
         return 2
@@ -25,6 +36,10 @@ def main(arguments: list[str]) -> int:
         return 4
     print(TRUST)
     return 0
+
+
+def _report(done: int, boxes: int) -> None:
+    print(f"proving it again, box {done} of {boxes}", file=sys.stderr)
 
 
 if __name__ == "__main__":

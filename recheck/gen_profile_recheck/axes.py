@@ -16,9 +16,9 @@ FINER = 4  # parts of a cycle, between whose ends bounds are by the greatest acc
 
 @dataclass(frozen=True)
 class AxisPiece:
-    """One axis on a piece of time: its smooth position as a polynomial of −1 … 1, and bounds of what it is off.
+    """One axis on a piece of time: its smooth position as a polynomial on −1 … 1, and bounds of the rest.
 
-    `gap` bounds |ε| in m (or rad), `rate` its rate, `mean` |ε̄|, and `swing` |ψ|; `first` is |ε| where it begins.
+    `gap` bounds |ε| in m (or rad), `rate` its rate, `mean` |ε̄|, `swing` |ψ|, and `first` |ε| at first.
     """
 
     smooth: arb_poly
@@ -37,11 +37,16 @@ def magnitude(values: Sequence[arb]) -> arb:
     return found
 
 
-def quintic(half: arb, positions: Sequence[float], speeds: Sequence[float], bends: Sequence[float]) -> arb_poly:
+def quintic(
+    half: arb, positions: Sequence[float], speeds: Sequence[float], bends: Sequence[float]
+) -> arb_poly:
     """Give the polynomial on −1 … 1 with position, velocity and acceleration at both ends."""
     (p, q), (u, v), (b, c) = positions, [half * one for one in speeds], [half * half * one for one in bends]
-    p, q, x = arb(p), arb(q), arb_poly([0, 1])
-    even, odd = (p + q) / 2, (q - p) / 2  # of value, then slope and bend, that are odd where it is even
+    x, even, odd = (
+        arb_poly([0, 1]),
+        (arb(p) + q) / 2,
+        (arb(q) - p) / 2,
+    )  # of value, then slope and bend, that are odd where it is even
     slope, other = (v - u) / 2, (v + u) / 2
     bend, twist = (b + c) / 2, (c - b) / 2
     square = x * x - 1

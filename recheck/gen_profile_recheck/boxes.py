@@ -1,16 +1,16 @@
 """A box of machines and their approximate motions, and bounds of what depends on these over a piece of time.
 
 A function of time τ and of parameters u, each on [−1, 1], is expanded as a power series of τ at Chebyshev's
-nodes of u, in balls. What N terms miss is at most M R⁻ᴺ/(1 − 1/R), with M its bound for |τ| ≤ R (Cauchy); what N
-nodes of one parameter miss, 4 M ρ⁻ᴺ/(1 − 1/ρ), with M its bound on the ellipse with foci ±1 and sum of half-axes ρ
-(Bernstein; Trefethen, theorem 8.2), times 1 + 2/π ln N for each parameter that is interpolated after it (Rivlin).
+nodes of u, in balls. What N terms miss is at most M R⁻ᴺ/(1 − 1/R), with M its bound for |τ| ≤ R (Cauchy);
+what N nodes of one parameter miss, 4 M ρ⁻ᴺ/(1 − 1/ρ), with M its bound on the ellipse with foci ±1 and sum of
+half-axes ρ (Bernstein; Trefethen, theorem 8.2), times 1 + 2/π ln N for each parameter before it (Rivlin).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from itertools import product
 from math import isfinite, log, pi, prod
 from types import SimpleNamespace
@@ -28,7 +28,7 @@ Values = list[Any]
 
 @dataclass
 class State:
-    """All that equations depend on: state, its slope, axes, their derivatives, constants, places of parameters."""
+    """All that equations depend on: state and slope, axes with derivatives, constants, parameters' places."""
 
     x: Values
     slope: Values
@@ -43,7 +43,7 @@ Function = Callable[[State], Values]
 
 @dataclass(frozen=True)
 class Enclosed:
-    """A function of time and parameters: Chebyshev coefficients, (time, parameters) with their counts; the rest."""
+    """A function of time and parameters: coefficients of Chebyshev's polynomials, how many, and the rest."""
 
     coefficients: arb_mat
     counts: tuple[int, ...]
@@ -73,7 +73,9 @@ def _disc(center: Any, radius: Any) -> acb:
 @cache
 def chebyshev(count: int) -> arb_mat:
     """Matrix from Chebyshev coefficients to powers: column k has those of T_k."""
-    rows = [arb_poly.chebyshev_t(k) for k in range(count)] if hasattr(arb_poly, "chebyshev_t") else _polys(count)
+    rows = (
+        [arb_poly.chebyshev_t(k) for k in range(count)] if hasattr(arb_poly, "chebyshev_t") else _polys(count)
+    )
     return arb_mat(count, count, [poly[row] for row in range(count) for poly in rows])
 
 
@@ -139,7 +141,7 @@ def _products(each: Sequence[Any], rows: Sequence[int], columns: Sequence[int]) 
 class Box:
     """Machines whose parameters lie in a part of their ranges.
 
-    `parts` tells of every range how often it was halved and which part it is; `terms`, how many terms series have.
+    `parts`: of every range how often it was halved, and which part it is; `terms`: of series in each.
     """
 
     machine: Machine
@@ -172,23 +174,19 @@ class Box:
             for number in range(len(self.terms))
         ]
 
-    def missed(self, counts: tuple[int, ...], first: Sequence[arb], key: Any, at: Callable[[int, float], Values]) -> list[arb]:
-        """Bound what interpolation misses of functions that are off by `first` at nodes, and at most `at` around."""
+    def missed(
+        self, counts: tuple[int, ...], first: Sequence[arb], key: Any, at: Callable[[int, float], Values]
+    ) -> list[arb]:
+        """Bound what interpolation misses of functions that are off by `first` at nodes, and `at` around."""
         found, amplified = [arb(0)] * len(first), arb(1)
         for number, count in enumerate(counts):
-            bounds = self.least(
-                (key, number),
-                ELLIPSES,
-                lambda rho, number=number, count=count: [
-                    4 * size_of(one) / arb(rho) ** count / (1 - 1 / arb(rho)) for one in at(number, rho)
-                ],
-            )
+            bounds = self.least((key, number), ELLIPSES, partial(_beyond, at, number, count))
             found = [one + amplified * bound for one, bound in zip(found, bounds, strict=True)]
             amplified *= 1 + 2 / pi * log(count) + 1e-9
         return [one + amplified * late for one, late in zip(found, first, strict=True)]
 
     def least(self, key: Any, choices: Sequence[float], bounds: Callable[[float], list[arb]]) -> list[arb]:
-        """Bound functions by the best of some choices: of those beside the one that was best the last time."""
+        """Bound functions by the best of some choices: those beside what was best the last time."""
         place = self._best.get(key, len(choices) // 2)
         while True:
             tried = {n: bounds(choices[n]) for n in range(max(0, place - 1), min(place + 2, len(choices)))}
@@ -199,11 +197,17 @@ class Box:
                 return [_least(row) for row in zip(*tried.values(), strict=True)]
             place -= 2
 
-    def polynomials(self, function: Callable[[Values, Any], Values], counts: tuple[int, ...]) -> list[arb_mat]:
+    def polynomials(
+        self, function: Callable[[Values, Any], Values], counts: tuple[int, ...]
+    ) -> list[arb_mat]:
         """Expand polynomials of the parameters, of degrees below these, a row of coefficients each."""
         at_nodes = [function(list(u), (counts, number)) for number, u in enumerate(self.grid(counts))]
         rows = zip(*at_nodes, strict=True)
         return [arb_mat(1, len(row), [arb(one) for one in row]) * interpolation(counts) for row in rows]
+
+
+def _beyond(at: Callable[[int, float], Values], number: int, count: int, rho: float) -> list[arb]:
+    return [4 * size_of(one) / arb(rho) ** count / (1 - 1 / arb(rho)) for one in at(number, rho)]
 
 
 def _least(bounds: Sequence[arb]) -> arb:
@@ -218,7 +222,7 @@ def size_of(value: Any) -> arb:
 
 @dataclass
 class Piece:
-    """A box's approximate motions on a piece of time: series (time terms × parameter terms) of every coordinate."""
+    """A box's approximate motions on a piece of time: of every coordinate (time × parameter) terms."""
 
     box: Box
     half: arb
@@ -240,7 +244,9 @@ class Piece:
             polynomials, scale = [one.derivative() for one in polynomials], scale / self.half
         return found
 
-    def _balls(self, tube: Sequence[Any], time: Sequence[arb], change: Sequence[arb], weights: Sequence[arb]) -> Any:
+    def _balls(
+        self, tube: Sequence[Any], time: Sequence[arb], change: Sequence[arb], weights: Sequence[arb]
+    ) -> Any:
         """Bound the motions and their slopes where terms have at most these weights."""
         x, slope = [], []
         for sizes, series, off in zip(self._sizes, self.series, tube, strict=True):
@@ -288,8 +294,10 @@ class Piece:
         states = [center + wide(rest) for center, rest in x]
         return State(states, [wide(one) for one in slope], self._axes_at(_range), k, places, "all")
 
-    def enclosed(self, function: Function, terms: int, counts: tuple[int, ...], tube: Sequence[Any]) -> list[Enclosed]:
-        """Enclose functions of the motions, and of all that is off them by a tube, over time and parameters."""
+    def enclosed(
+        self, function: Function, terms: int, counts: tuple[int, ...], tube: Sequence[Any]
+    ) -> list[Enclosed]:
+        """Enclose functions of the motions, and of all within a tube around them."""
         ctx.cap = terms
         at = [one * node_values(self.box.terms, counts) for one in self._in_powers]
         columns = [one.transpose().tolist() for one in at]
@@ -313,7 +321,10 @@ class Piece:
             ],
         )
         rests = self.box.missed(
-            counts, late, (terms, len(rows[0])), lambda number, rho: function(self.on_ellipse(number, rho, tube))
+            counts,
+            late,
+            (terms, len(rows[0])),
+            lambda number, rho: function(self.on_ellipse(number, rho, tube)),
         )
         result = []
         for output, rest in enumerate(rests):

@@ -1,19 +1,22 @@
 """How far every machine of a box is from its approximate motion, and how much it sways.
 
 With G = ∂f/∂v and P = ∂f/∂x G + ∂f/∂a − dG/dt along the smooth motion of the axes, z = x − G ε − P ψ follows
-ż = f(z, smooth axes) + r, where every term of r has ε̄, ψ or two factors of ε and its rate; the error e = z − x̃ obeys
-d|S e|/dt ≤ μ |S e| + |S| (|x̃' − f(x̃)| + |r|), μ the logarithmic norm of S (∂f/∂x) S⁻¹ (docs/certificate.md).
+ż = f(z, smooth axes) + r, where every term of r has ε̄, ψ or two factors of ε and its rate; the error
+e = z − x̃ obeys d|S e|/dt ≤ μ |S e| + |S| (|x̃' − f(x̃)| + |r|), μ the logarithmic norm of S (∂f/∂x) S⁻¹
+(docs/certificate.md).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial, reduce
 from itertools import product
 from typing import Any
 
 from flint import arb, arb_mat, arb_poly
 
+from gen_profile_recheck.axes import magnitude
 from gen_profile_recheck.boxes import Box, Enclosed, Piece, State, Values, _t, powers, wide
 from gen_profile_recheck.jets import SINGLE, along, moved
 
@@ -33,6 +36,16 @@ class Watch:
     bound: float
 
 
+@dataclass(frozen=True)
+class Step:
+    """A piece's greatest error, what setpoints fed into it, and how far states are off z, and z off x̃."""
+
+    greatest: arb
+    fed: arb
+    shift: Sequence[arb]
+    tube: Sequence[arb]
+
+
 class NotProvedError(Exception):
     """A sentence that says why nothing is proved."""
 
@@ -40,7 +53,9 @@ class NotProvedError(Exception):
 class BoxProof:
     """The proof for one box: pieces one after another."""
 
-    def __init__(self, box: Box, pieces: Sequence[Piece], scales: Sequence[Any], start: Sequence[float]) -> None:
+    def __init__(
+        self, box: Box, pieces: Sequence[Piece], scales: Sequence[Any], start: Sequence[float]
+    ) -> None:
         self.box, self.pieces, self.start = box, pieces, start
         self.scales = [ScaleMatrix(box, one) for one in scales]
         self.fine = tuple(count + MORE for count in box.terms)
@@ -62,17 +77,16 @@ class BoxProof:
             if number == 0:
                 error += norm(scale.sizes_of(_first_gap(piece, leap)))
             sides = [watch for watch in watches if number >= watch.first]
-            outputs = piece.enclosed(
-                lambda s, sides=sides: self._defect_and_sways(s, sides), TERMS, self.fine, [0] * len(self.start)
-            )
+            wanted = partial(self._defect_and_sways, sides)
+            outputs = piece.enclosed(wanted, TERMS, self.fine, [0] * len(self.start))
             defect, sways = outputs[: len(self.start)], outputs[len(self.start) :]
             source = norm(scale.sizes_of([one.size for one in defect]))
-            error, greatest, fed, shift, tube = self._step(piece, scale, error, source, fed)
+            error, step = self._step(piece, scale, error, source, fed)
             for watch, sway in zip(sides, sways, strict=True):
-                self._require_sway(piece, scale, watch, sway, greatest, shift, tube)
-            before = scale
+                self._require_sway(piece, scale, step, watch, sway)
+            before, fed = scale, step.fed
 
-    def _defect_and_sways(self, s: State, sides: Sequence[Watch]) -> Values:
+    def _defect_and_sways(self, sides: Sequence[Watch], s: State) -> Values:
         machine, (a, v, *_) = self.box.machine, s.axes
         found = [one - two for one, two in zip(s.slope, machine.rate(s.x, a, v, s.k), strict=True)]
         sways = machine.sway(s.x[: len(s.x) // 2], a, s.k) if sides else []
@@ -95,7 +109,7 @@ class BoxProof:
             found.append(sum((abs(a - b) for a, b in zip(off, ends, strict=True)), start=arb(0)))
         return found
 
-    def _step(self, piece: Piece, scale: ScaleMatrix, error: arb, source: arb, fed: arb) -> Any:
+    def _step(self, piece: Piece, scale: ScaleMatrix, error: arb, source: arb, fed: arb) -> tuple[arb, Step]:
         """Assume that errors keep below something, and prove it; the error at the end, and the greatest."""
         time = 2 * piece.half
         reach = ((error + source * time + fed) * 5 / 4 + arb(10) ** -14).abs_upper()
@@ -109,7 +123,7 @@ class BoxProof:
             step = (source + added) * time * most
             greatest = (error * most + step).abs_upper()
             if greatest <= reach:
-                return (error * factor + step).abs_upper(), greatest, added * time, found.shift, tube
+                return (error * factor + step).abs_upper(), Step(greatest, added * time, found.shift, tube)
             if not greatest.is_finite():
                 break
             reach = (greatest * WIDER).abs_upper()
@@ -133,9 +147,7 @@ class BoxProof:
         for i in range(n):
             sides = (entry[max(i, j), min(i, j)].size for j in range(n) if j != i)
             rows.append(sum(sides, start=entry[i, i].ball.upper()))
-        growth = rows[0]
-        for row in rows[1:]:
-            growth = growth.max(row)
+        growth = reduce(arb.max, rows)
         whole = norm([one.size for one in found[len(pairs) :]])
         return growth + whole * (scale.slack - 1)
 
@@ -144,13 +156,16 @@ class BoxProof:
         x, n = s.x, len(s.x)
         for chosen in range(n):
             x = moved(x, [1 if row == chosen else 0 for row in range(n)], SINGLE << chosen)
-        return [[along(one, SINGLE << column) for column in range(n)] for one in self.box.machine.rate(x, a, v, s.k)]
+        return [
+            [along(one, SINGLE << column) for column in range(n)]
+            for one in self.box.machine.rate(x, a, v, s.k)
+        ]
 
     def _require_sway(
-        self, piece: Piece, scale: ScaleMatrix, watch: Watch, sway: Enclosed, greatest: arb, shift: Any, tube: Any
+        self, piece: Piece, scale: ScaleMatrix, step: Step, watch: Watch, sway: Enclosed
     ) -> None:
-        machine, off = self.box.machine, [a + b for a, b in zip(tube, shift, strict=True)]
-        s, n = piece.everywhere(off), len(tube) // 2
+        machine, shift, n = self.box.machine, step.shift, len(step.tube) // 2
+        s = piece.everywhere([a + b for a, b in zip(step.tube, shift, strict=True)])
         axes = [one + wide(gap.gap) for one, gap in zip(s.axes[0], piece.axes, strict=True)]
         aways = [arb(0)] * len(machine.loads[watch.loads])
         gains: list[list[arb]] = [[] for _ in aways]
@@ -167,7 +182,7 @@ class BoxProof:
         back = scale.at(s.places, s.key)[1]
         for row, gain in enumerate(gains):
             turned = [sum((g * back[i][j] for i, g in enumerate(gain)), start=arb(0)) for j in range(2 * n)]
-            aways[row] += norm(turned) * scale.slack * greatest
+            aways[row] += norm(turned) * scale.slack * step.greatest
         room = watch.bound - norm(aways)
         allowed = room if len(aways) == 1 else room * room
         if not (room > 0 and keeps(sway, allowed.lower(), HALVINGS)):
@@ -186,7 +201,9 @@ class ScaleMatrix:
         self.nodes = tuple(1 if terms == 1 else INVERSE for terms in self.counts)
         self.entries = [[[arb(one) for one in entry] for entry in row] for row in entries]
         self.known: dict[Any, Any] = {}
-        inverses = box.polynomials(lambda u, _: _inverse(self._evaluated(self.entries, self.counts, u)), self.nodes)
+        inverses = box.polynomials(
+            lambda u, _: _inverse(self._evaluated(self.entries, self.counts, u)), self.nodes
+        )
         self.inverse = self._square([[one.mid() for one in row.entries()] for row in inverses])
         self.most, self.rows = _sizes(self.entries), [norm(row) for row in _sizes(self.inverse)]
         off = _norm_of(self._product_with(self, unit=1))
@@ -254,7 +271,7 @@ def _sizes(entries: Sequence[Sequence[Sequence[arb]]]) -> list[list[arb]]:
 def _norm_of(sizes: Sequence[Sequence[arb]]) -> arb:
     """Bound the norm of a matrix whose entries have at most these sizes."""
     rows, columns = ([sum(row, start=arb(0)) for row in kind] for kind in (sizes, zip(*sizes, strict=True)))
-    return (_largest(rows) * _largest(columns)).sqrt().abs_upper()
+    return (magnitude(rows) * magnitude(columns)).sqrt().abs_upper()
 
 
 class Disturbance:
@@ -303,28 +320,42 @@ class Disturbance:
 
     def _sizes(self) -> list[arb]:
         n, pieces = len(self.x), self.piece.axes
-        nothing = [0] * len(self.a)
         near_a = [one + wide(gap) for one, gap in zip(self.a, self.gaps, strict=True)]
         near_v = [one + wide(gap.rate) for one, gap in zip(self.v, pieces, strict=True)]
         by_a, by_v = [wide(gap) for gap in self.gaps], [wide(gap.rate) for gap in pieces]
-        squares = self.rate(self.x, moved(moved(near_a, by_a, 1), by_a, 2), moved(moved(near_v, by_v, 1), by_v, 2))
+        squares = self.rate(
+            self.x, moved(moved(near_a, by_a, 1), by_a, 2), moved(moved(near_v, by_v, 1), by_v, 2)
+        )
         second = [abs(arb(along(along(one, 1), 2))) / 2 for one in squares]
-        first = [abs(arb(along(one, 1))) for one in self.rate(self.x, moved(near_a, by_a, 1), moved(near_v, by_v, 1))]
+        first = [
+            abs(arb(along(one, 1)))
+            for one in self.rate(self.x, moved(near_a, by_a, 1), moved(near_v, by_v, 1))
+        ]
         faster = [wide(one) for one in first]
         true = [one + two for one, two in zip(self.rate(self.x, self.a, self.v), faster, strict=True)]
         found = second
-        moving = moved(self.x, true, 4), moved(self.a, self.v, 4), moved(self.v, self.bend, 4), moved(self.bend, self.jerk, 4)
+        moving = (
+            moved(self.x, true, 4),
+            moved(self.a, self.v, 4),
+            moved(self.v, self.bend, 4),
+            moved(self.bend, self.jerk, 4),
+        )
         for chosen, (axis, pull) in enumerate(zip(pieces, self.pulls, strict=True)):
             unit = [1 if row == chosen else 0 for row in range(len(self.v))]
             changed = [along(one, 4) for one in self.pull(chosen, *moving)]
             passed = [along(one, 1) for one in self.rate(moved(self.x, pull, 1), self.a, self.v)]
             turned = self.rate(moved(self.x, faster, 1), self.a, moved(self.v, unit, 2))
             for row in range(n):
-                found[row] += abs(arb(pull[row])) * axis.mean + abs(arb(along(along(turned[row], 1), 2))) * axis.gap
+                found[row] += (
+                    abs(arb(pull[row])) * axis.mean + abs(arb(along(along(turned[row], 1), 2))) * axis.gap
+                )
                 found[row] += (abs(arb(changed[row])) + abs(arb(passed[row]))) * axis.swing
         whole, lifted = [wide(one) for one in self.shift], [wide(one) for one in self.lifted]
         bent = self.rate(moved(moved(self.x, whole, 1), lifted, 2), self.a, self.v)
-        return [(one + abs(arb(along(along(two, 1), 2)))).abs_upper() for one, two in zip(found, bent, strict=True)]
+        return [
+            (one + abs(arb(along(along(two, 1), 2)))).abs_upper()
+            for one, two in zip(found, bent, strict=True)
+        ]
 
 
 def _first_gap(piece: Piece, leap: Sequence[arb]) -> list[arb]:
@@ -342,25 +373,18 @@ def _summed(columns: Any, size: int) -> list[arb]:
 
 def norm(values: Sequence[Any]) -> arb:
     """Bound a vector's length."""
-    return sum((abs(one) ** 2 for one in values), start=arb(0)).sqrt().abs_upper()
+    return sum((one.abs_upper() ** 2 for one in values), start=arb(0)).sqrt().abs_upper()
 
 
 def matrix_product(a: Sequence[Values], b: Sequence[Values]) -> list[Values]:
     """Multiply matrices many of whose entries are 0."""
     columns = list(zip(*b, strict=True))
 
-    def entry(row: Values, column: Values) -> Any:
+    def entry(row: Sequence[Any], column: Sequence[Any]) -> Any:
         pairs = zip(row, column, strict=True)
         return sum((x * y for x, y in pairs if not (_nothing(x) or _nothing(y))), start=0)
 
     return [[entry(row, column) for column in columns] for row in a]
-
-
-def _largest(values: Sequence[arb]) -> arb:
-    found = values[0]
-    for one in values[1:]:
-        found = found.max(one)
-    return found
 
 
 def _product(values: Any) -> Any:
@@ -375,7 +399,7 @@ def _nothing(value: Any) -> bool:
 
 
 def keeps(one: Enclosed, allowed: arb, halvings: int) -> bool:
-    """Tell whether a function's absolute value is proved to be at most so much, halving time or a parameter."""
+    """Tell whether a function's absolute value is proved to be at most so much, by halves."""
     if one.size <= allowed:
         return True
     if halvings == 0 or not abs(one.coefficients[0, 0]).is_finite() or not one.rest < allowed:

@@ -46,19 +46,19 @@ class Jet:
         """Negate."""
         return Jet({key: -value for key, value in self.parts.items()})
 
-    def __sub__(self, other: Scalar) -> Jet:
+    def __sub__(self, other: Scalar) -> Scalar:
         """Subtract."""
         return self + -other
 
-    def __rsub__(self, other: Scalar) -> Jet:
+    def __rsub__(self, other: Scalar) -> Scalar:
         """Subtract from another."""
         return -self + other
 
-    def __truediv__(self, other: Scalar) -> Jet:
+    def __truediv__(self, other: Scalar) -> Scalar:
         """Divide."""
         return self * inverse(other)
 
-    def __rtruediv__(self, other: Scalar) -> Jet:
+    def __rtruediv__(self, other: Scalar) -> Scalar:
         """Divide another."""
         return inverse(self) * other
 

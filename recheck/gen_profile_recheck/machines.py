@@ -1,8 +1,8 @@
-"""The machines' equations, written down by hand from the physics, in closed forms without differences of like terms.
+"""The machines' equations, written down by hand from the physics, in forms without differences of like terms.
 
-Each machine gives, of its unactuated coordinates q with rates dq, its axes a with velocities v and constants k:
-`driven`, the matrix D by which accelerations of the axes act, q̈ = free + D v̇; `free`; and `sway` of its loads.
-Everything that swings counts as positive where it trails an axis that sets off in positive direction.
+Each machine gives, of its unactuated coordinates q with rates dq, its axes a with velocities v and constants
+k: `driven`, the matrix D by which accelerations of the axes act, q̈ = free + D v̇; `free`; and `sway` of its
+loads. Everything that swings counts as positive where it trails an axis that sets off in positive direction.
 """
 
 from __future__ import annotations
@@ -106,8 +106,8 @@ def _joint_sway(q: Values, a: Values, k: SimpleNamespace) -> list[Scalar]:
     return [k.L * (sx * cy), k.L * sy]
 
 
-# The same below a trolley at radius r of a jib that turns by α. In the jib's frame the load lies at (X, Y, Z), and
-# besides its own acceleration feels (r̈ − α̈ Y − 2 α̇ Ẏ − α̇² X, α̈ X + 2 α̇ Ẋ − α̇² Y), here along both angles.
+# The same below a trolley at radius r of a jib that turns by α. In the jib's frame the load lies at (X, Y, Z)
+# and feels (r̈ − α̈ Y − 2 α̇ Ẏ − α̇² X, α̈ X + 2 α̇ Ẋ − α̇² Y) besides, here along both angles.
 
 
 def _jib_driven(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
@@ -124,7 +124,8 @@ def _jib_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -
     return [first + cr * along_jib / (k.L * ct), second + (ct * across - sr * st * along_jib) / k.L]
 
 
-# Masses behind an axis, each tied to the one before: m_i d̈_i = m_i ÿ − s_i + s_{i+1}, s_i = k_i Δd_i + c_i Δḋ_i.
+# Masses behind an axis, each tied to the one before: m_i d̈_i = m_i ÿ − s_i + s_{i+1}, with
+# s_i = k_i Δd_i + c_i Δḋ_i.
 
 
 def _chain_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
@@ -150,8 +151,8 @@ def _chain(masses: int) -> Machine:
     )
 
 
-# Liquid in a tank: modes n = 1, 2 as pendulums of length 1/(κ tanh κh), κ = (2n − 1) π/a, damped by ζ of boundary
-# layers and bulk (Keulegan): √(ν/2ω) [1/a + 1/b + κ (1 − 2h/a)/sinh 2κh] + 2 ν κ²/ω, ν = μ/ρ.
+# Liquid in a tank: modes n = 1, 2 as pendulums of length 1/(κ tanh κh), κ = (2n − 1) π/a, damped by ζ of
+# boundary layers and bulk (Keulegan): √(ν/2ω) [1/a + 1/b + κ (1 − 2h/a)/sinh 2κh] + 2 ν κ²/ω, ν = μ/ρ.
 
 
 def _tank(p: Mapping[str, Scalar]) -> SimpleNamespace:

@@ -94,7 +94,8 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
         header, *rows = csv.reader(content.decode("utf-8").splitlines())
         several = len(axes) > 1
         columns = [
-            header.index(f"{f'{name}_' if several else ''}position_{spec['axis'][name]['unit']}") for name in axes
+            header.index(f"{f'{name}_' if several else ''}position_{spec['axis'][name]['unit']}")
+            for name in axes
         ]
         told = [Decimal(row[header.index("time_s")]) for row in rows]
         cycle = float(told[1] - told[0])
@@ -103,7 +104,9 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
             raise ValueError("times that are not even")
         found = [[float(row[c]) / factor for row in rows] for c, factor in zip(columns, factors, strict=True)]
     except (ValueError, IndexError, ArithmeticError) as error:
-        raise NotProvedError(f"not covered, or damaged: an artefact that is no such table ({error})") from error
+        raise NotProvedError(
+            f"not covered, or damaged: an artefact that is no such table ({error})"
+        ) from error
     if not all(isfinite(one) for row in found for one in row):
         raise NotProvedError("the artefact holds a number that is not finite")
     counted = [spec["axis"][name]["unit"] == "counts" for name in axes]
@@ -119,7 +122,9 @@ def ranges_of(spec: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """List the ranges of the check that are wider than nothing."""
     check, plant = spec["check"], spec["plant"]
     shares = check["uncertain"] if "uncertain" in check else spec["robustness"].get("uncertain", {})
-    found = {name: (plant[name] * (1.0 - share), plant[name] * (1.0 + share)) for name, share in shares.items()}
+    found = {
+        name: (plant[name] * (1.0 - share), plant[name] * (1.0 + share)) for name, share in shares.items()
+    }
     found |= {name: (low, high) for name, (low, high) in check.get("spans", {}).items()}
     return {name: ends for name, ends in found.items() if ends[1] > ends[0]}
 
@@ -173,7 +178,10 @@ class Proof:
         return [
             [
                 [
-                    [self._scales[(((i * n + j) * terms + t) * boxes + box) * pieces + piece] for t in range(terms)]
+                    [
+                        self._scales[(((i * n + j) * terms + t) * boxes + box) * pieces + piece]
+                        for t in range(terms)
+                    ]
                     for j in range(n)
                 ]
                 for i in range(n)
@@ -198,7 +206,16 @@ class Proof:
             raise NotProvedError(f"the certificate is damaged ({error})") from error
         return [
             [
-                arb_mat(times, terms, [arb(one) * quanta[c] for one in whole[c * times * terms * pieces :][piece : times * terms * pieces : pieces]])
+                arb_mat(
+                    times,
+                    terms,
+                    [
+                        arb(one) * quanta[c]
+                        for one in whole[c * times * terms * pieces :][
+                            piece : times * terms * pieces : pieces
+                        ]
+                    ],
+                )
                 for c in range(n)
             ]
             for piece in range(pieces)

@@ -1,10 +1,9 @@
 """Certificates as files: made beside the artefact, checked again, and refused when anything is altered."""
 
-import base64
 import json
 import shutil
-import zlib
 
+import forgeries
 import numpy as np
 import pytest
 from command_line import run_here
@@ -93,143 +92,33 @@ def test_a_limit_below_the_bound_is_not_proved_though_the_check_passes(copied):
     assert failed.code == 4 and failed.document["certificate"] is None
 
 
-def stated_lower(document):
-    document["bounds_m"]["payload"] *= 0.99
-
-
-def stated_lower_on_the_way(document):
-    document["on_the_way"]["bound_m"] *= 0.99
-
-
-def asked_less(document):
-    document["setpoints"]["hoist"]["acceleration"]["bound"] *= 0.99
-
-
-def limit_on_the_way_raised(document):
-    document["on_the_way"]["limit_m"] *= 2.0
-
-
-def stated_more(document):
-    document["largest_met_m"] = {"payload": 0.0}
-
-
-def limits_of_axes_left_out(document):
-    del document["setpoints"]
-
-
-def limits_of_axes_denied(document):
-    document["setpoints"] = None
-
-
-def way_denied(document):
-    document["on_the_way"] = None
-
-
-def sooner(document):
-    document["until_s"] -= 0.5
-
-
-def longer(document):
-    document["until_s"] += 1e-9
-
-
-def bound_of_no_load(document):
-    document["bounds_m"]["hook"] = 0.0
-
-
-def bound_left_out(document):
-    document["bounds_m"].clear()
-
-
-def met_on_the_way(document):
-    document["on_the_way"]["largest_met_m"] = 0.0
-
-
-def a_part_of_the_box(document):
-    document["parts"][0] = [[3, 5]]
-
-
-def limits_raised(document):
-    document["limits_m"]["payload"] *= 2.0
-
-
-def narrower(document):
-    document["ranges"]["L0"][1] *= 0.99
-
-
-def knots_moved(document):
-    document["axes"]["knots"][3] += 1e-4
-
-
-def later(document):
-    document["from_s"] += 0.5
-
-
-def scales_singular(document):
-    document["scales"] = changed(document["scales"], "<f8", lambda scales: 0.0 * scales)
-
-
-def motion_altered(document):
-    document["motions"][0] = changed(document["motions"][0], "<i8", lambda c: c + c // 100)
-
-
-def motion_cut(document):
-    document["motions"][0]["shape"][0] += 1
-
-
-def motion_missing(document):
-    document["motions"].clear()
-
-
-def sums_inexact(document):
-    document["motions"][0] = changed(document["motions"][0], "<i8", lambda c: c * 2**20)
-
-
-def quanta_odd(document):
-    document["motions"][0]["quanta"][0] *= 3.0
-
-
-def terms_fewer(document):
-    document["terms"][0] -= 1
-
-
-def another_file(document):
-    document["artefact_sha256"] = "0" * 64
-
-
-def changed(packed, kind, change):
-    values = np.frombuffer(zlib.decompress(base64.b64decode(packed["zlib"])), kind)
-    content = base64.b64encode(zlib.compress(change(values).astype(kind).tobytes())).decode()
-    return {**packed, "zlib": content}
-
-
 TAMPERED = {
-    stated_lower: "does not prove what it says",
-    stated_lower_on_the_way: "does not prove what it says",
-    asked_less: "does not prove what it says of the setpoints",
-    limit_on_the_way_raised: "does not cover all machines and limits",
-    stated_more: "largest_met_m missing, or of no certificate",
-    limits_of_axes_left_out: "setpoints missing, or of no certificate",
-    limits_of_axes_denied: "does not prove what it says of the setpoints",
-    way_denied: "does not cover all machines and limits",
-    sooner: "about another time",
-    longer: "about another time",
-    bound_of_no_load: "is damaged",
-    bound_left_out: "is damaged",
-    met_on_the_way: "is damaged",
-    a_part_of_the_box: "does not cover all machines",
-    limits_raised: "does not cover all machines",
-    narrower: "does not cover all machines",
-    knots_moved: "does not belong to the file's setpoints",
-    later: "about another time",
-    scales_singular: "does not prove what it says",
-    motion_altered: "does not prove what it says",
-    motion_cut: "is damaged",
-    motion_missing: "is damaged",
-    sums_inexact: "sums are not exact",
-    terms_fewer: "is damaged",
-    quanta_odd: "is damaged",
-    another_file: "about another file",
+    forgeries.stated_lower: "does not prove what it says",
+    forgeries.stated_lower_on_the_way: "does not prove what it says",
+    forgeries.asked_less: "does not prove what it says of the setpoints",
+    forgeries.limit_on_the_way_raised: "does not cover all machines and limits",
+    forgeries.stated_more: "largest_met_m missing, or of no certificate",
+    forgeries.limits_of_axes_left_out: "setpoints missing, or of no certificate",
+    forgeries.limits_of_axes_denied: "does not prove what it says of the setpoints",
+    forgeries.way_denied: "does not cover all machines and limits",
+    forgeries.sooner: "about another time",
+    forgeries.longer: "about another time",
+    forgeries.bound_of_no_load: "is damaged",
+    forgeries.bound_left_out: "is damaged",
+    forgeries.met_on_the_way: "is damaged",
+    forgeries.a_part_of_the_box: "does not cover all machines",
+    forgeries.limits_raised: "does not cover all machines",
+    forgeries.narrower: "does not cover all machines",
+    forgeries.knots_moved: "does not belong to the file's setpoints",
+    forgeries.later: "about another time",
+    forgeries.scales_singular: "does not prove what it says",
+    forgeries.motion_altered: "does not prove what it says",
+    forgeries.motion_cut: "is damaged",
+    forgeries.motion_missing: "is damaged",
+    forgeries.sums_inexact: "sums are not exact",
+    forgeries.terms_fewer: "is damaged",
+    forgeries.quanta_odd: "is damaged",
+    forgeries.another_file: "about another file",
 }
 
 

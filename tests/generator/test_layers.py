@@ -17,6 +17,7 @@ PACKAGES = {
     "gen_profile": ROOT / "generator",
     "gen_profile_fmu": ROOT / "fmu",
     "gen_profile_exporters": ROOT / "exporters",
+    "gen_profile_recheck": ROOT / "recheck",
 }
 
 SAYING = (ast.Raise, ast.Yield)  # of errors, and of warnings

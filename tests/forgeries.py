@@ -1,0 +1,146 @@
+"""What somebody may alter in a certificate, so that it says what it does not prove."""
+
+import base64
+import zlib
+
+import numpy as np
+
+
+def stated_lower(document):
+    document["bounds_m"]["payload"] *= 0.99
+
+
+def stated_lower_on_the_way(document):
+    document["on_the_way"]["bound_m"] *= 0.99
+
+
+def asked_less(document):
+    document["setpoints"]["hoist"]["acceleration"]["bound"] *= 0.99
+
+
+def limit_on_the_way_raised(document):
+    document["on_the_way"]["limit_m"] *= 2.0
+
+
+def stated_more(document):
+    document["largest_met_m"] = {"payload": 0.0}
+
+
+def limits_of_axes_left_out(document):
+    del document["setpoints"]
+
+
+def limits_of_axes_denied(document):
+    document["setpoints"] = None
+
+
+def way_denied(document):
+    document["on_the_way"] = None
+
+
+def sooner(document):
+    document["until_s"] -= 0.5
+
+
+def longer(document):
+    document["until_s"] += 1e-9
+
+
+def bound_of_no_load(document):
+    document["bounds_m"]["hook"] = 0.0
+
+
+def bound_left_out(document):
+    document["bounds_m"].clear()
+
+
+def met_on_the_way(document):
+    document["on_the_way"]["largest_met_m"] = 0.0
+
+
+def a_part_of_the_box(document):
+    document["parts"][0] = [[3, 5]]
+
+
+def limits_raised(document):
+    document["limits_m"]["payload"] *= 2.0
+
+
+def narrower(document):
+    document["ranges"]["L0"][1] *= 0.99
+
+
+def knots_moved(document):
+    document["axes"]["knots"][3] += 1e-4
+
+
+def later(document):
+    document["from_s"] += 0.5
+
+
+def scales_singular(document):
+    document["scales"] = changed(document["scales"], "<f8", lambda scales: 0.0 * scales)
+
+
+def motion_altered(document):
+    document["motions"][0] = changed(document["motions"][0], "<i8", lambda c: c + c // 100)
+
+
+def motion_cut(document):
+    document["motions"][0]["shape"][0] += 1
+
+
+def motion_missing(document):
+    document["motions"].clear()
+
+
+def sums_inexact(document):
+    document["motions"][0] = changed(document["motions"][0], "<i8", lambda c: c * 2**20)
+
+
+def quanta_odd(document):
+    document["motions"][0]["quanta"][0] *= 3.0
+
+
+def terms_fewer(document):
+    document["terms"][0] -= 1
+
+
+def another_file(document):
+    document["artefact_sha256"] = "0" * 64
+
+
+def changed(packed, kind, change):
+    values = np.frombuffer(zlib.decompress(base64.b64decode(packed["zlib"])), kind)
+    content = base64.b64encode(zlib.compress(change(values).astype(kind).tobytes())).decode()
+    return {**packed, "zlib": content}
+
+
+FORGERIES = (
+    stated_lower,
+    stated_lower_on_the_way,
+    asked_less,
+    limit_on_the_way_raised,
+    stated_more,
+    limits_of_axes_left_out,
+    limits_of_axes_denied,
+    way_denied,
+    sooner,
+    longer,
+    bound_of_no_load,
+    bound_left_out,
+    met_on_the_way,
+    a_part_of_the_box,
+    limits_raised,
+    narrower,
+    knots_moved,
+    later,
+    scales_singular,
+    motion_altered,
+    motion_cut,
+    motion_missing,
+    sums_inexact,
+    quanta_odd,
+    terms_fewer,
+    another_file,
+)

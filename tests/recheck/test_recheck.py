@@ -1,0 +1,229 @@
+"""The re-checker agrees with the re-check of the program, of which it has nothing, and refuses forgeries."""
+
+import hashlib
+import json
+import shutil
+import subprocess
+import sys
+
+import forgeries
+import numpy as np
+import pytest
+from command_line import run_here
+from flint import arb, arb_mat
+
+import gen_profile as gp
+from gen_profile.certificate.arithmetic.balls import ball
+from gen_profile.certificate.equations import enclosed_equations
+from gen_profile.errors import CertificateError
+from gen_profile.plants.registry import find_plant
+from gen_profile_recheck.__main__ import main
+from gen_profile_recheck.axes import quintic
+from gen_profile_recheck.boxes import Enclosed
+from gen_profile_recheck.check import check
+from gen_profile_recheck.enclosure import NotProvedError, keeps
+from gen_profile_recheck.jets import along, inverse, moved, sine_cosine
+from gen_profile_recheck.machines import MACHINES
+
+KINDS = [
+    "double-pendulum-crane",
+    "single-pendulum-crane",
+    "gantry-crane",
+    "tower-crane",
+    "flexible-joint",
+    "slosh-tank",
+    "mass-spring-chain-3",
+]
+SPEC = (
+    "single-pendulum-crane",
+    "export.cycle_time=0.01",
+    "limits.sway=0.25",
+    "limits.acceleration=0.9",
+    "limits.jerk=3",
+    "robustness.uncertain={L0=0.02}",
+)
+slow = pytest.mark.slow
+CERTIFIED = [
+    SPEC,
+    ("flexible-joint", "robustness.uncertain={J=0.02}"),
+    pytest.param(("flexible-joint", "robustness.uncertain={k=0.02, c=0.2}"), marks=slow),
+    pytest.param(("flexible-joint", "check.uncertain={}"), marks=slow),
+    pytest.param(("flexible-joint", "axis.hub.unit=counts", "axis.hub.counts_per_metre=1e6"), marks=slow),
+    pytest.param(("slosh-tank",), marks=slow),
+    pytest.param(("slosh-tank", "plant.mu=0", "limits.sway=0.1"), marks=slow),
+    pytest.param(("mass-spring-chain", "robustness.uncertain={m3=0.02}"), marks=slow),
+    pytest.param(("mass-spring-chain", "plant.c1=2", "robustness.uncertain={k2=0.05}"), marks=slow),
+    pytest.param(("single-pendulum-crane",), marks=slow),
+    pytest.param(("single-pendulum-crane", "move.initial={phi=0.001}"), marks=slow),
+    pytest.param(("gantry-crane",), marks=slow),
+    pytest.param(("gantry-crane", "robustness.uncertain={L=0.05, c=0.2}", "limits.sway=0.4"), marks=slow),
+    pytest.param(("gantry-crane", "plant.L=8", "limits.acceleration=1"), marks=slow),
+    pytest.param(("tower-crane",), marks=slow),
+    pytest.param(("tower-crane", "robustness.uncertain={L=0.05}", "limits.sway=1"), marks=slow),
+    pytest.param(("double-pendulum-crane", "robustness.uncertain={L1=0.05}"), marks=slow),
+    pytest.param(("double-pendulum-crane", "robustness.uncertain={m2=0.2}"), marks=slow),
+    pytest.param(("paper", "robustness.uncertain={L1=0.05}"), marks=slow),
+    pytest.param(("paper-beta0", "robustness.uncertain={L2=0.05}", "export.cycle_time=0.004"), marks=slow),
+]
+
+
+def certified(folder, preset, *overrides):
+    """Design a motion and prove it; the artefact and its certificate."""
+    words = [word for override in overrides for word in ("--set", override)]
+    made = run_here("--preset", preset, *words, "--certify", "--out", folder)
+    assert made.code == 0, made.err
+    (artefact,) = folder.glob("*.csv")
+    return artefact, artefact.with_name(f"{artefact.name}.certificate.json")
+
+
+def contents(artefact, certificate):
+    return (
+        artefact.read_bytes(),
+        artefact.with_name("manifest.json").read_bytes(),
+        certificate.read_bytes(),
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_equations_are_those_of_the_program(kind):
+    plant, machine, random = find_plant(kind), MACHINES[kind], np.random.default_rng(1)
+    theirs, n = enclosed_equations(plant), len(plant.unactuated)
+    assert machine.axes == tuple(axis.name for axis in plant.actuated)
+    assert machine.coordinates == tuple(one.name for one in plant.unactuated)
+    assert (machine.loads, machine.end_load) == (plant.loads, (plant.end_load_name, plant.end_load))
+    for _ in range(20):
+        p = {one.name: (one.nominal or 0.01) * random.uniform(0.7, 1.3) for one in plant.parameters}
+        x, v = 0.4 * random.normal(size=2 * n), random.normal(size=len(plant.actuated))
+        a = random.uniform(0.5, 3.0, len(v))
+        k = machine.constants({name: arb(value) for name, value in p.items()})
+        balls = [[arb(one) for one in values.tolist()] for values in (x, a, v)]
+        ours = [*machine.rate(*balls, k), *machine.sway(balls[0][:n], balls[1], k)]
+        columns = [[ball(one) for one in values] for values in (x, a, v, p.values())]
+        seen = theirs.sway(columns[0][:n], columns[1], columns[3])
+        found = [row[0] for row in [*theirs.rate(*columns), *seen]]
+        assert [float(one) for one in ours] == pytest.approx([float(one.mid) for one in found], 1e-9, 1e-9)
+
+
+@pytest.mark.parametrize("spec", CERTIFIED)
+def test_what_the_program_proves_is_proved_again(tmp_path, spec):
+    artefact, certificate = certified(tmp_path, *spec)
+    assert gp.check_certificate(artefact, certificate).proved
+    assert check(*contents(artefact, certificate)).startswith("Proved of all machines with ")
+
+
+@pytest.fixture(scope="module")
+def genuine(tmp_path_factory):
+    return certified(tmp_path_factory.mktemp("genuine"), *SPEC)
+
+
+@pytest.fixture
+def copied(genuine, tmp_path):
+    shutil.copytree(genuine[0].parent, tmp_path, dirs_exist_ok=True)
+    return tuple(tmp_path / one.name for one in genuine)
+
+
+@pytest.mark.parametrize("forge", forgeries.FORGERIES)
+def test_forgeries_are_refused_by_both(copied, forge):
+    artefact, certificate = copied
+    document = json.loads(certificate.read_text())
+    forge(document)
+    certificate.write_text(json.dumps(document))
+    with pytest.raises(CertificateError):
+        gp.check_certificate(artefact, certificate)
+    with pytest.raises(NotProvedError):
+        check(*contents(artefact, certificate))
+
+
+def test_an_altered_setpoint_is_refused_though_the_hash_is_made_to_fit(copied):
+    artefact, certificate = copied
+    lines = artefact.read_text().splitlines()
+    cells = lines[800].split(",")
+    cells[1] = str(float(cells[1]) + 20.0)
+    artefact.write_text("\n".join([*lines[:800], ",".join(cells), *lines[801:]]) + "\n")
+    with pytest.raises(NotProvedError, match="another artefact"):
+        check(*contents(artefact, certificate))
+    document = json.loads(certificate.read_text())
+    document["artefact_sha256"] = hashlib.sha256(artefact.read_bytes()).hexdigest()
+    for axis in document["setpoints"].values():
+        for kind in axis.values():
+            kind["bound"] = min(kind["bound"] * 1e6, kind["limit"])
+    certificate.write_text(json.dumps(document))
+    with pytest.raises(NotProvedError):
+        check(*contents(artefact, certificate))
+
+
+def test_a_spec_with_other_limits_is_refused_though_its_hash_is_written_into_the_certificate(copied):
+    artefact, certificate = copied
+    document = json.loads(certificate.read_text())
+    for change in ("limits.velocity=0.5", "robustness.uncertain={L0=0.03}", "check.residual_sway=0.001"):
+        other = gp.preset_spec(SPEC[0], [*SPEC[1:-1], change] if "L0" in change else [*SPEC[1:], change])
+        forged = json.dumps({**document, "spec_sha256": other.sha256()}).encode()
+        with pytest.raises(NotProvedError):
+            check(artefact.read_bytes(), json.dumps(other.to_dict()).encode(), forged)
+        with pytest.raises(NotProvedError, match="about another spec"):
+            check(artefact.read_bytes(), json.dumps(other.to_dict()).encode(), json.dumps(document).encode())
+
+
+@pytest.mark.parametrize("text", ["[" * 200_000, '{"a": Infinity}', '{"a": 1e999}', "", "{}", "[]"])
+def test_what_is_no_certificate_is_said_to_be_none(genuine, text):
+    artefact, manifest, _ = contents(*genuine)
+    with pytest.raises(NotProvedError):
+        check(artefact, manifest, text.encode())
+
+
+def test_what_is_not_covered_is_said(tmp_path):
+    lag = "actuator={type='first-order', tau=0.2}"
+    artefact, certificate = certified(tmp_path, *SPEC[:2], lag)
+    with pytest.raises(NotProvedError, match="not covered: drives that lag"):
+        check(*contents(artefact, certificate))
+
+
+def test_on_the_command_line_it_says_what_it_trusts(genuine, capsys, copied):
+    artefact, certificate = genuine
+    manifest = artefact.with_name("manifest.json")
+    assert main([str(artefact), str(certificate), str(manifest)]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("Proved of all machines with L0 from 2.94 to 3.06") and "Trusted: " in said
+    copied[0].write_text("nothing")
+    assert main([str(copied[0]), str(certificate), str(manifest)]) == 4
+    assert capsys.readouterr().out == "Not proved: the certificate is about another artefact.\n"
+    assert main([str(artefact)]) == 2 and main(["none", "none", "none"]) == 2
+    assert "Cannot read none" in capsys.readouterr().err
+
+
+def test_it_loads_nothing_of_the_program():
+    script = "import sys, gen_profile_recheck.check; print(*sys.modules)"
+    environment = {"PYTHONPATH": str(sys.modules["gen_profile_recheck"].__path__[0] + "/..")}
+    loaded = subprocess.run(
+        [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert "flint" in loaded and not {"numpy", "casadi", "scipy", "gen_profile"} & {*loaded}
+
+
+def test_jets_are_derivatives():
+    x, y = moved(moved([arb(0.3), arb(0.7)], [1, 2], 1), [0, 1], 2)
+    angle, (sine, cosine) = arb(0.3) * arb(0.7), sine_cosine(x * y)
+    # along (1, 2) and (0, 1): of sin xy, (y + 2 x) cos xy, and of that by y
+    assert along(sine, 1).parts[0].overlaps((arb(0.7) + 2 * arb(0.3)) * angle.cos())
+    slope = angle.cos() - arb(0.3) * (arb(0.7) + 2 * arb(0.3)) * angle.sin()
+    assert along(along(sine, 1), 2).overlaps(slope)
+    (single,) = moved([arb(0.7)], [1], 2)
+    assert abs(along(inverse(single), 2) + 1 / arb(0.7) ** 2) < 1e-14
+    assert abs(along(along(cosine * cosine + sine * sine, 1), 2)) < 1e-15
+
+
+def test_quintics_have_the_values_at_their_ends():
+    found, half = quintic(arb(0.5), (1.0, 3.0), (-2.0, 0.5), (4.0, -1.0)), arb(0.5)
+    slope, bend = found.derivative(), found.derivative().derivative()
+    ends = [[poly(x) / half**order for x in (-1, 1)] for order, poly in enumerate([found, slope, bend])]
+    assert [[float(one) for one in row] for row in ends] == pytest.approx(
+        np.array([[1, 3], [-2, 0.5], [4, -1]])
+    )
+
+
+def test_a_greatest_value_is_found_by_halves():
+    # T2(t) + T1(u)/2 reaches 1.5 and no more, T2(t) T2(u) 1
+    sum_ = Enclosed(arb_mat([[0, 0.5, 0], [0, 0, 0], [1, 0, 0]]), (3, 3), arb(0))
+    product = Enclosed(arb_mat([[0.2, 0, 0], [0, 0, 0], [-0.4, 0, 0.7]]), (3, 3), arb(0.01))
+    assert keeps(sum_, arb(1.500001), 20) and not keeps(sum_, arb(1.499), 20)
+    assert keeps(product, arb(1.311), 20) and not keeps(product, arb(1.29), 12)
