@@ -187,15 +187,20 @@ class Box:
 
     def least(self, key: Any, choices: Sequence[float], bounds: Callable[[float], list[arb]]) -> list[arb]:
         """Bound functions by the best of some choices: those beside what was best the last time."""
-        place = self._best.get(key, len(choices) // 2)
+        tried: dict[int, list[arb]] = {}
+        sums: dict[int, float] = {}
+        place = self._best.get(key, len(choices) // 3)
         while True:
-            tried = {n: bounds(choices[n]) for n in range(max(0, place - 1), min(place + 2, len(choices)))}
-            sums = {n: sum(map(float, listed)) for n, listed in tried.items()}
+            for n in range(max(0, place - 1), min(place + 2, len(choices))):
+                if n not in tried:
+                    tried[n] = bounds(choices[n])
+                    sums[n] = sum(map(float, tried[n]))
             known = [n for n, total in sums.items() if isfinite(total)]
-            if known or 0 in tried:
-                self._best[key] = min(known, key=sums.__getitem__) if known else 0
+            best = min(known, key=sums.__getitem__) if known else max(0, place - 2)
+            if best == place or (not known and 0 in tried):
+                self._best[key] = best
                 return [_least(row) for row in zip(*tried.values(), strict=True)]
-            place -= 2
+            place = best
 
     def polynomials(
         self, function: Callable[[Values, Any], Values], counts: tuple[int, ...]

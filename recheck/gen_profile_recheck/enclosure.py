@@ -18,7 +18,7 @@ from flint import arb, arb_mat, arb_poly
 
 from gen_profile_recheck.axes import magnitude
 from gen_profile_recheck.boxes import Box, Enclosed, Piece, State, Values, _t, powers, wide
-from gen_profile_recheck.jets import SINGLE, along, moved
+from gen_profile_recheck.jets import SINGLE, Jet, along, moved
 
 TERMS, FEW_TERMS = 24, 14  # of power series in time: for the defect and sway, and for μ
 MORE, FEWER, FEWEST = 2, 1, 4  # nodes than terms in each parameter, likewise; and at least so many
@@ -320,20 +320,9 @@ class Disturbance:
 
     def _sizes(self) -> list[arb]:
         n, pieces = len(self.x), self.piece.axes
-        near_a = [one + wide(gap) for one, gap in zip(self.a, self.gaps, strict=True)]
-        near_v = [one + wide(gap.rate) for one, gap in zip(self.v, pieces, strict=True)]
-        by_a, by_v = [wide(gap) for gap in self.gaps], [wide(gap.rate) for gap in pieces]
-        squares = self.rate(
-            self.x, moved(moved(near_a, by_a, 1), by_a, 2), moved(moved(near_v, by_v, 1), by_v, 2)
-        )
-        second = [abs(arb(along(along(one, 1), 2))) / 2 for one in squares]
-        first = [
-            abs(arb(along(one, 1)))
-            for one in self.rate(self.x, moved(near_a, by_a, 1), moved(near_v, by_v, 1))
-        ]
+        first, found = self._by_axes()
         faster = [wide(one) for one in first]
         true = [one + two for one, two in zip(self.rate(self.x, self.a, self.v), faster, strict=True)]
-        found = second
         moving = (
             moved(self.x, true, 4),
             moved(self.a, self.v, 4),
@@ -356,6 +345,30 @@ class Disturbance:
             (one + abs(arb(along(along(two, 1), 2)))).abs_upper()
             for one, two in zip(found, bent, strict=True)
         ]
+
+    def _by_axes(self) -> tuple[list[arb], list[arb]]:
+        """Bound what the axes' being elsewhere changes in f, and by how much more than its slopes tell.
+
+        Derivatives are taken along one axis at a time, so that what cancels in them does.
+        """
+        pieces, m = self.piece.axes, len(self.a)
+        sizes = [*self.gaps, *(one.rate for one in pieces)]
+        near = [one + wide(size) for one, size in zip([*self.a, *self.v], sizes, strict=True)]
+        first, second = [arb(0)] * len(self.x), [arb(0)] * len(self.x)
+        for i, j in product(range(2 * m), repeat=2):
+            if j > i:
+                continue
+            once = moved(near, [int(row == i) for row in range(2 * m)], 1)
+            both = moved(once, [int(row == j) for row in range(2 * m)], 2)
+            share = sizes[i] * sizes[j] / (2 if i == j else 1)
+            for row, one in enumerate(self.rate(self.x, both[:m], both[m:])):
+                second[row] += abs(arb(along(along(one, 1), 2))) * share
+                if i == j:
+                    slope = along(one, 1)
+                    first[row] += (
+                        abs(arb(slope.parts.get(0, 0) if isinstance(slope, Jet) else slope)) * sizes[i]
+                    )
+        return first, second
 
 
 def _first_gap(piece: Piece, leap: Sequence[arb]) -> list[arb]:
