@@ -7,6 +7,7 @@ import csv
 import hashlib
 import json
 import math
+import re
 import zlib
 from array import array
 from collections.abc import Mapping, Sequence
@@ -80,42 +81,91 @@ def scales_of(spec: Mapping[str, Any], axes: Sequence[str]) -> list[float]:
 
 
 def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str]) -> Setpoints:
-    """Read a table of positions at even times (RFC 4180).
+    """Read a table of positions at even times (RFC 4180), or that of a playback block (IEC 61131-3).
 
     Raises
     ------
     NotProvedError
-        Of other formats, for which nothing is written here.
+        It is of another format, for which nothing is written here.
     """
+    try:
+        text = content.decode("utf-8")
+        found = _of_block(text, spec, axes) if "END_FUNCTION_BLOCK" in text else _of_table(text, spec, axes)
+    except (ValueError, IndexError, ArithmeticError) as error:
+        raise NotProvedError(f"not covered, or damaged: an artefact of another format ({error})") from error
+    if len(found.times) < 2 or not all(isfinite(one) for row in found.positions for one in row):
+        raise NotProvedError("the artefact holds a number that is not finite, or no motion")
+    return found
+
+
+def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> Setpoints:
     export, factors = spec["export"], scales_of(spec, axes)
     if export["csv_dialect"] != "rfc4180" or "position" not in export["csv_columns"]:
-        raise NotProvedError("not covered: tables of other dialects, or without positions")
-    try:
-        header, *rows = csv.reader(content.decode("utf-8").splitlines())
-        several = len(axes) > 1
-        columns = [
-            header.index(f"{f'{name}_' if several else ''}position_{spec['axis'][name]['unit']}")
-            for name in axes
-        ]
-        told = [Decimal(row[header.index("time_s")]) for row in rows]
-        cycle = float(told[1] - told[0])
-        over, under = Decimal(repr(cycle)).as_integer_ratio()
-        if any(time * under != number * over for number, time in enumerate(told)):
-            raise ValueError("times that are not even")
-        found = [[float(row[c]) / factor for row in rows] for c, factor in zip(columns, factors, strict=True)]
-    except (ValueError, IndexError, ArithmeticError) as error:
-        raise NotProvedError(
-            f"not covered, or damaged: an artefact that is no such table ({error})"
-        ) from error
-    if not all(isfinite(one) for row in found for one in row):
-        raise NotProvedError("the artefact holds a number that is not finite")
+        raise ValueError("tables of other dialects, or without positions")
+    header, *rows = csv.reader(text.splitlines())
+    several = len(axes) > 1
+    names = [f"{f'{name}_' if several else ''}position_{spec['axis'][name]['unit']}" for name in axes]
+    told = [Decimal(row[header.index("time_s")]) for row in rows]
+    cycle = float(told[1] - told[0])
+    over, under = Decimal(repr(cycle)).as_integer_ratio()
+    if any(time * under != number * over for number, time in enumerate(told)):
+        raise ValueError("times that are not even")
+    columns = [[float(row[header.index(name)]) for row in rows] for name in names]
     counted = [spec["axis"][name]["unit"] == "counts" for name in axes]
+    return _setpoints(cycle, columns, factors, counted)
+
+
+def _setpoints(
+    cycle: float, columns: Sequence[Sequence[float]], factors: Sequence[float], counted: Sequence[bool]
+) -> Setpoints:
+    over, under = Decimal(repr(cycle)).as_integer_ratio()
     return Setpoints(
-        times=[number * over / under for number in range(len(told))],
+        times=[number * over / under for number in range(len(columns[0]))],
         cycle=cycle,
-        positions=found,
+        positions=[[one / factor for one in row] for row, factor in zip(columns, factors, strict=True)],
         resolution=[flag / abs(factor) for flag, factor in zip(counted, factors, strict=True)],
     )
+
+
+def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> Setpoints:
+    """Play a block at full rate: positions of every cycle, or powers of the time since a segment began."""
+    bare, several = re.sub(r"\(\*.*?\*\)", "", text, flags=re.S), len(axes)
+
+    def constant(name: str) -> list[float]:
+        array_of = r"(?:ARRAY\s*\[[0-9.]+\]\s*OF\s*)?"
+        (found,) = re.findall(rf"\b{name}\s*:\s*{array_of}[A-Z]+\s*:=\s*\[?([^\];]*)", bare)
+        return [float(one) for one in found.split(",")]
+
+    layout, factors = spec["export"]["plc_layout"], scales_of(spec, axes)
+    counted = [layout == "counts" or spec["axis"][name]["unit"] == "counts" for name in axes]
+    if layout == "counts":
+        factors = [spec["axis"][name]["sign"] * spec["axis"][name]["counts_per_metre"] for name in axes]
+    (cycle,), (last,) = constant("cCycleTime"), constant("cLast")
+    if layout == "segments":
+        first, powers = constant("cFirst"), [constant(f"cPower{power}") for power in range(6)]
+        rows, segment = [], 0
+        for number in range(int(last)):
+            segment += segment + 1 < len(first) and number >= first[segment + 1]
+            time = (number - first[segment]) * cycle
+            rows.append(
+                [_horner([one[segment * several + axis] for one in powers], time) for axis in range(several)]
+            )
+        rows.append(constant("cTarget"))
+        counted = [False] * several
+    else:
+        flat = constant("cPosition")
+        rows = [flat[number : number + several] for number in range(0, len(flat), several)]
+        if len(rows) != int(last) + 1:
+            raise ValueError("a table of another length")
+    return _setpoints(cycle, list(zip(*rows, strict=True)), factors, counted)
+
+
+def _horner(powers: Sequence[float], time: float) -> float:
+    """Evaluate as the block does, rounding included."""
+    found = powers[-1]
+    for one in powers[-2::-1]:
+        found = one + time * found
+    return found
 
 
 def ranges_of(spec: Mapping[str, Any]) -> dict[str, tuple[float, float]]:

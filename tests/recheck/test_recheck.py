@@ -17,6 +17,8 @@ from gen_profile.certificate.arithmetic.balls import ball
 from gen_profile.certificate.equations import enclosed_equations
 from gen_profile.errors import CertificateError
 from gen_profile.plants.registry import find_plant
+from gen_profile_exporters.exporter import target_of
+from gen_profile_exporters.registry import find_exporter
 from gen_profile_recheck.__main__ import main
 from gen_profile_recheck.axes import quintic
 from gen_profile_recheck.boxes import Enclosed
@@ -24,6 +26,7 @@ from gen_profile_recheck.check import check
 from gen_profile_recheck.enclosure import NotProvedError, keeps
 from gen_profile_recheck.jets import along, inverse, moved, sine_cosine
 from gen_profile_recheck.machines import MACHINES
+from gen_profile_recheck.reading import read_setpoints
 
 KINDS = [
     "double-pendulum-crane",
@@ -67,12 +70,12 @@ CERTIFIED = [
 ]
 
 
-def certified(folder, preset, *overrides):
+def certified(folder, preset, *overrides, form="csv"):
     """Design a motion and prove it; the artefact and its certificate."""
     words = [word for override in overrides for word in ("--set", override)]
-    made = run_here("--preset", preset, *words, "--certify", "--out", folder)
+    made = run_here("--preset", preset, *words, "--export", form, "--certify", "--out", folder)
     assert made.code == 0, made.err
-    (artefact,) = folder.glob("*.csv")
+    artefact = next(folder / one.name for one in folder.iterdir() if one.suffix in (".csv", ".st"))
     return artefact, artefact.with_name(f"{artefact.name}.certificate.json")
 
 
@@ -102,6 +105,25 @@ def test_equations_are_those_of_the_program(kind):
         seen = theirs.sway(columns[0][:n], columns[1], columns[3])
         found = [row[0] for row in [*theirs.rate(*columns), *seen]]
         assert [float(one) for one in ours] == pytest.approx([float(one.mid) for one in found], 1e-9, 1e-9)
+
+
+@pytest.mark.parametrize("layout", ["segments", "samples", "counts"])
+@pytest.mark.parametrize("preset", ["single-pendulum-crane", "tower-crane", "paper"])
+def test_a_block_is_read_as_the_program_plays_it(preset, layout):
+    spec = gp.preset_spec(preset, ["export.cycle_time=0.02", f"export.plc_layout={layout}"])
+    profile, target = gp.plan(spec).command, target_of(spec)
+    (file, *_) = find_exporter("plc").encode(profile, target)
+    theirs = find_exporter("plc").replay(file.content, target)
+    ours = read_setpoints(file.content, spec.to_dict(), list(spec.axis))
+    assert ours.times == theirs.times.tolist() and ours.cycle == theirs.cycle_time
+    assert np.array_equal(np.array(ours.positions).T, theirs.position)
+    assert np.array_equal(ours.resolution, theirs.resolution)
+
+
+@pytest.mark.slow
+def test_a_function_block_is_proved_again(tmp_path):
+    artefact, certificate = certified(tmp_path, *SPEC, form="plc")
+    assert check(*contents(artefact, certificate)).startswith("Proved of all machines with L0 from 2.94")
 
 
 @pytest.mark.parametrize("spec", CERTIFIED)
