@@ -27,7 +27,7 @@ Values = list[Any]
 
 
 @dataclass
-class State:
+class MachineState:
     """All that equations depend on: state and slope, axes with derivatives, constants, parameters' places."""
 
     x: Values
@@ -38,11 +38,11 @@ class State:
     key: Any  # of these places
 
 
-Function = Callable[[State], Values]
+Function = Callable[[MachineState], Values]
 
 
 @dataclass(frozen=True)
-class Enclosed:
+class Expansion:
     """A function of time and parameters: coefficients of Chebyshev's polynomials, how many, and the rest."""
 
     coefficients: arb_mat
@@ -138,7 +138,7 @@ def _products(each: Sequence[Any], rows: Sequence[int], columns: Sequence[int]) 
 
 
 @dataclass
-class Box:
+class MachineBox:
     """Machines whose parameters lie in a part of their ranges.
 
     `parts`: of every range how often it was halved, and which part it is; `terms`: of series in each.
@@ -226,10 +226,10 @@ def size_of(value: Any) -> arb:
 
 
 @dataclass
-class Piece:
+class MotionPiece:
     """A box's approximate motions on a piece of time: of every coordinate (time × parameter) terms."""
 
-    box: Box
+    box: MachineBox
     half: arb
     axes: Sequence[AxisPiece]
     series: Sequence[arb_mat]
@@ -261,7 +261,7 @@ class Piece:
             slope.append(sum((a * b for a, b in zip(summed, change, strict=True)), start=arb(0)) / self.half)
         return x, slope
 
-    def on_disc(self, radius: float, tube: Sequence[Any]) -> State:
+    def on_disc(self, radius: float, tube: Sequence[Any]) -> MachineState:
         """Take complex times up to a radius, and all real parameters."""
         r, count = arb(radius), self.series[0].nrows()
         rows = [[abs(one) for one in row] for row in chebyshev(count).transpose().tolist()]
@@ -276,9 +276,9 @@ class Piece:
 
         k = self.box.constants(places, "all, complex")
         states, slopes = [_disc(*one) for one in x], [_disc(0, one) for one in slope]
-        return State(states, slopes, self._axes_at(kind), k, places, "all, complex")
+        return MachineState(states, slopes, self._axes_at(kind), k, places, "all, complex")
 
-    def on_ellipse(self, chosen: int, rho: float, tube: Sequence[Any]) -> State:
+    def on_ellipse(self, chosen: int, rho: float, tube: Sequence[Any]) -> MachineState:
         """Take one parameter on an ellipse, all others and time real."""
         count = self.series[0].nrows()
         weights = [arb(rho) ** degrees[chosen] for degrees in product(*map(range, self.box.terms))]
@@ -287,9 +287,9 @@ class Piece:
         k = self.box.constants(places, (chosen, rho))
         axes = [[acb(one) for one in row] for row in real]
         states, slopes = [_disc(*one) for one in x], [_disc(0, one) for one in slope]
-        return State(states, slopes, axes, k, places, (chosen, rho))
+        return MachineState(states, slopes, axes, k, places, (chosen, rho))
 
-    def everywhere(self, tube: Sequence[Any]) -> State:
+    def everywhere(self, tube: Sequence[Any]) -> MachineState:
         """Take all times and parameters at once, in real balls."""
         count = self.series[0].nrows()
         ones = [arb(1)] * self.series[0].ncols()
@@ -297,11 +297,11 @@ class Piece:
         places = [wide(1) for _ in self.box.terms]
         k = self.box.constants(places, "all")
         states = [center + wide(rest) for center, rest in x]
-        return State(states, [wide(one) for one in slope], self._axes_at(_range), k, places, "all")
+        return MachineState(states, [wide(one) for one in slope], self._axes_at(_range), k, places, "all")
 
     def enclosed(
         self, function: Function, terms: int, counts: tuple[int, ...], tube: Sequence[Any]
-    ) -> list[Enclosed]:
+    ) -> list[Expansion]:
         """Enclose functions of the motions, and of all within a tube around them."""
         ctx.cap = terms
         at = [one * node_values(self.box.terms, counts) for one in self._in_powers]
@@ -316,7 +316,7 @@ class Piece:
                 x.append(arb_series([values[0] + wide(off), *values[1:]], terms))
                 slope.append(arb_series(slopes, terms))
             k = self.box.constants(places, (counts, number))
-            found = function(State(x, slope, axes, k, list(places), (counts, number)))
+            found = function(MachineState(x, slope, axes, k, list(places), (counts, number)))
             rows.append([_padded(one, terms) for one in found])
         late = self.box.least(
             (terms, len(rows[0])),
@@ -334,7 +334,7 @@ class Piece:
         result = []
         for output, rest in enumerate(rests):
             matrix = arb_mat([row[output] for row in rows]).transpose()
-            result.append(Enclosed(powers(terms) * matrix * interpolation(counts), (terms, *counts), rest))
+            result.append(Expansion(powers(terms) * matrix * interpolation(counts), (terms, *counts), rest))
         return result
 
 

@@ -13,15 +13,15 @@ from typing import Any
 from flint import acb_mat, arb, ctx
 
 from gen_profile_recheck.axes import axis_pieces, quintic
-from gen_profile_recheck.boxes import Box, Piece
-from gen_profile_recheck.enclosure import BoxProof, NotProvedError, Watch
+from gen_profile_recheck.boxes import MachineBox, MotionPiece
+from gen_profile_recheck.enclosure import BoxProof, NotProvedError, SwayClaim
 from gen_profile_recheck.jets import along, moved
 from gen_profile_recheck.machines import MACHINES, Machine
 from gen_profile_recheck.reading import (
     FORMAT,
     KEYS,
-    Proof,
-    Setpoints,
+    ProofMaterial,
+    TimedSetpoints,
     ranges_of,
     read_json,
     read_setpoints,
@@ -50,7 +50,7 @@ class Case:
 
     machine: Machine
     spec: Mapping[str, Any]
-    setpoints: Setpoints
+    setpoints: TimedSetpoints
     ranges: Mapping[str, tuple[float, float]]
     document: Mapping[str, Any]
 
@@ -184,7 +184,7 @@ def _frequency(case: Case, parameters: Mapping[str, float]) -> float:
     return float(min(float(one.real.mid()) for one in values) ** 0.5)
 
 
-def _require_cover(proof: Proof, ranges: int) -> None:
+def _require_cover(proof: ProofMaterial, ranges: int) -> None:
     """Require that boxes are disjoint, and together everything."""
     if any(len(box) != ranges for box in proof.parts) or len(proof.terms) != ranges:
         raise NotProvedError("boxes of other parameters than the ranges'")
@@ -203,14 +203,14 @@ def _meet(one: tuple[int, int], other: tuple[int, int]) -> bool:
     return inside >> (deeper - level) == index
 
 
-def _watches(case: Case, knots: Sequence[float]) -> list[Watch]:
+def _watches(case: Case, knots: Sequence[float]) -> list[SwayClaim]:
     """List the bounds that are claimed, which must be all that the spec asks, and keep its limits."""
     limits, bounds, way = (case.document[name] for name in ("limits_m", "bounds_m", "on_the_way"))
     loads, sway = case.machine.loads, case.spec["limits"].get("sway")
     if limits != case.spec["check"]["residual_sway"] or not set(loads) == limits.keys() == bounds.keys():
         raise NotProvedError("the certificate is about other limits than the spec's, or other loads")
     arrived = max(n for n, knot in enumerate(knots) if knot <= case.setpoints.times[-1])
-    found = [Watch(slice(n, n + 1), arrived, bounds[load]) for n, load in enumerate(loads)]
+    found = [SwayClaim(slice(n, n + 1), arrived, bounds[load]) for n, load in enumerate(loads)]
     kept = [bounds[load] <= limits[load] for load in loads]
     if (sway is None) != (way is None):
         raise NotProvedError("the certificate is silent of the sway on the way, or the spec is")
@@ -223,7 +223,7 @@ def _watches(case: Case, knots: Sequence[float]) -> list[Watch]:
         ):
             raise NotProvedError("the certificate is about another limit on the way")
         kept.append(way["bound_m"] <= way["limit_m"])
-        found.append(Watch(both, 0, way["bound_m"]))
+        found.append(SwayClaim(both, 0, way["bound_m"]))
     if not all(kept):
         raise NotProvedError("a bound is above its limit")
     return found
@@ -231,7 +231,7 @@ def _watches(case: Case, knots: Sequence[float]) -> list[Watch]:
 
 def _prove(case: Case, progress: Progress) -> None:
     machine, setpoints = case.machine, case.setpoints
-    proof = Proof(case.document, 2 * len(machine.coordinates), len(machine.axes))
+    proof = ProofMaterial(case.document, 2 * len(machine.coordinates), len(machine.axes))
     _require_cover(proof, len(case.ranges))
     watches, knots, times = _watches(case, proof.knots), proof.knots, setpoints.times
     moving = {knot for knot in knots if knot <= times[-1]}
@@ -246,9 +246,9 @@ def _prove(case: Case, progress: Progress) -> None:
     names = (*machine.coordinates, *(f"{name}.rate" for name in machine.coordinates))
     start = [case.spec["move"].get("initial", {}).get(name, 0.0) for name in names]
     for number, parts in enumerate(proof.parts):
-        box = Box(machine, case.parameters, case.ranges, parts, proof.terms)
+        box = MachineBox(machine, case.parameters, case.ranges, parts, proof.terms)
         pieces = [
-            Piece(box, half, along_axes, series)
+            MotionPiece(box, half, along_axes, series)
             for half, along_axes, series in zip(
                 halves, zip(*axes, strict=True), proof.motion(number), strict=True
             )

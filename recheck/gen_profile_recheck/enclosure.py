@@ -17,18 +17,27 @@ from typing import Any
 from flint import arb, arb_mat, arb_poly
 
 from gen_profile_recheck.axes import magnitude
-from gen_profile_recheck.boxes import Box, Enclosed, Piece, State, Values, _t, powers, wide
+from gen_profile_recheck.boxes import (
+    Expansion,
+    MachineBox,
+    MachineState,
+    MotionPiece,
+    Values,
+    _t,
+    powers,
+    wide,
+)
 from gen_profile_recheck.jets import SINGLE, Jet, along, moved
 
 TERMS, FEW_TERMS = 24, 14  # of power series in time: for the defect and sway, and for μ
 MORE, FEWER, FEWEST = 2, 1, 4  # nodes than terms in each parameter, likewise; and at least so many
 ATTEMPTS, WIDER = 12, 2
 INVERSE = 7  # terms of V in each parameter
-HALVINGS = 24  # of pieces or ranges, to bound a sway
+MOST_PARTS = 4000  # of a piece and its ranges, to bound a sway
 
 
 @dataclass(frozen=True)
-class Watch:
+class SwayClaim:
     """A sway that is to be bounded: of which loads together, from which piece on, and by how much."""
 
     loads: slice
@@ -37,7 +46,7 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class Step:
+class PieceErrors:
     """A piece's greatest error, what setpoints fed into it, and how far states are off z, and z off x̃."""
 
     greatest: arb
@@ -54,14 +63,14 @@ class BoxProof:
     """The proof for one box: pieces one after another."""
 
     def __init__(
-        self, box: Box, pieces: Sequence[Piece], scales: Sequence[Any], start: Sequence[float]
+        self, box: MachineBox, pieces: Sequence[MotionPiece], scales: Sequence[Any], start: Sequence[float]
     ) -> None:
         self.box, self.pieces, self.start = box, pieces, start
         self.scales = [ScaleMatrix(box, one) for one in scales]
         self.fine = tuple(count + MORE for count in box.terms)
         self.coarse = tuple(max(FEWEST, count - FEWER) for count in box.terms)
 
-    def require(self, watches: Sequence[Watch]) -> None:
+    def require(self, watches: Sequence[SwayClaim]) -> None:
         """Prove the bounds of all sways.
 
         Raises
@@ -86,7 +95,7 @@ class BoxProof:
                 self._require_sway(piece, scale, step, watch, sway)
             before, fed = scale, step.fed
 
-    def _defect_and_sways(self, sides: Sequence[Watch], s: State) -> Values:
+    def _defect_and_sways(self, sides: Sequence[SwayClaim], s: MachineState) -> Values:
         machine, (a, v, *_) = self.box.machine, s.axes
         found = [one - two for one, two in zip(s.slope, machine.rate(s.x, a, v, s.k), strict=True)]
         sways = machine.sway(s.x[: len(s.x) // 2], a, s.k) if sides else []
@@ -109,7 +118,9 @@ class BoxProof:
             found.append(sum((abs(a - b) for a, b in zip(off, ends, strict=True)), start=arb(0)))
         return found
 
-    def _step(self, piece: Piece, scale: ScaleMatrix, error: arb, source: arb, fed: arb) -> tuple[arb, Step]:
+    def _step(
+        self, piece: MotionPiece, scale: ScaleMatrix, error: arb, source: arb, fed: arb
+    ) -> tuple[arb, PieceErrors]:
         """Assume that errors keep below something, and prove it; the error at the end, and the greatest."""
         time = 2 * piece.half
         reach = ((error + source * time + fed) * 5 / 4 + arb(10) ** -14).abs_upper()
@@ -123,17 +134,19 @@ class BoxProof:
             step = (source + added) * time * most
             greatest = (error * most + step).abs_upper()
             if greatest <= reach:
-                return (error * factor + step).abs_upper(), Step(greatest, added * time, found.shift, tube)
+                return (error * factor + step).abs_upper(), PieceErrors(
+                    greatest, added * time, found.shift, tube
+                )
             if not greatest.is_finite():
                 break
             reach = (greatest * WIDER).abs_upper()
         raise NotProvedError("errors of the approximate motion cannot be bounded")
 
-    def _growth(self, piece: Piece, scale: ScaleMatrix, tube: Sequence[arb]) -> arb:
+    def _growth(self, piece: MotionPiece, scale: ScaleMatrix, tube: Sequence[arb]) -> arb:
         """Bound the logarithmic norm by Gershgorin's circles of the symmetric part."""
         n = len(tube)
 
-        def symmetric(s: State) -> Values:
+        def symmetric(s: MachineState) -> Values:
             jacobian = self._jacobian(s)
             to, back = scale.at(s.places, s.key)
             turned = matrix_product(matrix_product(to, jacobian), back)
@@ -151,7 +164,7 @@ class BoxProof:
         whole = norm([one.size for one in found[len(pairs) :]])
         return growth + whole * (scale.slack - 1)
 
-    def _jacobian(self, s: State) -> list[Values]:
+    def _jacobian(self, s: MachineState) -> list[Values]:
         a, v = s.axes[:2]
         x, n = s.x, len(s.x)
         for chosen in range(n):
@@ -162,7 +175,7 @@ class BoxProof:
         ]
 
     def _require_sway(
-        self, piece: Piece, scale: ScaleMatrix, step: Step, watch: Watch, sway: Enclosed
+        self, piece: MotionPiece, scale: ScaleMatrix, step: PieceErrors, watch: SwayClaim, sway: Expansion
     ) -> None:
         machine, shift, n = self.box.machine, step.shift, len(step.tube) // 2
         s = piece.everywhere([a + b for a, b in zip(step.tube, shift, strict=True)])
@@ -185,7 +198,7 @@ class BoxProof:
             aways[row] += norm(turned) * scale.slack * step.greatest
         room = watch.bound - norm(aways)
         allowed = room if len(aways) == 1 else room * room
-        if not (room > 0 and keeps(sway, allowed.lower(), HALVINGS)):
+        if not (room > 0 and keeps(sway, allowed.lower())):
             raise NotProvedError(f"a sway is not bounded by {1e3 * watch.bound:.6g} mm")
 
 
@@ -195,7 +208,7 @@ class ScaleMatrix:
     With |S V − I| ≤ σ < ½, the inverse of S is V (I + F) with |F| ≤ 2 σ; `slack` is 1 + 2 σ.
     """
 
-    def __init__(self, box: Box, entries: Sequence[Sequence[Sequence[float]]]) -> None:
+    def __init__(self, box: MachineBox, entries: Sequence[Sequence[Sequence[float]]]) -> None:
         self.box, self.size, count = box, len(entries), len(entries[0][0])
         self.counts = tuple(1 if count == 1 else min(3, terms) for terms in box.terms)
         self.nodes = tuple(1 if terms == 1 else INVERSE for terms in self.counts)
@@ -277,7 +290,7 @@ def _norm_of(sizes: Sequence[Sequence[arb]]) -> arb:
 class Disturbance:
     """What setpoints beside the smooth motion add: bounds of r in `sizes`, and of x − z in `shift`."""
 
-    def __init__(self, piece: Piece, tube: Sequence[arb]) -> None:
+    def __init__(self, piece: MotionPiece, tube: Sequence[arb]) -> None:
         self.piece, self.machine = piece, piece.box.machine
         self.gaps = [one.gap for one in piece.axes]
         self._at(tube, [arb(0)] * len(tube))
@@ -371,7 +384,7 @@ class Disturbance:
         return first, second
 
 
-def _first_gap(piece: Piece, leap: Sequence[arb]) -> list[arb]:
+def _first_gap(piece: MotionPiece, leap: Sequence[arb]) -> list[arb]:
     """Bound what the smooth motion's first position is off, as the state sees it."""
     found = Disturbance(piece, leap)
     return _summed(zip(found.lifts, (one.first for one in piece.axes), strict=True), len(piece.series))
@@ -411,17 +424,23 @@ def _nothing(value: Any) -> bool:
     return isinstance(value, int) and value == 0
 
 
-def keeps(one: Enclosed, allowed: arb, halvings: int) -> bool:
-    """Tell whether a function's absolute value is proved to be at most so much, by halves."""
-    if one.size <= allowed:
-        return True
-    if halvings == 0 or not abs(one.coefficients[0, 0]).is_finite() or not one.rest < allowed:
-        return False
-    axis = _steepest(one)
-    return all(keeps(_half(one, axis, side), allowed, halvings - 1) for side in (-1, 1))
+def keeps(one: Expansion, allowed: arb, most: int = MOST_PARTS) -> bool:
+    """Tell whether a function's absolute value is proved to be at most so much, halving where it is not."""
+    waiting = [one]
+    for _ in range(most):
+        if not waiting:
+            return True
+        part = waiting.pop()
+        if part.size <= allowed:
+            continue
+        if not part.rest < allowed or not part.coefficients[0, 0].is_finite():
+            return False
+        axis = _steepest(part)
+        waiting += [_half(part, axis, side) for side in (-1, 1)]
+    return False
 
 
-def _steepest(one: Enclosed) -> int:
+def _steepest(one: Expansion) -> int:
     """Choose the variable whose own terms are greatest."""
     sums = [arb(0)] * len(one.counts)
     for degrees, entry in zip(product(*map(range, one.counts)), one.coefficients.entries(), strict=True):
@@ -430,14 +449,14 @@ def _steepest(one: Enclosed) -> int:
     return max(range(len(sums)), key=lambda axis: float(sums[axis].mid()))
 
 
-def _half(one: Enclosed, axis: int, side: int) -> Enclosed:
+def _half(one: Expansion, axis: int, side: int) -> Expansion:
     if axis == 0:
-        return Enclosed(_halving(one.counts[0], side) * one.coefficients, one.counts, one.rest)
+        return Expansion(_halving(one.counts[0], side) * one.coefficients, one.counts, one.rest)
     matrix = arb_mat(1, 1, [1])
     for number, count in enumerate(one.counts[1:], start=1):
         unit = arb_mat(count, count, [int(i == j) for i in range(count) for j in range(count)])
         matrix = _kronecker(matrix, _halving(count, side) if number == axis else unit)
-    return Enclosed(one.coefficients * matrix.transpose(), one.counts, one.rest)
+    return Expansion(one.coefficients * matrix.transpose(), one.counts, one.rest)
 
 
 def _kronecker(a: arb_mat, b: arb_mat) -> arb_mat:

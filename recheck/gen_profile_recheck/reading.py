@@ -47,7 +47,7 @@ def read_json(text: bytes) -> Any:
 
 
 @dataclass(frozen=True)
-class Setpoints:
+class TimedSetpoints:
     """Where the axes are told to be: times in s, and positions in m (or rad) of each axis."""
 
     times: Sequence[float]
@@ -80,7 +80,7 @@ def scales_of(spec: Mapping[str, Any], axes: Sequence[str]) -> list[float]:
     ]
 
 
-def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str]) -> Setpoints:
+def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
     """Read a table of positions at even times (RFC 4180), or that of a playback block (IEC 61131-3).
 
     Raises
@@ -98,7 +98,7 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
     return found
 
 
-def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> Setpoints:
+def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
     export, factors = spec["export"], scales_of(spec, axes)
     if export["csv_dialect"] != "rfc4180" or "position" not in export["csv_columns"]:
         raise ValueError("tables of other dialects, or without positions")
@@ -117,9 +117,9 @@ def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> Setpoi
 
 def _setpoints(
     cycle: float, columns: Sequence[Sequence[float]], factors: Sequence[float], counted: Sequence[bool]
-) -> Setpoints:
+) -> TimedSetpoints:
     over, under = Decimal(repr(cycle)).as_integer_ratio()
-    return Setpoints(
+    return TimedSetpoints(
         times=[number * over / under for number in range(len(columns[0]))],
         cycle=cycle,
         positions=[[one / factor for one in row] for row, factor in zip(columns, factors, strict=True)],
@@ -127,7 +127,7 @@ def _setpoints(
     )
 
 
-def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> Setpoints:
+def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
     """Play a block at full rate: positions of every cycle, or powers of the time since a segment began."""
     bare, several = re.sub(r"\(\*.*?\*\)", "", text, flags=re.S), len(axes)
 
@@ -179,7 +179,7 @@ def ranges_of(spec: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     return {name: ends for name, ends in found.items() if ends[1] > ends[0]}
 
 
-class Proof:
+class ProofMaterial:
     """The material of a certificate.
 
     Raises

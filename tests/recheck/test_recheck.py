@@ -21,7 +21,7 @@ from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter
 from gen_profile_recheck.__main__ import main
 from gen_profile_recheck.axes import quintic
-from gen_profile_recheck.boxes import Enclosed
+from gen_profile_recheck.boxes import Expansion
 from gen_profile_recheck.check import check
 from gen_profile_recheck.enclosure import NotProvedError, keeps
 from gen_profile_recheck.jets import along, inverse, moved, sine_cosine
@@ -245,7 +245,7 @@ def test_quintics_have_the_values_at_their_ends():
 
 def test_a_greatest_value_is_found_by_halves():
     # T2(t) + T1(u)/2 reaches 1.5 and no more, T2(t) T2(u) 1
-    sum_ = Enclosed(arb_mat([[0, 0.5, 0], [0, 0, 0], [1, 0, 0]]), (3, 3), arb(0))
-    product = Enclosed(arb_mat([[0.2, 0, 0], [0, 0, 0], [-0.4, 0, 0.7]]), (3, 3), arb(0.01))
-    assert keeps(sum_, arb(1.500001), 20) and not keeps(sum_, arb(1.499), 20)
-    assert keeps(product, arb(1.311), 20) and not keeps(product, arb(1.29), 12)
+    sum_ = Expansion(arb_mat([[0, 0.5, 0], [0, 0, 0], [1, 0, 0]]), (3, 3), arb(0))
+    product = Expansion(arb_mat([[0.2, 0, 0], [0, 0, 0], [-0.4, 0, 0.7]]), (3, 3), arb(0.01))
+    assert keeps(sum_, arb(1.500001)) and not keeps(sum_, arb(1.499))
+    assert keeps(product, arb(1.311)) and not keeps(product, arb(1.29))
