@@ -158,7 +158,9 @@ def test_what_may_be_zero_or_beyond_a_branch_proves_nothing():
     with np.errstate(all="ignore"):
         for found in (1.0 / wide, balls.log(wide), balls.sqrt(wide), balls.absolute(wide), balls.sign(wide)):
             assert not np.isfinite(found.rad).any()
-        assert (balls.sqrt(ball(np.zeros(1))).most == 0.0).all()  # as of a viscosity that is none
+        for nothing in (0.0, np.zeros(1)):
+            assert (balls.sqrt(ball(nothing)).most == 0.0).all()  # as of a viscosity that is none
+            assert not np.isfinite((1.0 / ball(nothing)).rad).any()
 
 
 def test_products_of_matrices_enclose_those_of_arb():

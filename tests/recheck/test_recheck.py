@@ -51,7 +51,7 @@ CERTIFIED = [
     ("flexible-joint", "robustness.uncertain={J=0.02}"),
     pytest.param(("flexible-joint", "robustness.uncertain={k=0.02, c=0.2}"), marks=slow),
     pytest.param(("flexible-joint", "check.uncertain={}"), marks=slow),
-    pytest.param(("flexible-joint", "axis.hub.unit=counts", "axis.hub.counts_per_metre=1e6"), marks=slow),
+    pytest.param(("flexible-joint", "axis.unit=counts", "axis.counts_per_metre=1e6"), marks=slow),
     pytest.param(("slosh-tank",), marks=slow),
     pytest.param(("slosh-tank", "plant.mu=0", "limits.sway=0.1"), marks=slow),
     pytest.param(("mass-spring-chain", "robustness.uncertain={m3=0.02}"), marks=slow),
@@ -230,8 +230,8 @@ def test_jets_are_derivatives():
     slope = angle.cos() - arb(0.3) * (arb(0.7) + 2 * arb(0.3)) * angle.sin()
     assert along(along(sine, 1), 2).overlaps(slope)
     (single,) = moved([arb(0.7)], [1], 2)
-    assert abs(along(inverse(single), 2) + 1 / arb(0.7) ** 2) < 1e-14
-    assert abs(along(along(cosine * cosine + sine * sine, 1), 2)) < 1e-15
+    assert along(inverse(single), 2).overlaps(-1 / arb(0.7) ** 2)
+    assert along(along(cosine * cosine + sine * sine, 1), 2).contains(0)
 
 
 def test_quintics_have_the_values_at_their_ends():

@@ -341,12 +341,8 @@ class Enclosure:
         return near, shifted * ROUND_UP
 
     def _jacobian_change(self, near: Ball, change: Ball) -> Ball:
-        """Enclose how much J changes with x, and with the axes as far as they are off."""
-        state, still = self._state(near), np.zeros(len(self.axes.halves.mid))
-        nothing = [[Ball(still, still)] * len(column) for column in state[1:3]]
-        parameters = [ball(0.0)] * len(state[3])
-        rows = self.equations.jacobian_change(*state, split(change, -1), *nothing, parameters)
-        return array(rows, near.shape[:2])
+        """Enclose how much J changes with x."""
+        return array(self.equations.jacobian_change(*self._state(near), split(change, -1)), near.shape[:2])
 
     def _disturbance(self, near: Ball, shifted: Array) -> Array:
         """Bound r, what the setpoints make of the motion beside the smooth one, (boxes, pieces, 2 n_u)."""

@@ -167,7 +167,7 @@ class EnclosedEquations:
     jacobian : 2 n_u × 2 n_u
         J = ∂f/∂x.
     jacobian_change : 2 n_u × 2 n_u
-        Change of J, of (x, q_a, v, p) and of the changes of these.
+        Change of J, of (x, q_a, v, p) and a change of x.
     lift : 2 n_u × m
         G = ∂f/∂v.
     lift_change : 2 n_u × m
@@ -229,7 +229,7 @@ def enclosed_equations(plant: Plant) -> EnclosedEquations:
     state = {"x": x, "q_a": q_a, "v": v, "p": d.p}
     smooth = {**state, "ddq_a": ddq_a}
     seen = {"q_u": d.q_u, "q_a": q_a, "p": d.p}
-    changes = {f"d_{name}": sym.symbols(f"d_{name}", symbol.shape[0]) for name, symbol in state.items()}
+    d_x = sym.symbols("d_x", 2 * n_u)
     motion = sym.column([x, q_a, v, ddq_a])
 
     def change(expression: sym.Symbol, variables: sym.Symbol, by: sym.Symbol) -> sym.Symbol:
@@ -239,16 +239,13 @@ def enclosed_equations(plant: Plant) -> EnclosedEquations:
     def enclosed(name: str, expression: sym.Symbol, inputs: Mapping[str, sym.Symbol] = state) -> Enclosed:
         return Enclosed(Function(name, inputs, expression), plant.type)
 
-    axes, whole = sym.column([q_a, v]), sym.column(list(state.values()))
+    axes = sym.column([q_a, v])
     by_axes = sym.jacobian(f, axes)
     pull = slopes @ lift + by_position - change(lift, motion[: 2 * n_u + 2 * m], sym.column([f, v, ddq_a]))
-    d_x = changes["d_x"]
     return EnclosedEquations(
         rate=enclosed("rate", f),
         jacobian=enclosed("jacobian", slopes),
-        jacobian_change=enclosed(
-            "jacobian_change", change(slopes, whole, sym.column(list(changes.values()))), {**state, **changes}
-        ),
+        jacobian_change=enclosed("jacobian_change", change(slopes, x, d_x), {**state, "d_x": d_x}),
         lift=enclosed("lift", lift),
         lift_change=enclosed("lift_change", change(lift, x, d_x), {**state, "d_x": d_x}),
         by_position=enclosed("by_position", by_position),

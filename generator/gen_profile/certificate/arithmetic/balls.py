@@ -114,7 +114,11 @@ Operand = Ball | Array | float
 
 def ball(value: Operand) -> Ball:
     """Take numbers as they are, exactly."""
-    return value if isinstance(value, Ball) else Ball(value, 0.0)
+    if isinstance(value, Ball):
+        return value
+    return Ball(
+        np.float64(value) if isinstance(value, (int, float)) else value, 0.0
+    )  # 1/0 raises of Python's
 
 
 def stack(balls: list[Ball], axis: int = 0) -> Ball:
