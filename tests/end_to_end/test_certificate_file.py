@@ -207,3 +207,13 @@ def test_the_main_job_says_what_is_not_proved_and_writes_no_certificate(tmp_path
 def test_a_proof_without_a_check_is_refused_before_anything_is_designed(tmp_path):
     refused = run_here(*BARE, "--certify", "--no-check", "--out", tmp_path / "none")
     assert refused.code == 2 and "--no-check" in refused.errors[0] and not (tmp_path / "none").exists()
+
+
+def test_where_counts_are_too_coarse_for_a_bound_that_is_said(tmp_path):
+    coarse = ("axis.unit=counts", "axis.counts_per_metre=10000", "robustness.uncertain={L1=0.01}")
+    spec = gp.preset_spec("double-pendulum-crane", [*coarse, "export.cycle_time=0.02"])
+    written = gp.design(spec, ["csv"], tmp_path, check=False)
+    proof = gp.certify_artefact(written.folder / written.artefacts[0].path)
+    assert proof.share < 1.0
+    assert "rounded to counts that are too coarse" in proof.reasons()[0]
+    assert "axis.counts_per_metre" in proof.reasons()[0]

@@ -56,6 +56,8 @@ class Certificate:
         Of every box, for `gen_profile.certificate.enclosure.Approximation`.
     scales : (boxes, pieces or 1, 2 n_u, 2 n_u, parameter terms or 1) array
         Likewise.
+    rounded : bool
+        Whether setpoints are rounded to counts, for the reasons where nothing is proved.
     """
 
     spec_sha256: str
@@ -71,6 +73,7 @@ class Certificate:
     terms: tuple[int, ...]
     motions: tuple[Motions, ...]
     scales: Array
+    rounded: bool = False
 
     @property
     def proved(self) -> bool:
@@ -80,9 +83,13 @@ class Certificate:
     def reasons(self) -> tuple[str, ...]:
         """Say what is not proved, a sentence each."""
         if self.share < 1.0:
+            coarse = ", or count positions more finely (axis.counts_per_metre)" if self.rounded else ""
+            others = "swing too far, or differ too much"
+            if self.rounded:
+                others += ", or positions are rounded to counts that are too coarse for a bound"
             return (
-                f"Bounds are proved for {100.0 * self.share:.3g} % of the machines; others swing too far, "
-                "or differ too much: narrow the ranges (check.uncertain), or take more time.",
+                f"Bounds are proved for {100.0 * self.share:.3g} % of the machines; others {others}: "
+                f"narrow the ranges (check.uncertain), or take more time{coarse}.",
             )
         return tuple(sway.reason for sway in self.sways if sway.reason is not None)
 

@@ -176,6 +176,7 @@ def _certificate(artefact: _Artefact, asked: Asked, found: Attempt) -> Certifica
         terms=theorem.terms,
         motions=found.motions,
         scales=found.scales,
+        rounded=bool(artefact.setpoints.resolution.any()),
     )
 
 
