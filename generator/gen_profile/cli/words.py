@@ -397,7 +397,8 @@ def _verdict(check: Check | None) -> str:
     load, finding = check.worst
     return (
         f"{'passed' if check.passed else 'FAILED'}: {load} {mm(finding.residual[load])} at worst "
-        f"({finding.scenario.name}), {mm(check.limit[load])} allowed, error below {mm(check.error_bound)}"
+        f"({finding.scenario.name}), {mm(check.limit[load])} allowed, "
+        f"integration error below {mm(check.error_bound)}"
     )
 
 
