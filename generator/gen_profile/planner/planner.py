@@ -18,6 +18,7 @@ from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.forms import read_block
 from gen_profile.planner.interface import BlockAxis, live_inputs
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_spec
 from gen_profile.suggestion import suggestion
 
 OWN = {  # of each axis
@@ -99,7 +100,7 @@ class Planner:
     Parameters
     ----------
     source : Spec, Path or str
-        A spec, or the path of a written block in any container.
+        A spec, its file (``.toml``), or the path of a written block in any container.
     position : float or (axes,) array, optional
         m (or rad), where the axis stands before the first cycle; the start of the spec's move if not given.
 
@@ -114,7 +115,10 @@ class Planner:
     """
 
     def __init__(self, source: Spec | Path | str, position: ArrayLike | None = None) -> None:
-        self._text = planner_block(source).text if isinstance(source, Spec) else read_block(Path(source))
+        if isinstance(source, Spec) or Path(source).suffix == ".toml":
+            self._text = planner_block(as_spec(source)).text
+        else:
+            self._text = read_block(Path(source))
         self._block = BlockInstance(self._text)
         self._axes = self._block.axes
         self._inputs = self._block.inputs  # as they are in the next cycle
