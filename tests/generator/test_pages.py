@@ -10,7 +10,9 @@ from gen_profile.cli.group import DefaultGroup
 from gen_profile.plants.registry import find_plant, plant_types
 
 ROOT = Path(__file__).parents[2]
-PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+DOCS = sorted((ROOT / "docs").glob("*.md"))
+PAGES = [*ROOT.glob("*.md"), *DOCS]
+BRIEF = {"glossary"}  # a table that needs no introduction
 OF_THE_GROUP = {"--help", "--version"}
 
 
@@ -19,6 +21,16 @@ def test_links_lead_somewhere(page):
     text = page.read_text("utf-8")
     targets = re.findall(r"\]\((?!https?:)([^)#]+)", text)
     assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in DOCS if page.stem not in BRIEF], ids=lambda page: page.stem
+)
+def test_a_page_begins_with_what_it_is_for(page):
+    box = page.read_text("utf-8").split("\n\n")[1].replace("\n> ", " ")
+    assert re.fullmatch(
+        r"> \*\*What it is for:\*\* .+\. \*\*When to read it:\*\* .+\. \*\*Example:\*\* .+\.", box
+    )
 
 
 def commands_on(page):
