@@ -21,6 +21,7 @@ from gen_profile.certificate.packing import Motions, pack, unpack
 from gen_profile.certificate.sway_limits import ProvedSway, SwayLimit
 from gen_profile.errors import CertificateError
 from gen_profile.strict_json import parse_json
+from gen_profile.summary import Summarised
 
 SUFFIX = ".certificate.json"
 FORMAT = "gen-profile certificate 1"
@@ -30,8 +31,8 @@ MATERIAL = ("axes", "parts", "terms", "motions", "scales")  # of the proof
 KEYS = {"format", "spec_sha256", "artefact_sha256", *CLAIMS, *MATERIAL}
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Certificate:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Certificate(Summarised):
     """What is proved, of what, and what the proof needs.
 
     Attributes
@@ -74,6 +75,17 @@ class Certificate:
     motions: tuple[Motions, ...]
     scales: Array
     rounded: bool = False
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "proved": self.proved,
+            "ranges": ", ".join(
+                f"{name} {low:.4g} to {high:.4g}" for name, (low, high) in self.ranges.items()
+            ),
+            "at most": ", ".join(f"{load} {1e3 * bound:.4g} mm" for load, bound in self.bounds.items())
+            or "unknown",
+        }
 
     @property
     def proved(self) -> bool:

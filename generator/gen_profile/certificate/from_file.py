@@ -43,7 +43,7 @@ class _Artefact:
 
 def certify_artefact(
     path: Path | str,
-    spec: Spec | None = None,
+    spec: Spec | Path | str | None = None,
     *,
     write: bool = True,
     progress: Progress = lambda _, __: None,
@@ -57,7 +57,7 @@ def certify_artefact(
     ----------
     path : Path or str
         Any artefact of a motion.
-    spec : Spec, optional
+    spec : Spec, or the path of one, optional
         Taken from ``manifest.json`` beside the file when not given.
     write : bool
         Whether to write it.
@@ -87,7 +87,7 @@ def certify_artefact(
 def check_certificate(
     path: Path | str,
     certificate: Path | str,
-    spec: Spec | None = None,
+    spec: Spec | Path | str | None = None,
     *,
     progress: Progress = lambda _, __: None,
 ) -> Certificate:
@@ -98,7 +98,7 @@ def check_certificate(
     path : Path or str
         The artefact.
     certificate : Path or str
-    spec : Spec, optional
+    spec : Spec, or the path of one, optional
         Taken from ``manifest.json`` beside the file when not given.
     progress : callable
         Told how many boxes of machines are done, and of how many.
@@ -150,7 +150,7 @@ def _bound_again(
     return len(boxes), theorem.enclosure(boxes, coefficients, np.array(scales)).bounds(enough)
 
 
-def _read(path: Path, spec: Spec | None) -> _Artefact:
+def _read(path: Path, spec: Spec | Path | str | None) -> _Artefact:
     content = read_artefact(path)
     spec, _ = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_of(path)).replay(content, target_of(spec))

@@ -18,6 +18,7 @@ from gen_profile.phrase import Phrase, joined
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
+from gen_profile.summary import Summarised
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -39,8 +40,8 @@ class ComparedMethod:
     safe: bool
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Comparison:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Comparison(Summarised):
     """All methods, and which to take.
 
     Attributes
@@ -63,6 +64,15 @@ class Comparison:
     too_slow: dict[str, float]
     efficient: frozenset[str]
     recommended: dict[str, Recommendation]
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "name": self.spec.name,
+            "methods": ", ".join(row.method for row in self.rows),
+            "left out": ", ".join(self.left_out) or "none",
+            **{kind: advice.method for kind, advice in self.recommended.items()},
+        }
 
     def advice(self) -> tuple[str, ...]:
         """Say which methods to take, in short; or that none will do."""

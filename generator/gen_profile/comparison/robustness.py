@@ -22,6 +22,7 @@ from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
+from gen_profile.summary import Summarised
 from gen_profile.verification.batch import Feed, many_machines, residual_peaks
 
 POINTS = {1: 61, 2: 25}  # per parameter, of a curve and of a map
@@ -37,8 +38,8 @@ def _arrays(values: Mapping[str, Array]) -> Mapping[str, Array]:
     return MappingProxyType({name: read_only(array) for name, array in values.items()})
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Robustness:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Robustness(Summarised):
     """Residual sway over relative errors of one parameter (a curve) or of two (a map).
 
     Attributes
@@ -56,6 +57,17 @@ class Robustness:
     errors: Mapping[str, Array] = attrs.field(converter=_arrays)
     residual: Mapping[str, Array] = attrs.field(converter=_arrays)
     left_out: Mapping[str, str] = attrs.field(factory=dict)
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "name": self.spec.name,
+            "errors": ", ".join(
+                f"{name} {100.0 * values[0]:+.3g} to {100.0 * values[-1]:+.3g} %"
+                for name, values in self.errors.items()
+            ),
+            **{method: f"{1e3 * self.end_load(method).max():.4g} mm at worst" for method in self.residual},
+        }
 
     @property
     def limits(self) -> Array:

@@ -21,6 +21,7 @@ from gen_profile.motion.profile import Profile, SampledProfile
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.summary import Summarised
 from gen_profile.verification.cosimulation import cosimulate, judge, judged_from, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import CHECKING, with_further
@@ -33,8 +34,8 @@ if TYPE_CHECKING:
     from gen_profile.proof.verdict import Proof  # SciPy's statistics take longer to load than the main job
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Design:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Design(Summarised):
     """Outcome of the main job.
 
     Attributes
@@ -53,6 +54,15 @@ class Design:
     check: Check | None
     artefacts: tuple[Artefact, ...]
     folder: Path
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "name": self.spec.name,
+            "check": "not done" if self.check is None else "passed" if self.passed else "failed",
+            "files": ", ".join(artefact.path for artefact in self.artefacts) or "none",
+            "folder": self.folder,
+        }
 
     @property
     def passed(self) -> bool:

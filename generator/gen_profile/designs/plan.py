@@ -19,13 +19,14 @@ from gen_profile.solvers.motion import optimal_profile
 from gen_profile.solvers.solution import Solution
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
+from gen_profile.summary import Summarised
 from gen_profile.work import OutOfWork, budget
 
 EXPLAINING = "looking for what would do"
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Plan:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Plan(Summarised):
     """A design that is not yet written.
 
     Attributes
@@ -46,6 +47,14 @@ class Plan:
     solver_time: float
     evaluation: MotionEvaluation
     figures: dict[str, float]
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "name": self.spec.name,
+            "motion": f"{self.motion.method}, {self.motion.duration:g} s",
+            "residual sway": f"{1e3 * self.figures['sway_residual_worst_m']:.4g} mm at worst",
+        }
 
     @property
     def motion(self) -> Profile:

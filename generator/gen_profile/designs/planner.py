@@ -22,10 +22,11 @@ from gen_profile.proof.prove import HISTORIES, prove
 from gen_profile.proof.verdict import Proof
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
+from gen_profile.summary import Summarised
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Deployment:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Deployment(Summarised):
     """A planner block, and how it was judged.
 
     Attributes
@@ -50,6 +51,15 @@ class Deployment:
     files: tuple[Artefact, ...]
     suggestions: tuple[Suggestion, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "name": self.spec.name,
+            "files": ", ".join(file.path for file in self.files) or "none",
+            "folder": self.folder,
+            **({"proof": "not done"} if self.proof is None else self.proof.summary()),
+        }
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""

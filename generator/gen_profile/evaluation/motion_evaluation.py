@@ -22,14 +22,15 @@ from gen_profile.problem.parameter_box import machines_inside
 from gen_profile.problem.problem import problem_of
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_spec
+from gen_profile.summary import Summarised
 
 COARSE_SAMPLES = 501  # of machines all over the ranges, between which the greatest is a parabola's
 ACCURACY = 1e-6  # of their integration, relative
 PICTURED = 1e-4  # likewise where nothing but a picture is made of it
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class MotionEvaluation:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class MotionEvaluation(Summarised):
     """A motion and what it does to the machines of its spec.
 
     Attributes
@@ -54,6 +55,15 @@ class MotionEvaluation:
     swing: PlantSimulation
     everywhere: PlantSimulation
     watch: float
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        figures = self.figures
+        return {
+            "motion": f"{self.motion.method}, {self.motion.duration:g} s",
+            "machines": len(self.machines),
+            "residual sway": f"{1e3 * figures['sway_residual_worst_m']:.4g} mm at worst",
+        }
 
     @cached_property
     def figures(self) -> dict[str, float]:

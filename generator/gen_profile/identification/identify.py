@@ -35,13 +35,14 @@ from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
 from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.suggestion import suggestion
+from gen_profile.summary import Summarised
 from gen_profile.units import units_of
 
 NOISY = 0.2  # of the swing: noise beyond it is none of a sensor
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Identification:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Identification(Summarised):
     """Outcome of an identification.
 
     Attributes
@@ -61,6 +62,13 @@ class Identification:
     logs: tuple[SwingLog, ...]
     estimate: Estimate
     q_a: tuple[float, ...]
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "name": self.spec.name,
+            **{name: f"{value:.6g}" for name, value in self.estimate.values.items()},
+        }
 
     def warnings(self) -> tuple[str, ...]:
         """Say what is wrong with the measurements, though parameters were found; a sentence each."""

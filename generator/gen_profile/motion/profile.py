@@ -14,6 +14,7 @@ from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from gen_profile.errors import GenProfileError
+from gen_profile.summary import Summarised
 
 Array = NDArray[np.float64]
 
@@ -55,8 +56,8 @@ class Motion:
     jerk: Array
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Profile:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Profile(Summarised):
     """Piecewise polynomial motion of every actuated axis, from rest at time 0.
 
     Segment k covers ``knots[k] <= t < knots[k + 1]``; its polynomial counts time from ``knots[k]``. Before
@@ -118,6 +119,17 @@ class Profile:
         return cls(
             knots=knots - knots[0], coefficients=coefficients, target=powers @ coefficients[-1], method=method
         )
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "method": self.method,
+            "axes": self.axes,
+            "from": self.start.tolist(),
+            "to": self.target.tolist(),
+            "duration": f"{self.duration:g} s",
+            "pieces": len(self.knots) - 1,
+        }
 
     @property
     def duration(self) -> float:
@@ -214,8 +226,8 @@ def grid_duration(duration: float, cycle_time: float) -> float:
     return grid_length(duration, cycle_time) * numerator / denominator
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class SampledProfile:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class SampledProfile(Summarised):
     """What a controller issues each cycle: one setpoint per cycle and axis, the first at time 0.
 
     Attributes
@@ -260,6 +272,11 @@ class SampledProfile:
             if values is not None and values.shape != self.position.shape:
                 raise GenProfileError("A sampled profile's columns differ in length.")
         _require_cycle(self.cycle_time)
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        samples, axes = self.position.shape
+        return {"axes": axes, "samples": samples, "cycle time": f"{self.cycle_time:g} s"}
 
     @property
     def times(self) -> Array:

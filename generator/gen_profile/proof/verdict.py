@@ -11,6 +11,7 @@ import numpy as np
 
 from gen_profile.proof.histories import History
 from gen_profile.proof.numbering import CORNERS, DRAWS, SEARCH
+from gen_profile.summary import Summarised
 from gen_profile.verification.verdict import Examination
 
 GROUPS = {
@@ -88,8 +89,8 @@ class JudgedHistory:
         }
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Proof(Examination):
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Proof(Summarised, Examination):
     """Verdict on a planner block.
 
     Attributes
@@ -123,6 +124,14 @@ class Proof(Examination):
     apart: float
     sway_limit: float | None = None
     faults: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "proof": "passed" if self.passed else "failed",
+            "histories": len(self.judged),
+            "worst": f"history {self.worst.number}, {100.0 * self.share(self.worst):.3g} % of the limit",
+        }
 
     def share(self, judged: JudgedHistory) -> float:
         """Share of the limit of residual sway that a history takes up, the error bound included."""

@@ -9,6 +9,7 @@ import attrs
 from gen_profile.errors import Code, InfeasibleProblem, NoMotion, Reason, SolverDiverged, Suggestion
 from gen_profile.motion.profile import Array
 from gen_profile.problem.problem import Problem
+from gen_profile.summary import Summarised
 
 LONGER = "Allow more time (move.duration), or shorten the move."
 WIDER = "Allow more time (move.duration), or wider limits."
@@ -35,8 +36,8 @@ ERRORS: dict[Status, type[NoMotion]] = {
 }
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Optimum:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Optimum(Summarised):
     """States, costates and what follows from them, in SI units on a mesh.
 
     Attributes
@@ -81,9 +82,13 @@ class Optimum:
     defect: float | None
     hamiltonian_variation: float | None
 
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {"nodes": len(self.knots), "states": self.states.shape[1], "cost": f"{self.cost:.6g}"}
 
-@attrs.frozen(kw_only=True, eq=False)
-class Solution:
+
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Solution(Summarised):
     """Outcome of a solve.
 
     Attributes
@@ -119,6 +124,15 @@ class Solution:
     worst_case_bound: float | None = None
     advice: str = ""
     suggestions: tuple[Suggestion, ...] = ()
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {
+            "status": self.status.name.lower(),
+            "method": self.method,
+            "iterations": self.iterations,
+            "residual": f"{self.residual:.2g}",
+        }
 
     @property
     def redundancy(self) -> str:

@@ -41,6 +41,7 @@ from gen_profile.spec.values import (
     Words,
     example,
 )
+from gen_profile.summary import Summarised
 from gen_profile.units import AxisScale, axis_factor
 
 DEFAULT_COUNTS_PER_SI = 1e6
@@ -381,8 +382,8 @@ class PlannerSpec(Checked, table="planner"):
     quick_stop_jerk: Positive | None = None
 
 
-@attrs.frozen(kw_only=True)
-class Spec(Checked):
+@attrs.frozen(kw_only=True, repr=False)
+class Spec(Summarised, Checked):
     """One motion task, complete: nothing downstream looks anything else up."""
 
     name: Name = "profile"
@@ -398,6 +399,17 @@ class Spec(Checked):
     export: ExportSpec = ExportSpec()
     can: CanSpec = attrs.field(factory=CanSpec)
     planner: PlannerSpec = PlannerSpec()
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        move, ranges = self.move, self.robustness.uncertain.items()
+        return {
+            "name": self.name,
+            "machine": self.plant.type,
+            "move": f"{list(move.start)} to {list(move.target)}",
+            "duration": "the shortest" if move.shortest else f"{move.duration:g} s",
+            "uncertain": ", ".join(f"{name} ±{100.0 * share:g} %" for name, share in ranges) or "nothing",
+        }
 
     def machine(self) -> Plant:
         """Load the plant."""

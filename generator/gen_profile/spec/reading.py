@@ -124,12 +124,12 @@ def make_spec(**tables: Any) -> Spec:
     return evolve_spec({}, **tables)
 
 
-def evolve_spec(spec: Spec | Mapping[str, Any], **tables: Any) -> Spec:
+def evolve_spec(spec: Spec | Mapping[str, Any] | Path | str, **tables: Any) -> Spec:
     """Change values of a spec, which is validated as a whole again.
 
     Parameters
     ----------
-    spec : Spec, or nested plain values
+    spec : Spec, the path of one, or nested plain values
     tables : mappings
         New values by table, as `read_spec` takes them.
 
@@ -138,7 +138,7 @@ def evolve_spec(spec: Spec | Mapping[str, Any], **tables: Any) -> Spec:
     SpecError
         With one sentence for every fault found.
     """
-    document = copy.deepcopy(spec.to_dict() if isinstance(spec, Spec) else dict(spec))
+    document = copy.deepcopy(dict(spec) if isinstance(spec, Mapping) else as_spec(spec).to_dict())
     _fill(document, tables)
     return spec_from_dict(document)
 

@@ -10,15 +10,16 @@ import numpy as np
 import tomli_w
 
 from gen_profile.spec.model import Spec
+from gen_profile.spec.reading import as_names, as_spec
 from gen_profile.sweep.grid import grid_of_values
 from gen_profile.sweep.plan import prepare, require_libraries
 from gen_profile.sweep.run import Sweep, sweep
 
 
 def run_sweep(
-    spec: Spec,
+    spec: Spec | Path | str,
     vary: Mapping[str, Sequence[Any]],
-    formats: Sequence[str],
+    formats: Sequence[str] | str,
     folder: Path | str,
     *,
     workers: int | None = None,
@@ -28,10 +29,10 @@ def run_sweep(
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec, or the path of one
     vary : mapping of str to sequence
         Values by key of the spec, such as ``{"plant.L1": [0.4, 0.5]}``.
-    formats : sequence of str
+    formats : sequence of str, or str
         To export, such as ``["plc"]``.
     folder : Path or str
         To write to.
@@ -49,6 +50,9 @@ def run_sweep(
         Dask or PyArrow are not installed, or the folder holds another sweep or cannot be written.
     """
     require_libraries()
+    spec = as_spec(spec)
     grid = grid_of_values({key: np.asarray(values).tolist() for key, values in vary.items()})
     text = (tomli_w.dumps(spec.to_dict()), spec.name, Path())
-    return sweep(prepare(text, (), grid, formats, Path(folder)), scheduler=scheduler, workers=workers)
+    return sweep(
+        prepare(text, (), grid, as_names(formats), Path(folder)), scheduler=scheduler, workers=workers
+    )

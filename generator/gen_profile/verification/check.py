@@ -17,7 +17,8 @@ from gen_profile.evaluation.scenarios import Scenario, further_scenarios, scenar
 from gen_profile.motion.profile import SampledProfile
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.reading import spec_from_dict
+from gen_profile.spec.reading import as_names, as_spec, spec_from_dict
+from gen_profile.summary import Summarised
 from gen_profile.verification.cosimulation import cosimulate, judge, sample_spacing
 from gen_profile.verification.external_fmu import judge_external
 from gen_profile.verification.monte_carlo import with_further
@@ -28,8 +29,8 @@ from gen_profile_exporters.exporter import target_of
 from gen_profile_exporters.registry import find_exporter, format_of
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Judgement:
+@attrs.frozen(kw_only=True, eq=False, repr=False)
+class Judgement(Summarised):
     """A check of one file, and what its manifest says about it.
 
     Attributes
@@ -51,6 +52,10 @@ class Judgement:
     manifest: str
     variant: str | None = None
 
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        return {"file": self.path, "format": self.format, "manifest": self.manifest, **self.check.summary()}
+
     @property
     def passed(self) -> bool:
         """Whether every load keeps its limit in every scenario, and nothing else is wrong."""
@@ -69,14 +74,14 @@ class Judgement:
 
 def check_artefact(
     path: Path | str,
-    spec: Spec | None = None,
+    spec: Spec | Path | str | None = None,
     *,
     samples: int | None = None,
     row: int | None = None,
     strict: bool = False,
-    scale: Sequence[str] = (),
-    mirror: Sequence[str] = (),
-    offset: Sequence[str] = (),
+    scale: Sequence[str] | str = (),
+    mirror: Sequence[str] | str = (),
+    offset: Sequence[str] | str = (),
     progress: Progress = no_progress,
 ) -> Judgement:
     """Replay a file, co-simulate it, and compare it with its manifest.
@@ -85,7 +90,7 @@ def check_artefact(
     ----------
     path : Path or str
         Any artefact that the exporters write; its format is told by its suffix.
-    spec : Spec, optional
+    spec : Spec, or the path of one, optional
         Taken from ``manifest.json`` beside the file when not given.
     samples : int, optional
         Draws in place of those that the spec asks for.
@@ -93,7 +98,7 @@ def check_artefact(
         Number of the only scenario to try.
     strict : bool
         Whether faults in the timing of setpoints count as well.
-    scale, mirror, offset : sequences of str
+    scale, mirror, offset : sequences of str, or str
         A variant to judge, see `gen_profile.verification.motion_variant.parse_variant`.
     progress : callable
         Told of a compilation, and how many scenarios beyond the machines are done, and of how many.
@@ -112,7 +117,7 @@ def check_artefact(
     content, format_ = read_artefact(path), format_of(path)
     spec, manifest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
-    variant = parse_variant(spec, scale, mirror, offset)
+    variant = parse_variant(spec, *map(as_names, (scale, mirror, offset)))
     standing = provenance(manifest, content, spec)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
@@ -190,7 +195,7 @@ def _every_other(setpoints: SampledProfile) -> SampledProfile:
 
 
 def spec_and_manifest(
-    path: Path, content: bytes, spec: Spec | None, *, planner: bool = False
+    path: Path, content: bytes, spec: Spec | Path | str | None, *, planner: bool = False
 ) -> tuple[Spec, Manifest | None]:
     """Take a spec that was named, or else the one in the manifest beside a file.
 
@@ -198,7 +203,7 @@ def spec_and_manifest(
     ----------
     path : Path
     content : bytes
-    spec : Spec or None
+    spec : Spec, or the path of one, or None
     planner : bool
         Whether the file is a planner block.
 
@@ -213,6 +218,7 @@ def spec_and_manifest(
     OutputError
         No spec was named, and no manifest is of this file.
     """
+    spec = None if spec is None else as_spec(spec)
     try:
         manifest = manifest_beside(path, content, planner=planner)
     except OutputError as error:

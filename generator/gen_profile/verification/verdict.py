@@ -12,6 +12,7 @@ from gen_profile.errors import CheckFailed
 from gen_profile.evaluation.scenarios import GROUPS, SEARCH, TIMING, Scenario
 from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import SWAY_TOLERANCE
+from gen_profile.summary import Summarised
 
 QUANTILES = (0.5, 0.9, 0.99)
 FINE = 1e3  # µm, up to which an error is told in these
@@ -65,8 +66,8 @@ class Examination:
             raise CheckFailed("\n".join(self.reasons()))
 
 
-@attrs.frozen(kw_only=True)
-class Check(Examination):
+@attrs.frozen(kw_only=True, repr=False)
+class Check(Summarised, Examination):
     """Verdict on one artefact.
 
     Attributes
@@ -102,6 +103,15 @@ class Check(Examination):
     sway_limit: float | None = None
     searched: int = 0
     doubts: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, object]:
+        """Tell what a reader looks for first."""
+        load, worst = self.worst
+        return {
+            "check": "passed" if self.passed else "failed",
+            "machines": len(self.findings),
+            "worst": f"{load} {1e3 * worst.residual[load]:.4g} mm of {1e3 * self.limit[load]:.4g} mm allowed",
+        }
 
     @property
     def groups(self) -> dict[str, tuple[Finding, ...]]:

@@ -1,0 +1,83 @@
+"""What a result prints in a terminal and in a notebook: what matters, in a line or a small table."""
+
+import attrs
+import pytest
+
+import gen_profile as gp
+from gen_profile.certificate.document import Certificate
+from gen_profile.designs.planner import Deployment
+from gen_profile.identification.identify import Identification
+from gen_profile.proof.verdict import Proof
+from gen_profile.summary import Summarised
+
+LONGEST = 400  # characters, of a line that is still read
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    spec = gp.preset_spec("paper")
+    made = gp.design(spec, "csv", tmp_path_factory.mktemp("out"))
+    judgement = gp.check_artefact(made.folder / "paper.csv", made.spec)
+    plan = made.plan
+    found = [spec, made, plan, plan.motion, plan.solution, plan.solution.optimum, plan.evaluation]
+    found += [judgement, judgement.check, gp.sample(plan.command, 0.01)]
+    found += [gp.robustness(spec, "L1", methods="zvd", points=3)]
+    return {type(one).__name__: one for one in found}
+
+
+def test_results_are_a_line_and_a_table(results):
+    for name, result in results.items():
+        assert repr(result).startswith(f"<{name} ") and len(repr(result)) < LONGEST
+        table = result._repr_html_()
+        assert table.startswith("<table>") and table.count("<tr>") == len(result.summary())
+
+
+def test_they_say_what_came_out(results):
+    assert "double-pendulum-crane" in repr(results["Spec"])
+    assert "converged" in repr(results["Solution"])
+    assert "check: passed" in repr(results["Check"])
+    assert "1.955 mm" in repr(results["Plan"])
+
+
+def test_one_that_failed_says_so(results):
+    check = results["Check"]
+    strict = attrs.evolve(check, limit=dict.fromkeys(check.limit, 1e-6))
+    assert "check: failed" in repr(strict)
+
+
+@pytest.mark.slow
+def test_a_comparison_names_its_methods():
+    comparison = gp.compare(gp.preset_spec("paper"))
+    assert len(repr(comparison)) < LONGEST
+    assert "gentlest: optimal-beta50" in repr(comparison)
+
+
+@pytest.mark.parametrize("kind", [Certificate, Deployment, Identification, Proof])
+def test_results_of_long_work_do_so_too(kind):
+    assert issubclass(kind, Summarised)
+    assert kind.__repr__ is Summarised.__repr__
+
+
+def test_names_of_others_are_text_in_a_table():
+    class Named(Summarised):
+        def summary(self):
+            return {"name": "<script>"}
+
+    assert "<script>" not in Named()._repr_html_()
+
+
+def test_a_spec_may_be_a_path_and_names_one_name(tmp_path, results):
+    path = tmp_path / "my.toml"
+    path.write_text(
+        'name = "mine"\n[plant]\ntype = "double-pendulum-crane"\n[move]\ndistance = 0.3\nduration = 3\n'
+    )
+    assert gp.evolve_spec(path, move={"duration": 4.0}).move.duration == 4.0
+    table = results["Design"].folder / "paper.csv"
+    judged = gp.check_artefact(table, path, scale="1.0")
+    assert judged.spec == gp.read_spec(path)
+
+
+def test_a_single_time_is_one_sample(results):
+    motion = results["Profile"]
+    assert motion(1.5).position.shape == (1, 1)
+    assert motion(1.5).position == pytest.approx(motion([1.0, 1.5]).position[1:])
