@@ -8,11 +8,11 @@ import pytest
 from generator.lagrangian_machines import double_pendulum, flexible_joint, gantry, single_pendulum, tower
 from scipy.integrate import trapezoid
 
+from gen_profile.plants.looks import body_size, drawings, pose_of
 from gen_profile.plants.machine_file import plant_of_file, read_machine_file
 from gen_profile.plants.plant import Coordinate
 from gen_profile.plants.registry import find_plant, plant_types
 from gen_profile.report.animation import Actor, Animation
-from gen_profile.report.machines import body_size, drawings, pose_of
 from gen_profile.report.page import ASSETS
 
 FRAMES = 50

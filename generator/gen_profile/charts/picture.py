@@ -67,11 +67,16 @@ def save(figures: Sequence[Figure], path: Path, salt: str, title: str) -> None:
     OutputError
         The file cannot be written.
     """
+    write(drawn(figures, title), path, salt)
+
+
+def write(canvas: Any, path: Path, salt: str) -> None:
+    """Write a figure of Matplotlib's to a file, the same bytes each time; as `save`."""
     import matplotlib  # noqa: PLC0415  # an extra
 
     suffix, content = path.suffix.lower(), BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": salt}):
-        drawn(figures, title).savefig(content, format=suffix[1:], dpi=110, metadata=METADATA[suffix])
+        canvas.savefig(content, format=suffix[1:], dpi=110, metadata=METADATA[suffix])
     deliver(path, content.getvalue())
 
 

@@ -10,6 +10,7 @@ import attrs
 from gen_profile.charts.comparison import comparison_figure
 from gen_profile.charts.curves import motion_figure, select_machines, sway_figure
 from gen_profile.charts.identification import identification_figure
+from gen_profile.charts.machine import draw_machine
 from gen_profile.charts.picture import require_drawable, save
 from gen_profile.charts.proof import draw
 from gen_profile.charts.robustness import robustness_figure
@@ -20,6 +21,7 @@ from gen_profile.designs.plan import Plan
 from gen_profile.designs.planner import Deployment
 from gen_profile.errors import OutputError
 from gen_profile.identification.identify import Identification
+from gen_profile.spec.model import Spec
 
 
 @attrs.frozen
@@ -33,14 +35,14 @@ class Picture:
 
 
 def plot(
-    result: Plan | Design | Comparison | Robustness | Identification | Deployment,
+    result: Spec | Plan | Design | Comparison | Robustness | Identification | Deployment,
     path: Path | str | None = None,
 ) -> Picture | None:
-    """Draw a motion and its sway, a comparison, robustness curves, a fitted swing or a planner block's proof.
+    """Draw a machine, a motion and its sway, a comparison, robustness, a fitted swing or a planner's proof.
 
     Parameters
     ----------
-    result : Plan, Design, Comparison, Robustness, Identification or Deployment
+    result : Spec, Plan, Design, Comparison, Robustness, Identification or Deployment
     path : Path or str, optional
         Of a PNG, SVG or PDF file. Without one the picture is returned, for a notebook to show.
 
@@ -57,6 +59,9 @@ def plot(
     path = Path(path)
     require_drawable(path)
     match result:
+        case Spec(plant=plant):
+            draw_machine(result.machine(), plant.parameters, path, f"{result.name}: {plant.type}")
+            return None
         case Design(plan=made):
             plot(made, path)
             return None

@@ -29,12 +29,14 @@ from gen_profile.cli.outcome import fail, leave_unproved, print_outcome, warn
 from gen_profile.cli.signing import require_signature, sign, sign_option, signed_by_option, signing_key
 from gen_profile.errors import CertificateError, OutputError, SpecError
 from gen_profile.plugins import require_installed
+from gen_profile.suggestion import suggestion
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from gen_profile.certificate.document import Certificate
     from gen_profile.designs.design import Design
+    from gen_profile.plants.plant import Plant
     from gen_profile.proof.check import BlockJudgement
     from gen_profile.spec.model import Spec
     from gen_profile.verification.check import Judgement
@@ -385,37 +387,55 @@ def formats(as_json: bool) -> None:
     )
 
 
-@cli.command(epilog="Example: gen-profile plants")
+@cli.command(epilog="Example: gen-profile plants gantry-crane --plot crane.png")
+@click.argument("name", metavar="[NAME]", required=False)
+@plot_option
 @output_options
-def plants(as_json: bool) -> None:
-    """List the machines with their axes, loads and parameters."""
+def plants(name: str | None, picture: Path | None, as_json: bool) -> None:
+    """List the machines with their axes, loads and parameters, or a single one."""
     from gen_profile.plants.registry import find_plant, plant_types
 
-    document, blocks = {}, []
-    for type_ in plant_types():
-        plant = find_plant(type_)
-        document[type_] = {
-            "summary": plant.summary,
-            "axes": {axis.name: axis.unit for axis in plant.actuated},
-            "swinging": {free.name: free.unit for free in plant.unactuated},
-            "loads": list(plant.loads),
-            "parameters": {
-                q.name: {"unit": q.unit, "nominal": q.nominal, "lower": q.lower, "upper": q.upper}
-                for q in plant.parameters
-            },
-        }
-        values = {
-            q.name: f"{q.description}, {q.nominal:g} {q.unit} ({q.lower:g} to {q.upper:g})"
+    if name is None and picture is not None:
+        raise SpecError("--plot: name the machine to draw, as gen-profile plants gantry-crane does.")
+    try:
+        known = [find_plant(type_) for type_ in ([name] if name else plant_types())]
+    except KeyError as error:
+        told = suggestion(str(name), plant_types())
+        raise SpecError(f"plants {str(name)[:60]}: unknown machine{told}") from error
+    if picture is not None:
+        from gen_profile.charts.machine import draw_machine
+
+        (plant,) = known
+        draw_machine(plant, plant.nominal(), picture, f"{plant.type}: {plant.summary}")
+    document = {plant.type: _plant_document(plant) for plant in known}
+    print_outcome({"plants": document}, "\n\n".join(map(_plant_words, known)), as_json)
+
+
+def _plant_document(plant: Plant) -> dict[str, Any]:
+    return {
+        "summary": plant.summary,
+        "axes": {axis.name: axis.unit for axis in plant.actuated},
+        "swinging": {free.name: free.unit for free in plant.unactuated},
+        "loads": list(plant.loads),
+        "parameters": {
+            q.name: {"unit": q.unit, "nominal": q.nominal, "lower": q.lower, "upper": q.upper}
             for q in plant.parameters
-        }
-        named = {
-            "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in plant.actuated),
-            "swinging": ", ".join(f"{free.name} ({free.unit})" for free in plant.unactuated),
-            "loads": ", ".join(plant.loads),
-        }
-        names = "".join(f"  {kind}: {listed}\n" for kind, listed in named.items())
-        blocks.append(f"{type_}: {plant.summary}\n{names}{_definitions(values)}")
-    print_outcome({"plants": document}, "\n\n".join(blocks), as_json)
+        },
+    }
+
+
+def _plant_words(plant: Plant) -> str:
+    values = {
+        q.name: f"{q.description}, {q.nominal:g} {q.unit} ({q.lower:g} to {q.upper:g})"
+        for q in plant.parameters
+    }
+    named = {
+        "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in plant.actuated),
+        "swinging": ", ".join(f"{free.name} ({free.unit})" for free in plant.unactuated),
+        "loads": ", ".join(plant.loads),
+    }
+    names = "".join(f"  {kind}: {listed}\n" for kind, listed in named.items())
+    return f"{plant.type}: {plant.summary}\n{names}{_definitions(values)}"
 
 
 @cli.command(epilog="Example: gen-profile presets double-pendulum-crane --out bay-4.toml")

@@ -8,8 +8,8 @@ import numpy as np
 
 from gen_profile.charts.curves import Shown, end_load_sway
 from gen_profile.evaluation.motion_evaluation import MotionEvaluation
+from gen_profile.plants.looks import body_size, drawings, pose_of
 from gen_profile.report.animation import Actor, Animation
-from gen_profile.report.machines import body_size, drawings, pose_of
 from gen_profile.spec.model import Spec
 
 TWINS = 2

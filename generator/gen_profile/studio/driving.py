@@ -21,9 +21,9 @@ from gen_profile.motion.profile import Array
 from gen_profile.planner.machine import planned_axes
 from gen_profile.planner.planner import Planner, SetpointHistory
 from gen_profile.plants.drawing import Drawing
+from gen_profile.plants.looks import body_size, drawings, pose_of
 from gen_profile.problem.dynamics import parameter_column
 from gen_profile.report.animation import Actor, Animation
-from gen_profile.report.machines import body_size, drawings, pose_of
 from gen_profile.spec.model import Spec
 from gen_profile.studio.orders import DriveQuestion
 from gen_profile.studio.views import fault
