@@ -34,7 +34,7 @@ LINES = {"rope": 1.4, "spring": 1.4, "frame": 3.0, "rail": 1.0}  # widths by kin
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class View:
+class MachineView:
     """A machine from one side: as it swings, and with each axis moved and each coordinate at rest.
 
     Attributes
@@ -141,7 +141,7 @@ def draw_machine(plant: Plant, parameters: Mapping[str, float], path: Path, titl
     write(canvas, path, plant.type)
 
 
-def views(plant: Plant, parameters: Mapping[str, float]) -> list[View]:
+def views(plant: Plant, parameters: Mapping[str, float]) -> list[MachineView]:
     """Look at a machine from every side that shows something."""
     still = np.zeros((1, len(plant.unactuated)))
     standing = np.array([plant.standing()])
@@ -162,12 +162,14 @@ def views(plant: Plant, parameters: Mapping[str, float]) -> list[View]:
     lengths = [one.name for one in plant.parameters if one.unit == "m"]
     grown = {name: seen({**parameters, name: parameters[name] + STEP}) for name in lengths}
     return [
-        View(drawing=one, plant=plant, grown={name: more[number].rest[0] for name, more in grown.items()})
+        MachineView(
+            drawing=one, plant=plant, grown={name: more[number].rest[0] for name, more in grown.items()}
+        )
         for number, one in enumerate(seen(parameters))
     ]
 
 
-def _draw(axis: Any, view: View) -> None:
+def _draw(axis: Any, view: MachineView) -> None:
     points, rest = view.drawing.points[0], view.drawing.rest[0]
     for shape in view.drawing.shapes:
         _shape(axis, shape, rest if shape.kind == "plumb" else points)
@@ -208,7 +210,7 @@ def _shape(axis: Any, shape: Shape, points: Array) -> None:
             axis.plot(*places.T, color=INK, linewidth=LINES[shape.kind])
 
 
-def _swing(axis: Any, view: View, name: str, point: int, without: Array) -> None:
+def _swing(axis: Any, view: MachineView, name: str, point: int, without: Array) -> None:
     """Draw the angle about the point that holds the line, or else the way of the point."""
     points = view.drawing.points[0]
     held = [start for start, end in view.pieces() if end == point]
