@@ -115,7 +115,10 @@ def _run_commands(text: str) -> None:
         own = str(PROGRAM.parent)  # last: a package there has a script named minisign, which does nothing
         path = os.pathsep.join([*(one for one in os.environ["PATH"].split(os.pathsep) if one != own), own])
         done = subprocess.run(
-            ["bash", "-euc", text], env={**os.environ, "PATH": path}, capture_output=True, check=False
+            ["bash", "-euc", f'python() {{ {shlex.quote(sys.executable)} "$@"; }}\n{text}'],
+            env={**os.environ, "PATH": path},
+            capture_output=True,
+            check=False,
         )
         assert done.returncode == 0, f"{text}\n{done.stderr.decode()}"
         return
