@@ -183,6 +183,24 @@ MACHINES = {
 }
 
 
+def test_commands_while_the_hoist_runs_take_no_more_operations():
+    limits = "limits.axis.cart={velocity=0.5, acceleration=0.3, jerk=2.0, travel=[-20.0, 20.0]}"
+    changes = [limits, "export.cycle_time=0.002", "planner.operations=3000"]
+    spec = preset_spec("single-pendulum-crane", [*changes, *MACHINES["single-pendulum-crane"]])
+    block, random, hoist = (
+        CountedBlock(compile_counting(planner_block(spec).text), fhoist=2.5),
+        np.random.default_rng(7),
+        2.5,
+    )
+    block.hold(1500)
+    for _ in range(20):
+        hoist = np.clip(hoist + 0.05 * random.normal(), 0.0, 5.0)
+        out = block.hold(
+            random.integers(5, 1500), bExecute=1.0, fTarget=random.uniform(-20.0, 20.0), fhoist=hoist
+        )
+        assert out["operations"].max() <= 3000
+
+
 @pytest.mark.parametrize("preset", MACHINES)
 def test_no_machine_takes_more_operations(preset):
     limits = ["velocity=0.5", "acceleration=0.3", "jerk=2.0", "travel=[-20.0, 20.0]"]

@@ -399,7 +399,7 @@ def _longest_slot(c: PlannerConstants) -> int:
 
 def _cycle_work(c: PlannerConstants) -> int:
     """Floating-point operations of every cycle, whatever is planned."""
-    following = 60 + 4 * c.modes * (4 * c.modes + 17)
+    following = 110 + 4 * c.modes * (4 * c.modes + 17)
     return (120 + (following if c.rates else 0)) * len(c.axes) - 35
 
 
