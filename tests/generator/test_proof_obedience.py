@@ -447,8 +447,15 @@ def _same(first, second):
 
 def test_a_damped_load_is_held_to_what_is_stated_where_the_axis_comes_to_rest():
     followed = SimpleNamespace(
-        issued={"fSwayLeft": np.array([0.0, 0.02, 0.01, 0.005])}, orders=(), sway_limit=0.05
+        issued={"fSwayLeft": np.array([0.0, 0.02, 0.01, 0.005]), "nPromise": np.zeros(4)},
+        orders=(),
+        sway_limit=0.05,
     )
     for left, found in ((0.02, []), (0.03, ["a load sways by 0.03 m, where fSwayLeft states 0.02 m"])):
         run = SimpleNamespace(residual=np.array([left]), stands=1)
         assert list(BlockWatch._understated(None, run, followed)) == found
+    followed.issued["nPromise"][-1] = 1.0  # the rope changed on the way
+    assert (
+        list(BlockWatch._understated(None, SimpleNamespace(residual=np.array([0.03]), stands=1), followed))
+        == []
+    )

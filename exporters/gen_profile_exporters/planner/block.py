@@ -81,6 +81,7 @@ SPARE = 0.3  # slots more than expected, by slots between two measured motions
 MORE_ITERATIONS = 5  # where these do not lead to a plan
 WAY_ITERATIONS = 13  # where the axis moves already
 SLOTS_PER_PERIOD = 20.0  # of the slowest mode
+MOST_LONGER = 20  # slots by which a plan may take longer than expected before pulses are quicker
 MIRROR_DECAY = 0.2  # over a motion, up to which its halves mirror each other until the last projection
 CENTRE = 0.15  # of an interior-point iteration: the complementarity it aims at, relative to that of now
 AGAINST = 0.1  # share of full speed away from a new target, from which an axis turns round first
@@ -326,6 +327,7 @@ def _whole_constants(c: PlannerConstants) -> dict[str, int]:
         "cRows": rows,
         "cFresh": FRESH,
         "cCycleWork": _cycle_work(c),
+        "cMostLonger": MOST_LONGER,
         "cConditions": _conditions(c),
         "cVariations": len(VARIATIONS) if not c.rates else 0,
         "cSlotBits": _longest_slot(c).bit_length(),

@@ -34,6 +34,7 @@ from gen_profile_exporters.planner.block import RESERVE
 from gen_profile_fmu.running.block_run import BlockRun, CalledBlock, Script
 
 LARGE_SWINGS = 0.1  # of the allowed sway, which the linear machine of a block does not know
+ADDED_UP = 5.0  # nPromise: errors left more than is allowed
 STATED = 1.05  # sway by what the block states: between the machines that it watches
 AT_ONCE = 64  # cycles between looks at whether a setpoint differs
 WANDER = 2.0  # of the allowed sway, by which calming may lead away from a target
@@ -144,7 +145,8 @@ class BlockWatch:
     def _understated(self, run: BlockRun, followed: Followed) -> Iterator[str]:
         """Tell where more sways on than the block states that errors may leave."""
         states, left = followed.issued.get("fSwayLeft"), float(run.residual.max(initial=0.0))
-        if states is None or any(order.kind in (QUICK_STOP, DISABLED) for order in followed.orders):
+        known = followed.issued["nPromise"][-1] in (0.0, ADDED_UP)
+        if states is None or not known or any(one.kind in (QUICK_STOP, DISABLED) for one in followed.orders):
             return  # it is not known how the load swings
         stated = float(states[run.stands :].max(initial=0.0))  # a damped load's falls
         if left > STATED * stated + LARGE_SWINGS * followed.sway_limit:
