@@ -24,9 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
-from typing import Any, ClassVar
-
-import attrs
+from typing import Any, ClassVar, NamedTuple
 
 from gen_profile.phrase import OR_WITH, Phrase, joined
 
@@ -93,8 +91,7 @@ class Code(StrEnum):
     RESIDUAL_SWAY = "residual_sway"  # no duration leaves so little
 
 
-@attrs.frozen(kw_only=True)
-class Reason:
+class Reason(NamedTuple):
     """Why there is no motion.
 
     Attributes
@@ -112,8 +109,7 @@ class Reason:
     allowed: float | None = None
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Suggestion:
+class Suggestion(NamedTuple):
     """Values with which a motion was found, and tried on all machines of the ranges.
 
     Attributes
@@ -189,7 +185,7 @@ class NoMotion(GenProfileError):
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON; see the command-line contract."""
         return {
-            "reasons": [attrs.asdict(reason) for reason in self.reasons],
+            "reasons": [reason._asdict() for reason in self.reasons],
             "suggestions": [suggestion.to_dict() for suggestion in self.suggestions],
         }
 

@@ -388,7 +388,7 @@ def test_events_tell_what_was_commanded_and_what_came_of_it(tmp_path):
     told = run_here("planner", "explain", events, "--json").document["events"]
     assert [one["code"] for one in told if one["time_s"] < 0.45][:2] == [11, 63]
     later = [one["code"] for one in told if one["time_s"] > 0.45]
-    assert later == [21, 32, 12, 11, 70, 20, 53, 41, 50, 22, 12, 42, 20, 13, 62, 11]
+    assert later == [21, 32, 12, 11, 70, 20, 53, 41, 50, 22, 12, 34, 42, 20, 13, 62, 11]
     assert next(one for one in told if one["code"] == 70)["value"] == 2.0
     assert "the target is reached, at 2" in run_here("planner", "explain", events).out
     plain = run_here("planner", "play", *write_plain(tmp_path), "--events", events)

@@ -101,7 +101,7 @@ def test_every_code_of_an_event_is_one_that_is_said_in_words():
     kinds = {
         "cEventState": ("cDisabled", "cStanding", "cMoving", "cBraking"),
         "cEventCommand": ("cCommandNone", "cCommandPosition", "cCommandVelocity"),
-        "cEventPlan": ("cJobMove", "cJobStop"),
+        "cEventPlan": ("cJobMove", "cJobStop", "cJobReach"),  # the last one of a plan to a velocity
         "cEventAborted": ("cCommandPosition", "cCommandVelocity", "cCommandReplaced"),
         "cEventError": [name for name in numbers if name.startswith("cError")],
         "cEventPromise": [name for name in numbers if name.startswith("cPromise")],

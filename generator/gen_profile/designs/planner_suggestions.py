@@ -23,7 +23,9 @@ Change = Callable[[Spec, float], tuple[Spec, dict[str, float]]]
 
 
 def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]) -> tuple[Suggestion, ...]:
-    """Look for changes that help, where too much sway, or a promise taken back for it, is all that is wrong.
+    """Look for changes that help, where sway is too much, or a promise was taken back for it.
+
+    What is wrong besides a promise taken back may come of it: whatever is named is tried in full.
 
     Parameters
     ----------
@@ -33,7 +35,8 @@ def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]
     prove : Spec → Proof
         Of the block of a changed spec, on as many histories.
     """
-    if proof.faults or any(fault != TAKEN_BACK for judged in proof.judged for fault in judged.faults):
+    faults = {fault for judged in proof.judged for fault in judged.faults}
+    if proof.faults or (faults and TAKEN_BACK not in faults):
         return ()
     found = (_tried(spec, proof, prove, change, power) for change, power in CHANGES.items())
     return tuple(suggestion for suggestion in found if suggestion is not None)

@@ -129,7 +129,7 @@ def remedy(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> Remedy:
 
 def beside(values: Mapping[str, Any], suggestions: Iterable[Suggestion]) -> tuple[Suggestion, ...]:
     """Name further values with which suggestions were tried."""
-    return tuple(attrs.evolve(one, values={**values, **one.values}) for one in suggestions)
+    return tuple(one._replace(values={**values, **one.values}) for one in suggestions)
 
 
 def sufficient_duration(spec: Spec) -> Suggestion | None:

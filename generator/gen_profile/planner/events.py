@@ -24,6 +24,7 @@ WORDS = {  # {:g} is the event's value
     24: "goes on after a hold",
     32: "a motion to the target was planned, which takes {:g} s",
     33: "a stop without sway was planned, which takes {:g} s",
+    34: "a motion to the stick's velocity was planned, after which the axis can stand in {:g} s",
     41: "a command to a position was refused, replaced or stopped before its end",
     42: "a stick is no longer followed",
     43: "another target replaced the one before its end",
