@@ -240,6 +240,19 @@ def test_a_tap_of_the_stick_moves_as_far_as_the_stick_says(text, velocity, secon
     assert last(driver, "fPosition") == pytest.approx(10.0 + velocity * seconds, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("order", "way"), [({"bStop": 1, "bVelocity": 0}, 0.1), ({"fVelocityCommand": 0.0}, 0.12)]
+)
+def test_a_slow_stick_has_its_velocity_soon_and_ends_soon(text, order, way):
+    """Pulses of 7 s followed it, which ran 0.2 m on."""
+    driver = standing(text, 10.0).hold(0.1, bVelocity=1).hold(3.0, fVelocityCommand=0.05)
+    assert last(driver, "bInVelocity")
+    begin = last(driver, "fPosition")
+    driver.hold(4.0, **order)
+    assert abs(last(driver, "fVelocity")) < 1e-3
+    assert 0.0 < last(driver, "fPosition") - begin < way
+
+
 def test_a_short_reversal_counts_by_its_length_not_by_its_phase(text):
     ends = []
     for phase in np.arange(0.0, 0.3, 0.05):

@@ -65,7 +65,7 @@ SHORT_SLOTS = (10, 12, 14, *range(16, 20))  # likewise, where plans may leave a 
 CHUNK = 45  # slots that a phase takes at once
 COUNTED = 40  # operations of a cycle that its cautious count leaves out
 ITERATIONS = 6
-RAMP_LEAST = 0.05  # of full speed: a change of the stick that is planned for
+RAMP_LEAST = 0.02  # of full speed: a change of the stick that is planned for
 RAMP_LEAST_SLOTS = 9
 TIGHTER = 20.0  # weight of second order, where as much of it is left as plans may spend
 PULSE_ADMITTED = 0.9
@@ -81,6 +81,7 @@ SPARE = 0.3  # slots more than expected, by slots between two measured motions
 MORE_ITERATIONS = 5  # where these do not lead to a plan
 WAY_ITERATIONS = 13  # where the axis moves already
 SLOTS_PER_PERIOD = 20.0  # of the slowest mode
+STALLED = 0.015  # of the full step: three shorter ones end a search; orders take as long, within 2 %
 MOST_LONGER = 20  # slots by which a plan may take longer than expected before pulses are quicker
 MIRROR_DECAY = 0.2  # over a motion, up to which its halves mirror each other until the last projection
 CENTRE = 0.15  # of an interior-point iteration: the complementarity it aims at, relative to that of now
@@ -427,6 +428,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cSlotsPerPeriod": SLOTS_PER_PERIOD,
         "cRate": min(axis.acceleration / axis.velocity for axis in c.axes),
         "cCurve": min(axis.jerk / axis.velocity for axis in c.axes),
+        "cStalled": STALLED,
         "cInside": INSIDE + (RESERVE if c.rates else 0.0),
         "cReserve": RESERVE if c.rates else 0.0,
         "cMargin": c.axes[0].targets[0] - c.axes[0].travel[0],

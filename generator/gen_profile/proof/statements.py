@@ -101,8 +101,9 @@ def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
         rests = order.begin + int(moving[-1]) + 1
         if rests >= order.end or not _is_end(motion, order, rests):
             continue
-        first = max(order.begin, rests - followed.after(0.5 * followed.period))
-        error = np.abs(time[first:rests] - (rests - np.arange(first, rests)) * followed.cycle)
+        planned = order.begin + followed.after(followed.reaction)  # before, it tells of the former motion
+        first = min(rests, max(planned, rests - followed.after(0.5 * followed.period)))
+        error = np.abs(time[first : rests + 1] - (rests - np.arange(first, rests + 1)) * followed.cycle)
         yield Allowance("time", first + int(np.argmax(error)), float(error.max()), slot)
         begun = order.begin + followed.after(followed.reaction + followed.period)
         if begun < rests and followed.slowest == inf:
