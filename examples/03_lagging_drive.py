@@ -17,9 +17,9 @@ for name, motion in (("leading", plan.command), ("not leading", plan.motion)):
     setpoints = gp.sample(motion, cycle_time=0.004)
     response = gp.cosimulate(spec, setpoints)
     missing = spec.move.target[0] - response.position[response.times.searchsorted(motion.duration), 0]
-    standing = response.times >= motion.duration + 10 * TAU
+    after = response.times >= motion.duration + 10 * TAU
     print(
         f"{name:12} commanded acceleration {abs(setpoints.acceleration).max():.2f} m/s², "
         f"{1e3 * missing:6.3f} mm short of the target at {motion.duration:g} s, "
-        f"sway afterwards {1e3 * abs(response.sway[standing, -1]).max():.4f} mm"
+        f"sway afterwards {1e3 * abs(response.sway[after, -1]).max():.4f} mm"
     )

@@ -18,5 +18,7 @@ cranes = {
 }
 sway = gp.residual_sways(spec, setpoints, cranes)[:, -1]
 
-for share in (50, 90, 99, 100):
-    print(f"{share:3} % of {RUNS} cranes are left with less than {1e3 * np.percentile(sway, share):.2f} mm")
+for percent in (50, 90, 99, 100):
+    print(
+        f"{percent:3} % of {RUNS} cranes are left with less than {1e3 * np.percentile(sway, percent):.2f} mm"
+    )

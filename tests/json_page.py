@@ -33,32 +33,32 @@ def documented() -> dict[str, list[Any]]:
     return found
 
 
-def _differences(told: Any, found: Any, place: str) -> Iterator[str]:
+def _differences(stated: Any, found: Any, place: str) -> Iterator[str]:
     """Tell which keys are on one side only; texts on the page stand for any value without keys."""
-    match told:
+    match stated:
         case str():
-            part = re.match(r"(\w+), above", told)
+            part = re.match(r"(\w+), above", stated)
             if part and found is not None:
                 yield from _differences(documented()[f"`{part[1]}`"][0], found, place)
             elif isinstance(found, dict):
                 yield f"{place} has keys that are not told"
         case dict() if isinstance(found, dict):
-            yield from _different_keys(told, found, place)
+            yield from _different_keys(stated, found, place)
         case list() if isinstance(found, list):
             for element in found:
-                yield from _differences(told[0], element, f"{place}[]")
-        case _ if found not in (None, told):
-            yield f"{place} is {found!r}, not {told!r}"
+                yield from _differences(stated[0], element, f"{place}[]")
+        case _ if found not in (None, stated):
+            yield f"{place} is {found!r}, not {stated!r}"
 
 
-def _different_keys(told: dict[str, Any], found: dict[str, Any], place: str) -> Iterator[str]:
-    any_name = next((shape for key, shape in told.items() if key.startswith("<")), None)
+def _different_keys(stated: dict[str, Any], found: dict[str, Any], place: str) -> Iterator[str]:
+    any_name = next((shape for key, shape in stated.items() if key.startswith("<")), None)
     for key, value in found.items():
-        shape = told.get(key, any_name)
+        shape = stated.get(key, any_name)
         if shape is None:
             yield f"{place}.{key} is not told"
         else:
             yield from _differences(shape, value, f"{place}.{key}")
-    for key, shape in told.items():
+    for key, shape in stated.items():
         if key not in found and not key.startswith("<") and not str(shape).startswith("only"):
             yield f"{place}.{key} is told, but not there"

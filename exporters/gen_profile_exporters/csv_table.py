@@ -110,20 +110,20 @@ def _motion(
     values = np.array([_numbers(line, cells, header) for line, cells in rows])[:, order]
     cycle_time = _cycle_time(values[:, 0], lines)
     by_axis = values[:, 1:].reshape(len(values), len(target.axes), len(target.export.csv_columns))
-    found = dict(zip(target.export.csv_columns, np.moveaxis(by_axis, 2, 0), strict=True))
+    columns = dict(zip(target.export.csv_columns, np.moveaxis(by_axis, 2, 0), strict=True))
     factor = np.array([axis.factor for axis in target.axes])
-    if "position" in found:
-        _check_counts(found["position"], target.axes, lines)
+    if "position" in columns:
+        _check_counts(columns["position"], target.axes, lines)
     else:
-        found["position"] = _integrated(
-            found["velocity"], cycle_time, in_axis_units(np.array(target.start), factor)
+        columns["position"] = _integrated(
+            columns["velocity"], cycle_time, in_axis_units(np.array(target.start), factor)
         )
     table = AxisTable(
         cycle_time=cycle_time,
-        position=found["position"],
-        velocity=found.get("velocity"),
-        acceleration=found.get("acceleration"),
-        jerk=found.get("jerk"),
+        position=columns["position"],
+        velocity=columns.get("velocity"),
+        acceleration=columns.get("acceleration"),
+        jerk=columns.get("jerk"),
     )
     return motion_of(table, target.axes)
 
@@ -183,9 +183,9 @@ def _text(content: bytes) -> str:
     return text
 
 
-def _column_order(found: Sequence[str], target: Target) -> list[int]:
+def _column_order(heads: Sequence[str], target: Target) -> list[int]:
     """Where each expected column stands; the header must hold exactly those."""
-    names = [name.strip() for name in found]
+    names = [name.strip() for name in heads]
     axes, expected = target.axes, _header(target)
     if len(names) == 1 and len(re.split(r"[;\t]", names[0])) > 1:
         raise ExportError(

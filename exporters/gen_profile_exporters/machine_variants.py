@@ -79,8 +79,8 @@ def _law(plant: Plant, spec: Spec) -> Law:
     def law(q_u: Array, dq_u: Array, q_a: Array, dq_a: Array, ddq_a: Array) -> tuple[Array, Array]:
         count, swing, at = len(q_u), list(q_u.T), list(q_a.T)
         terms = plant.equations(swing, list(dq_u.T), at, list(dq_a.T), p)
-        driven = _matrices(terms.M_au, count).swapaxes(1, 2) @ ddq_a[..., None]
-        push = _matrices([terms.K_u, terms.G_u], count).sum(axis=1)[..., None] - driven
+        input_force = _matrices(terms.M_au, count).swapaxes(1, 2) @ ddq_a[..., None]
+        push = _matrices([terms.K_u, terms.G_u], count).sum(axis=1)[..., None] - input_force
         sway = _matrices([plant.outputs(swing, at, p).sway], count)[:, 0]
         return np.linalg.solve(_matrices(terms.M_uu, count), push)[..., 0], sway
 
@@ -106,11 +106,11 @@ def _states(plant: Plant, spec: Spec) -> States:
     states = [
         [
             *(SWING * random.uniform(-1.0, 1.0, (2, loads))),
-            start + share * (target - start),
+            start + fraction * (target - start),
             speed * random.uniform(0.5, 1.0, len(size)),
             push * random.uniform(0.5, 1.0, len(size)),
         ]
-        for share in np.linspace(0.1, 0.9, STATES)
+        for fraction in np.linspace(0.1, 0.9, STATES)
     ]
     return [np.array(values) for values in zip(*states, strict=True)]
 
@@ -151,8 +151,8 @@ def _mirrors(law: Law, states: States, axis: int) -> bool:
 def _mirrored(law: Law, states: States, axis: int, sign: Array) -> bool:
     q_u, dq_u, *axes = _changed(states, axis, factor=-1.0)
     acceleration, sway = law(sign * q_u, sign * dq_u, *axes)
-    due, seen = law(*states)
-    return _same((sign * acceleration, np.abs(sway)), (due, np.abs(seen)))
+    due, sway_due = law(*states)
+    return _same((sign * acceleration, np.abs(sway)), (due, np.abs(sway_due)))
 
 
 def _is_linear(law: Law, states: States, axis: int) -> bool:

@@ -8,9 +8,9 @@ from collections.abc import Iterable
 from gen_profile.phrase import Phrase
 
 MOST = 3  # names to suggest
-ALIKE = 0.65  # difflib's ratio from which on a word is a misspelling of another
+MIN_SIMILARITY = 0.65  # difflib's ratio from which on a word is a misspelling of another
 # other words for what is called so here, in the languages and the products that users come from
-MEANINGS = {
+SYNONYMS = {
     "velocity": "v vmax v_max max_velocity speed geschwindigkeit",
     "acceleration": "a amax a_max max_acceleration beschleunigung",
     "jerk": "j jmax j_max max_jerk ruck",
@@ -75,7 +75,7 @@ def meant(word: str, known: Iterable[str]) -> list[str]:
     """Find the names, `MOST` at most, that a person may mean: by meaning, by a part, or misspelt."""
     names, word = list(known), word.strip().lower()
     same = [name for name in names if name.lower() == word]
-    by_meaning = [name for name in names if word in MEANINGS.get(name, "").split()]
+    by_meaning = [name for name in names if word in SYNONYMS.get(name, "").split()]
     by_part = [
         name
         for name in names
@@ -98,7 +98,7 @@ def _misspelt(word: str, names: Iterable[str]) -> list[str]:
         return SequenceMatcher(None, rests[0], rests[1]).ratio()
 
     best = max(names, key=likeness, default="")
-    return [best] if best and likeness(best) >= ALIKE else []
+    return [best] if best and likeness(best) >= MIN_SIMILARITY else []
 
 
 def number_meant(text: str) -> str:

@@ -16,8 +16,8 @@ class Summarised:
         raise NotImplementedError
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{name}: {value}" for name, value in self.summary().items())
-        return f"<{type(self).__name__} {told}>"
+        pairs = ", ".join(f"{name}: {value}" for name, value in self.summary().items())
+        return f"<{type(self).__name__} {pairs}>"
 
     def _repr_html_(self) -> str:
         """Lay the summary out as Jupyter shows it."""

@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import attrs
 
-LOOK = 0.05  # s of work between looks at the clock, which take time themselves
+CLOCK_INTERVAL = 0.05  # s of work between looks at the clock, which take time themselves
 
 
 Found = TypeVar("Found")
@@ -38,7 +38,7 @@ class _Budget:
         if self.left < 0.0:
             raise OutOfWork
         if self.left < self.look:
-            self.look = self.left - LOOK
+            self.look = self.left - CLOCK_INTERVAL
             if time.process_time() > self.ends:
                 self.left = -math.inf  # for code that catches this and goes on
                 raise OutOfWork

@@ -31,17 +31,21 @@ class AxisPiece:
 
 def magnitude(values: Sequence[arb]) -> arb:
     """Bound the absolute values of all."""
-    found = arb(0)
+    largest = arb(0)
     for one in values:
-        found = found.max(one.abs_upper())
-    return found
+        largest = largest.max(one.abs_upper())
+    return largest
 
 
 def quintic(
-    half: arb, positions: Sequence[float], speeds: Sequence[float], bends: Sequence[float]
+    half: arb, positions: Sequence[float], speeds: Sequence[float], accelerations: Sequence[float]
 ) -> arb_poly:
     """Give the polynomial on −1 … 1 with position, velocity and acceleration at both ends."""
-    (p, q), (u, v), (b, c) = positions, [half * one for one in speeds], [half * half * one for one in bends]
+    (p, q), (u, v), (b, c) = (
+        positions,
+        [half * one for one in speeds],
+        [half * half * one for one in accelerations],
+    )
     x, even, odd = (
         arb_poly([0, 1]),
         (arb(p) + q) / 2,

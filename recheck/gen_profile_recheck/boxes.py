@@ -80,10 +80,10 @@ def chebyshev(count: int) -> arb_mat:
 
 
 def _polys(count: int) -> list[arb_poly]:
-    found, x = [arb_poly([1]), arb_poly([0, 1])], arb_poly([0, 1])
-    while len(found) < count:
-        found.append(2 * x * found[-1] - found[-2])
-    return found[:count]
+    polynomials, x = [arb_poly([1]), arb_poly([0, 1])], arb_poly([0, 1])
+    while len(polynomials) < count:
+        polynomials.append(2 * x * polynomials[-1] - polynomials[-2])
+    return polynomials[:count]
 
 
 @cache
@@ -174,16 +174,16 @@ class MachineBox:
             for number in range(len(self.terms))
         ]
 
-    def missed(
+    def interpolation_error(
         self, counts: tuple[int, ...], first: Sequence[arb], key: Any, at: Callable[[int, float], Values]
     ) -> list[arb]:
         """Bound what interpolation misses of functions that are off by `first` at nodes, and `at` around."""
-        found, amplified = [arb(0)] * len(first), arb(1)
+        error, amplified = [arb(0)] * len(first), arb(1)
         for number, count in enumerate(counts):
             bounds = self.least((key, number), ELLIPSES, partial(_beyond, at, number, count))
-            found = [one + amplified * bound for one, bound in zip(found, bounds, strict=True)]
+            error = [one + amplified * bound for one, bound in zip(error, bounds, strict=True)]
             amplified *= 1 + 2 / pi * log(count) + 1e-9
-        return [one + amplified * late for one, late in zip(found, first, strict=True)]
+        return [one + amplified * late for one, late in zip(error, first, strict=True)]
 
     def least(self, key: Any, choices: Sequence[float], bounds: Callable[[float], list[arb]]) -> list[arb]:
         """Bound functions by the best of some choices: those beside what was best the last time."""
@@ -243,11 +243,11 @@ class MotionPiece:
         return [[[abs(one) for one in row] for row in series.tolist()] for series in self.series]
 
     def _axes_at(self, kind: Callable[[arb_poly], Any]) -> list[Values]:
-        found, polynomials, scale = [], [one.smooth for one in self.axes], arb(1)
+        values, polynomials, scale = [], [one.smooth for one in self.axes], arb(1)
         for _ in range(4):
-            found.append([kind(one) * scale for one in polynomials])
+            values.append([kind(one) * scale for one in polynomials])
             polynomials, scale = [one.derivative() for one in polynomials], scale / self.half
-        return found
+        return values
 
     def _balls(
         self, tube: Sequence[Any], time: Sequence[arb], change: Sequence[arb], weights: Sequence[arb]
@@ -316,8 +316,8 @@ class MotionPiece:
                 x.append(arb_series([values[0] + wide(off), *values[1:]], terms))
                 slope.append(arb_series(slopes, terms))
             k = self.box.constants(places, (counts, number))
-            found = function(MachineState(x, slope, axes, k, list(places), (counts, number)))
-            rows.append([_padded(one, terms) for one in found])
+            outputs = function(MachineState(x, slope, axes, k, list(places), (counts, number)))
+            rows.append([_padded(one, terms) for one in outputs])
         late = self.box.least(
             (terms, len(rows[0])),
             DISCS,
@@ -325,7 +325,7 @@ class MotionPiece:
                 size_of(one) / arb(r) ** terms / (1 - 1 / arb(r)) for one in function(self.on_disc(r, tube))
             ],
         )
-        rests = self.box.missed(
+        rests = self.box.interpolation_error(
             counts,
             late,
             (terms, len(rows[0])),

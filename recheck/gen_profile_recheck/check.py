@@ -130,15 +130,15 @@ def _require_setpoints(case: Case) -> None:
         orders = [(n, kind) for n, kind in enumerate(KINDS, start=1) if own.get(kind) is not None]
         for order, kind in orders:
             rounding = 2 ** (order - 1) * case.setpoints.resolution[number] / cycle**order
-            found, told = _difference(case, number, order), said[name][kind]
-            if not found <= told["bound"] * (1 + SAME):
+            largest, claim = _difference(case, number, order), said[name][kind]
+            if not largest <= claim["bound"] * (1 + SAME):
                 raise NotProvedError(f"the setpoints ask {name} for more {kind} than is said")
-            if kind in OVERSHOOT and told["bound"] > (1 + OVERSHOOT[kind]) * own[kind] + rounding:
+            if kind in OVERSHOOT and claim["bound"] > (1 + OVERSHOOT[kind]) * own[kind] + rounding:
                 raise NotProvedError(f"the setpoints break the limit of {kind} of {name}")
-            if told["limit"] != own[kind] or abs(told["rounding"] - rounding) > SAME * rounding:
+            if claim["limit"] != own[kind] or abs(claim["rounding"] - rounding) > SAME * rounding:
                 raise NotProvedError(f"limit or rounding of {kind} of {name} are others")
             unit = f"{'rad' if name in ('slew', 'hub') else 'm'}/{KINDS[kind]}"
-            if told.keys() != {"bound", "limit", "rounding", "unit"} or told["unit"] != unit:
+            if claim.keys() != {"bound", "limit", "rounding", "unit"} or claim["unit"] != unit:
                 raise NotProvedError(f"something else is said of {kind} of {name}")
         if orders:
             asked[name] = {kind for _, kind in orders}
@@ -149,12 +149,12 @@ def _require_setpoints(case: Case) -> None:
 def _difference(case: Case, axis: int, order: int) -> float:
     """Bound an axis' difference quotients, with those before the first and after the last setpoint."""
     cycle, velocity = case.setpoints.cycle, arb(case.spec["move"]["final_velocity"][axis])
-    found = [arb(one) for one in case.setpoints.positions[axis]]
-    after = [found[-1] + n * cycle * velocity for n in range(1, order)]
-    found = found[:1] * (order - 1) + found + after
+    quotients = [arb(one) for one in case.setpoints.positions[axis]]
+    after = [quotients[-1] + n * cycle * velocity for n in range(1, order)]
+    quotients = quotients[:1] * (order - 1) + quotients + after
     for _ in range(order):
-        found = [(after - before) / cycle for before, after in pairwise(found)]
-    return max(float(abs(one).upper()) for one in found)
+        quotients = [(after - before) / cycle for before, after in pairwise(quotients)]
+    return max(float(abs(one).upper()) for one in quotients)
 
 
 def _require_times(case: Case) -> None:
@@ -178,7 +178,7 @@ def _frequency(case: Case, parameters: Mapping[str, float]) -> float:
     columns = []
     for chosen in range(n):
         unit = [1 if row == chosen else 0 for row in range(n)]
-        bent = machine.free(moved(still, unit, 1), still, axes, [arb(0)] * len(axes), k)
+        bent = machine.drift(moved(still, unit, 1), still, axes, [arb(0)] * len(axes), k)
         columns.append([-arb(along(one, 1)) for one in bent])
     values = acb_mat([list(row) for row in zip(*columns, strict=True)]).eig(algorithm="approx")
     return float(min(float(one.real.mid()) for one in values) ** 0.5)
@@ -210,7 +210,7 @@ def _watches(case: Case, knots: Sequence[float]) -> list[SwayClaim]:
     if limits != case.spec["check"]["residual_sway"] or not set(loads) == limits.keys() == bounds.keys():
         raise NotProvedError("the certificate is about other limits than the spec's, or other loads")
     arrived = max(n for n, knot in enumerate(knots) if knot <= case.setpoints.times[-1])
-    found = [SwayClaim(slice(n, n + 1), arrived, bounds[load]) for n, load in enumerate(loads)]
+    claims = [SwayClaim(slice(n, n + 1), arrived, bounds[load]) for n, load in enumerate(loads)]
     kept = [bounds[load] <= limits[load] for load in loads]
     if (sway is None) != (way is None):
         raise NotProvedError("the certificate is silent of the sway on the way, or the spec is")
@@ -223,10 +223,10 @@ def _watches(case: Case, knots: Sequence[float]) -> list[SwayClaim]:
         ):
             raise NotProvedError("the certificate is about another limit on the way")
         kept.append(way["bound_m"] <= way["limit_m"])
-        found.append(SwayClaim(both, 0, way["bound_m"]))
+        claims.append(SwayClaim(both, 0, way["bound_m"]))
     if not all(kept):
         raise NotProvedError("a bound is above its limit")
-    return found
+    return claims
 
 
 def _prove(case: Case, progress: Progress) -> None:

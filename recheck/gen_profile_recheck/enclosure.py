@@ -97,16 +97,16 @@ class BoxProof:
 
     def _defect_and_sways(self, sides: Sequence[SwayClaim], s: MachineState) -> Values:
         machine, (a, v, *_) = self.box.machine, s.axes
-        found = [one - two for one, two in zip(s.slope, machine.rate(s.x, a, v, s.k), strict=True)]
+        entries = [one - two for one, two in zip(s.slope, machine.rate(s.x, a, v, s.k), strict=True)]
         sways = machine.sway(s.x[: len(s.x) // 2], a, s.k) if sides else []
         for watch in sides:
-            seen = sways[watch.loads]
-            found.append(seen[0] if len(seen) == 1 else sum(one * one for one in seen))
-        return found
+            own_sway = sways[watch.loads]
+            entries.append(own_sway[0] if len(own_sway) == 1 else sum(one * one for one in own_sway))
+        return entries
 
     def _leap(self, number: int) -> list[arb]:
         """Bound by how much the approximate motion leaps where a piece begins."""
-        found = []
+        jumps = []
         for row, series in enumerate(self.pieces[number].series):
             signs = arb_mat(1, series.nrows(), [(-1) ** k for k in range(series.nrows())])
             off = (signs * series).entries()
@@ -115,8 +115,8 @@ class BoxProof:
                 ends = (arb_mat(1, last.nrows(), [1] * last.nrows()) * last).entries()
             else:
                 ends = [arb(self.start[row])] + [arb(0)] * (len(off) - 1)
-            found.append(sum((abs(a - b) for a, b in zip(off, ends, strict=True)), start=arb(0)))
-        return found
+            jumps.append(sum((abs(a - b) for a, b in zip(off, ends, strict=True)), start=arb(0)))
+        return jumps
 
     def _step(
         self, piece: MotionPiece, scale: ScaleMatrix, error: arb, source: arb, fed: arb
@@ -127,15 +127,15 @@ class BoxProof:
         for _ in range(ATTEMPTS):
             tube = [(reach * row).abs_upper() for row in scale.rows]
             growth = self._growth(piece, scale, tube)
-            found = Disturbance(piece, tube)
-            added = norm(scale.sizes_of(found.sizes))
+            disturbance = Disturbance(piece, tube)
+            added = norm(scale.sizes_of(disturbance.sizes))
             factor = (growth * time).exp()
             most = factor.max(arb(1))
             step = (source + added) * time * most
             greatest = (error * most + step).abs_upper()
             if greatest <= reach:
                 return (error * factor + step).abs_upper(), PieceErrors(
-                    greatest, added * time, found.shift, tube
+                    greatest, added * time, disturbance.shift, tube
                 )
             if not greatest.is_finite():
                 break
@@ -149,19 +149,21 @@ class BoxProof:
         def symmetric(s: MachineState) -> Values:
             jacobian = self._jacobian(s)
             to, back = scale.at(s.places, s.key)
-            turned = matrix_product(matrix_product(to, jacobian), back)
-            whole = [one for row in turned for one in row]
-            return [(turned[i][j] + turned[j][i]) / arb(2) for i in range(n) for j in range(i + 1)] + whole
+            transformed = matrix_product(matrix_product(to, jacobian), back)
+            whole = [one for row in transformed for one in row]
+            return [
+                (transformed[i][j] + transformed[j][i]) / arb(2) for i in range(n) for j in range(i + 1)
+            ] + whole
 
-        found = piece.enclosed(symmetric, FEW_TERMS, self.coarse, tube)
+        bounds = piece.enclosed(symmetric, FEW_TERMS, self.coarse, tube)
         pairs = [(i, j) for i in range(n) for j in range(i + 1)]
-        entry = dict(zip(pairs, found[: len(pairs)], strict=True))
+        entry = dict(zip(pairs, bounds[: len(pairs)], strict=True))
         rows = []
         for i in range(n):
             sides = (entry[max(i, j), min(i, j)].size for j in range(n) if j != i)
             rows.append(sum(sides, start=entry[i, i].ball.upper()))
         growth = reduce(arb.max, rows)
-        whole = norm([one.size for one in found[len(pairs) :]])
+        whole = norm([one.size for one in bounds[len(pairs) :]])
         return growth + whole * (scale.slack - 1)
 
     def _jacobian(self, s: MachineState) -> list[Values]:
@@ -184,8 +186,8 @@ class BoxProof:
         gains: list[list[arb]] = [[] for _ in aways]
         for chosen in range(n):
             unit = [1 if row == chosen else 0 for row in range(n)]
-            seen = machine.sway(moved(s.x[:n], unit, 1), axes, s.k)[watch.loads]
-            for row, one in enumerate(seen):
+            sways = machine.sway(moved(s.x[:n], unit, 1), axes, s.k)[watch.loads]
+            for row, one in enumerate(sways):
                 gains[row].append(arb(along(one, 1)))
                 aways[row] += abs(gains[row][-1]) * shift[chosen]
         for chosen, gap in enumerate(piece.axes):
@@ -194,8 +196,10 @@ class BoxProof:
                 aways[row] += abs(arb(along(one, 1))) * gap.gap
         back = scale.at(s.places, s.key)[1]
         for row, gain in enumerate(gains):
-            turned = [sum((g * back[i][j] for i, g in enumerate(gain)), start=arb(0)) for j in range(2 * n)]
-            aways[row] += norm(turned) * scale.slack * step.greatest
+            transformed = [
+                sum((g * back[i][j] for i, g in enumerate(gain)), start=arb(0)) for j in range(2 * n)
+            ]
+            aways[row] += norm(transformed) * scale.slack * step.greatest
         room = watch.bound - norm(aways)
         allowed = room if len(aways) == 1 else room * room
         if not (room > 0 and keeps(sway, allowed.lower())):
@@ -258,8 +262,8 @@ class ScaleMatrix:
                 for j, column in enumerate(zip(*back, strict=True))
             ]
 
-        found = self.box.polynomials(entries, counts)
-        return self._square([sum((abs(one) for one in row.entries()), start=arb(0)) for row in found])
+        products = self.box.polynomials(entries, counts)
+        return self._square([sum((abs(one) for one in row.entries()), start=arb(0)) for row in products])
 
     def sizes_of(self, sizes: Sequence[arb]) -> list[arb]:
         """Bound the entries of S times a vector whose entries have at most these sizes."""
@@ -315,11 +319,11 @@ class Disturbance:
 
     def lift(self, x: Values, a: Values, v: Values) -> list[Values]:
         """List the columns of G."""
-        found = []
+        lifts = []
         for chosen in range(len(v)):
             unit = [1 if row == chosen else 0 for row in range(len(v))]
-            found.append([along(one, 1) for one in self.rate(x, a, moved(v, unit, 1))])
-        return found
+            lifts.append([along(one, 1) for one in self.rate(x, a, moved(v, unit, 1))])
+        return lifts
 
     def pull(self, chosen: int, x: Values, a: Values, v: Values, bend: Values) -> Values:
         """Give a column of P."""
@@ -328,12 +332,12 @@ class Disturbance:
         beside = [along(one, 1) for one in self.rate(moved(x, lift, 1), moved(a, unit, 1), v)]
         flow = self.rate(x, a, v)
         later = moved(v, bend, 2)
-        turned = self.rate(moved(x, flow, 2), moved(a, v, 2), moved(later, unit, 1))
-        return [one - along(along(two, 1), 2) for one, two in zip(beside, turned, strict=True)]
+        crossed = self.rate(moved(x, flow, 2), moved(a, v, 2), moved(later, unit, 1))
+        return [one - along(along(two, 1), 2) for one, two in zip(beside, crossed, strict=True)]
 
     def _sizes(self) -> list[arb]:
         n, pieces = len(self.x), self.piece.axes
-        first, found = self._by_axes()
+        first, sizes = self._by_axes()
         faster = [wide(one) for one in first]
         true = [one + two for one, two in zip(self.rate(self.x, self.a, self.v), faster, strict=True)]
         moving = (
@@ -346,17 +350,17 @@ class Disturbance:
             unit = [1 if row == chosen else 0 for row in range(len(self.v))]
             changed = [along(one, 4) for one in self.pull(chosen, *moving)]
             passed = [along(one, 1) for one in self.rate(moved(self.x, pull, 1), self.a, self.v)]
-            turned = self.rate(moved(self.x, faster, 1), self.a, moved(self.v, unit, 2))
+            crossed = self.rate(moved(self.x, faster, 1), self.a, moved(self.v, unit, 2))
             for row in range(n):
-                found[row] += (
-                    abs(arb(pull[row])) * axis.mean + abs(arb(along(along(turned[row], 1), 2))) * axis.gap
+                sizes[row] += (
+                    abs(arb(pull[row])) * axis.mean + abs(arb(along(along(crossed[row], 1), 2))) * axis.gap
                 )
-                found[row] += (abs(arb(changed[row])) + abs(arb(passed[row]))) * axis.swing
+                sizes[row] += (abs(arb(changed[row])) + abs(arb(passed[row]))) * axis.swing
         whole, lifted = [wide(one) for one in self.shift], [wide(one) for one in self.lifted]
         bent = self.rate(moved(moved(self.x, whole, 1), lifted, 2), self.a, self.v)
         return [
             (one + abs(arb(along(along(two, 1), 2)))).abs_upper()
-            for one, two in zip(found, bent, strict=True)
+            for one, two in zip(sizes, bent, strict=True)
         ]
 
     def _by_axes(self) -> tuple[list[arb], list[arb]]:
@@ -373,9 +377,9 @@ class Disturbance:
                 continue
             once = moved(near, [int(row == i) for row in range(2 * m)], 1)
             both = moved(once, [int(row == j) for row in range(2 * m)], 2)
-            share = sizes[i] * sizes[j] / (2 if i == j else 1)
+            weight = sizes[i] * sizes[j] / (2 if i == j else 1)
             for row, one in enumerate(self.rate(self.x, both[:m], both[m:])):
-                second[row] += abs(arb(along(along(one, 1), 2))) * share
+                second[row] += abs(arb(along(along(one, 1), 2))) * weight
                 if i == j:
                     slope = along(one, 1)
                     first[row] += (
@@ -386,15 +390,15 @@ class Disturbance:
 
 def _first_gap(piece: MotionPiece, leap: Sequence[arb]) -> list[arb]:
     """Bound what the smooth motion's first position is off, as the state sees it."""
-    found = Disturbance(piece, leap)
-    return _summed(zip(found.lifts, (one.first for one in piece.axes), strict=True), len(piece.series))
+    disturbance = Disturbance(piece, leap)
+    return _summed(zip(disturbance.lifts, (one.first for one in piece.axes), strict=True), len(piece.series))
 
 
 def _summed(columns: Any, size: int) -> list[arb]:
-    found = [arb(0)] * size
+    total = [arb(0)] * size
     for column, weight in columns:
-        found = [one + abs(arb(entry)) * weight for one, entry in zip(found, column, strict=True)]
-    return [one.abs_upper() for one in found]
+        total = [one + abs(arb(entry)) * weight for one, entry in zip(total, column, strict=True)]
+    return [one.abs_upper() for one in total]
 
 
 def norm(values: Sequence[Any]) -> arb:
@@ -414,10 +418,10 @@ def matrix_product(a: Sequence[Values], b: Sequence[Values]) -> list[Values]:
 
 
 def _product(values: Any) -> Any:
-    found: Any = arb(1)
+    product: Any = arb(1)
     for one in values:
-        found = found * one
-    return found
+        product = product * one
+    return product
 
 
 def _nothing(value: Any) -> bool:

@@ -81,10 +81,10 @@ def inverse(x: Scalar) -> Scalar:
         return 1 / x
     main, rest = _split(x)
     once = 1 / main
-    term = found = Jet({0: once})
+    term = total = Jet({0: once})
     while (term := -(term * rest * once)).parts:
-        found = found + term
-    return found
+        total = total + term
+    return total
 
 
 def sine_cosine(x: Scalar) -> tuple[Scalar, Scalar]:

@@ -1,8 +1,9 @@
 """The machines' equations, written down by hand from the physics, in forms without differences of like terms.
 
 Each machine gives, of its unactuated coordinates q with rates dq, its axes a with velocities v and constants
-k: `driven`, the matrix D by which accelerations of the axes act, q̈ = free + D v̇; `free`; and `sway` of its
-loads. Everything that swings counts as positive where it trails an axis that sets off in positive direction.
+k: `input_matrix`, the matrix D by which accelerations of the axes act, q̈ = drift + D v̇; `drift`; and `sway`
+of its loads. Everything that swings counts as positive where it trails an axis that sets off in positive
+direction.
 """
 
 from __future__ import annotations
@@ -27,19 +28,19 @@ class Machine:
     coordinates: tuple[str, ...]
     loads: tuple[str, ...]
     end_load: tuple[str, slice]
-    driven: Callable[[Values, Values, SimpleNamespace], list[list[Scalar]]]
-    free: Callable[[Values, Values, Values, Values, SimpleNamespace], list[Scalar]]
+    input_matrix: Callable[[Values, Values, SimpleNamespace], list[list[Scalar]]]
+    drift: Callable[[Values, Values, Values, Values, SimpleNamespace], list[Scalar]]
     sway: Callable[[Values, Values, SimpleNamespace], list[Scalar]]
     constants: Callable[[Mapping[str, Scalar]], SimpleNamespace] = lambda p: SimpleNamespace(**p)
 
     def rate(self, x: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
         """Give ẋ of x = (q, w), where w = dq − D v does not leap when v does."""
         q, w = x[: len(x) // 2], x[len(x) // 2 :]
-        dq = [one + _product(row, v) for one, row in zip(w, self.driven(q, a, k), strict=True)]
-        turned = self.driven(moved(q, dq, INNER), moved(a, v, INNER), k)
-        free = self.free(q, dq, a, v, k)
-        changes = [[along(one, INNER) for one in row] for row in turned]
-        return dq + [one - _product(row, v) for one, row in zip(free, changes, strict=True)]
+        dq = [one + _product(row, v) for one, row in zip(w, self.input_matrix(q, a, k), strict=True)]
+        carried = self.input_matrix(moved(q, dq, INNER), moved(a, v, INNER), k)
+        drift = self.drift(q, dq, a, v, k)
+        changes = [[along(one, INNER) for one in row] for row in carried]
+        return dq + [one - _product(row, v) for one, row in zip(drift, changes, strict=True)]
 
 
 def _product(row: Values, v: Values) -> Scalar:
@@ -52,7 +53,7 @@ def _product(row: Values, v: Values) -> Scalar:
 # solved with sin β and cos β expanded by δ; the determinant is L1 L2 (m1 + m2 sin² δ).
 
 
-def _two_ropes_driven(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
+def _two_ropes_inputs(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
     (sa, ca), (sd, cd) = map(sine_cosine, q)
     inertia = k.m1 + k.m2 * (sd * sd)
     upper = ca / k.L1 + k.m2 * (cd * sd * sa) / (k.L1 * inertia)
@@ -60,7 +61,7 @@ def _two_ropes_driven(q: Values, a: Values, k: SimpleNamespace) -> list[list[Sca
     return [[upper], [lower - upper]]
 
 
-def _two_ropes_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+def _two_ropes_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
     (sa, ca), (sd, cd) = map(sine_cosine, q)
     da, dd = dq
     db, mass, inertia = da + dd, k.m1 + k.m2, k.m1 + k.m2 * (sd * sd)
@@ -81,7 +82,7 @@ def _two_ropes_sway(q: Values, a: Values, k: SimpleNamespace) -> list[Scalar]:
 # One rope of length l = L0 + hoist: l φ̈ = −g sin φ − 2 l̇ φ̇ − c φ̇/(m l) + ÿ cos φ.
 
 
-def _one_rope_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+def _one_rope_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
     length = k.L0 + a[1]
     return [-(k.g * sine_cosine(q[0])[0] + (2 * v[1] + k.c / (k.m * length)) * dq[0]) / length]
 
@@ -89,12 +90,12 @@ def _one_rope_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespa
 # A rope on a universal joint: the load lies at (x − L sin θx cos θy, y − L sin θy, −L cos θx cos θy).
 
 
-def _joint_driven(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
+def _joint_inputs(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
     (sx, cx), (sy, cy) = map(sine_cosine, q)
     return [[cx / (k.L * cy), 0], [-(sx * sy) / k.L, cy / k.L]]
 
 
-def _joint_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+def _joint_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
     (sx, cx), (sy, cy) = map(sine_cosine, q)
     damping = k.c / (k.m * k.L * k.L)
     first = -(k.g * sx) / (k.L * cy) + 2 * (sy / cy * dq[0] * dq[1]) - damping * dq[0]
@@ -110,17 +111,17 @@ def _joint_sway(q: Values, a: Values, k: SimpleNamespace) -> list[Scalar]:
 # and feels (r̈ − α̈ Y − 2 α̇ Ẏ − α̇² X, α̈ X + 2 α̇ Ẋ − α̇² Y) besides, here along both angles.
 
 
-def _jib_driven(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
+def _jib_inputs(q: Values, a: Values, k: SimpleNamespace) -> list[list[Scalar]]:
     (sr, cr), (st, ct) = map(sine_cosine, q)
     return [[cr * st / ct, cr / (k.L * ct)], [ct * a[1] / k.L - sr, -(sr * st) / k.L]]
 
 
-def _jib_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+def _jib_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
     (sr, cr), (st, ct) = map(sine_cosine, q)
     x, y = a[1] - k.L * (sr * ct), -(k.L * st)
     dx, dy = v[1] + k.L * (sr * st * dq[1] - cr * ct * dq[0]), -(k.L * (ct * dq[1]))
     along_jib, across = -(2 * v[0] * dy) - v[0] * v[0] * x, 2 * v[0] * dx - v[0] * v[0] * y
-    first, second = _joint_free(q, dq, a, v, k)
+    first, second = _joint_drift(q, dq, a, v, k)
     return [first + cr * along_jib / (k.L * ct), second + (ct * across - sr * st * along_jib) / k.L]
 
 
@@ -128,7 +129,7 @@ def _jib_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -
 # s_i = k_i Δd_i + c_i Δḋ_i.
 
 
-def _chain_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+def _chain_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
     def pull(i: int) -> Scalar:
         if i == len(q):
             return 0
@@ -145,8 +146,8 @@ def _chain(masses: int) -> Machine:
         coordinates=tuple(f"d{i + 1}" for i in range(masses)),
         loads=names,
         end_load=(names[-1], slice(masses - 1, masses)),
-        driven=lambda q, a, k: [[1]] * len(q),
-        free=_chain_free,
+        input_matrix=lambda q, a, k: [[1]] * len(q),
+        drift=_chain_drift,
         sway=lambda q, a, k: list(q),
     )
 
@@ -170,7 +171,7 @@ def _tank(p: Mapping[str, Scalar]) -> SimpleNamespace:
     return k
 
 
-def _tank_free(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
+def _tank_drift(q: Values, dq: Values, a: Values, v: Values, k: SimpleNamespace) -> list[Scalar]:
     modes = zip(q, dq, k.L, k.loss, strict=True)
     return [-(k.g * sine_cosine(one)[0]) / length - loss * rate for one, rate, length, loss in modes]
 
@@ -183,8 +184,8 @@ MACHINES: Mapping[str, Machine] = {
         coordinates=("theta1", "theta2"),
         loads=("hook", "payload"),
         end_load=("payload", slice(1, 2)),
-        driven=_two_ropes_driven,
-        free=_two_ropes_free,
+        input_matrix=_two_ropes_inputs,
+        drift=_two_ropes_drift,
         sway=_two_ropes_sway,
     ),
     "single-pendulum-crane": Machine(
@@ -192,8 +193,8 @@ MACHINES: Mapping[str, Machine] = {
         coordinates=("phi",),
         loads=("payload",),
         end_load=("payload", slice(0, 1)),
-        driven=lambda q, a, k: [[sine_cosine(q[0])[1] / (k.L0 + a[1]), 0]],
-        free=_one_rope_free,
+        input_matrix=lambda q, a, k: [[sine_cosine(q[0])[1] / (k.L0 + a[1]), 0]],
+        drift=_one_rope_drift,
         sway=lambda q, a, k: [(k.L0 + a[1]) * sine_cosine(q[0])[0]],
     ),
     "gantry-crane": Machine(
@@ -201,8 +202,8 @@ MACHINES: Mapping[str, Machine] = {
         coordinates=("theta_x", "theta_y"),
         loads=_JOINT,
         end_load=("load", slice(0, 2)),
-        driven=_joint_driven,
-        free=_joint_free,
+        input_matrix=_joint_inputs,
+        drift=_joint_drift,
         sway=_joint_sway,
     ),
     "tower-crane": Machine(
@@ -210,8 +211,8 @@ MACHINES: Mapping[str, Machine] = {
         coordinates=("theta_r", "theta_t"),
         loads=_JIB,
         end_load=("load", slice(0, 2)),
-        driven=_jib_driven,
-        free=_jib_free,
+        input_matrix=_jib_inputs,
+        drift=_jib_drift,
         sway=_joint_sway,
     ),
     "flexible-joint": Machine(
@@ -219,8 +220,8 @@ MACHINES: Mapping[str, Machine] = {
         coordinates=("alpha",),
         loads=("tip",),
         end_load=("tip", slice(0, 1)),
-        driven=lambda q, a, k: [[1]],
-        free=lambda q, dq, a, v, k: [-(k.k * q[0] + k.c * dq[0]) / k.J],
+        input_matrix=lambda q, a, k: [[1]],
+        drift=lambda q, dq, a, v, k: [-(k.k * q[0] + k.c * dq[0]) / k.J],
         sway=lambda q, a, k: [k.R * q[0]],
     ),
     "slosh-tank": Machine(
@@ -228,8 +229,10 @@ MACHINES: Mapping[str, Machine] = {
         coordinates=("theta1", "theta2"),
         loads=("surface",),
         end_load=("surface", slice(0, 1)),
-        driven=lambda q, a, k: [[sine_cosine(one)[1] / length] for one, length in zip(q, k.L, strict=True)],
-        free=_tank_free,
+        input_matrix=lambda q, a, k: [
+            [sine_cosine(one)[1] / length] for one, length in zip(q, k.L, strict=True)
+        ],
+        drift=_tank_drift,
         sway=lambda q, a, k: [k.rise[0] * sine_cosine(q[0])[0] + k.rise[1] * sine_cosine(q[1])[0]],
         constants=_tank,
     ),

@@ -67,8 +67,8 @@ def spec_of(document: Mapping[str, Any], digest: str) -> Mapping[str, Any]:
     for one in listed:
         text = json.dumps(one["spec"], sort_keys=True, separators=(",", ":"), ensure_ascii=True)
         if hashlib.sha256(text.encode("ascii")).hexdigest() == digest:
-            found: Mapping[str, Any] = one["spec"]
-            return found
+            spec: Mapping[str, Any] = one["spec"]
+            return spec
     raise NotProvedError("the certificate is about another spec")
 
 
@@ -90,12 +90,14 @@ def read_setpoints(content: bytes, spec: Mapping[str, Any], axes: Sequence[str])
     """
     try:
         text = content.decode("utf-8")
-        found = _of_block(text, spec, axes) if "END_FUNCTION_BLOCK" in text else _of_table(text, spec, axes)
+        setpoints = (
+            _of_block(text, spec, axes) if "END_FUNCTION_BLOCK" in text else _of_table(text, spec, axes)
+        )
     except (ValueError, IndexError, ArithmeticError) as error:
         raise NotProvedError(f"not covered, or damaged: an artefact of another format ({error})") from error
-    if len(found.times) < 2 or not all(isfinite(one) for row in found.positions for one in row):
+    if len(setpoints.times) < 2 or not all(isfinite(one) for row in setpoints.positions for one in row):
         raise NotProvedError("the artefact holds a number that is not finite, or no motion")
-    return found
+    return setpoints
 
 
 def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedSetpoints:
@@ -105,10 +107,10 @@ def _of_table(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedS
     header, *rows = csv.reader(text.splitlines())
     several = len(axes) > 1
     names = [f"{f'{name}_' if several else ''}position_{spec['axis'][name]['unit']}" for name in axes]
-    told = [Decimal(row[header.index("time_s")]) for row in rows]
-    cycle = float(told[1] - told[0])
+    times = [Decimal(row[header.index("time_s")]) for row in rows]
+    cycle = float(times[1] - times[0])
     over, under = Decimal(repr(cycle)).as_integer_ratio()
-    if any(time * under != number * over for number, time in enumerate(told)):
+    if any(time * under != number * over for number, time in enumerate(times)):
         raise ValueError("times that are not even")
     columns = [[float(row[header.index(name)]) for row in rows] for name in names]
     counted = [spec["axis"][name]["unit"] == "counts" for name in axes]
@@ -133,8 +135,8 @@ def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedS
 
     def constant(name: str) -> list[float]:
         array_of = r"(?:ARRAY\s*\[[0-9.]+\]\s*OF\s*)?"
-        (found,) = re.findall(rf"\b{name}\s*:\s*{array_of}[A-Z]+\s*:=\s*\[?([^\];]*)", bare)
-        return [float(one) for one in found.split(",")]
+        (values,) = re.findall(rf"\b{name}\s*:\s*{array_of}[A-Z]+\s*:=\s*\[?([^\];]*)", bare)
+        return [float(one) for one in values.split(",")]
 
     layout, factors = spec["export"]["plc_layout"], scales_of(spec, axes)
     counted = [layout == "counts" or spec["axis"][name]["unit"] == "counts" for name in axes]
@@ -162,21 +164,22 @@ def _of_block(text: str, spec: Mapping[str, Any], axes: Sequence[str]) -> TimedS
 
 def _horner(powers: Sequence[float], time: float) -> float:
     """Evaluate as the block does, rounding included."""
-    found = powers[-1]
+    total = powers[-1]
     for one in powers[-2::-1]:
-        found = one + time * found
-    return found
+        total = one + time * total
+    return total
 
 
 def ranges_of(spec: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """List the ranges of the check that are wider than nothing."""
     check, plant = spec["check"], spec["plant"]
     shares = check["uncertain"] if "uncertain" in check else spec["robustness"].get("uncertain", {})
-    found = {
-        name: (plant[name] * (1.0 - share), plant[name] * (1.0 + share)) for name, share in shares.items()
+    ranges = {
+        name: (plant[name] * (1.0 - fraction), plant[name] * (1.0 + fraction))
+        for name, fraction in shares.items()
     }
-    found |= {name: (low, high) for name, (low, high) in check.get("spans", {}).items()}
-    return {name: ends for name, ends in found.items() if ends[1] > ends[0]}
+    ranges |= {name: (low, high) for name, (low, high) in check.get("spans", {}).items()}
+    return {name: ends for name, ends in ranges.items() if ends[1] > ends[0]}
 
 
 class ProofMaterial:
@@ -284,7 +287,7 @@ def _unpacked(packed: Mapping[str, Any], kind: str) -> tuple[list[int], array[An
     _require(0 < size <= MOST_BYTES and min(shape) > 0, "arrays")
     content = zlib.decompressobj().decompress(base64.b64decode(packed["zlib"], validate=True), size)
     _require(len(content) == size, "arrays")
-    found = array(kind, content)
+    values = array(kind, content)
     if memoryview(array("H", [1])).tobytes() != b"\x01\x00":
-        found.byteswap()
-    return shape, found
+        values.byteswap()
+    return shape, values

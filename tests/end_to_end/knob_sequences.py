@@ -28,7 +28,7 @@ SEARCHING = "Looking for what would help"
 UNHEARD = ("Internal error", "unheard of", "has ended")
 
 
-def turned(chance: random.Random, knobs: list[dict[str, Any]]) -> dict[str, Any]:
+def edits_of(chance: random.Random, knobs: list[dict[str, Any]]) -> dict[str, Any]:
     """Turn a knob as a hand might, within its bounds and now and then beyond."""
     knob = chance.choice(knobs)
     path, value = knob["path"], knob["value"]
@@ -115,7 +115,7 @@ async def turn_knobs(running: Studio, seed: str, first: int, count: int) -> Coun
         await page.show(preset, edits)
         ends[f"at first: {await page.answer()}"] += 1
         for _ in range(chance.randint(1, 8)):
-            taken = edits | turned(chance, page.knobs)
+            taken = edits | edits_of(chance, page.knobs)
             await page.show(preset, taken)
             edits = edits if chance.random() < UNDONE else taken
             await asyncio.sleep(chance.choice([0.0, 0.02, 0.1]))
@@ -159,7 +159,7 @@ def main() -> None:
     parser.add_argument("--seed", default="knobs")
     parser.add_argument("--first", type=int, default=0)
     arguments = parser.parse_args()
-    with tempfile.TemporaryFile("w+") as told, studio("--preset", "paper", told=told) as running:
+    with tempfile.TemporaryFile("w+") as stderr, studio("--preset", "paper", stderr=stderr) as running:
         warm = 50
         print(
             asyncio.run(turn_knobs(running, "warm", 0, warm)), Footprint.of(running.pid), sep="\n", flush=True
@@ -168,8 +168,8 @@ def main() -> None:
         ends = asyncio.run(turn_knobs(running, arguments.seed, arguments.first, arguments.count))
         print(f"{arguments.count} sequences, {time.perf_counter() - began:.0f} s: {dict(ends)}")
         print(Footprint.of(running.pid))
-        told.seek(0)
-        print("told:", told.read() or "nothing")
+        stderr.seek(0)
+        print("told:", stderr.read() or "nothing")
 
 
 if __name__ == "__main__":

@@ -57,8 +57,8 @@ class Studio:
     async def connect(self, **headers: str) -> WebSocketClientConnection:
         """Open a conversation as the page does."""
         url = f"{self.address.replace('http:', 'ws:')}live"
-        told = {"Origin": self.origin, "Cookie": self.cookie} | headers
-        return await websocket_connect(HTTPRequest(url, headers=told))
+        sent = {"Origin": self.origin, "Cookie": self.cookie} | headers
+        return await websocket_connect(HTTPRequest(url, headers=sent))
 
     def open(self, window: Browser) -> None:
         """Type the code into a browser's window."""
@@ -72,15 +72,15 @@ class Studio:
 def studio(
     *words: str | Path,
     folder: Path | None = None,
-    told: IO[str] | None = None,
+    stderr: IO[str] | None = None,
     program: Sequence[str | Path] = (PROGRAM,),
     browser: Path | None = None,
 ) -> Iterator[Studio]:
-    """Start the studio, and end it as Ctrl-C does; `told` takes its stderr."""
+    """Start the studio, and end it as Ctrl-C does; `stderr` takes its stderr."""
     command = [*program, "studio", "--json", *([] if browser else ["--no-browser"]), *words]
     told_of = {**os.environ, "BROWSER": f"{browser} %s"}
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=told, text=True, cwd=folder, env=told_of
+        command, stdout=subprocess.PIPE, stderr=stderr, text=True, cwd=folder, env=told_of
     ) as process:
         try:
             assert process.stdout is not None

@@ -62,8 +62,8 @@ def test_what_the_setpoints_ask_of_the_axes_is_what_differences_of_the_file_say(
     for axis in ("cart", "hoist"):
         position = 1e-3 * np.pad(table[f"{axis}_position_mm"], 2, mode="edge")
         for order, kind, limit in ((2, "acceleration", 0.9), (3, "jerk", 3.0)):
-            found, told = np.abs(np.diff(position, order)).max() / 0.01**order, said[axis][kind]
-            assert told["bound"] == pytest.approx(found, rel=1e-6) and told["limit"] == limit
+            found, claim = np.abs(np.diff(position, order)).max() / 0.01**order, said[axis][kind]
+            assert claim["bound"] == pytest.approx(found, rel=1e-6) and claim["limit"] == limit
         assert said[axis]["acceleration"]["unit"] == "m/s²" and "velocity" not in said[axis]
 
 
@@ -214,6 +214,6 @@ def test_where_counts_are_too_coarse_for_a_bound_that_is_said(tmp_path):
     spec = gp.preset_spec("double-pendulum-crane", [*coarse, "export.cycle_time=0.02"])
     written = gp.design(spec, ["csv"], tmp_path, check=False)
     proof = gp.certify_artefact(written.folder / written.artefacts[0].path)
-    assert proof.share < 1.0
+    assert proof.fraction < 1.0
     assert "rounded to counts that are too coarse" in proof.reasons()[0]
     assert "axis.counts_per_metre" in proof.reasons()[0]

@@ -10,7 +10,7 @@ from end_to_end.studios import studio
 
 @pytest.mark.slow
 def test_random_knobs_leave_no_traceback_no_process_and_no_open_file():
-    with tempfile.TemporaryFile("w+") as told, studio(told=told) as running:
+    with tempfile.TemporaryFile("w+") as stderr, studio(stderr=stderr) as running:
         asyncio.run(turn_knobs(running, "first", 0, 1))
         before = Footprint.of(running.pid)
         ends = asyncio.run(turn_knobs(running, "sample", 0, 3))
@@ -18,6 +18,6 @@ def test_random_knobs_leave_no_traceback_no_process_and_no_open_file():
         assert ends.pop("at first: verdict") == 3 and ends.pop("at last: verdict") == 1
         assert set(ends) <= {"verdict", "faults", "failure", "overtaken"}
         assert (after.files, after.workers) <= (before.files, before.workers)
-        told.seek(0)
-        (line,) = told.read().splitlines()
+        stderr.seek(0)
+        (line,) = stderr.read().splitlines()
         assert line.startswith("The code was used.")

@@ -150,9 +150,9 @@ def answer(address, **headers):
 class TestPage:
     def test_it_tells_the_state(self, page):
         status, content = answer(f"{page.address}state")
-        (axis,) = (told := json.loads(content))["axes"]
-        assert (status, told["phase"], told["over"]) == (200, "stream", False)
-        assert (told["time"], told["duration"]) == (1.0, 1.5)
+        (axis,) = (state := json.loads(content))["axes"]
+        assert (status, state["phase"], state["over"]) == (200, "stream", False)
+        assert (state["time"], state["duration"]) == (1.0, 1.5)
         assert axis["planned"] == [0.0, 1.0, 2.0, 3.0]
         assert axis["actual"] == [0.0, None, 1.99, None]
 
@@ -194,6 +194,6 @@ def test_the_address_is_told(log):
         address = next(
             line.split()[-1] for line in process.stderr if line.startswith("Watch at http://127.0.0.1:")
         )
-        told = json.loads(answer(f"{address}state")[1])
+        state = json.loads(answer(f"{address}state")[1])
         out, _ = process.communicate()
-    assert (told["name"], process.returncode, json.loads(out)["state"]) == ("paper", 0, "done")
+    assert (state["name"], process.returncode, json.loads(out)["state"]) == ("paper", 0, "done")

@@ -56,43 +56,43 @@ def residual(library, case, asked_for, distance):
 
 @pytest.mark.slow
 def test_what_was_swept_is_found_itself(library):
-    found = looked_up(library, "--move.distance", "0.3", "--plant.L1", "0.35", "--solver.method", "auto")
-    row = read_table(library, grid_of(library)).to_pylist()[found["case"]]
+    nearest = looked_up(library, "--move.distance", "0.3", "--plant.L1", "0.35", "--solver.method", "auto")
+    row = read_table(library, grid_of(library)).to_pylist()[nearest["case"]]
     assert (row["move.distance"], row["plant.L1"], row["solver.method"]) == (0.3, 0.35, "auto")
-    assert found["differences"] == {"move.distance": 0.0, "plant.L1": 0.0}
-    assert found["artefact"]["manifest"] == "matches"
-    assert found["sway_residual_worst_m"] == pytest.approx(row["check_worst_sway_m"], rel=1e-3)
-    assert found["artefacts"][0]["path"] == str(library / row["folder"] / "paper.csv")
+    assert nearest["differences"] == {"move.distance": 0.0, "plant.L1": 0.0}
+    assert nearest["artefact"]["manifest"] == "matches"
+    assert nearest["sway_residual_worst_m"] == pytest.approx(row["check_worst_sway_m"], rel=1e-3)
+    assert nearest["artefacts"][0]["path"] == str(library / row["folder"] / "paper.csv")
 
 
 def test_one_file_answers_as_the_folder_does_and_gives_the_profile_out(library, tmp_path):
     words = ("--move.distance", "0.31", "--plant.L1", "0.305", "--solver.method", "auto")
     path = archived(library, tmp_path / "library.sqlite")
-    due, found = looked_up(library, *words), looked_up(path, *words, "--out", tmp_path / "out")
-    files = {"artefact": found["artefact"], "artefacts": found["artefacts"]}
-    assert found == due | files
-    for one, other in zip(due["artefacts"], found["artefacts"], strict=True):
+    due, nearest = looked_up(library, *words), looked_up(path, *words, "--out", tmp_path / "out")
+    files = {"artefact": nearest["artefact"], "artefacts": nearest["artefacts"]}
+    assert nearest == due | files
+    for one, other in zip(due["artefacts"], nearest["artefacts"], strict=True):
         assert Path(other["path"]).parent == tmp_path / "out"
         assert Path(other["path"]).read_bytes() == Path(one["path"]).read_bytes()
-    assert check_artefact(found["artefacts"][0]["path"]).manifest == "matches"
+    assert check_artefact(nearest["artefacts"][0]["path"]).manifest == "matches"
 
 
 @pytest.mark.parametrize("length", [0.305, 0.31])
 def test_between_the_values_the_nearest_is_judged_on_the_machine_asked_for(library, length):
-    found = looked_up(library, f"--plant.L1={length}", "--move.distance=0.31", "--solver.method=auto")
-    assert found["used"] == {"solver.method": "auto", "move.distance": 0.3, "plant.L1": 0.3}
-    assert found["differences"] == pytest.approx({"move.distance": -0.01, "plant.L1": 0.3 - length})
-    sway, passed = residual(library, found["case"], length, 0.3)
-    assert passed and found["sway_residual_worst_m"] == sway
-    assert sway != pytest.approx(found["sway_residual_worst_designed_m"], rel=1e-3)
+    nearest = looked_up(library, f"--plant.L1={length}", "--move.distance=0.31", "--solver.method=auto")
+    assert nearest["used"] == {"solver.method": "auto", "move.distance": 0.3, "plant.L1": 0.3}
+    assert nearest["differences"] == pytest.approx({"move.distance": -0.01, "plant.L1": 0.3 - length})
+    sway, passed = residual(library, nearest["case"], length, 0.3)
+    assert passed and nearest["sway_residual_worst_m"] == sway
+    assert sway != pytest.approx(nearest["sway_residual_worst_designed_m"], rel=1e-3)
 
 
 @pytest.mark.slow
 def test_a_nearer_profile_that_is_not_safe_there_is_passed_over(library):
     words = ("--move.distance", "0.39", "--plant.L1", "0.33", "--solver.method", "auto")
-    found = looked_up(library, *words)
-    assert found["used"]["move.distance"] == 0.3
-    passed_over = [entry["case"] for entry in found["passed_over"]]
+    nearest = looked_up(library, *words)
+    assert nearest["used"]["move.distance"] == 0.3
+    passed_over = [entry["case"] for entry in nearest["passed_over"]]
     assert passed_over
     for case in passed_over:
         assert not residual(library, case, 0.33, 0.4)[1]
@@ -104,8 +104,10 @@ def test_a_nearer_profile_that_is_not_safe_there_is_passed_over(library):
 
 @pytest.mark.parametrize(("distance", "length"), [(0.39, 0.33), (0.36, 0.3), (0.33, 0.31)])
 def test_nearness_counts_in_steps_of_the_grid(library, distance, length):
-    found = looked_up(library, f"--move.distance={distance}", f"--plant.L1={length}", "--solver.method=auto")
-    tried = [*(entry["case"] for entry in found["passed_over"]), found["case"]]
+    nearest = looked_up(
+        library, f"--move.distance={distance}", f"--plant.L1={length}", "--solver.method=auto"
+    )
+    tried = [*(entry["case"] for entry in nearest["passed_over"]), nearest["case"]]
     rows = [row for row in read_table(library, grid_of(library)).to_pylist() if row["status"] == "passed"]
     rows = [row for row in rows if row["solver.method"] == "auto"]
     steps = {

@@ -43,14 +43,16 @@ def test_a_script_drives_simulated_drives(tmp_path, monkeypatch):
     table = tmp_path / "driven.csv"
     options = (*deployed(tmp_path, {"passed": True}), "--simulate-drive", "--log", table)
     outcome = run_here("stream", *options, "--live-parameter", "L1=0.42", "--json")
-    told = outcome.document
-    assert (outcome.code, told["state"], told["cycles_planned"]) == (0, "done", None)
-    assert told["planner"] == {"promise": True, "error_ids": []}
-    assert 0.0 < told["drive"]["sway_residual_peak_m"] < 0.01  # the machine's rope is longer than the block's
+    document = outcome.document
+    assert (outcome.code, document["state"], document["cycles_planned"]) == (0, "done", None)
+    assert document["planner"] == {"promise": True, "error_ids": []}
+    assert (
+        0.0 < document["drive"]["sway_residual_peak_m"] < 0.01
+    )  # the machine's rope is longer than the block's
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert list(rows[0]) == ["time_s", "cart_planned_m", "cart_actual_m", "promise", "error_id"]
     due = list(csv.DictReader(play(planner_text(), KNOWING).table.splitlines()))
-    assert len(rows) == told["cycles_sent"] == len(due)
+    assert len(rows) == document["cycles_sent"] == len(due)
     for now, before in zip(rows[1:], due, strict=False):  # a drive is where it was led to by the cycle before
         assert float(now["cart_planned_m"]) == pytest.approx(float(before["position_m"]), abs=1e-6)
 

@@ -347,8 +347,8 @@ def test_the_report_is_named_after_the_spec_by_default(tmp_path, monkeypatch):
 def test_a_delivered_file_is_reported_on_by_its_manifest(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert run_here("--preset", "paper", "--export", "plc", "--export", "csv", "--out", "deploy").code == 0
-    told = run_here("report", "deploy/paper.st", "--no-compare")
-    assert (told.code, told.errors) == (0, [])
+    outcome = run_here("report", "deploy/paper.st", "--no-compare")
+    assert (outcome.code, outcome.errors) == (0, [])
     text = " ".join(Reader(Path("paper.html").read_text("utf-8")).texts)
     assert hashlib.sha256(Path("deploy/paper.st").read_bytes()).hexdigest() in text.replace(" ", "")
     table = Path("deploy/paper.csv")

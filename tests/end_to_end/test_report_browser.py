@@ -171,16 +171,16 @@ def test_the_slider_sets_the_time_and_larger_sway_is_drawn_larger(browser, paper
     assert hanging == pytest.approx(end, abs=0.5)
     assert "arrived" in browser.find(".clock").text
     browser.run(SEEK, 0.1)  # 0.7 s
-    told = float(re.search(r"\+([0-9.]+) mm", browser.find(".actor h3 span").text)[1])
-    assert told == pytest.approx(19.35, abs=0.05)
+    swing = float(re.search(r"\+([0-9.]+) mm", browser.find(".actor h3 span").text)[1])
+    assert swing == pytest.approx(19.35, abs=0.05)
     scale = (end - start) / 300.0
     trolley, load = places()
-    assert trolley - load == pytest.approx(scale * told, rel=0.05)
+    assert trolley - load == pytest.approx(scale * swing, rel=0.05)
     browser.run(
         "const s = document.querySelector('.scale'); s.value = '5'; s.dispatchEvent(new Event('change'))"
     )
     trolley, load = places()
-    assert trolley - load == pytest.approx(5.0 * scale * told, rel=0.05)
+    assert trolley - load == pytest.approx(5.0 * scale * swing, rel=0.05)
 
 
 def test_panels_zoom_together_and_a_legend_hides_a_curve_everywhere(browser, paper):

@@ -11,9 +11,9 @@ BARE = ("--preset", "paper", "--set", "export.cycle_time=0.01")
 FILES = ("paper.csv", "manifest.json", "manifest.json.minisig")
 
 
-def minisign(*words, told=""):
+def minisign(*words, entered=""):
     done = subprocess.run(
-        [program("minisign", "minisign"), *words], input=told, capture_output=True, text=True, check=False
+        [program("minisign", "minisign"), *words], input=entered, capture_output=True, text=True, check=False
     )
     return done.returncode, done.stdout + done.stderr
 
@@ -49,9 +49,9 @@ def checked(folder, keys, name="own", file="paper.csv"):
 
 
 def test_minisign_verifies_what_the_program_signs(signed, keys):
-    code, told = minisign("-Vm", signed / "manifest.json", "-p", keys / "own.pub")
-    assert code == 0 and "Signature and comment signature verified" in told
-    assert "Trusted comment: manifest of paper" in told
+    code, printed = minisign("-Vm", signed / "manifest.json", "-p", keys / "own.pub")
+    assert code == 0 and "Signature and comment signature verified" in printed
+    assert "Trusted comment: manifest of paper" in printed
     assert minisign("-Vm", signed / "manifest.json", "-p", keys / "other.pub")[0] != 0
 
 
@@ -104,8 +104,8 @@ def test_another_key_a_file_beside_and_no_key_are_refused(copied, keys):
 
 
 def test_an_encrypted_key_is_left_to_minisign(keys, tmp_path):
-    code, told = minisign("-G", "-p", tmp_path / "p", "-s", tmp_path / "s", told="a\na\n")
-    assert code == 0, told
+    code, printed = minisign("-G", "-p", tmp_path / "p", "-s", tmp_path / "s", entered="a\na\n")
+    assert code == 0, printed
     refused = run_here(*BARE, "--out", tmp_path / "new", "--sign", tmp_path / "s")
     assert refused.code == 2 and "minisign -Sm manifest.json" in refused.errors[0]
 

@@ -73,13 +73,13 @@ def streamed(*arguments):
 def test_simulated_drives_end_without_sway(deployed, tmp_path):
     table = tmp_path / "driven.csv"
     outcome = streamed(deployed / "paper.log", "--simulate-drive", "--self-test", "--log", table)
-    told = outcome.document
-    assert (outcome.code, told["state"], told["reason"]) == (0, "done", "")
-    assert told["cycles_sent"] == told["cycles_planned"] == 151
-    assert told["drive"]["position_error_m"] == 0.0
-    assert 0.0 < told["drive"]["sway_residual_peak_m"] < 3e-4
-    assert {"p50", "p99", "max"} <= told["lateness_us"].keys()
-    assert sum(told["lateness_us"]["histogram"].values()) == 151
+    document = outcome.document
+    assert (outcome.code, document["state"], document["reason"]) == (0, "done", "")
+    assert document["cycles_sent"] == document["cycles_planned"] == 151
+    assert document["drive"]["position_error_m"] == 0.0
+    assert 0.0 < document["drive"]["sway_residual_peak_m"] < 3e-4
+    assert {"p50", "p99", "max"} <= document["lateness_us"].keys()
+    assert sum(document["lateness_us"]["histogram"].values()) == 151
     head, *rows = csv.reader(table.read_text().splitlines())
     assert head == ["time_s", "cart_planned_m", "cart_actual_m"]
     assert len(rows) == 151
@@ -93,11 +93,11 @@ def test_drives_that_take_only_speed(tmp_path, hasty):
     options = [word for override in spec for word in ("--set", override)]
     designed = run_here("--preset", "paper", *options, "--export", "can", "--out", tmp_path, "--json")
     assert designed.document["check"]["passed"]
-    told = streamed(tmp_path / "paper.log", "--simulate-drive").document
-    assert (told["state"], told["reason"]) == ("done", "")
-    assert told["drive"]["position_error_m"] == 0.0
-    assert told["drive"]["following_error_max_m"] < 1.1e-6  # a count
-    assert 0.0 < told["drive"]["sway_residual_peak_m"] < 3e-4
+    document = streamed(tmp_path / "paper.log", "--simulate-drive").document
+    assert (document["state"], document["reason"]) == ("done", "")
+    assert document["drive"]["position_error_m"] == 0.0
+    assert document["drive"]["following_error_max_m"] < 1.1e-6  # a count
+    assert 0.0 < document["drive"]["sway_residual_peak_m"] < 3e-4
 
 
 @pytest.fixture
@@ -134,11 +134,13 @@ def test_a_busy_machine_delays_a_simulation_as_a_whole(deployed, monkeypatch):
         send(self, messages)
 
     monkeypatch.setattr(Pacer, "send", kept_from_it)
-    told = run_here("stream", deployed / "paper.log", "--simulate-drive", "--json").document
-    assert (told["state"], told["cycles_sent"]) == ("done", 151)
-    assert told["drive"]["sway_residual_peak_m"] < 3e-4
-    assert told["lateness_us"]["max"] < 10_000
-    stall = re.fullmatch(r"This machine stalled for (\d+) ms in all, and the .* with it\.", told["notes"][-1])
+    document = run_here("stream", deployed / "paper.log", "--simulate-drive", "--json").document
+    assert (document["state"], document["cycles_sent"]) == ("done", 151)
+    assert document["drive"]["sway_residual_peak_m"] < 3e-4
+    assert document["lateness_us"]["max"] < 10_000
+    stall = re.fullmatch(
+        r"This machine stalled for (\d+) ms in all, and the .* with it\.", document["notes"][-1]
+    )
     assert int(stall[1]) >= 3 * (100 - 5)
 
 
@@ -168,13 +170,16 @@ def test_a_silent_bus_is_told_once(deployed):
 
 
 def test_dry_run_touches_no_bus(deployed):
-    told = run_here("stream", deployed / "paper.log", "--dry-run", "--json").document
-    assert (told["state"], told["cycles_sent"], told["cycles_planned"]) == ("planned", 0, 151)
-    assert told["axes"] == [{"name": "cart", "node": 1, "start_m": 0.0, "target_m": 0.3}]
-    assert 0.02 < told["bus_load"] < 0.04
-    assert {"node": 1, "object": "60C2h:01", "value": 2, "meaning": "interpolation period: digits"} in told[
-        "startup"
-    ]
+    document = run_here("stream", deployed / "paper.log", "--dry-run", "--json").document
+    assert (document["state"], document["cycles_sent"], document["cycles_planned"]) == ("planned", 0, 151)
+    assert document["axes"] == [{"name": "cart", "node": 1, "start_m": 0.0, "target_m": 0.3}]
+    assert 0.02 < document["bus_load"] < 0.04
+    assert {
+        "node": 1,
+        "object": "60C2h:01",
+        "value": 2,
+        "meaning": "interpolation period: digits",
+    } in document["startup"]
     words = run_here("stream", deployed / "paper.log", "--dry-run").out
     assert "cart: node 1, from 0 to 0.3 m" in words
     assert "1400h:01 = 80000201h  controlword: off while it changes" in words
@@ -183,11 +188,11 @@ def test_dry_run_touches_no_bus(deployed):
 
 def test_a_spec_is_designed_first(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    told = run_here(
+    document = run_here(
         "stream", "--preset", "paper", "--node", "5", "--mode", "ip", "--dry-run", "--json"
     ).document
-    assert told["axes"][0]["node"] == 5
-    assert {entry["value"] for entry in told["startup"] if entry["object"] == "6060h:00"} == {7}
+    assert document["axes"][0]["node"] == 5
+    assert {entry["value"] for entry in document["startup"] if entry["object"] == "6060h:00"} == {7}
     assert not list(tmp_path.iterdir())
 
 
@@ -375,11 +380,11 @@ def test_drives_of_their_own(deployed, monkeypatch):
     monkeypatch.setattr(workflow, "SystemClock", lambda: clock)
     spec = ("--set", "can.timeout=0.5", "--set", "can.sync_period=0.02")
     options = ("--interface", "virtual", "--channel", "apart", "--own-mapping", "--miss", "hold")
-    told = run_here("drive-sim", "--preset", "paper", *spec, *options, "--json").document
-    assert told["states"] == ["switch on disabled"]
+    document = run_here("drive-sim", "--preset", "paper", *spec, *options, "--json").document
+    assert document["states"] == ["switch on disabled"]
     assert records[0].reason == ""
-    assert told["position_m"] == pytest.approx([0.3])
-    assert told["sway_residual_peak_m"] < 3e-4
+    assert document["position_m"] == pytest.approx([0.3])
+    assert document["sway_residual_peak_m"] < 3e-4
 
 
 @pytest.fixture
@@ -419,8 +424,8 @@ class TestSlowMotions:
         assert 0.01 < peak / (np.abs(np.diff(ways)).max() / 1e6 / 0.02) <= 0.1 * (1 + 1e-3)
 
     def test_jogging(self, deployed, drive_away):
-        told = self.streamed(deployed, "--jog", "cart=-0.01").document
-        assert told["state"] == "done"
+        document = self.streamed(deployed, "--jog", "cart=-0.01").document
+        assert document["state"] == "done"
         assert drive_away.actual == pytest.approx(60_000)
 
     @pytest.mark.slow

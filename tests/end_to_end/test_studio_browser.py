@@ -87,10 +87,10 @@ def test_a_view_is_shared_with_its_state(page):
     field.send_keys(Keys.CONTROL, "a", Keys.NULL, "2.95\n")
     page.wait("return location.hash.length > 9")
     look_at(page, "compare")
-    name, _, told = page.run("return location.hash").partition("/")
-    assert name == "#compare" and told
-    assert page.run("return document.querySelector('#places a[data-view=drive]').hash") == f"#drive/{told}"
-    assert page.run("return document.querySelector('#places a[data-view=design]').hash") == f"#{told}"
+    name, _, state = page.run("return location.hash").partition("/")
+    assert name == "#compare" and state
+    assert page.run("return document.querySelector('#places a[data-view=drive]').hash") == f"#drive/{state}"
+    assert page.run("return document.querySelector('#places a[data-view=design]').hash") == f"#{state}"
     page.run("location.reload()")
     page.wait("return document.querySelector('#command')?.textContent.endsWith('move.duration=2.95')")
     assert page.run("return document.body.dataset.show") == "compare"
@@ -117,21 +117,21 @@ def test_sliders_stop_at_round_values_and_always_move(page):
 
 
 def test_numbers_are_told_as_they_are_read(page):
-    told = page.run("""
+    texts = page.run("""
         const speak = (language, act) => { document.documentElement.lang = language; return act(); };
         const all = () => [numbers.millimetres(7.995e-8), numbers.millimetres(1.61549), numbers.short(0.0272),
             numbers.sentence('needs 1.142 (jerk = 4.5, travel = [0.1, 2.5])'), numbers.ticks(2.76, 3.24)];
         const told = [speak('en', all), speak('de', all)];
         document.documentElement.lang = 'en';
         return told;""")
-    assert told[0] == [
+    assert texts[0] == [
         "< 0.001",
         "1.615",
         "0.0272",
         "needs 1.142 (jerk = 4.5, travel = [0.1, 2.5])",
         [2.8, 2.9, 3, 3.1, 3.2],
     ]
-    assert told[1][:4] == ["< 0,001", "1,615", "0,0272", "needs 1,142 (jerk = 4.5, travel = [0.1, 2.5])"]
+    assert texts[1][:4] == ["< 0,001", "1,615", "0,0272", "needs 1,142 (jerk = 4.5, travel = [0.1, 2.5])"]
 
 
 def test_designs_have_names_that_lie_on_nothing_and_an_axis_with_several_places(page):

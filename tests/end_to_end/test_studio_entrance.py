@@ -144,7 +144,7 @@ def until_closed(connection):
 
 @pytest.mark.slow
 def test_strangers_who_hold_connections_keep_no_user_out(tmp_path):
-    with (tmp_path / "told").open("w+") as told, studio(told=told) as running, ExitStack() as held:
+    with (tmp_path / "told").open("w+") as stderr, studio(stderr=stderr) as running, ExitStack() as held:
         place, begun = urlsplit(running.address), [*half_sent(urlsplit(running.address).netloc)]
         cookie = running.cookie
         for index in range(BEYOND):
@@ -158,8 +158,8 @@ def test_strangers_who_hold_connections_keep_no_user_out(tmp_path):
         assert len([*Path(f"/proc/{running.pid}/fd").iterdir()]) < 200
         heard = conversation(running, {"say": "open", "address": ""}, until="state")
         assert heard["hello"]["start"]
-        told.seek(0)
-        assert len(told.read().splitlines()) == 1  # another code
+        stderr.seek(0)
+        assert len(stderr.read().splitlines()) == 1  # another code
 
 
 @pytest.mark.slow

@@ -53,15 +53,15 @@ def test_strangers_are_refused(running):
 
 
 def test_a_code_works_once_and_in_any_writing(tmp_path):
-    with (tmp_path / "told").open("w+") as told, studio(told=told) as running:
+    with (tmp_path / "told").open("w+") as stderr, studio(stderr=stderr) as running:
         assert running.enter("") == running.enter("aaaaaaaa") == running.enter("ä") == ""
         assert running.enter(running.code, Origin="http://evil.example") == ""
         given = running.enter(f" {running.code[:4].upper()}-{running.code[4:]}")
         assert given.startswith(f"gen-profile-studio-{urlsplit(running.address).port}=")
         assert given.split("; ")[1:] == ["HttpOnly", "Path=/", "SameSite=Strict"]
         assert running.enter(running.code) == ""
-        told.seek(0)
-        assert running.enter(told.read().split()[-1]) == given
+        stderr.seek(0)
+        assert running.enter(stderr.read().split()[-1]) == given
 
 
 def test_the_page_can_load_and_tell_nothing_elsewhere(running):

@@ -58,6 +58,6 @@ def require_limits(out, rounding=1e-9, limits=(VELOCITY, ACCELERATION, JERK, HIG
 
 def residual(out, rates):
     """Amplitude that each mode is left with, relative to that of a step to the greatest velocity."""
-    turned = np.exp(1j * np.outer(rates, CYCLE * np.arange(len(out["fVelocity"]))))
-    left = np.trapezoid(out["fAcceleration"] * turned, dx=CYCLE)
+    phasors = np.exp(1j * np.outer(rates, CYCLE * np.arange(len(out["fVelocity"]))))
+    left = np.trapezoid(out["fAcceleration"] * phasors, dx=CYCLE)
     return np.abs(left).max() / max(np.abs(out["fVelocity"]).max(), 1e-3)

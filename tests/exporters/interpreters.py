@@ -128,11 +128,11 @@ def differences(programs):
                 in_c = run([*translations].index(name), rows) if name in translations else REFUSED
                 due = interpreted(text, rows)
                 ends[due if due == REFUSED else FAULT if due[-1] == FAULT else "value"] += 1
-                told = "\n".join([*map(str, rows), *program.lines])
+                listing = "\n".join([*map(str, rows), *program.lines])
                 if [*map(bits, in_c)] != [*map(bits, due)]:
-                    words.append(f"{program.seed}: C {in_c}, interpreter {due}\n{told}")
+                    words.append(f"{program.seed}: C {in_c}, interpreter {due}\n{listing}")
                 if program.result and bits(due[0]) != bits(program.result):
-                    words.append(f"{program.seed}: both {due[0]}, expected {program.result}\n{told}")
+                    words.append(f"{program.seed}: both {due[0]}, expected {program.result}\n{listing}")
     return ends, words
 
 

@@ -46,7 +46,7 @@ class PlannerBench(Bench):
         for axis in self.axes:
             self.put(axis, vendor.off)
         self.bring([at * unit for at, unit in zip(starts, units.values(), strict=True)])
-        self.told = self.told[-1:]
+        self.commanded = self.commanded[-1:]
 
     def guided(self, **inputs):
         """Take the axes over."""
@@ -54,7 +54,7 @@ class PlannerBench(Bench):
 
     def positions(self):
         """What the axes were told, in m."""
-        return np.array(self.told) / UNITS
+        return np.array(self.commanded) / UNITS
 
 
 class Converter:

@@ -28,13 +28,13 @@ def under_way(vendor, move=ONE, cycles=20):
     bench = bench_of(vendor, move)
     for _ in range(cycles):
         assert bench.cycle(bExecute=True)["bbusy"]
-    assert np.ptp(bench.told, axis=0).min() > 0.01
+    assert np.ptp(bench.commanded, axis=0).min() > 0.01
     return bench
 
 
 def steps(bench):
     """Greatest step of the setpoints from cycle to cycle, per axis."""
-    return np.abs(np.diff(bench.told, axis=0)).max(axis=0)
+    return np.abs(np.diff(bench.commanded, axis=0)).max(axis=0)
 
 
 # What happens to an axis, and the errors that tell it; a block may notice before its axis's state does.
@@ -55,10 +55,10 @@ def test_a_healthy_axis_gets_every_setpoint_and_is_let_go_at_the_end(vendor, mov
     bench = bench_of(vendor, move)
     outputs = bench.until(lambda row: row["bdone"], bExecute=True)
     assert not outputs["bbusy"] and outputs["nerrorid"] == 0
-    np.testing.assert_allclose(bench.told[-1], move.target, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(bench.commanded[-1], move.target, rtol=0, atol=1e-12)
     path = sample(move, CYCLE).position
-    begin = next(k for k, row in enumerate(bench.told) if row != bench.told[0]) - 1
-    np.testing.assert_allclose(bench.told[begin : begin + 51], path, rtol=0, atol=1e-9)
+    begin = next(k for k, row in enumerate(bench.commanded) if row != bench.commanded[0]) - 1
+    np.testing.assert_allclose(bench.commanded[begin : begin + 51], path, rtol=0, atol=1e-9)
     for _ in range(5):
         assert bench.cycle(bExecute=True)["bdone"]
     outputs = bench.until(lambda row: not row["bdone"], bExecute=False)
@@ -78,7 +78,7 @@ def test_a_pulse_is_enough_and_another_motion_can_follow(vendor):
         bench.cycle(bExecute=False)
     back = {"bMirror": True, "fStartOffset": 0.3}
     bench.until(lambda row: row["bdone"], bExecute=True, **back)
-    np.testing.assert_allclose(bench.told[-1], 0.1, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(bench.commanded[-1], 0.1, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("move", [ONE, TWO], ids=["one", "two"])
@@ -90,15 +90,15 @@ def test_a_mishap_on_the_way_is_told_and_never_followed_by_a_jump(vendor, mishap
     happen(bench)
     outputs = bench.cycle(bExecute=True)
     assert outputs["berror"] and outputs["nerrorid"] in due
-    stood = bench.told[-1][-1]
+    stood = bench.commanded[-1][-1]
     outputs = bench.until(lambda row: not row["bbusy"], bExecute=True)
     assert outputs["berror"] and not outputs["bdone"]
     # The lost axis is told nothing any more; the others stopped where the motion leads.
-    assert bench.told[-1][-1] == stood
+    assert bench.commanded[-1][-1] == stood
     assert (steps(bench) <= fastest.max() * 1.6).all()
     for _ in range(50):
         assert bench.cycle(bExecute=True)["nerrorid"] in due
-    assert bench.told[-1] == bench.told[-50]
+    assert bench.commanded[-1] == bench.commanded[-50]
 
     # All is well again: nothing moves before another edge, and then the start is checked.
     for axis in bench.axes:
@@ -109,13 +109,13 @@ def test_a_mishap_on_the_way_is_told_and_never_followed_by_a_jump(vendor, mishap
     assert not bench.cycle(bExecute=False)["berror"]
     outputs = bench.until(lambda row: not row["bbusy"], bExecute=True)
     assert (outputs["berror"], outputs["nerrorid"]) == (True, 2)
-    assert bench.told[-1] == bench.told[-50]
+    assert bench.commanded[-1] == bench.commanded[-50]
 
     # Brought back to the start, it plays.
     bench.cycle(bExecute=False)
     bench.bring(STARTS)
     bench.until(lambda row: row["bdone"], bExecute=True)
-    np.testing.assert_allclose(bench.told[-1], move.target, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(bench.commanded[-1], move.target, rtol=0, atol=1e-12)
 
 
 def test_another_edge_while_the_others_still_stop_waits_for_them(vendor):
@@ -123,12 +123,12 @@ def test_another_edge_while_the_others_still_stop_waits_for_them(vendor):
     bench.put(bench.axes[1], bench.vendor.error)
     bench.cycle(bExecute=True)
     bench.put(bench.axes[1], bench.vendor.fit)
-    stood = bench.told[-1][1]
+    stood = bench.commanded[-1][1]
     assert bench.cycle(bExecute=False)["bbusy"]
     outputs = bench.until(lambda row: row["berror"], bExecute=True)
     assert outputs["nerrorid"] == 2
-    assert bench.told[-1][1] == stood
-    assert bench.told[-1][0] != pytest.approx(0.1, abs=0.01)
+    assert bench.commanded[-1][1] == stood
+    assert bench.commanded[-1][0] != pytest.approx(0.1, abs=0.01)
 
 
 @pytest.mark.parametrize("mishap", MISHAPS)
@@ -140,16 +140,16 @@ def test_an_axis_that_cannot_be_taken_is_an_error_at_once(vendor, mishap):
     outputs = bench.until(lambda row: row["berror"], most=3, bExecute=True)
     assert outputs["nerrorid"] in due | {WORK}
     outputs = bench.until(lambda row: not row["bbusy"], most=3, bExecute=True)
-    assert outputs["berror"] and bench.told[-1] == bench.told[0]
+    assert outputs["berror"] and bench.commanded[-1] == bench.commanded[0]
 
 
 def test_an_axis_is_taken_where_it_stands_and_let_go_if_the_start_is_refused(vendor):
     bench = bench_of(vendor)
     bench.bring([7.0])
-    bench.told = []
+    bench.commanded = []
     outputs = bench.until(lambda row: row["berror"], bExecute=True)
     assert (outputs["bbusy"], outputs["nerrorid"]) == (False, 2)
-    assert {row[0] for row in bench.told} == {7.0}
+    assert {row[0] for row in bench.commanded} == {7.0}
     bench.axes[0].call(bAway=True)
     for _ in range(5):
         assert bench.cycle(bExecute=True)["nerrorid"] == 2
@@ -167,8 +167,8 @@ def test_abort_stops_and_holds_and_at_the_start_is_refused(vendor):
     outputs = bench.until(lambda row: not row["bbusy"], bExecute=True, bAbort=True)
     for _ in range(5):
         assert outputs["baborted"] and not outputs["berror"]
-        stood, outputs = bench.told[-1], bench.cycle(bExecute=True, bAbort=True)
-    assert bench.told[-1] == stood
+        stood, outputs = bench.commanded[-1], bench.cycle(bExecute=True, bAbort=True)
+    assert bench.commanded[-1] == stood
     bench.cycle(bExecute=False)
     bench.bring(STARTS)
     outputs = bench.until(lambda row: not row["bbusy"], bExecute=True, bAbort=True)
@@ -183,10 +183,10 @@ def test_the_way_that_is_left_is_played_on_while_held_and_after_it_was_let_go(ve
             for _ in range(10):
                 outputs = bench.cycle(bExecute=False, bAbort=False)
             assert not outputs["baborted"]
-        stood = bench.told[-1][0]
+        stood = bench.commanded[-1][0]
         outputs = bench.until(lambda row: not row["bbusy"], bAbort=False, bContinue=True)
         assert outputs["bdone"], outputs
-        assert 0.12 < stood < 0.39 and bench.told[-1][0] == pytest.approx(0.4, abs=1e-12)
+        assert 0.12 < stood < 0.39 and bench.commanded[-1][0] == pytest.approx(0.4, abs=1e-12)
         assert steps(bench) < 0.013  # 0.5625 m/s for a cycle
 
 
@@ -196,10 +196,10 @@ def test_the_way_that_is_left_is_not_played_on_from_elsewhere(vendor):
     bench.until(lambda row: not row["bbusy"], bExecute=True)
     bench.put(bench.axes[0], bench.vendor.fit)
     bench.bring([0.15])
-    told = len(bench.told)
+    count = len(bench.commanded)
     outputs = bench.until(lambda row: not row["bbusy"], bExecute=False, bContinue=True)
     assert (outputs["berror"], outputs["nerrorid"]) == (True, 2)
-    assert {row[0] for row in bench.told[told:]} == {0.15}
+    assert {row[0] for row in bench.commanded[count:]} == {0.15}
 
 
 def test_a_block_that_ends_without_telling_an_error_is_noticed():

@@ -18,9 +18,9 @@ def played(text, inputs, outputs, rows, folder):
     """Outputs of a block that matiec compiled, cycle by cycle."""
     library = compile_text(text, folder)
     read = "".join(f'scanf("%lf", &value); fb.{name.upper()}.value = value;\n' for name in inputs)
-    told = "".join(f'printf("%a ", (double) fb.{name.upper()}.value);\n' for name in outputs)
+    written = "".join(f'printf("%a ", (double) fb.{name.upper()}.value);\n' for name in outputs)
     source = HARNESS.replace("FB_BAY_3", "FB_BAY_3_PLANNER").replace("__GET_VAR(fb.NERRORID,)", "0")
-    for name, part in {"SWITCHES": "", "REALS": read, "OUTPUTS": told}.items():
+    for name, part in {"SWITCHES": "", "REALS": read, "OUTPUTS": written}.items():
         source = source.replace(f"        {name}\n", part)
     (folder / "main.c").write_text(source, encoding="ascii")
     flags = ["-O1", "-ffp-contract=off", "-w", "-I", str(library / "C"), "-o", "player", "main.c", "-lm"]

@@ -306,8 +306,8 @@ def test_three_modes_are_left_at_rest_in_little_more_than_the_shortest_time():
         done = np.argmax(out["bDone"])
         assert out["fPosition"][-1] == target
         assert np.flatnonzero(out["fVelocity"])[0] <= 25
-        turned = np.exp(1j * np.outer(rates, 1e-3 * np.arange(9000)))
-        assert np.abs(np.trapezoid(out["fAcceleration"] * turned, dx=1e-3)).max() < 1e-8
+        phasors = np.exp(1j * np.outer(rates, 1e-3 * np.arange(9000)))
+        assert np.abs(np.trapezoid(out["fAcceleration"] * phasors, dx=1e-3)).max() < 1e-8
         assert farthest(1e-3 * done / 1.10, rates, (0.6, 1.5, 20.0)) < abs(target - before)
         worst.append(out["operations"].max())
     stick = [block.hold(400, bVelocity=1.0, fVelocityCommand=speed) for speed in (0.6, -0.6)]

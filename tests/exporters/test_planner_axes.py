@@ -57,8 +57,8 @@ def require_limits(out):
 
 def residual(out, rope=ROPE):
     """Amplitude in m/s that the load is left with, in either direction."""
-    turned = np.exp(1j * np.sqrt(G / rope) * CYCLE * np.arange(len(out["bBusy"])))
-    return max(np.abs(np.trapezoid(out[f"fAcceleration_{axis}"] * turned, dx=CYCLE)) for axis in LIMITS)
+    phasors = np.exp(1j * np.sqrt(G / rope) * CYCLE * np.arange(len(out["bBusy"])))
+    return max(np.abs(np.trapezoid(out[f"fAcceleration_{axis}"] * phasors, dx=CYCLE)) for axis in LIMITS)
 
 
 def random_command(random):

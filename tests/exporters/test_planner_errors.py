@@ -54,8 +54,8 @@ def left(out, L1, m1=0.192, m2=0.183, L2=0.391, g=9.81):
     driven = np.linalg.solve(shapes, np.linalg.solve(mass, [(m1 + m2) * L1, m2 * L2]))
     shown = np.abs(np.array([[L1, 0.0], [L1, L2]]) @ shapes).max(axis=0) * np.abs(driven)
     rates = np.sqrt(squares)
-    turned = np.exp(1j * np.outer(rates, CYCLE * np.arange(len(out["fAcceleration"]))))
-    found = shown / rates * np.abs(np.trapezoid(out["fAcceleration"] * turned, dx=CYCLE))
+    phasors = np.exp(1j * np.outer(rates, CYCLE * np.arange(len(out["fAcceleration"]))))
+    found = shown / rates * np.abs(np.trapezoid(out["fAcceleration"] * phasors, dx=CYCLE))
     return found[np.argsort(rates)]
 
 

@@ -90,12 +90,12 @@ def test_an_axis_that_never_reaches_the_velocity_of_its_limits_is_told_of():
     changes = ["limits.velocity=2.0", "limits.travel=[0.0, 1000.0]"]
     slow, quick = (parse_spec(BAY, [*changes, f"limits.acceleration={a}"]) for a in (0.05, 1.0))
     (sentence,) = slow_axes(slow, planner_block(slow))
-    told = re.match(
+    warning = re.match(
         r"limits\.velocity: of 2 m/s the block reaches ([\d.]+) m/s with L1 = 3, m2 = \d+: ", sentence
     )
-    assert told
+    assert warning
     assert sentence.endswith("raise limits.acceleration.")
-    assert stick(slow, 3.0).max() == pytest.approx(float(told[1]), rel=0.05)
+    assert stick(slow, 3.0).max() == pytest.approx(float(warning[1]), rel=0.05)
     assert slow_axes(quick, planner_block(quick)) == ()
 
 

@@ -398,11 +398,11 @@ def test_events_tell_what_was_commanded_and_what_came_of_it(tmp_path):
     played = ("planner", "play", tmp_path / "block.st", "--commands", tmp_path / "commands.csv")
     events = tmp_path / "events.csv"
     assert run_here(*played, "--out", tmp_path / "setpoints.csv", "--events", events).code == 0
-    told = run_here("planner", "explain", events, "--json").document["events"]
-    assert [one["code"] for one in told if one["time_s"] < 0.45][:2] == [11, 63]
-    later = [one["code"] for one in told if one["time_s"] > 0.45]
+    explained = run_here("planner", "explain", events, "--json").document["events"]
+    assert [one["code"] for one in explained if one["time_s"] < 0.45][:2] == [11, 63]
+    later = [one["code"] for one in explained if one["time_s"] > 0.45]
     assert later == [21, 32, 12, 11, 70, 20, 53, 41, 50, 22, 12, 34, 42, 20, 13, 62, 11]
-    assert next(one for one in told if one["code"] == 70)["value"] == 2.0
+    assert next(one for one in explained if one["code"] == 70)["value"] == 2.0
     assert "the target is reached, at 2" in run_here("planner", "explain", events).out
     plain = run_here("planner", "play", *write_plain(tmp_path), "--events", events)
     assert (plain.code, "state planner.events = true" in plain.err) == (2, True)

@@ -82,7 +82,7 @@ def test_each_part_has_a_heading_and_numbers_of_equations_that_the_documentation
     page = (request.config.rootpath / "docs/planner-algorithm.md").read_text("utf-8")
     known = dict(re.findall(r"(?m)^\| \((\d+)\) \| .* \| (.*) \|$", page))
     assert list(known) == [str(number) for number in range(1, len(known) + 1)]
-    told = dict.fromkeys(known, "")
+    parts_by_number = dict.fromkeys(known, "")
     for path in sorted(TEXT.rglob("*.st")):
         if path.stem in ("block", "interface") or path.parent.name == "formulas":
             continue
@@ -90,8 +90,8 @@ def test_each_part_has_a_heading_and_numbers_of_equations_that_the_documentation
         assert re.match(r"\s*(@where_\w+\s*)?\(\* =====", text), path.name
         for heading in re.findall(r"\(\* =====.*?\*\)", text, re.DOTALL):
             for number in re.findall(r"\((\d+)\)", heading):
-                told[number] += f"`{path.name}`, "
-    for number, parts in told.items():
+                parts_by_number[number] += f"`{path.name}`, "
+    for number, parts in parts_by_number.items():
         assert {*parts.split(", ")} >= {*known[number].split(", ")}, number
 
 

@@ -87,14 +87,14 @@ class TestOneAxis:
         stages = []
         bench.until(lambda row: stages.append(row["nstage"]) or row["benabled"], most=40, **ON)
         assert sorted(set(stages)) == [POWERING, TAKING, GUIDING] and stages == sorted(stages)
-        assert {at for (at,) in bench.told} == {START * UNITS}
+        assert {at for (at,) in bench.commanded} == {START * UNITS}
         bench.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, fTarget=9.0)
-        assert bench.told[-1] == [pytest.approx(9.0 * UNITS, abs=1e-9)]
+        assert bench.commanded[-1] == [pytest.approx(9.0 * UNITS, abs=1e-9)]
         require_smooth(bench.positions())
 
     def test_it_gets_the_setpoints_of_the_block_alone(self, bench, bay):
         bench.guided()
-        begin = len(bench.told)
+        begin = len(bench.commanded)
         for _ in range(2000):
             bench.cycle(**ON, bExecute=True, fTarget=9.0)
         alone = CountedBlock(compiled(bay.text()), bEnable=0.0, fActPosition=START)
@@ -114,29 +114,29 @@ class TestOneAxis:
         outputs = bench.cycle(**ON, bExecute=True, fTarget=12.0)
         assert (outputs["nerrorid"], outputs["benabled"], outputs["nstage"]) == (20, False, BLOCK_OFF)
         # It runs on by itself; nothing that happens guides it but a reset and another edge.
-        stands = bench.told[-1][0] + 0.4 * UNITS
+        stands = bench.commanded[-1][0] + 0.4 * UNITS
         bench.part(bench.axes[0]).call(**{bench.vendor.actual: stands, bench.vendor.setpoint: stands})
-        told = len(bench.told)
+        count = len(bench.commanded)
         for given in (ON, {"bPower": True}, ON, {**ON, "bReset": True}, ON):
             for _ in range(30):
                 assert not bench.cycle(**{"bReset": False, "bEnable": False, **given})["benabled"]
         assert bench.cycle(**ON)["nerrorid"] == 0
         bench.cycle(bPower=True, bEnable=False)
         outputs = bench.guided(bExecute=False)
-        assert {at for (at,) in bench.told[told:]} == {stands}
+        assert {at for (at,) in bench.commanded[count:]} == {stands}
         assert (outputs["bpromise"], outputs["npromise"]) == (False, 2)
         outputs = bench.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, fTarget=12.0)
-        assert bench.told[-1] == [pytest.approx(12.0 * UNITS, abs=1e-9)]
-        require_smooth(bench.positions()[told:])
+        assert bench.commanded[-1] == [pytest.approx(12.0 * UNITS, abs=1e-9)]
+        require_smooth(bench.positions()[count:])
 
     def test_an_axis_that_is_taken_away_or_loses_its_power_is_an_error_with_its_number(self, bench):
         under_way(bench)
         bench.axes[0].call(bAway=True)
         outputs = bench.until(lambda row: row["berror"], most=2, **ON)
-        stood = bench.told[-1]
+        stood = bench.commanded[-1]
         assert outputs["nerrorid"] == AWAY
         bench.axes[0].call(bAway=False)
-        assert not bench.cycle(**ON)["benabled"] and bench.told[-1] == stood
+        assert not bench.cycle(**ON)["benabled"] and bench.commanded[-1] == stood
         bench.cycle(bEnable=False, bReset=True)
         bench.cycle(bReset=False)
         under_way(bench, fTarget=20.0)
@@ -148,7 +148,7 @@ class TestOneAxis:
     def test_a_controlled_disable_stops_without_sway_first(self, bench, bay, dropped):
         under_way(bench, fTarget=30.0)
         left = ON | {dropped: False}
-        moved = len(bench.told)
+        moved = len(bench.commanded)
         outputs = bench.cycle(**left)
         assert (outputs["benabled"], outputs["nstage"]) == (True, STOPPING)
         outputs = bench.until(quiet, most=9000, **left)
@@ -161,7 +161,7 @@ class TestOneAxis:
         alone.hold(100)
         alone.hold(1, bEnable=1.0)
         alone.hold(round(6.0 / CYCLE), bExecute=1.0, fTarget=30.0)
-        stopped = alone.hold(len(bench.told) - moved, bStop=1.0)["fPosition"]
+        stopped = alone.hold(len(bench.commanded) - moved, bStop=1.0)["fPosition"]
         np.testing.assert_allclose(bench.positions()[moved:, 0], stopped, rtol=0, atol=1e-9)
         assert stopped[-1] < 20.0
         powered = bench.part(bench.axes[0])[bench.vendor.state] == bench.vendor.fit
@@ -209,7 +209,7 @@ class TestOneAxis:
             outputs = bench.cycle(**ON, fFollowingLimit=0.05)
             if outputs["nerrorid"]:
                 break
-        begin = len(bench.told)
+        begin = len(bench.commanded)
         assert (outputs["nerrorid"], outputs["nstage"]) == (7, STOPPING)
         bench.until(lambda row: row["nstage"] == BLOCK_OFF, most=600, **ON, fFollowingLimit=0.05)
         steps = np.diff(bench.positions()[begin - 2 :, 0]) / CYCLE
@@ -223,10 +223,10 @@ class TestOneAxis:
         for number in range(60):
             outputs = bench.cycle(**(ON if number > 20 else {"bPower": True}))
             if not bench.wrapper["bFeed"] or (bench.vendor.part and not bench.axes[0]["bGenerator"]):
-                at = bench.told[-1][0] + speed * UNITS * CYCLE
+                at = bench.commanded[-1][0] + speed * UNITS * CYCLE
                 places = dict.fromkeys((bench.vendor.setpoint, bench.vendor.actual), at)
                 bench.part(bench.axes[0]).call(**places, **{bench.vendor.speed: speed * UNITS})
-                bench.told[-1] = [at]
+                bench.commanded[-1] = [at]
         assert outputs["benabled"] and outputs["bbusy"]
         bench.until(quiet, most=2000, **ON)
         steps = np.diff(bench.positions()[1:, 0]) / CYCLE
@@ -237,11 +237,11 @@ class TestOneAxis:
         for _ in range(20):
             bench.cycle(bPower=True)
         for _ in range(40):
-            lagging = {bench.vendor.actual: bench.told[-1][0] + 5.0}
+            lagging = {bench.vendor.actual: bench.commanded[-1][0] + 5.0}
             bench.part(bench.axes[0]).call(**lagging)
             outputs = bench.cycle(**ON)
         assert outputs["benabled"]
-        assert {at for (at,) in bench.told} == {START * UNITS}
+        assert {at for (at,) in bench.commanded} == {START * UNITS}
 
     def test_an_axis_that_is_not_homed_is_not_taken_and_can_be_homed_meanwhile(self, bench):
         bench.given |= dict.fromkeys(bench.homed, False)
@@ -249,7 +249,7 @@ class TestOneAxis:
         outputs = bench.until(lambda row: row["berror"], most=40, **ON)
         assert (outputs["nerrorid"], outputs["benabled"]) == (ASTRAY, False)
         bench.until(lambda row: bench.part(bench.axes[0])[bench.vendor.state] & 1, most=20, **ON)
-        assert bench.told == [bench.told[0]] * len(bench.told)
+        assert bench.commanded == [bench.commanded[0]] * len(bench.commanded)
         bench.put(bench.axes[0], bench.vendor.fit)
         bench.cycle(bPower=True, bEnable=False, bReset=True)
         bench.cycle(bPower=True, bEnable=False, bReset=False)
@@ -284,7 +284,7 @@ class TestOneAxis:
         assert blocks != VENDORS[of].blocks
         bench = PlannerBench(attrs.evolve(VENDORS[of], blocks=blocks), bay, {"": UNITS}, [START])
         outputs = bench.until(lambda row: row["berror"], most=2600, **ON)
-        assert (outputs["nerrorid"], len(bench.told) > 2400) == (number, True)
+        assert (outputs["nerrorid"], len(bench.commanded) > 2400) == (number, True)
 
 
 class TestTwoAxes:
@@ -294,18 +294,18 @@ class TestTwoAxes:
         two.put(two.axes[number], two.vendor.error)
         outputs = two.cycle(**ON)
         assert (outputs["nerrorid"], outputs["benabled"], outputs["nstage"]) == (20, True, STOPPING)
-        begin, lost = len(two.told), two.told[-1][number]
+        begin, lost = len(two.commanded), two.commanded[-1][number]
         outputs = two.until(lambda row: row["nstage"] == BLOCK_OFF, most=600, **ON)
         for _ in range(20):
             assert two.cycle(**ON)["nerrorid"] == 20
-        assert {row[number] for row in two.told[begin:]} == {lost}
+        assert {row[number] for row in two.commanded[begin:]} == {lost}
         steps = np.diff(two.positions()[begin - 2 :, 1 - number]) / CYCLE
         assert steps[0] > 0.1 and abs(steps[-1]) < 1e-5
         assert np.abs(np.diff(steps)).max() < 0.8 * CYCLE * 1.001  # the quick stop's deceleration
 
     def test_both_are_taken_over_before_either_moves_and_arrive_together(self, two):
         two.guided()
-        assert np.ptp(two.told, axis=0).tolist() == [0.0, 0.0]
+        assert np.ptp(two.commanded, axis=0).tolist() == [0.0, 0.0]
         given = {"fTarget_x": 6.0, "fTarget_y": 3.0}
         two.until(lambda row: row["bdone"], most=9000, **ON, bExecute=True, **given)
         np.testing.assert_allclose(two.positions()[-1], [6.0, 3.0], rtol=0, atol=1e-9)

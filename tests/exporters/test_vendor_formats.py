@@ -204,8 +204,8 @@ def test_a_wrapper_takes_and_tells_all_but_positions(library, move):
     assert all(outer[name] == inner[name] for name in outer)
     call = re.search(r"fbMotion\((.*?)\);", wrapper.body, re.DOTALL)[1]
     assert set(re.findall(r"(\w+) :=", call)) == {v.name for v in block.variables if v.section == "VAR_INPUT"}
-    told = [name for name in outer if outer[name].section == "VAR_OUTPUT"]
-    assert all(len(re.findall(rf"^{name} := .*;$", wrapper.body, re.MULTILINE)) == 1 for name in told)
+    copied = [name for name in outer if outer[name].section == "VAR_OUTPUT"]
+    assert all(len(re.findall(rf"^{name} := .*;$", wrapper.body, re.MULTILINE)) == 1 for name in copied)
     own = [v.name for v in wrapper.variables if v.section == "VAR"]
     assert all(re.search(rf"\b{name}\b", wrapper.body) for name in own)
 

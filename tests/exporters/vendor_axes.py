@@ -280,7 +280,7 @@ class Bench:
         self.wrapper = FunctionBlock(wrapper, blocks)
         self.axes = [FunctionBlock(vendor.blocks[vendor.axis], blocks) for _ in starts]
         self.given = dict(zip(names, self.axes, strict=True))
-        self.told = []
+        self.commanded = []
         for axis in self.axes:
             self.put(axis, vendor.fit)
 
@@ -309,11 +309,13 @@ class Bench:
                 else (self.vendor.setpoint, self.vendor.actual)
             )
             part.call(**{come: part[gone]})
-        told = [self.part(axis)[self.vendor.setpoint] for axis in self.axes]
-        for axis, at, before in zip(self.axes, told, self.told[-1] if self.told else told, strict=True):
+        commanded = [self.part(axis)[self.vendor.setpoint] for axis in self.axes]
+        for axis, at, before in zip(
+            self.axes, commanded, self.commanded[-1] if self.commanded else commanded, strict=True
+        ):
             if at == before:
                 self.part(axis).call(**{self.vendor.speed: 0.0})
-        self.told.append(told)
+        self.commanded.append(commanded)
         return outputs
 
     def until(self, condition, most=500, **inputs):
@@ -335,4 +337,4 @@ class PlaybackBench(Bench):
         self.bring(starts)
         while not self.wrapper["fbMotion"]["bChecked"]:
             self.cycle(bExecute=False)
-        self.told = self.told[-1:]
+        self.commanded = self.commanded[-1:]

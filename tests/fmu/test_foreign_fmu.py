@@ -223,9 +223,9 @@ def test_a_binary_for_this_computer_is_required(tmp_path, version, folders, has)
         for folder in folders:
             new.writestr(f"binaries/{folder}/customer.bin", b"")
     path.write_bytes(packed.getvalue())
-    told = done_here(run_of(path), tmp_path / "work")
-    assert told.startswith("customer.fmu: the FMU has no binary for this computer")
-    assert f"(it has {has})" in told
+    message = done_here(run_of(path), tmp_path / "work")
+    assert message.startswith("customer.fmu: the FMU has no binary for this computer")
+    assert f"(it has {has})" in message
 
 
 def with_description(path, change):

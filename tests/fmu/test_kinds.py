@@ -76,9 +76,9 @@ class TestModelExchange:
         lag = kind == "plant-velocity"
         instance.begin({**OTHER, **({"tau": 0.05} if lag else {})})
         name = "cart.setpoint_velocity" if lag else "cart.setpoint_acceleration"
-        found = exchange(instance, TIMES, lambda time: instance.write({name: wave(time)}), OUTPUTS, 2e-3)
+        rows_out = exchange(instance, TIMES, lambda time: instance.write({name: wave(time)}), OUTPUTS, 2e-3)
         follow = (lambda t, v: (wave(t) - v) / 0.05) if lag else (lambda t, v: wave(t))
-        np.testing.assert_allclose(found, expected(follow), rtol=0.0, atol=2e-8)
+        np.testing.assert_allclose(rows_out, expected(follow), rtol=0.0, atol=2e-8)
 
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     def test_of_setpoints_takes_one_each_period(self, open_instance, tau):
@@ -91,10 +91,10 @@ class TestModelExchange:
             instance.write({"cart.setpoint": positions[min(k + 1, 100)]})
 
         times = np.arange(101) * 0.02
-        found = exchange(instance, times, next_setpoint, OUTPUTS, 1e-3)
+        rows_out = exchange(instance, times, next_setpoint, OUTPUTS, 1e-3)
         states, carts = oracle.swing_in_steps(positions, 0.02, tau, OTHER)
-        np.testing.assert_allclose(found[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
-        np.testing.assert_allclose(found[:, 2], carts, rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(rows_out[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(rows_out[:, 2], carts, rtol=0.0, atol=1e-8)
 
     def test_of_velocities_holds_one_each_period_where_drives_are_ideal(self, open_instance):
         instance = open_instance("plant-velocity", exchange=True)
@@ -106,28 +106,28 @@ class TestModelExchange:
             instance.write({"cart.setpoint_velocity": velocities[int(time / 0.02 + 1e-9)]})
 
         times = np.arange(101) * 0.02
-        found = exchange(instance, times, next_velocity, OUTPUTS, 1e-3)
+        rows_out = exchange(instance, times, next_velocity, OUTPUTS, 1e-3)
         states, carts = oracle.swing_in_steps(positions, 0.02, 0.0, OTHER)
-        np.testing.assert_allclose(found[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
-        np.testing.assert_allclose(found[:, 2], carts, rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(rows_out[:, :2], states[:, :2], rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(rows_out[:, 2], carts, rtol=0.0, atol=1e-8)
 
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     def test_of_a_system(self, open_instance, tau):
         instance = open_instance("system", exchange=True)
         instance.begin({**OTHER, "tau": tau, "start_time": 0.1})
         times = np.arange(0.0, 4.0001, 0.01)
-        found = exchange(instance, times, lambda time: None, OUTPUTS, 2e-3)
-        np.testing.assert_allclose(found, followed(times, tau), rtol=0.0, atol=2e-8)
+        rows_out = exchange(instance, times, lambda time: None, OUTPUTS, 2e-3)
+        np.testing.assert_allclose(rows_out, followed(times, tau), rtol=0.0, atol=2e-8)
 
     def test_of_a_profile(self, open_instance):
         instance = open_instance("profile", exchange=True)
         instance.begin({"start_time": 0.1})
         times = np.arange(0.0, 3.0, 0.013)
         names = [f"cart.setpoint{suffix}" for suffix in ("", "_velocity", "_acceleration", "_jerk")]
-        found = exchange(instance, times, lambda time: None, names, 1.0)
+        rows_out = exchange(instance, times, lambda time: None, names, 1.0)
         for order in range(4):
             exact = motion(1).derivative(times - 0.1, order)[:, 0]
-            np.testing.assert_allclose(found[:, order], exact, rtol=0.0, atol=1e-13)
+            np.testing.assert_allclose(rows_out[:, order], exact, rtol=0.0, atol=1e-13)
 
 
 def followed(times, tau):
@@ -173,13 +173,13 @@ class TestCosimulation:
             instance.write({name: wave(time)})
             instance.slopes(name, *(wave(time, order) for order in (1, 2, 3)))
 
-        found = cosimulate(instance, TIMES, before, OUTPUTS)
+        rows_out = cosimulate(instance, TIMES, before, OUTPUTS)
 
         def follow(time, velocity):
             return (wave(time) - velocity) / tau if tau else wave(time, 1 if tau == 0.0 else 0)
 
         # a velocity that the axes have at once errs as its Taylor series does: 0.8 · 3⁴ · (10 ms)⁴ / 4! m/s
-        np.testing.assert_allclose(found, expected(follow), rtol=0.0, atol=1e-8 if tau != 0.0 else 3e-8)
+        np.testing.assert_allclose(rows_out, expected(follow), rtol=0.0, atol=1e-8 if tau != 0.0 else 3e-8)
         instance.close()
 
     @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
@@ -187,7 +187,7 @@ class TestCosimulation:
         """In FMI 3, where inputs have no derivatives: at the middle of each integration step of 1 ms."""
         lag = kind == "plant-velocity"
         name = "cart.setpoint_velocity" if lag else "cart.setpoint_acceleration"
-        seen, shown = [], []
+        observed, shown = [], []
 
         def update(_, time, asked, readable, finished, may_return, *__):
             assert (asked, may_return) == (not readable, False)
@@ -196,7 +196,7 @@ class TestCosimulation:
                 instance.write({name: wave(time)})
             else:
                 shown.append(time)
-                seen.append(instance.read(*OUTPUTS))
+                observed.append(instance.read(*OUTPUTS))
 
         instance = Instance(cached_fmu(model_of(kind, CRANE), Version.FMI3), Version.FMI3, exchange=False,
                             intermediateUpdate=update)  # fmt: skip
@@ -206,7 +206,7 @@ class TestCosimulation:
         fine = np.linspace(0.0, 2.0, 2001)
         np.testing.assert_allclose(shown, fine[1:], rtol=0.0, atol=1e-12)
         follow = (lambda t, v: (wave(t) - v) / 0.05) if lag else (lambda t, v: wave(t))
-        np.testing.assert_allclose(seen, expected(follow, fine)[1:], rtol=0.0, atol=5e-6)
+        np.testing.assert_allclose(observed, expected(follow, fine)[1:], rtol=0.0, atol=5e-6)
 
     @pytest.mark.parametrize("kind", ["plant-acceleration", "plant-velocity"])
     def test_holds_inputs_that_have_no_derivatives(self, open_instance, kind):
@@ -215,7 +215,7 @@ class TestCosimulation:
         instance.begin({**OTHER, **({"tau": 0.05} if lag else {})})
         name = "cart.setpoint_velocity" if lag else "cart.setpoint_acceleration"
         times = np.arange(0.0, 1.01, 0.1)
-        found = cosimulate(instance, times, lambda time, _: instance.write({name: wave(time)}), OUTPUTS)
+        rows_out = cosimulate(instance, times, lambda time, _: instance.write({name: wave(time)}), OUTPUTS)
         state, rows = np.zeros(6), [np.zeros(4)]
         for low, high in pairwise(times):
 
@@ -227,7 +227,7 @@ class TestCosimulation:
 
             state = solve_ivp(rates, (low, high), state, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
             rows.append(state[[0, 1, 4, 5]])
-        np.testing.assert_allclose(found, rows, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(rows_out, rows, rtol=0.0, atol=1e-9)
 
     def test_of_velocities_that_ideal_drives_have_at_once(self, open_instance):
         """As interpolated setpoints: a velocity held over a step strikes the loads as its impulse."""
@@ -235,15 +235,15 @@ class TestCosimulation:
         positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
         instance.begin({**OTHER, "tau": 0.0})
         times, velocities = np.arange(101) * 0.02, np.diff(positions) / 0.02
-        found = cosimulate(
+        rows_out = cosimulate(
             instance,
             times,
             lambda time, _: instance.write({"cart.setpoint_velocity": velocities[round(time / 0.02)]}),
             OUTPUTS,
         )
         states, carts = oracle.swing_in_steps(positions, 0.02, 0.0, OTHER)
-        np.testing.assert_allclose(found[:, :2], states[:, :2], rtol=0.0, atol=1e-9)
-        np.testing.assert_allclose(found[:, 2], carts, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(rows_out[:, :2], states[:, :2], rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(rows_out[:, 2], carts, rtol=0.0, atol=1e-12)
 
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     def test_of_setpoints(self, open_instance, tau):
@@ -251,15 +251,15 @@ class TestCosimulation:
         positions = 0.3 * np.sin(np.linspace(0.0, 2.0, 101)) ** 2
         instance.begin({**OTHER, "tau": tau})
         times = np.arange(101) * 0.02
-        found = cosimulate(
+        rows_out = cosimulate(
             instance,
             times,
             lambda _, end: instance.write({"cart.setpoint": positions[round(end / 0.02)]}),
             OUTPUTS,
         )
         states, carts = oracle.swing_in_steps(positions, 0.02, tau, OTHER)
-        np.testing.assert_allclose(found[:, :2], states[:, :2], rtol=0.0, atol=1e-9)
-        np.testing.assert_allclose(found[:, 2], carts, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(rows_out[:, :2], states[:, :2], rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(rows_out[:, 2], carts, rtol=0.0, atol=1e-12)
 
     @pytest.mark.parametrize("tau", [0.0, 0.05])
     @pytest.mark.parametrize("step", [0.01, 0.07])
@@ -267,10 +267,10 @@ class TestCosimulation:
         instance = open_instance("system", exchange=False)
         instance.begin({**OTHER, "tau": tau, "start_time": 0.1})
         times = np.arange(0.0, 4.0001, step)
-        found = cosimulate(instance, times, lambda *_: None, OUTPUTS)
-        np.testing.assert_allclose(found, followed(times, tau), rtol=0.0, atol=1e-8)
+        rows_out = cosimulate(instance, times, lambda *_: None, OUTPUTS)
+        np.testing.assert_allclose(rows_out, followed(times, tau), rtol=0.0, atol=1e-8)
         if tau == 0.0:
-            assert found[-1, 2] == motion(1).target[0]
+            assert rows_out[-1, 2] == motion(1).target[0]
 
     @pytest.mark.parametrize("step", [0.001, 0.013, 0.9])
     def test_of_a_profile_is_exact_at_any_communication_point(self, open_instance, step):
@@ -278,10 +278,10 @@ class TestCosimulation:
         instance.begin({"start_time": 0.1})
         times = np.arange(0.0, 3.0, step)
         names = [f"cart.setpoint{suffix}" for suffix in ("", "_velocity", "_acceleration", "_jerk")]
-        found = cosimulate(instance, times, lambda *_: None, names)
+        rows_out = cosimulate(instance, times, lambda *_: None, names)
         for order in range(4):
             exact = motion(1).derivative(times - 0.1, order)[:, 0]
-            np.testing.assert_allclose(found[:, order], exact, rtol=0.0, atol=1e-13)
+            np.testing.assert_allclose(rows_out[:, order], exact, rtol=0.0, atol=1e-13)
 
     def test_begins_with_a_swing_and_goes_on_at_speed(self, version):
         """What a spec's `move.initial` and `move.final_velocity` ask for."""
@@ -293,13 +293,13 @@ class TestCosimulation:
         machine = PlantInstance(plant=CRANE, parameters=OTHER, initial=swing)
         models = system_model("onward", machine, onward), profile_model("onward", CRANE.actuated, onward)
         outputs = OUTPUTS, ("cart.setpoint", "cart.setpoint_velocity")
-        found = []
+        rows_out = []
         for model, names in zip(models, outputs, strict=True):
             instance = Instance(cached_fmu(model, version), version, exchange=False)
             instance.begin({})
-            found.append(cosimulate(instance, TIMES, lambda *_: None, names))
+            rows_out.append(cosimulate(instance, TIMES, lambda *_: None, names))
             instance.close()
-        swung, moved = found
+        swung, moved = rows_out
         exact = np.column_stack([onward.derivative(TIMES, order)[:, 0] for order in range(2)])
         np.testing.assert_allclose(moved, exact, rtol=0.0, atol=1e-14)
         np.testing.assert_allclose(swung[:, 2:], exact, rtol=0.0, atol=1e-12)
@@ -312,26 +312,26 @@ class TestCosimulation:
     def test_waits_for_its_trigger(self, open_instance, kind):
         instance = open_instance(kind, exchange=False)
         instance.begin({"start_time": 0.05}, wait_for_trigger=True)
-        seen = []
+        observed = []
         for k in range(400):
             instance.set_boolean("trigger", k in {2, 50, 60})  # too early; in time; once more
             instance.fmu.doStep(k * 0.01, 0.01)
-            seen.append((instance.get_boolean("moving"), instance.get_boolean("done")))
+            observed.append((instance.get_boolean("moving"), instance.get_boolean("done")))
             time = 0.01 * (k + 1) - 0.5
             exact = motion(1)(np.array([time])).position[0, 0]
             assert instance.read("cart.setpoint")[0] == pytest.approx(exact, abs=1e-12)
-        began, ended = seen.index((True, False)), seen.index((False, True))
+        began, ended = observed.index((True, False)), observed.index((False, True))
         assert (began, ended) == (50, pytest.approx(274, abs=1))
-        assert seen == [(False, False)] * began + [(True, False)] * (ended - began) + [(False, True)] * (
+        assert observed == [(False, False)] * began + [(True, False)] * (ended - began) + [(False, True)] * (
             400 - ended
         )
 
     def test_starts_swinging_where_asked(self, open_instance):
         instance = open_instance("plant-acceleration", exchange=False)
         instance.begin({**OTHER, "theta1": 0.2, "theta2": -0.1, "theta2.rate": 0.3, "cart.start": 0.5})
-        found = cosimulate(instance, TIMES, lambda *_: None, OUTPUTS)
+        rows_out = cosimulate(instance, TIMES, lambda *_: None, OUTPUTS)
         exact = expected(lambda *_: 0.0, start=(0.2, 0.1, 0.0, 0.3), cart=(0.5, 0.0))
-        np.testing.assert_allclose(found, exact, rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(rows_out, exact, rtol=0.0, atol=1e-8)
 
 
 class TestDirectionalDerivatives:
@@ -363,8 +363,8 @@ class TestDirectionalDerivatives:
         for known in (*states, *inputs):
             exact = (evaluate(1e-5, known) - evaluate(-1e-5, known)) / 2e-5
             evaluate(0.0, known)
-            found = instance.directional(unknowns, [known], [1.0])
-            np.testing.assert_allclose(found, exact, rtol=1e-7, atol=1e-7, err_msg=known)
+            rows_out = instance.directional(unknowns, [known], [1.0])
+            np.testing.assert_allclose(rows_out, exact, rtol=1e-7, atol=1e-7, err_msg=known)
         twice = instance.directional(unknowns, states[:2], [2.0, 3.0])
         one = [instance.directional(unknowns, [state], [1.0]) for state in states[:2]]
         np.testing.assert_allclose(twice, 2.0 * one[0] + 3.0 * one[1], rtol=1e-12)
@@ -383,8 +383,8 @@ class TestDirectionalDerivatives:
         for known, value in {"L1": 0.6, "m2": 0.1, "tau": 0.05, "cart__start": 0.0, "theta1": 0.3}.items():
             exact = (evaluate(**{known: value + 1e-6}) - evaluate(**{known: value - 1e-6})) / 2e-6
             evaluate()
-            found = instance.directional(unknowns, [known.replace("__", ".")], [1.0])
-            np.testing.assert_allclose(found, exact, rtol=1e-6, atol=1e-7, err_msg=known)
+            rows_out = instance.directional(unknowns, [known.replace("__", ".")], [1.0])
+            np.testing.assert_allclose(rows_out, exact, rtol=1e-6, atol=1e-7, err_msg=known)
         instance.fmu.exitInitializationMode()
 
     @pytest.mark.parametrize("kind", ["profile", "system"])
@@ -404,8 +404,8 @@ class TestDirectionalDerivatives:
         for known, value in {"cart__start": 0.2, "cart__distance": -0.5, "start_time": -1.0}.items():
             exact = (evaluate(**{known: value + 1e-6}) - evaluate(**{known: value - 1e-6})) / 2e-6
             evaluate()
-            found = instance.directional(unknowns, [known.replace("__", ".")], [1.0])
-            np.testing.assert_allclose(found, exact, rtol=1e-6, atol=1e-8, err_msg=known)
+            rows_out = instance.directional(unknowns, [known.replace("__", ".")], [1.0])
+            np.testing.assert_allclose(rows_out, exact, rtol=1e-6, atol=1e-8, err_msg=known)
         instance.fmu.exitInitializationMode()
 
 
@@ -418,14 +418,14 @@ class TestMotion:
         instance.begin({"cart.start": 1.0, "cart.distance": -0.6})
         times = np.arange(0.0, 3.0, 0.01)
         names = [f"cart.setpoint{suffix}" for suffix in ("", "_velocity", "_acceleration", "_jerk")]
-        found = cosimulate(instance, times, lambda *_: None, names)
+        rows_out = cosimulate(instance, times, lambda *_: None, names)
         planned = motion(1)
         scale = -0.6 / (planned.target[0] - 0.1)
         for order in range(4):
             exact = scale * planned.derivative(times, order)[:, 0] + (
                 1.0 - 0.1 * scale if order == 0 else 0.0
             )
-            np.testing.assert_allclose(found[:, order], exact, rtol=0.0, atol=1e-12)
+            np.testing.assert_allclose(rows_out[:, order], exact, rtol=0.0, atol=1e-12)
         if kind == "system":
             assert instance.read("cart.position")[0] == pytest.approx(0.4, abs=1e-15)
 
@@ -436,9 +436,9 @@ class TestMotion:
             instance.fmu.doStep(low, high - low)
             for done, suffix in enumerate(("", "_velocity", "_acceleration", "_jerk")):
                 for order in (1, 2, 3):
-                    found = instance.output_derivative(f"cart.setpoint{suffix}", order)
+                    rows_out = instance.output_derivative(f"cart.setpoint{suffix}", order)
                     exact = motion(1).derivative(np.array([high]), done + order)[0, 0]
-                    assert found == pytest.approx(exact, abs=1e-12)
+                    assert rows_out == pytest.approx(exact, abs=1e-12)
         description = ElementTree.parse(instance.fmu.unzipDirectory + "/modelDescription.xml")
         assert description.find("CoSimulation").get("maxOutputDerivativeOrder") == "3"
 
@@ -462,9 +462,9 @@ class TestMotion:
         instance.fmu.enterContinuousTimeMode()
         for time in (0.05, 0.3, 0.9, 2.4, 3.0, 0.9, 0.3, 0.05):
             instance.fmu.setTime(time)
-            found = instance.read("cart.setpoint", "cart.setpoint_acceleration")
+            rows_out = instance.read("cart.setpoint", "cart.setpoint_acceleration")
             exact = [motion(1).derivative(np.array([time - 0.1]), order)[0, 0] for order in (0, 2)]
-            np.testing.assert_allclose(found, exact, rtol=0.0, atol=1e-13)
+            np.testing.assert_allclose(rows_out, exact, rtol=0.0, atol=1e-13)
 
     def test_of_a_system_survives_late_events(self, open_instance):
         """An importer with a fixed step that handles an event at the next end of a step."""
@@ -493,6 +493,6 @@ class TestBackwards:
         unknowns, knowns = ["der(theta1.rate)", "sway.payload"], ["theta1", "cart.velocity", "L1"]
         jacobian = np.column_stack([instance.directional(unknowns, [known], [1.0]) for known in knowns])
         references = [[instance.references[name] for name in names] for names in (unknowns, knowns)]
-        found = instance.fmu.getAdjointDerivative(*references, [2.0, -1.0], nSensitivity=3)
-        np.testing.assert_allclose(found, [2.0, -1.0] @ jacobian, rtol=1e-13)
+        rows_out = instance.fmu.getAdjointDerivative(*references, [2.0, -1.0], nSensitivity=3)
+        np.testing.assert_allclose(rows_out, [2.0, -1.0] @ jacobian, rtol=1e-13)
         instance.close()

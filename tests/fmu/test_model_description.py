@@ -197,16 +197,16 @@ def test_dependencies_are_those_of_the_equations(plant, kind, version):
     for quantity in ("sway", "height", "angle"):
         for load, value in zip(plant.loads, getattr(seen, quantity), strict=True):
             assert found[f"{quantity}.{variable_name(load)}"] == sources_of(value)
-    told = plant.mechanics(each[0], each[2], named)
-    places = [casadi.vertcat(*place) for place in told.place]
+    mechanics = plant.mechanics(each[0], each[2], named)
+    places = [casadi.vertcat(*place) for place in mechanics.place]
     for body, place in zip(plant.bodies, places, strict=True):
         for direction, value in zip("xyz", casadi.vertsplit(place), strict=True):
             assert found[f"position.{body}.{direction}"] == sources_of(value)
     if plant.bodies:
         q, dq = casadi.vertcat(q_u, q_a), casadi.vertcat(dq_u, dq_a)
         speeds = [casadi.jacobian(place, q) @ dq for place in places]
-        kinetic = sum(m * casadi.sumsqr(speed) for m, speed in zip(told.mass, speeds, strict=True))
-        assert found["energy"] == sources_of(kinetic) | sources_of(told.potential)
+        kinetic = sum(m * casadi.sumsqr(speed) for m, speed in zip(mechanics.mass, speeds, strict=True))
+        assert found["energy"] == sources_of(kinetic) | sources_of(mechanics.potential)
     for state in states:
         assert found[state] == {state}
 

@@ -3,8 +3,9 @@
 A mutant changes one place of one part of the text, or one constant. It is killed where a history shows a
 fault that the sound block does not show there, or leaves more sway than is allowed.
 
-Left out are mutants of lines that no machine's block has, and those that `ALIKE` names. Of one that survives,
-it is told whether any axis moves otherwise in any history, and how much later it rests in the mean.
+Left out are mutants of lines that no machine's block has, and those that `EQUIVALENT` names. Of one that
+survives, it is printed whether any axis moves otherwise in any history, and how much later it rests on
+average.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ AXIS = re.compile(r"\[(n(?:Plan)?Axis)\]")
 CONSTANT = re.compile(r"(?m)^ *(c\w+) : (ARRAY \[[^]]*\] OF )?(LREAL|DINT) := \[?([^;\]]*)\]?;")
 ROUNDING, BEYOND = 1e-5, 1e6  # numbers that are as good half as great again: of rounding, and beyond all
 UNKNOWN = {"interface"}  # parts that hold no statements
-ALIKE = {  # mutants, by part and the line that they make: why a block with it is as good
+EQUIVALENT = {  # mutants, by part and the line that they make: why a block with it is as good
     "inputs: aLiveOnce[nIndex] := aLiveOnce[nIndex];": "of the first three values two are alike all the same",
     "inputs: IF NOT (ABS(aActual[cAxes - 1 - nAxis]) <= 1.0E+9)"
     " OR NOT (ABS(aActualVelocity[nAxis]) <= 1.0E+9) THEN": "both axes are asked",
@@ -91,7 +92,7 @@ def mutants(text: str) -> Iterator[Mutant]:
         if path.stem not in UNKNOWN:
             for number, line in enumerate(_code(path.read_text("ascii"))):
                 for way, now in _changed(line):
-                    if f"{path.stem}: {now.strip()}" not in ALIKE:
+                    if f"{path.stem}: {now.strip()}" not in EQUIVALENT:
                         yield Mutant(way=way, part=path.stem, line=number, now=now, before=line)
     for name, _, kind, values in CONSTANT.findall(text):
         for place, value in enumerate(values.split(",")):
@@ -149,10 +150,10 @@ class Machine:
 
 def machine(name: str, spec: Spec, count: int) -> Machine:
     """Look at what the sound block does."""
-    told = list[block.PlannerConstants]()
+    captured = list[block.PlannerConstants]()
     text_of, design.block_text = (
         design.block_text,
-        lambda constants: told.append(constants) or text_of(constants),
+        lambda constants: captured.append(constants) or text_of(constants),
     )
     try:
         text = design.planner_block(spec).text
@@ -163,9 +164,15 @@ def machine(name: str, spec: Spec, count: int) -> Machine:
     drawn = [numbering.history(number) for number in range(len(numbering.drawn))]
     random.Random(name).shuffle(drawn)
     drawn = drawn[:count]
-    found = [one for _, one in judged(spec, text, histories, drawn)]
+    judgements = [one for _, one in judged(spec, text, histories, drawn)]
     return Machine(
-        name=name, spec=spec, constants=told[0], text=text, histories=histories, drawn=drawn, shown=found
+        name=name,
+        spec=spec,
+        constants=captured[0],
+        text=text,
+        histories=histories,
+        drawn=drawn,
+        shown=judgements,
     )
 
 
@@ -184,8 +191,8 @@ def judged(
 
 def kinds_of(spec: Spec, one: JudgedHistory) -> set[str]:
     """Name the kinds of its faults."""
-    share = one.share(spec.check.residual_sway, 0.0)
-    return {*map(kind_of, one.faults), *(["the load sways"] if share > 1.0 else [])}
+    fraction = one.fraction(spec.check.residual_sway, 0.0)
+    return {*map(kind_of, one.faults), *(["the load sways"] if fraction > 1.0 else [])}
 
 
 @contextmanager

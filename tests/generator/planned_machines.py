@@ -62,9 +62,9 @@ def swing(time, acceleration, m1, m2, L1, L2, **_):
 
     def slope(state, inputs):
         (a, b, da, db), (push, L, dL, ddL) = state, inputs
-        heavy, coupling, turned = (m1 + m2) * L, np.cos(a - b), 2.0 * dL * da
-        first = (m1 + m2) * (push * np.cos(a) - G * np.sin(a) - turned) - m2 * L2 * db**2 * np.sin(a - b)
-        second = push * np.cos(b) - G * np.sin(b) + (L * da**2 - ddL) * np.sin(a - b) - turned * coupling
+        heavy, coupling, coriolis = (m1 + m2) * L, np.cos(a - b), 2.0 * dL * da
+        first = (m1 + m2) * (push * np.cos(a) - G * np.sin(a) - coriolis) - m2 * L2 * db**2 * np.sin(a - b)
+        second = push * np.cos(b) - G * np.sin(b) + (L * da**2 - ddL) * np.sin(a - b) - coriolis * coupling
         ratio = m2 * coupling
         dda = (first - ratio * second) / (heavy - ratio * L * coupling)
         return np.array([da, db, dda, (second - L * coupling * dda) / L2])

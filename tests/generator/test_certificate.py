@@ -154,7 +154,7 @@ def test_an_exact_solution_in_arb_is_below_the_bound_and_close(tau):
     machines = [{**spec.plant.parameters, "J": J} for J in inertias]
     sways = [exact_joint(found.theorem.setpoints, machine, tau, watch) for machine in machines]
     worst = np.max(sways, axis=0)  # after the move, and at any time
-    assert found.share == 1.0
+    assert found.fraction == 1.0
     assert (worst <= greatest(found)).all() and (greatest(found) <= CLOSE * worst).all()
 
 
@@ -196,7 +196,7 @@ def test_no_machine_of_a_dense_grid_sways_more_and_the_worst_nearly_as_much(find
     spec, setpoints = found.theorem.spec, found.theorem.setpoints
     grid = {name: np.linspace(*ends, 61) for name, ends in spec.checked_ranges().items()}
     worst = gp.residual_sways(spec, setpoints, grid).max(axis=0)
-    assert found.share == 1.0
+    assert found.fraction == 1.0
     assert (worst <= greatest(found)).all()
     assert (greatest(found) <= CLOSE * worst).all()
 
@@ -208,7 +208,7 @@ def test_a_load_that_swings_in_two_directions_is_bounded_on_the_way_by_the_lengt
         gp.cosimulate(spec, setpoints, {"L": L}) for L in np.linspace(*spec.checked_ranges()["L"], 5)
     ]
     worst = max(np.hypot(*response.sway.T).max() for response in responses)
-    assert found.share == 1.0 and len(found.theorem.limits) == 3
+    assert found.fraction == 1.0 and len(found.theorem.limits) == 3
     assert worst <= greatest(found)[2] <= CLOSE * worst
 
 
@@ -223,7 +223,7 @@ def test_several_parameters_make_one_box_together():
     worst = gp.residual_sways(spec, setpoints, {"L0": grid[:, 0], "c": grid[:, 1]}).max()
     # a bound is not narrowed further than to half a per cent of what is allowed
     nearly = CLOSE * worst + 5e-3 * spec.check.residual_sway["payload"]
-    assert found.share == 1.0 and worst <= greatest(found)[0] <= nearly
+    assert found.fraction == 1.0 and worst <= greatest(found)[0] <= nearly
 
 
 def test_how_many_processors_there_are_changes_nothing(monkeypatch):
@@ -253,7 +253,7 @@ def test_three_parameters_of_two_pendulums_are_proved_together():
     }
     worst = gp.residual_sways(spec, setpoints, grid).max(axis=0)
     limits = np.array(list(spec.check.residual_sway.values()))
-    assert found.share == 1.0
+    assert found.fraction == 1.0
     assert (worst <= greatest(found)).all() and (greatest(found) <= CLOSE * worst + 5e-3 * limits).all()
 
 
@@ -299,6 +299,6 @@ export = {cycle_time = 0.02}
     )
     written = gp.design(gp.read_spec(spec), ["csv"], tmp_path / "out", check=False)
     proof = gp.certify_artefact(written.folder / written.artefacts[0].path)
-    assert not proof.proved and proof.share == 0.0 and not proof.bounds
+    assert not proof.proved and proof.fraction == 0.0 and not proof.bounds
     assert proof.reasons()[0].startswith("Bounds are proved for 0 % of the machines")
     assert not list(written.folder.glob("*.certificate.json"))

@@ -19,18 +19,18 @@ def check(*findings, error_bound=0.0, faults=()):
 
 
 def test_passes_when_every_load_keeps_its_limit_everywhere():
-    found = check(finding("nominal", 0.0, 0.0), finding("longer", 0.004, 0.002))
-    assert found.passed
-    assert found.reasons() == ()
-    assert found.demand == 1.0
+    judged = check(finding("nominal", 0.0, 0.0), finding("longer", 0.004, 0.002))
+    assert judged.passed
+    assert judged.reasons() == ()
+    assert judged.demand == 1.0
 
 
 @pytest.mark.parametrize(("hook", "payload"), [(0.0041, 0.0), (0.0, 0.0021)])
 def test_one_load_on_one_machine_fails_it(hook, payload):
-    found = check(finding("nominal", 0.0, 0.0), finding("longer", hook, payload))
-    assert not found.passed
-    assert [found.keeps_limit(each) for each in found.findings] == [True, False]
-    assert found.demand > 1.0
+    judged = check(finding("nominal", 0.0, 0.0), finding("longer", hook, payload))
+    assert not judged.passed
+    assert [judged.keeps_limit(each) for each in judged.findings] == [True, False]
+    assert judged.demand > 1.0
 
 
 def test_the_error_bound_counts_against_it():
@@ -39,15 +39,15 @@ def test_the_error_bound_counts_against_it():
 
 
 def test_the_worst_takes_up_the_greatest_share_of_its_own_limit():
-    found = check(finding("nominal", 0.003, 0.001), finding("longer", 0.001, 0.0018))
-    load, worst = found.worst
+    judged = check(finding("nominal", 0.003, 0.001), finding("longer", 0.001, 0.0018))
+    load, worst = judged.worst
     assert (load, worst.scenario.name) == ("payload", "longer")
-    assert found.demand == pytest.approx(0.9)
+    assert judged.demand == pytest.approx(0.9)
 
 
 def test_the_reason_names_load_machine_figure_limit_key_and_error():
-    found = check(finding("nominal", 0.0, 0.0), finding("L1 +20 %", 0.0, 0.00345), error_bound=2.5e-7)
-    assert found.reasons() == (
+    judged = check(finding("nominal", 0.0, 0.0), finding("L1 +20 %", 0.0, 0.00345), error_bound=2.5e-7)
+    assert judged.reasons() == (
         "The payload sways by 3.45 mm after the move (L1 +20 %), and 2 mm are allowed "
         "(check.residual_sway; numerical error up to 0.25 µm).",
     )
@@ -59,16 +59,16 @@ def test_a_large_error_is_told_without_powers_of_ten():
 
 
 def test_faults_fail_it_whatever_the_sway():
-    found = check(finding("nominal", 0.0, 0.0), faults=("Something is wrong.",))
-    assert not found.passed
-    assert found.reasons() == ("Something is wrong.",)
-    assert found.demand == float("inf")
+    judged = check(finding("nominal", 0.0, 0.0), faults=("Something is wrong.",))
+    assert not judged.passed
+    assert judged.reasons() == ("Something is wrong.",)
+    assert judged.demand == float("inf")
     assert len(check(finding("nominal", 1.0, 0.0), faults=("Something is wrong.",)).reasons()) == 2
 
 
 def test_the_document_holds_the_contract_s_keys():
-    found = check(finding("nominal", 0.003, 0.001), finding("longer", 0.001, 0.0025), error_bound=1e-6)
-    document = found.to_dict()
+    judged = check(finding("nominal", 0.003, 0.001), finding("longer", 0.001, 0.0025), error_bound=1e-6)
+    document = judged.to_dict()
     assert {key: document[key] for key in ("passed", "limit_m", "error_bound_m", "arrival_s")} == {
         "passed": False,
         "limit_m": 0.002,
@@ -79,12 +79,12 @@ def test_the_document_holds_the_contract_s_keys():
     assert [row["residual_peak_m"] for row in document["scenarios"]] == [0.001, 0.0025]
     assert [row["passed"] for row in document["scenarios"]] == [True, False]
     assert document["scenarios"][0]["parameters"] == {"L1": 1.0}
-    assert document["reasons"] == list(found.reasons())
+    assert document["reasons"] == list(judged.reasons())
 
 
 def timed(name, hook, payload, group, row):
-    found = finding(name, hook, payload)
-    return attrs.evolve(found, scenario=attrs.evolve(found.scenario, group=group, row=row))
+    judged = finding(name, hook, payload)
+    return attrs.evolve(judged, scenario=attrs.evolve(judged.scenario, group=group, row=row))
 
 
 def test_faults_of_timing_count_only_where_that_is_asked_for():
@@ -105,10 +105,10 @@ def test_sway_on_the_way_counts_on_every_machine():
         attrs.evolve(timed(name, 0.0, 0.0, "machines", row), on_the_way=sway)
         for row, (name, sway) in enumerate({"nominal": 0.03, "longer": 0.0302, "shorter": 0.0304}.items())
     ]
-    found = attrs.evolve(check(*rows), sway_limit=0.03)
-    assert [found.keeps_limit(row) for row in rows] == [True, True, False]  # 1 % is the search's own error
-    assert not found.passed and found.demand == pytest.approx(0.0304 / 0.0303)
-    (reason,) = found.reasons()
+    judged = attrs.evolve(check(*rows), sway_limit=0.03)
+    assert [judged.keeps_limit(row) for row in rows] == [True, True, False]  # 1 % is the search's own error
+    assert not judged.passed and judged.demand == pytest.approx(0.0304 / 0.0303)
+    (reason,) = judged.reasons()
     assert reason.startswith(
         "The payload sways by 30.4 mm on the way (shorter), and 30 mm are allowed (limits"
     )
@@ -117,8 +117,8 @@ def test_sway_on_the_way_counts_on_every_machine():
 
 def test_each_group_has_its_verdict_worst_row_and_quantiles():
     rows = [timed(f"sample {n}", 0.0, 1e-5 * n, "samples", 1 + n) for n in range(201)]
-    found = check(finding("nominal", 0.0, 0.0), *rows)
-    machines, samples = found.to_dict()["groups"]
+    judged = check(finding("nominal", 0.0, 0.0), *rows)
+    machines, samples = judged.to_dict()["groups"]
     assert (machines["group"], machines["rows"], machines["passed"]) == ("machines", 1, True)
     assert (samples["rows"], samples["passed"], samples["counts"]) == (201, True, True)
     assert samples["worst"] == {"load": "payload", "row": 201, "residual_peak_m": pytest.approx(0.002)}
@@ -127,5 +127,5 @@ def test_each_group_has_its_verdict_worst_row_and_quantiles():
         "0.9": pytest.approx(1.8e-3),
         "0.99": pytest.approx(1.98e-3),
     }
-    listed = [row["row"] for row in found.to_dict()["scenarios"]]
+    listed = [row["row"] for row in judged.to_dict()["scenarios"]]
     assert listed == [0, 1, *range(153, 202)]  # the first, and the 49 worst

@@ -55,9 +55,9 @@ def test_shared_options_are_told_once():
 
 
 def test_every_exit_code_is_told():
-    told = {int(code) for code in re.findall(r"^\| (\d+) \|", section("Exit codes"), flags=re.MULTILINE)}
+    codes = {int(code) for code in re.findall(r"^\| (\d+) \|", section("Exit codes"), flags=re.MULTILINE)}
     kinds = [GenProfileError, *GenProfileError.__subclasses__()]
-    assert told == {0, *(kind.exit_code for kind in kinds), outcome.INTERRUPTED}
+    assert codes == {0, *(kind.exit_code for kind in kinds), outcome.INTERRUPTED}
 
 
 def test_every_command_s_document_is_told():

@@ -193,12 +193,12 @@ def test_columns_that_are_not_there(column):
 def test_an_identified_spec_is_designed_for(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     slow, fast = periods(**(CRANE.nominal() | {"L1": 0.5, "L2": 0.38}))
-    found = run_here(
+    run = run_here(
         "identify", "--preset", "paper", "--measured", "L1=0.502±0.004", "--free", "L2",
         "--period", f"{10 * slow:.2f}±0.1/10", "--period", f"2:{10 * fast:.2f}±0.1/10", "--json",
     )  # fmt: skip
-    assert (found.code, found.errors) == (0, [])
-    document = found.document
+    assert (run.code, run.errors) == (0, [])
+    document = run.document
     assert document["path"] == "identified.toml"
     assert document["contradiction"] == 1.0
     assert document["parameters"]["L1"]["given"] == 0.47
@@ -207,9 +207,13 @@ def test_an_identified_spec_is_designed_for(tmp_path, monkeypatch):
     assert spec.sha256() == document["spec_sha256"]
     assert spec.plant.parameters["L2"] == pytest.approx(document["parameters"]["L2"]["value"], abs=1e-4)
     for name, row in document["parameters"].items():
-        share = row["half_range"] / row["value"]
+        fraction = row["half_range"] / row["value"]
         stated = preset_spec("paper").robustness.uncertain.get(name, 0.0)  # is never narrowed
-        assert max(share, stated) <= spec.robustness.uncertain[name] < max(1.1 * share + 0.01, stated + 1e-9)
+        assert (
+            max(fraction, stated)
+            <= spec.robustness.uncertain[name]
+            < max(1.1 * fraction + 0.01, stated + 1e-9)
+        )
     assert run_here("identified.toml", "--set", "check.residual_sway=0.02", "--no-check").code == 0
 
 
@@ -219,17 +223,17 @@ def test_a_log_is_read_and_told_of(tmp_path):
     noisy = np.degrees(exact + np.random.default_rng(1).normal(0.0, 2e-3, len(times)))
     rows = "".join(f"{t:.2f};{v:.4f}\n" for t, v in zip(times + 30.0, noisy, strict=True))
     (tmp_path / "log.csv").write_text("time;angle\n29.0;80.0\n" + rows, "utf-8")
-    found = run_here(
+    run = run_here(
         "identify", "--preset", "single-pendulum-crane", "--set", "plant.L0=2.6", "--free", "L0",
         "--swing", tmp_path / "log.csv", "--columns", "time,angle", "--unit", "deg", "--after", "30",
         "--at", "12,2", "--out", tmp_path / "new.toml",
     )  # fmt: skip
-    assert (found.code, found.errors) == (0, [])
+    assert (run.code, run.errors) == (0, [])
     stages = ["reading the log", "fitting", "looking at what the fit leaves", "finding the ranges"]
-    lines = [line.removesuffix(" …").partition(",")[0] for line in found.err.splitlines()]
+    lines = [line.removesuffix(" …").partition(",")[0] for line in run.err.splitlines()]
     assert list(dict.fromkeys(lines)) == stages  # a long stage is told again, with its seconds
-    assert "log of payload" in found.out
-    assert "200 samples of its angle" in found.out
+    assert "log of payload" in run.out
+    assert "200 samples of its angle" in run.out
     assert read_spec(tmp_path / "new.toml").plant.parameters["L0"] == pytest.approx(3.0, abs=0.02)
 
 
@@ -243,13 +247,13 @@ def test_logs_of_other_computers_and_encoders(tmp_path, encoding, unit, size):
     counts = np.round((exact + 7.0) / 0.25) * 0.25 / size
     rows = "".join(f"{1e3 * t:.0f};{v}\n" for t, v in zip(times, counts, strict=True))
     (tmp_path / "log.csv").write_text(f"Zeit;Winkel °\n{rows}", encoding)
-    found = run_here(
+    run = run_here(
         "identify", "--preset", "single-pendulum-crane", "--set", "plant.c=0", "--free", "L0", "--at", "12,2",
         "--swing", tmp_path / "log.csv", "--columns", "Zeit,Winkel °", "--unit", unit, "--time-unit", "ms",
         "--out", tmp_path / "new.toml", "--json",
     )  # fmt: skip
-    assert (found.code, found.errors) == (0, [])
-    row = found.document["parameters"]["L0"]
+    assert (run.code, run.errors) == (0, [])
+    row = run.document["parameters"]["L0"]
     assert abs(row["value"] - 2.3) < row["half_range"] < 0.02
 
 
@@ -305,11 +309,11 @@ def test_comments_stay_in_their_column(tmp_path, monkeypatch):
 
 
 def test_a_contradiction_is_told(tmp_path):
-    found = run_here(
+    run = run_here(
         "identify", "--measured", "L1=0.5±0.001", "--measured", "L1=0.6±0.001", "--out", tmp_path / "x.toml"
     )
-    assert found.code == 0
-    assert "the readings contradict one another" in found.out
+    assert run.code == 0
+    assert "the readings contradict one another" in run.out
 
 
 @pytest.mark.parametrize(
@@ -385,8 +389,8 @@ def test_what_the_author_of_a_spec_wrote_stays(tmp_path):
         "identify", tmp_path / "bay.toml", "--set", "move.duration=15.0", "--swing", tmp_path / "log.csv",
         "--free", "L0", "--out", tmp_path / "new.toml", "--plot", tmp_path / "fit.png",
     )  # fmt: skip
-    found = run_here(*words)
-    assert (found.code, found.errors) == (0, [])
+    run = run_here(*words)
+    assert (run.code, run.errors) == (0, [])
     text = (tmp_path / "new.toml").read_text("utf-8")
     length = read_spec(tmp_path / "new.toml").plant.parameters["L0"]
     assert length == pytest.approx(3.0, abs=1e-3)
@@ -394,7 +398,7 @@ def test_what_the_author_of_a_spec_wrote_stays(tmp_path):
         "14.0", "15.0"
     )  # as far as there is room
     assert text == changed
-    assert re.search(r"kept +the spec's range of L0, ±10", found.out)
+    assert re.search(r"kept +the spec's range of L0, ±10", run.out)
     assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
 
 

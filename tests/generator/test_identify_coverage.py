@@ -30,9 +30,11 @@ def test_tape_and_stopwatch_hold_the_machine_in_their_ranges():
             Period(mode=1, seconds=random.normal(slow, 0.01), uncertainty=0.01),
             Period(mode=2, seconds=random.normal(fast, 0.004), uncertainty=0.004),
         ]
-        found = estimate(machine, ["L1", "L2"], readings)
-        hits += inside(found, true)
-        errors.append([(found.values[n] - true[n]) / found.standard_uncertainty[n] for n in ("L1", "L2")])
+        estimated = estimate(machine, ["L1", "L2"], readings)
+        hits += inside(estimated, true)
+        errors.append(
+            [(estimated.values[n] - true[n]) / estimated.standard_uncertainty[n] for n in ("L1", "L2")]
+        )
     assert hits >= 0.98 * 300
     np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.12)  # neither too wide nor too narrow
     np.testing.assert_allclose(np.mean(errors, axis=0), 0.0, atol=0.2)
@@ -49,10 +51,12 @@ def test_a_logged_swing_holds_the_machine_in_its_ranges():
     for _ in range(12):
         values = exact + 0.03 + random.normal(0.0, 3e-3, len(times))
         log = SwingLog(times=times, values=values, quantity="angle", load="payload")
-        found = estimate(machine, ["L0", "c"], [], [log])
-        hits += inside(found, true)
-        errors.append([(found.values[n] - true[n]) / found.standard_uncertainty[n] for n in ("L0", "c")])
-        assert found.noise[0] == pytest.approx(3e-3, rel=0.25)
+        estimated = estimate(machine, ["L0", "c"], [], [log])
+        hits += inside(estimated, true)
+        errors.append(
+            [(estimated.values[n] - true[n]) / estimated.standard_uncertainty[n] for n in ("L0", "c")]
+        )
+        assert estimated.noise[0] == pytest.approx(3e-3, rel=0.25)
     assert hits >= 11
     np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.45)
 
@@ -66,9 +70,9 @@ def test_a_log_and_a_tape_together_find_both_ropes_of_a_double_pendulum():
     log = SwingLog(times=times, values=noisy, quantity="angle", load="hook")
     machine = SwingingMachine(plant=CRANE, parameters=CRANE.nominal(), q_a=(0.0,))
     tape = DirectReading(parameter="L1", value=0.523, uncertainty=0.005)
-    found = estimate(machine, ["L1", "L2", "c1"], [tape], [log])
-    assert inside(found, true)
-    assert found.half_range["L2"] < 0.005
+    estimated = estimate(machine, ["L1", "L2", "c1"], [tape], [log])
+    assert inside(estimated, true)
+    assert estimated.half_range["L2"] < 0.005
 
 
 # what a swing tells, how far it is off the spec's
@@ -100,9 +104,9 @@ def test_every_machine_is_told_by_its_swing(type_):
     exact = np.array([plant.outputs(q, axes, SimpleNamespace(**true)).sway[-1] for q in q_u.T])
     noise = np.random.default_rng(1).normal(0.0, 0.03 * np.abs(exact).max(), len(times))
     log = SwingLog(times=times, values=exact + noise, quantity="sway", load=plant.loads[-1])
-    found = estimate(SwingingMachine(plant=plant, parameters=given, q_a=tuple(axes)), [name], [], [log])
-    assert inside(found, true)
-    assert found.half_range[name] < 0.02 * true[name]
+    estimated = estimate(SwingingMachine(plant=plant, parameters=given, q_a=tuple(axes)), [name], [], [log])
+    assert inside(estimated, true)
+    assert estimated.half_range[name] < 0.02 * true[name]
 
 
 @pytest.mark.slow
@@ -114,10 +118,10 @@ def test_a_gyroscope_on_the_hook_tells_both_ropes():
     values = rates + 0.02 + np.random.default_rng(3).normal(0.0, 5e-3, len(times))
     log = SwingLog(times=times, values=values, quantity="rate", load="hook")
     machine = SwingingMachine(plant=CRANE, parameters=given, q_a=(0.0,))
-    found = estimate(machine, ["L1", "L2"], [], [log])
-    assert inside(found, true)
-    assert max(found.half_range[name] / true[name] for name in ("L1", "L2")) < 2e-3
-    assert found.noise[0] == pytest.approx(5e-3, rel=0.1)
+    estimated = estimate(machine, ["L1", "L2"], [], [log])
+    assert inside(estimated, true)
+    assert max(estimated.half_range[name] / true[name] for name in ("L1", "L2")) < 2e-3
+    assert estimated.noise[0] == pytest.approx(5e-3, rel=0.1)
 
 
 @pytest.mark.slow
@@ -131,9 +135,9 @@ def test_steps_of_an_encoder_do_not_average_out():
     for zero in np.arange(12) / 12.0:
         values = np.round(exact / step + zero) * step
         log = SwingLog(times=times, values=values, quantity="angle", load="payload")
-        found = estimate(machine, ["c"], [], [log])
-        assert inside(found, true)
-        errors.append((found.values["c"] - true["c"]) / found.standard_uncertainty["c"])
+        estimated = estimate(machine, ["c"], [], [log])
+        assert inside(estimated, true)
+        errors.append((estimated.values["c"] - true["c"]) / estimated.standard_uncertainty["c"])
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.5
 
 
@@ -149,11 +153,11 @@ def test_ranges_that_are_not_straight_reach_as_far_as_the_measurement_allows():
     machine = SwingingMachine(
         plant=HOIST, parameters=given | {"L0": 2.3, "c": 0.8 * damping(T)}, q_a=(0.0, 4.0)
     )
-    found = estimate(machine, ["c"], [Period(mode=1, seconds=T, uncertainty=spread)])
-    assert found.values["c"] == pytest.approx(damping(T), rel=1e-5)
+    estimated = estimate(machine, ["c"], [Period(mode=1, seconds=T, uncertainty=spread)])
+    assert estimated.values["c"] == pytest.approx(damping(T), rel=1e-5)
     slope, reach = (damping(T + 1e-5) - damping(T - 1e-5)) / 2e-5, 2.576 * spread
     assert damping(T) - damping(T - reach) > 1.3 * slope * reach
-    assert found.half_range["c"] == pytest.approx(damping(T) - damping(T - reach), rel=0.06)
+    assert estimated.half_range["c"] == pytest.approx(damping(T) - damping(T - reach), rel=0.06)
 
 
 @pytest.mark.slow
@@ -167,8 +171,8 @@ def test_what_part_of_a_log_does_not_tell_stays_near_the_spec_meanwhile():
     random = np.random.default_rng(0)
     noises = [random.normal(0.0, 1e-3, len(times)) for _ in range(4)]
     log = SwingLog(times=times, values=exact + noises[3], quantity="sway", load="surface")
-    found = estimate(SwingingMachine(plant=plant, parameters=given, q_a=(0.0,)), ["h"], [], [log])
-    assert inside(found, true)
+    estimated = estimate(SwingingMachine(plant=plant, parameters=given, q_a=(0.0,)), ["h"], [], [log])
+    assert inside(estimated, true)
 
 
 def test_noise_that_lasts_from_sample_to_sample_counts_for_less():

@@ -35,9 +35,9 @@ def test_another_rope_that_is_wrong_is_named():
     machine = SwingingMachine(plant=CRANE, parameters=true | {"L1": 0.47, "L2": 0.36}, q_a=(0.0,))
     with pytest.raises(
         InfeasibleProblem, match=r"rad RMS, .* is left of it, strongest at .*another .*L2"
-    ) as told:
+    ) as refusal:
         estimate(machine, ["L1"], [], [log])
-    assert "free " in str(told.value)
+    assert "free " in str(refusal.value)
     assert inside(estimate(machine, ["L1", "L2"], [], [log]), true)
 
 
@@ -50,10 +50,10 @@ def test_a_damping_that_is_wrong_is_named():
 def test_of_parameters_that_explain_a_log_alike_none_is_advised():
     """A swing tells c/m and nothing else of both, so m must not be blamed where c is another one."""
     exact = swing(HOIST.nominal() | {"c": 1500.0}, TIMES, [0.15, 0.0])
-    with pytest.raises(InfeasibleProblem, match="measure one of them directly") as told:
+    with pytest.raises(InfeasibleProblem, match="measure one of them directly") as refusal:
         estimate(hoist(c=200.0), ["L0"], [], [log_of(exact + NOISE)])
-    assert "another m than" in str(told.value) and "another c than" in str(told.value)
-    assert "free m" not in str(told.value) and "such as" not in str(told.value)
+    assert "another m than" in str(refusal.value) and "another c than" in str(refusal.value)
+    assert "free m" not in str(refusal.value) and "such as" not in str(refusal.value)
 
 
 def test_what_explains_a_log_worse_beyond_chance_is_not_named():

@@ -22,14 +22,14 @@ LENGTHS = {
 SMALL = {"theta2"}  # of the tank: a wave too low to be seen beside the first one
 
 
-def seen(type_):
+def drawn_sides(type_):
     plant = find_plant(type_)
     return plant, views(plant, plant.nominal())
 
 
 @pytest.mark.parametrize("type_", plant_types())
 def test_every_variable_is_named(type_):
-    plant, sides = seen(type_)
+    plant, sides = drawn_sides(type_)
     assert {name for view in sides for name, _, _ in view.moved()} == {axis.name for axis in plant.actuated}
     swinging = {name for view in sides for name, _, _ in view.swung()}
     missing = {free.name for free in plant.unactuated} - swinging
@@ -45,7 +45,7 @@ def test_a_short_rope_is_named_below_a_long_one():
 
 @pytest.mark.parametrize(("type_", "axis"), [("double-pendulum-crane", "cart"), ("gantry-crane", "x")])
 def test_what_swings_positively_is_drawn_where_it_trails(type_, axis):
-    _, (side, *_) = seen(type_)
+    _, (side, *_) = drawn_sides(type_)
     directions = {name: direction for name, _, direction in side.moved()}
     assert directions[axis] == pytest.approx([1.0, 0.0])
     for _, point, without in side.swung():
@@ -53,7 +53,7 @@ def test_what_swings_positively_is_drawn_where_it_trails(type_, axis):
 
 
 def test_a_hoist_pays_out_along_the_rope():
-    _, (side,) = seen("single-pendulum-crane")
+    _, (side,) = drawn_sides("single-pendulum-crane")
     directions = {name: direction for name, _, direction in side.moved()}
     assert directions["hoist"][1] < -0.9
     (pair,) = (pair for name, pair in side.lengths() if name == "L0 + hoist")
@@ -66,8 +66,8 @@ def test_the_command_draws_a_machine(tmp_path):
     outcome = run_here("plants", "single-pendulum-crane", "--plot", tmp_path / "crane.svg", "--json")
     assert outcome.code == 0, outcome.err
     assert list(outcome.document["plants"]) == ["single-pendulum-crane"]
-    told = {node.text for node in ElementTree.parse(tmp_path / "crane.svg").iter() if node.text}
-    assert told  # well-formed
+    texts = {node.text for node in ElementTree.parse(tmp_path / "crane.svg").iter() if node.text}
+    assert texts  # well-formed
     gp.plot(gp.preset_spec("bay-crane"), tmp_path / "bay.png")
     assert (tmp_path / "bay.png").stat().st_size > 10_000
 

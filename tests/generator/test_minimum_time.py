@@ -47,12 +47,12 @@ def shortest(frequencies, distances, guess, desensitized, **limits):
     ],
 )
 def test_of_the_papers_crane(limits, desensitized):
-    found = choice.minimum_time(
+    shortest_found = choice.minimum_time(
         crane_problem(desensitized=desensitized, limits=LimitsSpec(**limits))
     ).duration
     frequencies, _ = modes(CRANE.nominal())
-    best = shortest(frequencies, [0.3], found, frequencies if desensitized else [], **limits)
-    assert 0.998 * best < found < 1.02 * best
+    best = shortest(frequencies, [0.3], shortest_found, frequencies if desensitized else [], **limits)
+    assert 0.998 * best < shortest_found < 1.02 * best
 
 
 def test_a_travel_that_ends_where_the_move_does_takes_no_longer():
@@ -67,13 +67,13 @@ def test_a_travel_that_ends_where_the_move_does_takes_no_longer():
 @pytest.mark.slow
 def test_with_a_limit_of_the_sway_on_the_way():
     limits = LimitsSpec(acceleration=0.5, sway=0.02)
-    found = choice.minimum_time(crane_problem(desensitized=("L1",), limits=limits)).duration
+    shortest_found = choice.minimum_time(crane_problem(desensitized=("L1",), limits=limits)).duration
     frequencies, _ = modes(CRANE.nominal())
     swung = (CRANE.nominal(), 0.02)
-    best = shortest(frequencies, [0.3], found, frequencies, acceleration=0.5, sway=swung)
-    loose = shortest(frequencies, [0.3], found, frequencies, acceleration=0.5)
+    best = shortest(frequencies, [0.3], shortest_found, frequencies, acceleration=0.5, sway=swung)
+    loose = shortest(frequencies, [0.3], shortest_found, frequencies, acceleration=0.5)
     assert loose < 0.95 * best  # the sway is what it waits for
-    assert 0.998 * best < found < 1.02 * best
+    assert 0.998 * best < shortest_found < 1.02 * best
 
 
 def of_the_chain(p):
@@ -147,16 +147,16 @@ def searched(excess, start=10.0, most=100.0, search=searching.EXACT):
         tried.append(duration)
         return excess(duration)
 
-    found = least(listed, start, search, most, in_cycles)
+    least_value = least(listed, start, search, most, in_cycles)
     assert len(set(tried)) == len(tried)
-    return found, tried
+    return least_value, tried
 
 
-@pytest.mark.parametrize(("enough", "tries"), [(10.001, 3), (10.03, 7), (10.5, 13), (13.0, 15)])
-def test_a_duration_of_which_only_is_known_whether_it_will_do_is_found_by_bisection(enough, tries):
+@pytest.mark.parametrize(("upper", "tries"), [(10.001, 3), (10.03, 7), (10.5, 13), (13.0, 15)])
+def test_a_duration_of_which_only_is_known_whether_it_will_do_is_found_by_bisection(upper, tries):
     """Every try is a design of seconds."""
-    found, tried = searched(lambda duration: -math.inf if duration >= enough else math.inf)
-    assert enough <= found <= enough * math.exp(searching.EXACT.precision) + 0.001
+    value, tried = searched(lambda duration: -math.inf if duration >= upper else math.inf)
+    assert upper <= value <= upper * math.exp(searching.EXACT.precision) + 0.001
     assert len(tried) <= tries
 
 
@@ -165,27 +165,27 @@ def test_no_duration_is_looked_for_without_end():
 
 
 def test_where_the_excess_falls_no_more_no_duration_is_looked_for():
-    found, tried = searched(lambda duration: 0.3 + 0.1 / duration, 1.0, 1e9, relaxation.LEAST)
-    assert found is None
+    value, tried = searched(lambda duration: 0.3 + 0.1 / duration, 1.0, 1e9, relaxation.LEAST)
+    assert value is None
     assert len(tried) <= 12
 
 
-@pytest.mark.parametrize("enough", [8.0, 9.99, 10.001, 10.03, 10.5, 13.0])
+@pytest.mark.parametrize("upper", [8.0, 9.99, 10.001, 10.03, 10.5, 13.0])
 @pytest.mark.parametrize("power", [1.0, 4.0, 30.0])
-def test_an_excess_that_is_known_leads_to_the_duration_in_few_tries(enough, power):
+def test_an_excess_that_is_known_leads_to_the_duration_in_few_tries(upper, power):
     def excess(duration):
-        return power * math.log(enough / duration)
+        return power * math.log(upper / duration)
 
-    found, tried = searched(excess)
-    assert enough <= found
-    assert excess(found) >= -searching.EXACT.close or found <= enough * math.exp(searching.EXACT.precision)
+    value, tried = searched(excess)
+    assert upper <= value
+    assert excess(value) >= -searching.EXACT.close or value <= upper * math.exp(searching.EXACT.precision)
     assert len(tried) <= 5
 
 
 def test_an_excess_that_falls_ever_more_slowly_is_followed_with_few_tries():
     """They take half a second each."""
-    found, tried = searched(lambda d: (3.0 - d) + 0.5 * (3.0 - d) ** 2, 2.7, 30.0)
-    assert 3.0 <= found < 3.01
+    value, tried = searched(lambda d: (3.0 - d) + 0.5 * (3.0 - d) ** 2, 2.7, 30.0)
+    assert 3.0 <= value < 3.01
     assert len(tried) <= 5
 
 
@@ -207,13 +207,13 @@ def test_no_motion_is_designed_twice_for_durations_that_end_on_the_same_cycle():
 
 def test_a_motion_that_no_machine_can_follow_is_passed_over(monkeypatch):
     """A hoist without limits flings the load about in the shortest motion."""
-    found = draft(preset_spec("paper"))
+    drafted = draft(preset_spec("paper"))
 
     def flung(*_):
         raise CosimulationError("The motion cannot be integrated beyond 2.565 s.")
 
     monkeypatch.setattr("gen_profile.designs.draft.evaluate", flung)
-    assert found.excess_sway == math.inf
+    assert drafted.excess_sway == math.inf
 
 
 def test_where_the_work_does_not_reach_for_many_intervals_the_motion_on_few_is_taken(monkeypatch):
@@ -222,7 +222,7 @@ def test_where_the_work_does_not_reach_for_many_intervals_the_motion_on_few_is_t
 
     monkeypatch.setattr(searching, "solved", solved)
     limits = ["limits.acceleration=0.7", "move.duration=minimum"]
-    found = draft(preset_spec("paper", [*limits, "check.residual_sway=0.0031"]))
-    assert found.excess_sway <= 0.0
-    assert found.spec.move.duration == pytest.approx(2.6, rel=0.01)
-    assert found.solution.problem.duration == found.spec.move.duration
+    drafted = draft(preset_spec("paper", [*limits, "check.residual_sway=0.0031"]))
+    assert drafted.excess_sway <= 0.0
+    assert drafted.spec.move.duration == pytest.approx(2.6, rel=0.01)
+    assert drafted.solution.problem.duration == drafted.spec.move.duration

@@ -12,10 +12,10 @@ from gen_profile.errors import SpecError
 from gen_profile.spec.reading import parse_spec
 
 
-def proof(share, faults=(), broken=()):
+def proof(fraction, faults=(), broken=()):
     judged = SimpleNamespace(faults=broken)
     return SimpleNamespace(
-        share=lambda _: share, faults=faults, judged=(judged,), worst=judged, passed=share <= 1.0
+        fraction=lambda _: fraction, faults=faults, judged=(judged,), worst=judged, passed=fraction <= 1.0
     )
 
 
@@ -28,8 +28,8 @@ def test_each_change_is_made_as_large_as_it_must_be(power):
         limits, check = changed.limits, changed.check
         assert limits.acceleration / limits.velocity == pytest.approx(0.3, rel=0.1)
         uncertain = changed.checked_ranges()["L1"][1] / 6.0 - 1.0
-        share = 5.0 * (uncertain / 0.05) ** (2.0 * power) * limits.velocity**power
-        return proof(share * (0.05 / check.residual_sway["hook"]) ** power)
+        fraction = 5.0 * (uncertain / 0.05) ** (2.0 * power) * limits.velocity**power
+        return proof(fraction * (0.05 / check.residual_sway["hook"]) ** power)
 
     surer, slower, more = planner_suggestions(spec, proof(5.0), swaying)
     assert surer.values["check.uncertain.L1"] < 0.05

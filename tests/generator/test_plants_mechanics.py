@@ -112,13 +112,13 @@ def test_bodies_are_where_and_of_what_mass_the_mechanics_say(type_, seed):
     plant = lagrange.plant
     parameters, q, dq, _ = some_machine(plant, seed)
     n_u, p = len(plant.unactuated), SimpleNamespace(**parameters)
-    told = plant.mechanics(q[:n_u], q[n_u:], p)
-    assert len(told.place) == len(told.mass) == len(plant.bodies)
+    mechanics = plant.mechanics(q[:n_u], q[n_u:], p)
+    assert len(mechanics.place) == len(mechanics.mass) == len(plant.bodies)
     masses = MACHINES[type_][0](q, p)[0]
     places = [place for _, place in masses][: len(plant.bodies)]
     if type_ == "flexible-joint":  # there on the unit circle
         places = [np.multiply(place, p.R) for place in places]
-    np.testing.assert_allclose(told.place, places, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(mechanics.place, places, rtol=1e-12, atol=1e-12)
     if type_ != "slosh-tank":
         e = dynamics(plant)
         energy = Function("energy", {"q": sym.column([e.q_u, e.q_a]), "dq": sym.column([e.dq_u, e.dq_a]),

@@ -224,8 +224,8 @@ def place(q_u, q_a, p):
 
 def with_bodies(plant, **changes):
     def mechanics(q_u, q_a, p):
-        told = {"mass": [p.m], "place": place(q_u, q_a, p), "gravity": p.g} | changes
-        return Mechanics(**{name: term(q_u, p) if callable(term) else term for name, term in told.items()})
+        terms = {"mass": [p.m], "place": place(q_u, q_a, p), "gravity": p.g} | changes
+        return Mechanics(**{name: term(q_u, p) if callable(term) else term for name, term in terms.items()})
 
     return attrs.evolve(plant, bodies=("load",), mechanics=mechanics)
 

@@ -95,7 +95,7 @@ def test_a_sound_block_is_proved(spec, proof):
     assert proof.passed
     assert {one.group for one in proof.judged} == {CORNERS, DRAWS, SEARCH}
     assert [one.number for one in proof.judged] == list(range(40))
-    assert 0.0 < proof.share(proof.worst) < 1.0
+    assert 0.0 < proof.fraction(proof.worst) < 1.0
     assert proof.apart < 1e-12
     slowed = [
         (one.override, *one.velocity_limits) for judged in proof.judged for one in judged.history.commands
@@ -243,8 +243,8 @@ def test_other_machines_are_proved(written, live):
     spec = parse_spec(written)
     proof = prove(spec, planner_block(spec).text, histories=30)
     assert proof.reasons() == ()
-    told = {one.history.live[live] for one in proof.judged}
-    assert (min(told), max(told)) == spec.planner.live[live]
+    live_values = {one.history.live[live] for one in proof.judged}
+    assert (min(live_values), max(live_values)) == spec.planner.live[live]
     hoisted = {one.history.places[1:] for one in proof.judged}
     assert (len(hoisted) > 1) == (live == "hoist")
 
@@ -336,7 +336,7 @@ def test_after_a_quick_stop_nothing_is_promised(spec):
     swaying = attrs.evolve(GOOD, promise=False, residual=np.array([1.0, 1.0]))
     judged = judge_run(spec, swaying, history, cycle=CYCLE, number=0, group=DRAWS)
     assert judged.faults == ()
-    assert judged.share(spec.check.residual_sway, 0.0) == 0.0
+    assert judged.fraction(spec.check.residual_sway, 0.0) == 0.0
 
 
 @pytest.fixture(scope="module")
@@ -383,10 +383,10 @@ def test_a_page_tells_of_the_proof(deployed, tmp_path):
     folder = deployed[0]
     proof = json.loads((folder / "manifest.json").read_text())["check"]
     page = tmp_path / "bay.html"
-    told = run_here(
+    document = run_here(
         "report", folder / "bay 3.st", "--out", page, "--field", "Customer=ACME", "--json"
     ).document
-    assert told["proof"] == proof
+    assert document["proof"] == proof
     text = unescape(page.read_text("utf-8"))
     worst = proof["worst"]
     assert f"gen-profile check 'bay 3.st' --history {worst['number']} runs" in text
@@ -397,7 +397,7 @@ def test_a_page_tells_of_the_proof(deployed, tmp_path):
     assert ranked == pytest.approx([limit * share for share in shares], rel=1e-2)
     assert f"history {worst['number']} of {proof['histories']}, drawn with the seed {proof['seed']}" in text
     assert "ACME" in text
-    assert told["report"]["bytes"] == page.stat().st_size
+    assert document["report"]["bytes"] == page.stat().st_size
     data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', text, re.DOTALL)[1])
     history, mapped = data["figures"]
     assert [entry["name"] for entry in history["legend"]][:3] == ["setpoint", "command", "this history"]

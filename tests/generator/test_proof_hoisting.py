@@ -168,7 +168,7 @@ def test_a_block_is_proved_for_ropes_that_change_on_the_way(written, changes):
     text = planner_block(spec).text
     proof = prove(spec, text, histories=40)
     assert proof.reasons() == ()
-    assert proof.share(proof.worst) < 0.2
+    assert proof.fraction(proof.worst) < 0.2
     ((name, rate),) = spec.planner.live_rate.items()
     speeds = []
     for one in proof.judged:
@@ -184,7 +184,7 @@ def test_a_block_is_proved_for_ropes_that_change_on_the_way(written, changes):
     assert rope.y_label == f"{name} (m)"
     assert rope.lines[0].y[0] == worst.live[name]
     assert rope.lines[0].y[-1] == pytest.approx(worst.hoisting[name][-1][1])
-    assert f"{name} {worst.live[name]:.4g} m at first" in worst.told(spec.machine().units)
+    assert f"{name} {worst.live[name]:.4g} m at first" in worst.reported(spec.machine().units)
 
 
 @pytest.mark.slow

@@ -24,9 +24,9 @@ from gen_profile.proof.orders import (
     Ends,
     Facts,
     Inputs,
+    ReceivedOrders,
     TimedOrder,
-    Told,
-    told,
+    read_orders,
 )
 from gen_profile.proof.verdict import kind_of
 from gen_profile.proof.watching import BlockWatch
@@ -46,7 +46,7 @@ def as_told(*orders):
     holds = np.zeros(CYCLES, dtype=bool)
     for one in orders:
         holds[one.begin : one.end] = one.kind in (POSITION, VELOCITY)
-    return Told(
+    return ReceivedOrders(
         orders=orders, aborted=np.zeros(CYCLES, dtype=bool), error=np.zeros(CYCLES, dtype=int), holds=holds
     )
 
@@ -91,7 +91,7 @@ def obedient():
         reaction=1.5,
         axes=[BlockAxis(name="")],
         limits=[LIMITS],
-        told=as_told(
+        received=as_told(
             order(0, TOLD, STOP),
             order(TOLD, STICK, POSITION, TARGET),
             order(STICK, STOPPED, VELOCITY, 0.8),
@@ -118,14 +118,14 @@ def with_output(name, within, value):
 
 
 def with_orders(*given, moved=0.0, **changes):
-    followed = attrs.evolve(obedient(), told=as_told(*given), **changes)
+    followed = attrs.evolve(obedient(), received=as_told(*given), **changes)
     followed.issued["fPosition"][510:] += moved
     return followed
 
 
 def with_told(name, within, value):
     followed = obedient()
-    getattr(followed.told, name)[within] = value
+    getattr(followed.received, name)[within] = value
     return followed
 
 
@@ -142,7 +142,7 @@ def disabled(**changes):
     rest, move, *others = obedient().orders
     off = order(1000, 1100, DISABLED)
     orders = (rest, attrs.evolve(move, end=1000), off, order(1100, STICK, STOP), *others)
-    followed = attrs.evolve(obedient(), told=as_told(*orders), **changes)
+    followed = attrs.evolve(obedient(), received=as_told(*orders), **changes)
     for name, value in (("bEnabled", 0.0), ("bPromise", 0.0), ("nPromise", 4.0)):
         followed.issued[name][1000:1100] = value
     followed.issued["bDone"][1000:STICK] = 0.0
@@ -189,7 +189,7 @@ FAULTS = {
     "not aborted": with_told("aborted", 300, True),
     "error": with_output("bError", 300, 1.0),
     "refused": with_told("error", slice(300, 400), 3),
-    "untold": with_output(("bError", "nErrorId"), slice(300, 400), 1.0),
+    "wrong error": with_output(("bError", "nErrorId"), slice(300, 400), 1.0),
     "blocked": with_zone(),
     "zone": with_zone(low=-2.0, high=-1.0, number=2),
     "taken over": disabled(steps=np.full((1, CYCLES), 0.1)),
@@ -271,11 +271,11 @@ def read(*rows, facts=None):
     for _, changes in rows:
         values |= changes
         given.append(list(values.values()))
-    return told([begin for begin, _ in rows], np.array(given), INPUTS, 1000, facts)
+    return read_orders([begin for begin, _ in rows], np.array(given), INPUTS, 1000, facts)
 
 
 def test_orders_are_read_from_inputs():
-    found = read(
+    received = read(
         (0, {}),
         (10, {"bExecute": 1.0, "fTarget": 5.0}),
         (20, {"bExecute": 0.0}),
@@ -286,7 +286,7 @@ def test_orders_are_read_from_inputs():
         (70, {"bExecute": 1.0, "fTarget": 1000.0}),
         (80, {"bExecute": 0.0, "bQuickStop": 1.0, "rOverride": np.nan}),
     )
-    assert [(one.begin, one.kind, one.values, one.tops, one.edge) for one in found.orders] == [
+    assert [(one.begin, one.kind, one.values, one.tops, one.edge) for one in received.orders] == [
         (0, STOP, (), (1.0,), 0),
         (10, POSITION, (5.0,), (1.0,), 10),  # and nothing new with the second edge
         (40, POSITION, (5.0,), (0.5,), 10),
@@ -294,9 +294,9 @@ def test_orders_are_read_from_inputs():
         (60, STOP, (), (1.0,), 60),
         (80, QUICK_STOP, (), (1.0,), 80),
     ]
-    assert [one.end for one in found.orders] == [*(one.begin for one in found.orders[1:]), 1000]
-    assert changes(found.error) == {70: 3, 80: 0, 100: 5}
-    assert changes(found.aborted) == {50: 1, 60: 0, 70: 1, 80: 0}
+    assert [one.end for one in received.orders] == [*(one.begin for one in received.orders[1:]), 1000]
+    assert changes(received.error) == {70: 3, 80: 0, 100: 5}
+    assert changes(received.aborted) == {50: 1, 60: 0, 70: 1, 80: 0}
 
 
 def changes(flags):
@@ -305,7 +305,7 @@ def changes(flags):
 
 
 def test_what_cannot_be_obeyed_is_read_from_inputs():
-    found = read(
+    received = read(
         (0, {"bStop": 1.0}),
         (10, {"bExecute": 1.0}),
         (20, {"bExecute": 0.0, "bStop": 0.0}),
@@ -319,13 +319,13 @@ def test_what_cannot_be_obeyed_is_read_from_inputs():
         (95, {"bExecute": 0.0}),
         (97, {"bVelocity": 0.0}),
     )
-    assert [(one.begin, one.kind) for one in found.orders] == [(0, STOP), (60, QUICK_STOP), (80, STOP)]
-    assert changes(found.error) == {30: 1, 40: 0, 60: 7, 80: 0, 90: 6, 97: 0}
-    assert changes(found.aborted) == {10: 1, 20: 0, 30: 1, 50: 0}
+    assert [(one.begin, one.kind) for one in received.orders] == [(0, STOP), (60, QUICK_STOP), (80, STOP)]
+    assert changes(received.error) == {30: 1, 40: 0, 60: 7, 80: 0, 90: 6, 97: 0}
+    assert changes(received.aborted) == {10: 1, 20: 0, 30: 1, 50: 0}
 
 
 def test_wrong_values_count_once_they_have_lasted():
-    found = read(
+    received = read(
         (0, {"bExecute": 1.0, "fTarget": 5.0}),
         (10, {"fL": 3.0}),
         (25, {"fL": 1.0}),
@@ -336,9 +336,9 @@ def test_wrong_values_count_once_they_have_lasted():
         (95, {"bExecute": 0.0, "bReset": 1.0}),
         (99, {"bExecute": 1.0, "bReset": 0.0}),
     )
-    assert [(one.begin, one.kind) for one in found.orders] == [(0, POSITION), (60, STOP), (99, POSITION)]
-    assert changes(found.error) == {60: 5, 95: 0}
-    assert changes(found.aborted) == {60: 1, 80: 0, 90: 1, 95: 0}
+    assert [(one.begin, one.kind) for one in received.orders] == [(0, POSITION), (60, STOP), (99, POSITION)]
+    assert changes(received.error) == {60: 5, 95: 0}
+    assert changes(received.aborted) == {60: 1, 80: 0, 90: 1, 95: 0}
 
 
 def test_what_commands_mean_depends_on_what_the_block_did():
@@ -354,15 +354,15 @@ def test_what_commands_mean_depends_on_what_the_block_did():
     assert changes(read(*rows, facts=Facts(**facts)).holds) == {300: 0}
     done = none.copy()
     done[150:200] = True
-    found = read(*rows, facts=Facts(**facts | {"done": done}))
-    assert changes(found.holds) == {200: 0}
-    assert [one.kind for one in found.orders] == [
+    received = read(*rows, facts=Facts(**facts | {"done": done}))
+    assert changes(received.holds) == {200: 0}
+    assert [one.kind for one in received.orders] == [
         POSITION,
         STOP,
         DISABLED,
         STOP,
     ]  # deflected as it was enabled
-    assert not found.aborted.any()
+    assert not received.aborted.any()
 
 
 @pytest.fixture(scope="module")

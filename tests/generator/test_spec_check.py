@@ -28,7 +28,7 @@ def test_all_of_it_survives_being_written_down():
         ],
     )
     assert spec_from_dict(spec.to_dict()) == spec
-    assert spec.check.path.faulty and spec.check.path.bends
+    assert spec.check.path.faulty and spec.check.path.alters_setpoints
 
 
 @pytest.mark.parametrize(

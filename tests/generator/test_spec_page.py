@@ -24,7 +24,7 @@ OTHERWISE = {
 }
 
 
-def told():
+def documented():
     """List the keys of every table, those in comments among them; of a key with dots the first part."""
     keys = {}
     table = ""
@@ -41,11 +41,11 @@ def told():
 def test_every_key_is_told(field):
     kind = get_type_hints(Spec)[field.name]
     if not attrs.has(kind):
-        assert field.name in {*told(), *told()[""]}
+        assert field.name in {*documented(), *documented()[""]}
         return
     other = OTHERWISE.get(field.name, {})
     due = {other.get(inner.name, inner.name) for inner in attrs.fields(kind)}
-    assert due <= told()[field.name]
+    assert due <= documented()[field.name]
 
 
 def test_defaults_are_those_shown():

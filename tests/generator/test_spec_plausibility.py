@@ -4,7 +4,7 @@ import pytest
 from command_line import run_here
 
 from gen_profile.errors import SpecError
-from gen_profile.spec.plausibility import doubts
+from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.spec.reading import preset_spec, presets
 
 CRANE = "double-pendulum-crane"
@@ -13,7 +13,7 @@ QUAY = ("plant.L1=50", "plant.m1=9000", "plant.m2=40000")
 
 @pytest.mark.parametrize("name", presets())
 def test_presets_are_in_no_doubt(name):
-    assert doubts(preset_spec(name)) == ()
+    assert plausibility_warnings(preset_spec(name)) == ()
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_presets_are_in_no_doubt(name):
     ],
 )
 def test_machines_from_the_laboratory_to_the_quay_are_in_no_doubt(name, overrides):
-    assert doubts(preset_spec(name, overrides)) == ()
+    assert plausibility_warnings(preset_spec(name, overrides)) == ()
 
 
 @pytest.mark.parametrize(
@@ -78,8 +78,8 @@ def test_what_cannot_be_meant_is_refused(name, override, place, cure):
     ],
 )
 def test_what_is_hardly_meant_is_told(name, override, place, cure):
-    told = doubts(preset_spec(name, [override]))
-    assert any(sentence.startswith(f"{place}: ") and sentence.endswith(cure) for sentence in told)
+    warnings = plausibility_warnings(preset_spec(name, [override]))
+    assert any(sentence.startswith(f"{place}: ") and sentence.endswith(cure) for sentence in warnings)
 
 
 def test_a_doubt_is_told_once_and_is_among_the_warnings_of_the_check(tmp_path):
@@ -87,7 +87,7 @@ def test_a_doubt_is_told_once_and_is_among_the_warnings_of_the_check(tmp_path):
     outcome = run_here("--preset", "paper", *doubtful, "--out", tmp_path, "--json")
     (said,) = (line for line in outcome.err.splitlines() if line.startswith("Beware: "))
     assert outcome.code == 0
-    assert [f"Beware: {told}" for told in outcome.document["check"]["warnings"]] == [said]
+    assert [f"Beware: {warning}" for warning in outcome.document["check"]["warnings"]] == [said]
     assert said.startswith("Beware: can.start_tolerance: 1 m are more than half of the move")
 
 
@@ -95,4 +95,4 @@ def test_a_limit_that_nobody_typed_is_no_slip():
     """The payload's default is 1 % of the move, which is far for so short a rope."""
     spec = preset_spec("paper", ["check.residual_sway={ hook = 0.06 }", "move.distance=33"])
     assert dict(spec.check.residual_sway) == {"hook": 0.06, "payload": 0.33}
-    assert not any("payload" in doubt for doubt in doubts(spec))
+    assert not any("payload" in doubt for doubt in plausibility_warnings(spec))

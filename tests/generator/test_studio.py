@@ -154,35 +154,35 @@ def test_a_knob_s_bounds_are_the_spec_s(preset):
 
 
 def test_live_ranges_and_spans_have_knobs():
-    found = {knob["path"]: knob for knob in parts(picture(of("paper", EDITS[-1])))["setting"]["knobs"]}
-    assert found["planner.live.L1"]["value"] == [0.4, 0.5]
-    assert found["planner.live_rate.L1"]["value"] == 0.01 and "planner.live_rate.L2" not in found
-    assert found["check.spans.c1"]["value"] == [0.0, 0.02] and found["check.spans.c2"]["value"] is None
-    assert found["can.node"]["value"] == 5 and found["can.node"]["whole"] is True
+    by_part = {knob["path"]: knob for knob in parts(picture(of("paper", EDITS[-1])))["setting"]["knobs"]}
+    assert by_part["planner.live.L1"]["value"] == [0.4, 0.5]
+    assert by_part["planner.live_rate.L1"]["value"] == 0.01 and "planner.live_rate.L2" not in by_part
+    assert by_part["check.spans.c1"]["value"] == [0.0, 0.02] and by_part["check.spans.c2"]["value"] is None
+    assert by_part["can.node"]["value"] == 5 and by_part["can.node"]["whole"] is True
 
 
 def test_what_is_shown_is_what_a_design_finds():
-    found = parts(picture(of("paper", {"move.duration": 3.2})))
-    assert list(found) == ["curves", "animation", "setting", "verdict"]
+    by_part = parts(picture(of("paper", {"move.duration": 3.2})))
+    assert list(by_part) == ["curves", "animation", "setting", "verdict"]
     design = plan(spec_from_dict(document_of(PAPER, {"move.duration": 3.2})))
-    sway = next(panel for panel in found["curves"]["sway"] if panel["title"] == "Sway of the payload")
+    sway = next(panel for panel in by_part["curves"]["sway"] if panel["title"] == "Sway of the payload")
     nominal = next(curve for curve in sway["curves"] if curve["name"] == "nominal")
     peak = 1e3 * design.figures["sway_transient_peak_m"]
     assert max(map(abs, nominal["y"])) == pytest.approx(peak, rel=2e-3)
-    takes = {row["quantity"]: row["takes"] for row in found["curves"]["margins"]}
+    takes = {row["quantity"]: row["takes"] for row in by_part["curves"]["margins"]}
     assert takes["jerk"] == pytest.approx(design.figures["jerk_max_m_per_s3"])
-    assert found["verdict"]["passed"] is True
-    assert found["verdict"]["point"]["residual"] == pytest.approx(design.figures["sway_residual_worst_m"])
-    assert found["setting"]["command"] == "gen-profile --preset paper --set move.duration=3.2"
+    assert by_part["verdict"]["passed"] is True
+    assert by_part["verdict"]["point"]["residual"] == pytest.approx(design.figures["sway_residual_worst_m"])
+    assert by_part["setting"]["command"] == "gen-profile --preset paper --set move.duration=3.2"
 
 
 @pytest.mark.slow
 def test_what_takes_longer_comes_afterwards_and_can_be_taken():
-    found = parts(depth(of("paper", {})))
-    assert list(found) == ["spectrum", "robustness", "maps", "comparison"] and found["maps"]["maps"] == []
-    (panel,) = found["robustness"]["panels"]
+    by_part = parts(depth(of("paper", {})))
+    assert list(by_part) == ["spectrum", "robustness", "maps", "comparison"] and by_part["maps"]["maps"] == []
+    (panel,) = by_part["robustness"]["panels"]
     assert panel["curves"][0]["name"] == "optimal-beta50"
-    rows = {row["method"]: row for row in found["comparison"]["rows"]}
+    rows = {row["method"]: row for row in by_part["comparison"]["rows"]}
     for method in ("zv", "optimal-beta20"):
         taken = parts(picture(of("paper", rows[method]["edits"])))["verdict"]["point"]
         figures = {name: rows[method][name] for name in ("duration", "acceleration", "sway", "residual")}
@@ -193,9 +193,9 @@ def test_two_uncertain_parameters_make_a_map():
     """Whose middle lines are the curves of either parameter alone."""
     edits = {"robustness.uncertain.L2": 0.1, "solver.method": "zvd", "move.duration": 4.0}
     answer = depth(of("paper", edits))
-    found = {part["part"]: part for part in (next(answer) for _ in range(3))}
-    (drawn,) = found["maps"]["maps"]
-    curve = found["robustness"]["panels"][0]
+    by_part = {part["part"]: part for part in (next(answer) for _ in range(3))}
+    (drawn,) = by_part["maps"]["maps"]
+    curve = by_part["robustness"]["panels"][0]
     limit = 1e3 * preset_spec("paper").check.residual_sway["payload"]
     assert drawn["frame"] == pytest.approx([20.0, 10.0]) and len(drawn["values"]) == len(drawn["y"])
     middle = [value * limit / 100.0 for value in drawn["values"][len(drawn["y"]) // 2]]
@@ -205,10 +205,10 @@ def test_two_uncertain_parameters_make_a_map():
 
 def test_what_cannot_be_says_why_and_what_would_help():
     edits = {"move.duration": 1.5, "limits.velocity": 0.15}
-    found = parts(picture(of("paper", edits)))
-    assert found["failure"]["sentences"] and found["failure"]["cures"]
-    assert found["failure"]["answer"] == "none"
-    (cure,) = found["failure"]["cures"]
+    by_part = parts(picture(of("paper", edits)))
+    assert by_part["failure"]["sentences"] and by_part["failure"]["cures"]
+    assert by_part["failure"]["answer"] == "none"
+    (cure,) = by_part["failure"]["cures"]
     healed = parts(picture(of("paper", {**edits, **cure})))
     assert "verdict" in healed and "failure" not in healed
 
@@ -221,14 +221,14 @@ def test_a_margin_of_travel_is_the_share_of_it_that_is_used(travel, share):
 
 
 def test_a_value_that_does_not_fit_is_told_at_its_knob():
-    found = parts(picture(of("paper", {"plant.m1": -1.0, "limits.velocity": "fast"})))
-    assert {fault["place"] for fault in found["faults"]["faults"]} == {"plant.m1", "limits.velocity"}
+    by_part = parts(picture(of("paper", {"plant.m1": -1.0, "limits.velocity": "fast"})))
+    assert {fault["place"] for fault in by_part["faults"]["faults"]} == {"plant.m1", "limits.velocity"}
 
 
 def test_a_spec_that_does_not_fit_is_not_called_a_motion_that_cannot_be():
     start = WrittenSpec(words=("x.toml",), text='plant.type = "cran"', folder=PAPER.folder)
-    found = parts(picture(Question(start=start, state=StudioState())))
-    assert found["failure"]["answer"] == "faulty" and "cran" in found["failure"]["sentences"][1]
+    by_part = parts(picture(Question(start=start, state=StudioState())))
+    assert by_part["failure"]["answer"] == "faulty" and "cran" in by_part["failure"]["sentences"][1]
 
 
 def test_a_start_that_is_no_spec_is_a_sentence():
@@ -278,8 +278,8 @@ def test_whatever_is_turned_is_answered_without_a_traceback():
     ]
     ends = {"verdict": 0, "failure": 0, "faults": 0}
     for _ in range(25):
-        found = parts(picture(of("paper", random_edits(chance, quick))))
-        (end,) = ends.keys() & found.keys()
+        by_part = parts(picture(of("paper", random_edits(chance, quick))))
+        (end,) = ends.keys() & by_part.keys()
         ends[end] += 1
-        assert "Internal error" not in json.dumps(found)
+        assert "Internal error" not in json.dumps(by_part)
     assert min(ends["verdict"], ends["faults"]) > 1

@@ -21,7 +21,7 @@ PAPER = Question(start=preset_start("paper"), state=StudioState(preset="paper"))
 TRUE = 0.52  # m, L1 of the crane that was logged
 
 
-def told(content, name="log.csv", **how):
+def answer_to(content, name="log.csv", **how):
     reading = {"use": "", "columns": None, "after": 0.0, "at": (), "free": (), **how}
     asked = LogQuestion(question=PAPER, name=name, content=content, **reading)
     parts = json.loads(json.dumps(list(log(asked)), allow_nan=False))
@@ -47,7 +47,7 @@ def test_a_swing_tells_parameters_that_can_be_taken(swing, count, tmp_path, monk
     if count != 1.0:  # as an encoder tells it
         rows = [row.replace(",", ".").split(";") for row in swing.decode().splitlines()[1:]]
         swing = "".join(f"{time};{round(float(value) / count)}\n" for time, value in rows).encode()
-    found = told(swing, name="stop.csv", use="swing", columns=f"time_ms=1,hook_angle_{count:g}deg=2")
+    found = answer_to(swing, name="stop.csv", use="swing", columns=f"time_ms=1,hook_angle_{count:g}deg=2")
     (row,) = found["identified"]["parameters"]
     assert row["name"] == "L1" and abs(row["value"] - TRUE) <= row["half_range"]
     taken = spec_from_dict(document_of(PAPER.start, found["identified"]["edits"]))
@@ -61,7 +61,7 @@ def test_a_swing_tells_parameters_that_can_be_taken(swing, count, tmp_path, monk
 
 
 def test_columns_that_no_name_tells_are_asked_for(swing):
-    found = told(swing)
+    found = answer_to(swing)
     assert found["log"]["columns"] == [{"name": "Uhr", "meaning": ""}, {"name": "Geber 4", "meaning": ""}]
     assert {"time", "cart_position", "hook_angle"} <= set(found["log"]["meanings"])
     assert "column" in found["unread"]["sentences"][0] and found["log"]["free"] == ["L1"]
@@ -72,7 +72,7 @@ def test_a_move_is_told_from_a_swing_and_held_against_the_plan():
     times = np.arange(0.0, motion.duration + 6.0, 0.02)
     place = motion(times - 0.5).position[:, 0]
     rows = [f"{time:.2f},{1e3 * x:.4f},0.0\n" for time, x in zip(times, place, strict=True)]
-    found = told("".join(["time_s,cart_position_mm,payload_sway_mm\n", *rows]).encode())
+    found = answer_to("".join(["time_s,cart_position_mm,payload_sway_mm\n", *rows]).encode())
     assert found["log"]["use"] == "move" and found["measured"]["passed"] is True
     assert "begins at 0.5 s" in found["measured"]["sentences"][-1]
     panel = next(panel for panel in found["measured"]["panels"] if panel["title"] == "Position of cart")
@@ -95,7 +95,7 @@ def test_a_move_is_told_from_a_swing_and_held_against_the_plan():
     ],
 )
 def test_what_is_no_log_is_a_sentence(content, words):
-    assert words in " ".join(told(content)["unread"]["sentences"])
+    assert words in " ".join(answer_to(content)["unread"]["sentences"])
 
 
 def test_columns_by_number_are_no_cells_of_the_same_text():

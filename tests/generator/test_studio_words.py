@@ -12,7 +12,7 @@ from gen_profile.designs.suggestions import IN_VAIN
 from gen_profile.errors import NoMotion, SpecError, Suggestion
 from gen_profile.phrase import Phrase
 from gen_profile.solvers.solution import LATER, LONGER, WIDER, Status
-from gen_profile.spec.plausibility import doubts
+from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.spec.reading import preset_spec, presets, spec_from_dict
 from gen_profile.studio.knobs import knobs
 from gen_profile.studio.state import document_of, preset_start
@@ -73,10 +73,10 @@ def test_every_template_has_a_translation_with_the_same_fields(template, file):
     assert translated == template or not ENGLISH.search(PART.sub("", translated).removeprefix("at:"))
 
 
-def told(document):
+def sentences_of(document):
     """What the spec's rules say of a document, without the places."""
     try:
-        sentences = doubts(spec_from_dict(document))
+        sentences = plausibility_warnings(spec_from_dict(document))
     except SpecError as error:
         sentences = error.faults
     return {fault(sentence)["sentence"] for sentence in sentences}
@@ -112,7 +112,7 @@ def test_whatever_rules_say_of_a_knob_s_value(preset):
         usual = (50.0 * knob.value,) if isinstance(knob.value, float) else ()
         for value in (*UNFIT[knob.kind], *knob.choices, *usual):
             changed = value if knob.index is None else [value] * len(spec.axis)
-            sentences |= told(document_of(start, {knob.path: changed}))
+            sentences |= sentences_of(document_of(start, {knob.path: changed}))
     assert len(sentences) > 30
     english = {sentence for sentence in sentences if ENGLISH.search(german(sentence))}
     assert english == set()

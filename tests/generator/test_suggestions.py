@@ -118,27 +118,27 @@ def test_limits_that_no_single_one_is_to_blame_for_are_widened_together():
 
 
 def test_what_was_found_before_the_work_is_used_up_is_told(monkeypatch):
-    spec, told = preset_spec("paper", ["limits.sway=0.01"]), []
+    spec, tries = preset_spec("paper", ["limits.sway=0.01"]), []
 
     def least_change(asked, change, *_):
-        if told:
+        if tries:
             raise OutOfWork
-        told.append(suggestions._tried(asked, change(1.5)))
-        return told[0]
+        tries.append(suggestions._tried(asked, change(1.5)))
+        return tries[0]
 
     monkeypatch.setattr(suggestions, "least_change", least_change)
     found = suggestions.remedy(spec)
-    assert found.suggestions == tuple(told)
-    assert list(told[0].values) == ["move.duration"]
+    assert found.suggestions == tuple(tries)
+    assert list(tries[0].values) == ["move.duration"]
 
 
 def test_where_nothing_that_was_tried_will_do_it_is_told_how_long_it_would_take(monkeypatch):
     given_up = lambda spec, **_: choice.given_up(problem_of(spec))  # noqa: E731
     monkeypatch.setattr(suggestions, "tried", given_up)
     advice = suggestions.remedy(preset_spec("paper", ["limits.acceleration=0.01"])).advice
-    (told,) = re.findall(r"^By an estimate that was not tried, it takes some ([\d.]+) s", advice)
-    assert works("paper", "limits.acceleration=0.01", f"move.duration={1.1 * float(told)}")
-    assert not works("paper", "limits.acceleration=0.01", f"move.duration={0.9 * float(told)}")
+    (estimate,) = re.findall(r"^By an estimate that was not tried, it takes some ([\d.]+) s", advice)
+    assert works("paper", "limits.acceleration=0.01", f"move.duration={1.1 * float(estimate)}")
+    assert not works("paper", "limits.acceleration=0.01", f"move.duration={0.9 * float(estimate)}")
 
 
 def test_no_limits_are_named_that_no_machine_has():
@@ -209,9 +209,9 @@ def test_the_indirect_method_which_knows_no_limits_is_told_how_to_keep_them():
     overrides = ["solver.method=indirect", "limits.acceleration=0.5"]
     with pytest.raises(LimitViolation) as violation:
         plan(preset_spec("paper", overrides))
-    told = str(violation.value)
-    assert told.startswith("limits.acceleration: 0.5 is allowed, the motion needs 0.7")
-    assert told.endswith('It can be done with solver.method = "auto".')
+    message = str(violation.value)
+    assert message.startswith("limits.acceleration: 0.5 is allowed, the motion needs 0.7")
+    assert message.endswith('It can be done with solver.method = "auto".')
     (reason,), (suggestion,) = violation.value.reasons, violation.value.suggestions
     assert (reason.code, reason.place, reason.allowed) == ("limit_broken", "limits.acceleration", 0.5)
     assert suggestion.spec == preset_spec("paper", [*overrides, "solver.method=auto"])
@@ -296,7 +296,7 @@ def test_the_least_duration_is_found_in_few_steps_however_far_it_is(monkeypatch,
 
         def least(self, _):
             tried.append(self.problem.duration)
-            return relaxation.Relaxed(wider=(needed / self.problem.duration) ** 2, found=None)
+            return relaxation.Relaxed(wider=(needed / self.problem.duration) ** 2, sequence_result=None)
 
     monkeypatch.setattr(relaxation, "Relaxation", Quadratic)
     problem = problem_of(preset_spec("paper", ["limits.sway=0.01", "move.duration=3"]))
@@ -346,7 +346,11 @@ def test_a_duration_is_guessed_where_programs_settle_for_shorter_ones_only(monke
 
         def least(self, _):
             duration = self.problem.duration
-            return None if duration > 20.0 else relaxation.Relaxed(wider=900.0 / duration**2, found=None)
+            return (
+                None
+                if duration > 20.0
+                else relaxation.Relaxed(wider=900.0 / duration**2, sequence_result=None)
+            )
 
     monkeypatch.setattr(relaxation, "Relaxation", Settling)
     problem = problem_of(preset_spec("paper", ["limits.sway=0.01"]))

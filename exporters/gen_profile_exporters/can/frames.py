@@ -143,7 +143,7 @@ def cob_ids(target: Target) -> tuple[Mapping[int, int], ...]:
         There are too few node ids, or two PDOs have the same COB-ID.
     """
     plan = layout(target.can)
-    used = sorted({*plan.received, *plan.told})
+    used = sorted({*plan.received, *plan.transmitted})
     found, taken = [], dict[int, str]()
     for axis, node in zip(target.axes, nodes(target), strict=True):
         stated = target.can.cob_ids.get(axis.name, CobIdsSpec())
@@ -245,7 +245,7 @@ def frame_bits(data_bytes: int) -> int:
 def cycle_bits(target: Target) -> int:
     """Bits of one cycle at their most: SYNC and, per axis, setpoints and answers; on the fullest bus."""
     plan = layout(target.can)
-    sizes = [packing(fields).size for fields in (*plan.setpoints.values(), *plan.told.values())]
+    sizes = [packing(fields).size for fields in (*plan.setpoints.values(), *plan.transmitted.values())]
     return frame_bits(0) + _most_axes(target) * sum(map(frame_bits, sizes))
 
 

@@ -99,14 +99,14 @@ class Layout:
     ----------
     received : mapping of int to tuple of Field
         What the drive is sent, in the order in which a cycle sends it.
-    told : mapping of int to tuple of Field
+    transmitted : mapping of int to tuple of Field
         What the drive sends at each SYNC: statusword and actual position, in one TPDO or in two.
     fixed : bool
         Whether the drive's own mapping says so, and must not be changed.
     """
 
     received: Pdos
-    told: Pdos
+    transmitted: Pdos
     fixed: bool
 
     @property
@@ -139,8 +139,8 @@ class Layout:
         """Name a PDO in use as `can.cob_ids` does."""
         if pdo == self.leading:
             return "setpoint"
-        if pdo in self.told:
-            return "feedback" if STATUSWORD in self.told[pdo] else "position"
+        if pdo in self.transmitted:
+            return "feedback" if STATUSWORD in self.transmitted[pdo] else "position"
         return "command" if pdo == self.command else "feed_forward"
 
     def offset(self, wanted: Field, fields: Sequence[Field]) -> int:
@@ -159,10 +159,10 @@ def layout(can: CanSpec) -> Layout:
     if not can.fixed_pdos.stated:
         return Layout(
             received={RPDO1: (CONTROLWORD,), **_setpoints(can)},
-            told={TPDO1: (STATUSWORD, ACTUAL_POSITION)},
+            transmitted={TPDO1: (STATUSWORD, ACTUAL_POSITION)},
             fixed=False,
         )
-    return Layout(received=_fixed_received(can), told=_fixed_told(can), fixed=True)
+    return Layout(received=_fixed_received(can), transmitted=_fixed_transmitted(can), fixed=True)
 
 
 def setpoint_fields(can: CanSpec) -> tuple[Field, ...]:
@@ -222,7 +222,7 @@ def _sent(entry: int, needed: Sequence[Field], place: str) -> Field:
     )
 
 
-def _fixed_told(can: CanSpec) -> Pdos:
+def _fixed_transmitted(can: CanSpec) -> Pdos:
     """Choose the TPDO with both, else the first with each."""
     stated = dict(zip(TPDOS, can.fixed_pdos.sent, strict=True))
     wanted = (STATUSWORD, ACTUAL_POSITION)

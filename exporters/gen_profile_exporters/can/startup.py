@@ -190,7 +190,7 @@ def _mapping(node: int, own: Mapping[int, int], can: CanSpec) -> Iterator[Entry]
             yield Entry(
                 PARAMETERS[pdo], 5, 16, timeout_ms(can), "longest wait for a setpoint (ms)", optional=True
             )
-    for pdo, fields in layout.told.items():
+    for pdo, fields in layout.transmitted.items():
         answer, name = NO_REMOTE_REQUEST | own[pdo], NAMES[layout.role(pdo)]
         yield from _pdo(PARAMETERS[pdo], answer, ON_SYNC, fields, name, fixed=layout.fixed)
     for pdo, index in PARAMETERS.items():

@@ -193,7 +193,9 @@ def planner_wrapper(block: BlockSource, units: Mapping[str, float], library: Mot
     name = f"{block.name}_{'Axis' if library.axis_type else 'Velocity'}"
     outer = [v for v in block.variables if v.section in INTERFACE]
     hidden = {f"{key}{n}" for n in units for key in (*SETPOINTS, *(PLACES if library.axis_type else ()))}
-    told = [attrs.evolve(v, comment=COMMENTS.get(v.name, v.comment)) for v in outer if v.name not in hidden]
+    declared = [
+        attrs.evolve(v, comment=COMMENTS.get(v.name, v.comment)) for v in outer if v.name not in hidden
+    ]
     variables = (
         *(
             BlockVariable(section="VAR_IN_OUT", name=f"Axis{n}", type=library.axis_type)
@@ -201,7 +203,7 @@ def planner_wrapper(block: BlockSource, units: Mapping[str, float], library: Mot
             if library.axis_type
         ),
         POWER,
-        *told,
+        *declared,
         *(attrs.evolve(v, name=v.name.format(n=n)) for n in units for v in library.variables),
         STAGE,
         *_own(block, units, library),
@@ -261,7 +263,7 @@ def _body(block: BlockSource, units: Mapping[str, float], library: MotionLibrary
         for key, place in PLACES.items():
             given[f"{key}{n}"] = place.format(n=n, speed=library.speed.format(n=n))
     setpoints = {f"{key}{n}" for n in units for key in SETPOINTS}
-    told = [v for v in outputs if v.name not in setpoints]
+    copied = [v for v in outputs if v.name not in setpoints]
     return BODY.format(
         prepare=prepare,
         take=each("    bTaken{n} := TRUE;", places),
@@ -270,7 +272,7 @@ def _body(block: BlockSource, units: Mapping[str, float], library: MotionLibrary
         feed=feed,
         results="".join(
             _list(v, v.name, f"fbPlanner.{v.name}") if v.array else f"{v.name} := fbPlanner.{v.name};\n"
-            for v in told
+            for v in copied
         ),
     )
 

@@ -121,11 +121,11 @@ class PlannerConstants:
         By how much each may change before it is taken over anew.
     rates : mapping of str to float
         How fast some may change on the way, per s.
-    lowers : mapping of str to float
+    rope_length_gain : mapping of str to float
         Of live parameters that lower all loads by as much as they grow: the inverse of gravity, in s²/m.
     sway_limit : float
         m, that the loads may sway after a motion.
-    calm : float
+    tolerated_sway : float
         m, sway up to which nothing is done about it.
     events : bool
         Whether the last events are outputs.
@@ -146,7 +146,7 @@ class PlannerConstants:
         full speed; 0 is no condition.
     degrees : int
         Chebyshev polynomials per live parameter.
-    bends : sequence of float
+    curvatures : sequence of float
         Of each live parameter t from -1 to 1: k of (t + k) / (1 + k t), of which they are; of the
         frequencies and decays, then of what follows.
     exponents : (parameters, terms) array of int
@@ -167,9 +167,9 @@ class PlannerConstants:
     nominal: tuple[float, ...]
     drift: tuple[float, ...]
     rates: Mapping[str, float]
-    lowers: Mapping[str, float]
+    rope_length_gain: Mapping[str, float]
     sway_limit: float
-    calm: float
+    tolerated_sway: float
     events: bool
     zones: bool
     operations: int
@@ -178,7 +178,7 @@ class PlannerConstants:
     doubt: float
     second_order: Array
     degrees: int
-    bends: Sequence[float]
+    curvatures: Sequence[float]
     exponents: NDArray[np.int64]
     modes: int
     model: Array
@@ -228,8 +228,8 @@ def _with_while_loops(text: str) -> str:
     """Write FOR loops as WHILE loops: since 2024 matiec leaves out those of a single pass."""
     lines, counters = list[str](), list[str]()
     for line in text.split("\n"):
-        if begins := FOR.fullmatch(line):
-            margin, counter, first, last, more = begins.groups()
+        if loop := FOR.fullmatch(line):
+            margin, counter, first, last, more = loop.groups()
             within = f"< {last[:-4]}" if last.endswith(" - 1") else f"<= {last}"
             lines += [f"{margin}{counter} := {first};", f"{margin}WHILE {counter} {within} DO{more}"]
             counters.append(counter)
@@ -432,7 +432,7 @@ def _real_constants(c: PlannerConstants) -> dict[str, float]:
         "cInside": INSIDE + (RESERVE if c.rates else 0.0),
         "cReserve": RESERVE if c.rates else 0.0,
         "cMargin": c.axes[0].targets[0] - c.axes[0].travel[0],
-        "cCalm": c.calm,
+        "cCalm": c.tolerated_sway,
         "cAtOnce": AT_ONCE,
         "cAfterCut": AFTER_CUT,
         "cDoubt": c.doubt,
@@ -475,10 +475,10 @@ def _arrays(c: PlannerConstants) -> dict[str, Sequence[float] | Array]:
         "cTargetLow": [axis.targets[0] for axis in c.axes],
         "cTargetHigh": [axis.targets[1] for axis in c.axes],
         "cSecondOrder": c.second_order,
-        **({"cLowers": [c.lowers.get(name, 0.0) for name in lives]} if c.rates else {}),
+        **({"cLowers": [c.rope_length_gain.get(name, 0.0) for name in lives]} if c.rates else {}),
         "cLiveLow": [low for low, _ in lives.values()],
         "cLiveHigh": [high for _, high in lives.values()],
-        "cLiveBend": c.bends or (0.0, 0.0),
+        "cLiveBend": c.curvatures or (0.0, 0.0),
         **({} if c.rates else {"cVariation": VARIATIONS}),
         "cLiveDrift": c.drift or (0.0,),
         "cLiveStep": [c.cycle * c.rates.get(name, 0.0) * (1.0 + ROUNDING) for name in lives],

@@ -170,8 +170,8 @@ def _reach(ends: Array, inside: Array, cycle_time: float) -> float:
 
     Errors of a quintic's position and acceleration grow with the sixth and fourth power of its length.
     """
-    missed = _interpolation(inside.shape[1] + 1, cycle_time) @ ends - inside
-    far, bent = np.maximum.reduce(np.abs(missed, out=missed), axis=(1, 2)).tolist()
+    error = _interpolation(inside.shape[1] + 1, cycle_time) @ ends - inside
+    far, bent = np.maximum.reduce(np.abs(error, out=error), axis=(1, 2)).tolist()
     return float(1.0 / max(far ** (1 / 6), bent**0.25, LEAST))
 
 

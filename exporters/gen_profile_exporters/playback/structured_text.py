@@ -100,12 +100,14 @@ def read_block(text: str, target: Target) -> SampledProfile:
 def read_table(text: str, target: Target) -> PlaybackTable:
     """Read a block's table; raises as `replay` does."""
     layout = playback_block.layout_of(text)
-    found = playback_block.match(text, layout, len(target.axes))
-    if not _NAME.fullmatch(found["block"].text):
-        raise ExportError(f"line {found['block'].line}: {found['block'].text!r} stands where a name is due.")
-    _array(found["start_tolerance"])
-    table = _table(found, layout, target)
-    _verify(found, table)
+    tokens = playback_block.match(text, layout, len(target.axes))
+    if not _NAME.fullmatch(tokens["block"].text):
+        raise ExportError(
+            f"line {tokens['block'].line}: {tokens['block'].text!r} stands where a name is due."
+        )
+    _array(tokens["start_tolerance"])
+    table = _table(tokens, layout, target)
+    _verify(tokens, table)
     return table
 
 
@@ -222,27 +224,27 @@ def _allowed(variants: AxisVariants) -> str:
     return f"allows {', '.join(allowed)}" if allowed else "allows no variants"
 
 
-def _table(found: Mapping[str, Token], layout: str, target: Target) -> PlaybackTable:
+def _table(tokens: Mapping[str, Token], layout: str, target: Target) -> PlaybackTable:
     """Read the table; too few values would compile all the same, and leave zeros."""
     axes = counted_axes(target, layout)
     names = SEGMENT_COLUMNS if layout == "segments" else SAMPLE_COLUMNS
-    columns = [_array(found[name]) for name in names]
+    columns = [_array(tokens[name]) for name in names]
     rows = len(columns[0])
-    first = _array(found["first"]) if layout == "segments" else None
-    lengths = [(found[name], len(column), rows) for name, column in zip(names, columns, strict=True)]
+    first = _array(tokens["first"]) if layout == "segments" else None
+    lengths = [(tokens[name], len(column), rows) for name, column in zip(names, columns, strict=True)]
     if first is not None:
-        lengths.append((found["first"], len(first) * len(axes), rows))
+        lengths.append((tokens["first"], len(first) * len(axes), rows))
     for token, length, due in lengths:
-        if length != due or due % len(axes) or found["rows"].text != f"[0..{due - 1}]":
+        if length != due or due % len(axes) or tokens["rows"].text != f"[0..{due - 1}]":
             raise ExportError(
-                f"line {token.line}: {length} values in an array {found['rows'].text[:40]} for {len(axes)} "
+                f"line {token.line}: {length} values in an array {tokens['rows'].text[:40]} for {len(axes)} "
                 "axes; values are missing or too many, export the block again."
             )
-    cycle, last = found["cycle_time"], _number(found["last"].text, found["last"])
+    cycle, last = tokens["cycle_time"], _number(tokens["last"].text, tokens["last"])
     cycles = rows // len(axes) - 1 if first is None else last
     if last != cycles or not 1 <= last <= MOST_CYCLES or (first is not None and not _rise(first, last)):
         raise ExportError(
-            f"line {found['last'].line}: cLast = {last:g} does not belong to the table; "
+            f"line {tokens['last'].line}: cLast = {last:g} does not belong to the table; "
             "export the block again."
         )
     columns_by_axis = np.array(columns).reshape(len(names), -1, len(axes))
@@ -253,9 +255,9 @@ def _table(found: Mapping[str, Token], layout: str, target: Target) -> PlaybackT
         first=first,
         columns=columns_by_axis,
         last=int(last),
-        target=columns_by_axis[0, -1] if first is None else _end(found["target"], axes),
-        stated_play_on=_within(found["play_on"], last),
-        variants=_variants(found, axes),
+        target=columns_by_axis[0, -1] if first is None else _end(tokens["target"], axes),
+        stated_play_on=_within(tokens["play_on"], last),
+        variants=_variants(tokens, axes),
     )
 
 
@@ -268,11 +270,11 @@ def _within(token: Token, last: float) -> int:
     return int(number)
 
 
-def _variants(found: Mapping[str, Token], axes: Sequence[AxisScale]) -> tuple[AxisVariants, ...]:
-    columns = [_array(found[name]) for name in ("least_scale", "mirrors", "shifts")]
+def _variants(tokens: Mapping[str, Token], axes: Sequence[AxisScale]) -> tuple[AxisVariants, ...]:
+    columns = [_array(tokens[name]) for name in ("least_scale", "mirrors", "shifts")]
     if any(len(column) != len(axes) for column in columns):
         raise ExportError(
-            f"line {found['least_scale'].line}: {len(axes)} axes, but values for another number of them; "
+            f"line {tokens['least_scale'].line}: {len(axes)} axes, but values for another number of them; "
             "export the block again."
         )
     return tuple(
@@ -296,27 +298,27 @@ def _rise(first: Array, last: float) -> bool:
     return bool(first[0] == 0.0 and (cycles == np.floor(cycles)).all() and (np.diff(cycles) >= 1.0).all())
 
 
-def _verify(found: Mapping[str, Token], table: PlaybackTable) -> None:
+def _verify(tokens: Mapping[str, Token], table: PlaybackTable) -> None:
     """Refuse a block that would refuse to start, or whose limits are those of another motion."""
-    due, written = _values(table), found["checksum"]
+    due, written = _values(table), tokens["checksum"]
     if written.text != due["checksum"]:
         raise ExportError(
             f"line {written.line}: the checksum of the constants is {due['checksum']}, not "
             f"{written.text[:40]}: one was altered, and the block would refuse to start (nErrorId 5); "
             "export it again."
         )
-    for name, token in found.items():
+    for name, token in tokens.items():
         same = token.text == due.get(name, token.text)  # as it was exported: no number need be read
         if not same and _numbers(token) != _numbers(Token(due[name])):
             raise ExportError(
                 f"line {token.line}: {token.text[:40]} stands where the table asks for {due[name][:40]}; "
                 "export the block again."
             )
-    missed = np.abs(table.arrival() - table.target)
+    end_error = np.abs(table.arrival() - table.target)
     factor = np.abs([axis.factor for axis in table.axes])
-    if (missed > POSITION_ERROR * factor + ROUNDING * np.abs(table.target)).any():
+    if (end_error > POSITION_ERROR * factor + ROUNDING * np.abs(table.target)).any():
         raise ExportError(
-            f"line {found['target'].line}: cTarget = {found['target'].text[:40]} is not where the table "
+            f"line {tokens['target'].line}: cTarget = {tokens['target'].text[:40]} is not where the table "
             "ends; export the block again."
         )
 

@@ -45,12 +45,12 @@ def equations_source(equations: Dynamics) -> str:
     }
     seeds = {name: sym.symbols(f"change_of_{name}", column.shape[0]) for name, column in arguments.items()}
     everything, change = sym.column(list(arguments.values())), sym.column(list(seeds.values()))
-    tangents = [sym.directional(expression, everything, change) for expression in (e.ddq_u, e.seen)]
+    tangents = [sym.directional(expression, everything, change) for expression in (e.ddq_u, e.outputs)]
     changes = {f"change_of_{name}": column for name, column in seeds.items()}
     text = sym.c_source(
         Function("equations_acceleration", arguments, e.ddq_u),
-        Function("equations_jump", arguments, e.driven @ e.ddq_a),
-        Function("equations_outputs", arguments, e.seen),
+        Function("equations_jump", arguments, e.input_matrix @ e.ddq_a),
+        Function("equations_outputs", arguments, e.outputs),
         Function("equations_tangent", {**arguments, **changes}, *tangents),
     )
     return f'#include "equations.h"\n{_bare(text)}'

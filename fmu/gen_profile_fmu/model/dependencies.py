@@ -81,7 +81,7 @@ def _motion(table: VariableTable) -> dict[int, set[int]]:
 def _observed(
     equations: Dynamics, table: VariableTable, drives: Mapping[int, set[int]]
 ) -> dict[int, set[int]]:
-    return _rows(equations, equations.seen, table.references(*OBSERVED), table, drives)
+    return _rows(equations, equations.outputs, table.references(*OBSERVED), table, drives)
 
 
 def _derivatives(

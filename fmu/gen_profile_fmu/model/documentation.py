@@ -164,12 +164,12 @@ def _motion_plots(axes: Sequence[Coordinate], profile: Profile) -> str:
     times = np.linspace(0.0, profile.duration, _SAMPLES)
     plots = []
     for unit in dict.fromkeys(axis.unit for axis in axes):
-        alike = [index for index, axis in enumerate(axes) if axis.unit == unit]
+        same_unit = [index for index, axis in enumerate(axes) if axis.unit == unit]
         for order, title in enumerate(
             (f"position in {unit}", f"velocity in {unit}/s", f"acceleration in {unit}/s²")
         ):
-            columns = profile.derivative(times, order)[:, alike]
-            plots.append(_plot(times, columns, [axes[index].name for index in alike], title))
+            columns = profile.derivative(times, order)[:, same_unit]
+            plots.append(_plot(times, columns, [axes[index].name for index in same_unit], title))
     return "\n".join(plots)
 
 

@@ -63,13 +63,13 @@ def state_nominals(
         Its integration would take too many steps.
     """
     times = np.linspace(0.0, motion.duration, _SAMPLES)
-    (seen,) = PlantSimulation(plant, motion, [parameters], motion.duration, initial).at(times)
-    free, driven = [q.name for q in plant.unactuated], [axis.name for axis in plant.actuated]
+    (response,) = PlantSimulation(plant, motion, [parameters], motion.duration, initial).at(times)
+    swinging, axes = [q.name for q in plant.unactuated], [axis.name for axis in plant.actuated]
     sizes = {
-        **_sizes(free, seen.q_u),
-        **_sizes([f"{name}.rate" for name in free], seen.dq_u),
-        **_sizes([f"{name}.position" for name in driven], seen.position),
-        **_sizes([f"{name}.velocity" for name in driven], seen.velocity),
+        **_sizes(swinging, response.q_u),
+        **_sizes([f"{name}.rate" for name in swinging], response.dq_u),
+        **_sizes([f"{name}.position" for name in axes], response.position),
+        **_sizes([f"{name}.velocity" for name in axes], response.velocity),
     }
     return {variable_name(name): size for name, size in sizes.items()}
 

@@ -159,8 +159,8 @@ def planned_system_model(
     tau, velocity, start = (table.references(of) for of in ("TAU", "DQ_A", "START"))
     drives = {axis: {rate, *tau} for axis, rate in enumerate(velocity)}
     of_plant = plant_structure(equations, table, drives, {axis: {place} for axis, place in enumerate(start)})
-    begins = dict(zip(stands, (start[number] for number in planned), strict=True))
-    of_block = _structure(block, table, at | begins)
+    start_values = dict(zip(stands, (start[number] for number in planned), strict=True))
+    of_block = _structure(block, table, at | start_values)
     asked = [led[planned.index(k)] if k in planned else None for k in range(len(names))]
     others = iter(table.references("OTHERS"))
     places = [next(others) if place is None else place for place in asked]

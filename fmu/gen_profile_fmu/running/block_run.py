@@ -57,7 +57,7 @@ class Script:
     ----------
     cycle : float
         s.
-    begins : (rows,) array of int
+    start_cycles : (rows,) array of int
         Cycle from which each row of inputs holds; the first is 0.
     inputs : (rows, inputs) array
         Of the block, and behind them what else axes follow.
@@ -70,7 +70,7 @@ class Script:
     """
 
     cycle: float
-    begins: Sequence[int]
+    start_cycles: Sequence[int]
     inputs: Array
     actual: Sequence[int]
     longest: int
@@ -86,14 +86,14 @@ class Hoist:
     ----------
     axis : int
         Of the plant.
-    told : int
+    column : int
         Place of the column.
     ratio : float
         Of the axis's position to its values.
     """
 
     axis: int
-    told: int
+    column: int
     ratio: float
 
 
@@ -171,7 +171,7 @@ class _History(Structure):
     _fields_ = [
         ("cycle", c_double),
         ("n_rows", c_size_t),
-        ("begins", POINTER(c_long)),
+        ("start_cycles", POINTER(c_long)),
         ("inputs", POINTER(c_double)),
         ("actual", POINTER(c_size_t)),
         *((name, c_long) for name in ("longest", "settle", "watch")),
@@ -181,7 +181,7 @@ class _History(Structure):
         ("setpoints", POINTER(c_double)),
         ("led", POINTER(c_size_t)),
         ("n_hoists", c_size_t),
-        *((name, POINTER(c_size_t)) for name in ("hoists", "told")),
+        *((name, POINTER(c_size_t)) for name in ("hoists", "columns")),
         ("ratios", POINTER(c_double)),
         ("n_marks", c_size_t),
         ("marks", POINTER(c_long)),
@@ -305,12 +305,12 @@ class BlockFollower:
         hoists: Sequence[Hoist],
         marks: Sequence[int],
     ) -> _History:
-        begins = (c_long * len(script.begins))(*script.begins)
+        start_cycles = (c_long * len(script.start_cycles))(*script.start_cycles)
         setpoints = [values[name] for name in self._setpoints]
         return _History(
             cycle=script.cycle,
-            n_rows=len(begins),
-            begins=begins,
+            n_rows=len(start_cycles),
+            start_cycles=start_cycles,
             inputs=_doubles(script.inputs),
             actual=(c_size_t * len(script.actual))(*script.actual),
             longest=script.longest,
@@ -327,7 +327,7 @@ class BlockFollower:
             led=(c_size_t * len(led))(*led),
             n_hoists=len(hoists),
             hoists=(c_size_t * len(hoists))(*(hoist.axis for hoist in hoists)),
-            told=(c_size_t * len(hoists))(*(hoist.told for hoist in hoists)),
+            columns=(c_size_t * len(hoists))(*(hoist.column for hoist in hoists)),
             ratios=(c_double * len(hoists))(*(hoist.ratio for hoist in hoists)),
             n_marks=len(marks),
             marks=(c_long * len(marks))(*marks),

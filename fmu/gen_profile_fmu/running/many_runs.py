@@ -128,7 +128,7 @@ class ManyRuns:
         if len(shares) == 1:
             reached = [self._workers[0].run(plan, 0, len(found), found)]
         else:
-            reached = list(self._threads.map(lambda share: share[0].run(plan, *share[1:], found), shares))
+            reached = list(self._threads.map(lambda part: part[0].run(plan, *part[1:], found), shares))
         for run, (worker, _, end) in zip(reached, shares, strict=True):
             if run < end:
                 reason = " ".join(worker.messages)

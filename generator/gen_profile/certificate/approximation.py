@@ -91,15 +91,15 @@ def scales(theorem: Theorem, boxes: Sequence[DyadicBox]) -> Array:
     )
     middles = 0.5 * (axes.position[:-1] + axes.position[1:])
     few = [_energies(plant, machines, q_a) for q_a in middles[:: max(1, len(middles) // 8)]]
-    alike = all(np.allclose(one, few[0], rtol=1e-12, atol=0.0) for one in few)
-    found = few[:1] if alike else [_energies(plant, machines, q_a) for q_a in middles]
-    energies = np.stack(found, axis=1)  # (2, pieces, machines, n_u, n_u)
-    energies = energies.reshape(2, len(found), len(boxes), len(grid), *energies.shape[3:]).swapaxes(1, 2)
+    equal = all(np.allclose(one, few[0], rtol=1e-12, atol=0.0) for one in few)
+    matrices = few[:1] if equal else [_energies(plant, machines, q_a) for q_a in middles]
+    energies = np.stack(matrices, axis=1)  # (2, pieces, machines, n_u, n_u)
+    energies = energies.reshape(2, len(matrices), len(boxes), len(grid), *energies.shape[3:]).swapaxes(1, 2)
     mass, stiffness = 0.5 * (energies + np.swapaxes(energies, -1, -2))
     root = _root(mass[:, -1:, :1], -0.5)  # at the end; S shall change little from piece to piece
     modes = root @ np.linalg.eigh(root @ stiffness[:, -1:, :1] @ root)[1]
-    turned = (np.swapaxes(modes, -1, -2) @ one @ modes for one in (stiffness, mass))
-    blocks = [_root(one, 0.5) @ np.linalg.inv(modes) for one in turned]
+    modal = (np.swapaxes(modes, -1, -2) @ one @ modes for one in (stiffness, mass))
+    blocks = [_root(one, 0.5) @ np.linalg.inv(modes) for one in modal]
     whole = np.zeros((*mass.shape[:3], 2 * mass.shape[3], 2 * mass.shape[3]))
     n_u = mass.shape[3]
     whole[..., :n_u, :n_u], whole[..., n_u:, n_u:] = blocks

@@ -33,8 +33,8 @@ class Ranges:
     def values(self, box: DyadicBox, places: Array) -> Array:
         """Values at places on [−1, 1] of a box, rounded, shape (places, ranges)."""
         low, high = (np.array(ends).reshape(-1) for ends in shares(box))
-        share = 0.5 * (low + high) + 0.5 * (high - low) * places
-        return np.asarray(self.lower + share * (self.upper - self.lower))
+        fractions = 0.5 * (low + high) + 0.5 * (high - low) * places
+        return np.asarray(self.lower + fractions * (self.upper - self.lower))
 
     def enclosed(self, boxes: Sequence[DyadicBox]) -> tuple[Ball, Ball]:
         """Enclose the ends of boxes, each of shape (boxes, ranges)."""

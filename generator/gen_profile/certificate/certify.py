@@ -55,9 +55,9 @@ class Attempt:
         Of `Approximation`, for these boxes.
     bounds : (boxes, limits) array
         m, of `Theorem.limits`.
-    seen : (limits,) array
+    largest_met : (limits,) array
         Greatest sway that was met, in m.
-    share : float
+    fraction : float
         Of the whole box, of which a bound is proved.
     """
 
@@ -66,8 +66,8 @@ class Attempt:
     motions: tuple[Motions, ...]
     scales: Array
     bounds: Array
-    seen: Array
-    share: float
+    largest_met: Array
+    fraction: float
 
 
 def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _, __: None) -> Attempt:
@@ -93,29 +93,29 @@ def attempt(spec: Spec, setpoints: SampledProfile, progress: Progress = lambda _
     first = _first_boxes(theorem, spans, most)
     limits = np.array([limit.allowed for limit in theorem.limits])
     waiting, done, tried = first, dict[DyadicBox, _Proof](), 0
-    seen, fruitless, before = np.zeros(len(limits)), 0, np.inf
+    largest_met, fruitless, before = np.zeros(len(limits)), 0, np.inf
     while waiting:
-        prove = partial(_prove, theorem, _wanted(seen, limits))
+        prove = partial(_prove, theorem, _wanted(largest_met, limits))
         for batch, proofs, here in in_order(prove, _integrated(theorem, waiting)):
             done.update(zip(batch, proofs, strict=True))
-            seen = np.fmax(seen, here)
+            largest_met = np.fmax(largest_met, here)
             tried += len(batch)
             progress(tried, tried + len(waiting))
-        wanted = _wanted(seen, limits)
+        wanted = _wanted(largest_met, limits)
         coarse = [box for box, proof in done.items() if not (proof.bound <= wanted).all()]
         deepest = sum(level for level, _ in first[0]) + DEEPEST
         coarse = [box for box in coarse if box and sum(level for level, _ in box) < deepest]
         above = np.array([done[box].bound - wanted for box in waiting])
-        found = np.isfinite(above).all(axis=1)
-        worst = float(above.max()) if found.all() else np.inf
-        nearer = worst < FRUITFUL * before if found.all() else bool(found.any())
+        proved = np.isfinite(above).all(axis=1)
+        worst = float(above.max()) if proved.all() else np.inf
+        nearer = worst < FRUITFUL * before if proved.all() else bool(proved.any())
         fruitless, before = 0 if nearer else fruitless + 1, min(before, worst)
         if tried + 2 * len(coarse) > most or fruitless == FRUITLESS:
             break
         waiting = [part for box in coarse for part in halves(box, _widest(box, spans))]
         for box in coarse:
             del done[box]
-    return _attempt(theorem, done, seen)
+    return _attempt(theorem, done, largest_met)
 
 
 def _first_boxes(theorem: Theorem, spans: Sequence[float], most: int) -> list[DyadicBox]:
@@ -135,10 +135,10 @@ def _first_boxes(theorem: Theorem, spans: Sequence[float], most: int) -> list[Dy
     return whole(levels)
 
 
-def _wanted(seen: Array, limits: Array) -> Array:
+def _wanted(largest_met: Array, limits: Array) -> Array:
     """Tell how low bounds should be, by the greatest sway seen."""
-    wanted = np.maximum(CLOSE * seen, seen + CLOSE_TO_LIMIT * limits)
-    return np.where(seen < limits, np.minimum(wanted, limits / (1.0 + SLACK)), wanted)
+    wanted = np.maximum(CLOSE * largest_met, largest_met + CLOSE_TO_LIMIT * limits)
+    return np.where(largest_met < limits, np.minimum(wanted, limits / (1.0 + SLACK)), wanted)
 
 
 def _halvings(span: float) -> int:
@@ -173,30 +173,30 @@ def _integrated(
 
 
 def _prove(
-    theorem: Theorem, enough: Array, made: tuple[Sequence[DyadicBox], Array, Array]
+    theorem: Theorem, targets: Array, made: tuple[Sequence[DyadicBox], Array, Array]
 ) -> tuple[Sequence[DyadicBox], list[_Proof], Array]:
     """Prove bounds for a batch, and tell the greatest sway that was met."""
     batch, coefficients, scales = made
-    found = theorem.enclosure(batch, coefficients, scales).bounds(enough)
+    bounds = theorem.enclosure(batch, coefficients, scales).bounds(targets)
     proofs = [
         _Proof(motions=Motions.of(motion), scales=scale, bound=bound)
-        for motion, scale, bound in zip(coefficients, scales, found.sway, strict=True)
+        for motion, scale, bound in zip(coefficients, scales, bounds.sway, strict=True)
     ]
-    return batch, proofs, np.nanmax(found.seen, axis=0, initial=0.0)
+    return batch, proofs, np.nanmax(bounds.largest_met, axis=0, initial=0.0)
 
 
-def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], seen: Array) -> Attempt:
+def _attempt(theorem: Theorem, done: dict[DyadicBox, _Proof], largest_met: Array) -> Attempt:
     """Keep the boxes with a bound."""
-    proved = {box: found for box, found in done.items() if np.isfinite(found.bound).all()}
+    proved = {box: proof for box, proof in done.items() if np.isfinite(proof.bound).all()}
     volume = sum((Fraction(1, prod(2**level for level, _ in box)) for box in proved), Fraction(0))
     return Attempt(
         theorem=theorem,
         boxes=tuple(proved),
         motions=tuple(proof.motions for proof in proved.values()),
         scales=np.array([proof.scales for proof in proved.values()]),
-        bounds=np.array([proof.bound for proof in proved.values()]).reshape(-1, len(seen)),
-        seen=seen,
-        share=float(volume),
+        bounds=np.array([proof.bound for proof in proved.values()]).reshape(-1, len(largest_met)),
+        largest_met=largest_met,
+        fraction=float(volume),
     )
 
 

@@ -47,7 +47,7 @@ class Certificate(Summarised):
         Of every load after the move, and of the end load on the way where that is limited.
     asked : mapping
         Of the axes, see `gen_profile.certificate.axes.setpoint_limits.asked_of_axes`.
-    share : float
+    fraction : float
         Of the ranges' box, of which the bounds are proved.
     axes : AxisMotion
     boxes : tuple of DyadicBox
@@ -68,7 +68,7 @@ class Certificate(Summarised):
     until: float
     sways: tuple[ProvedSway, ...]
     asked: Asked
-    share: float
+    fraction: float
     axes: AxisMotion
     boxes: tuple[DyadicBox, ...]
     terms: tuple[int, ...]
@@ -90,17 +90,17 @@ class Certificate(Summarised):
     @property
     def proved(self) -> bool:
         """Whether every machine of the ranges keeps the limits."""
-        return self.share == 1.0 and not self.reasons()
+        return self.fraction == 1.0 and not self.reasons()
 
     def reasons(self) -> tuple[str, ...]:
         """Say what is not proved, a sentence each."""
-        if self.share < 1.0:
+        if self.fraction < 1.0:
             coarse = ", or count positions more finely (axis.counts_per_metre)" if self.rounded else ""
             others = "swing too far, or differ too much"
             if self.rounded:
                 others += ", or positions are rounded to counts that are too coarse for a bound"
             return (
-                f"Bounds are proved for {100.0 * self.share:.3g} % of the machines; others {others}: "
+                f"Bounds are proved for {100.0 * self.fraction:.3g} % of the machines; others {others}: "
                 f"narrow the ranges (check.uncertain), or take more time{coarse}.",
             )
         return tuple(sway.reason for sway in self.sways if sway.reason is not None)
@@ -108,7 +108,7 @@ class Certificate(Summarised):
     @property
     def demand(self) -> float:
         """Share of its limit that the worst sway is proved to take up at most; infinite without a bound."""
-        whole = self.share == 1.0
+        whole = self.fraction == 1.0
         return max(
             sway.bound / sway.limit.allowed if whole and sway.bound is not None else inf
             for sway in self.sways
@@ -130,9 +130,9 @@ class Certificate(Summarised):
         return {sway.limit.load: sway.limit.allowed for sway in self.after}
 
     @property
-    def seen(self) -> dict[str, float]:
+    def largest_met(self) -> dict[str, float]:
         """Greatest residual sway in m of every load that was met; of it nothing is proved."""
-        return {sway.limit.load: sway.seen for sway in self.after}
+        return {sway.limit.load: sway.largest_met for sway in self.after}
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -145,18 +145,18 @@ class Certificate(Summarised):
             "proved": self.proved,
             "bounds_m": self.bounds,
             "limits_m": self.limits,
-            "largest_met_m": self.seen,
+            "largest_met_m": self.largest_met,
             "on_the_way": None
             if (way := self.on_the_way) is None
             else {
                 "load": way.limit.load,
                 "bound_m": way.bound,
                 "limit_m": way.limit.allowed,
-                "largest_met_m": way.seen,
+                "largest_met_m": way.largest_met,
             },
             "setpoints": self.asked,
             "ranges": {name: list(ends) for name, ends in self.ranges.items()},
-            "share_proved": self.share,
+            "share_proved": self.fraction,
             "boxes": len(self.boxes),
             "from_s": self.arrival,
             "until_s": self.until,
@@ -221,7 +221,7 @@ def parse(content: bytes) -> Certificate:
             until=float(document["until_s"]),
             sways=tuple(_sways(document)),
             asked=document["setpoints"],
-            share=1.0,
+            fraction=1.0,
             axes=AxisMotion(**axes),
             boxes=tuple(tuple(_part(*part) for part in box) for box in document["parts"]),
             terms=tuple(int(count) for count in document["terms"]),
@@ -261,7 +261,7 @@ def _sways(document: Mapping[str, Any]) -> Iterator[ProvedSway]:
         raise ValueError("bounds of other loads than the limits'")
     for load, allowed in limits.items():
         limit = SwayLimit(load=load, allowed=float(allowed))
-        yield ProvedSway(limit=limit, bound=float(bounds[load]), seen=nan)
+        yield ProvedSway(limit=limit, bound=float(bounds[load]), largest_met=nan)
     if way is not None:
         limit = SwayLimit(load=str(way["load"]), allowed=float(way["limit_m"]), on_the_way=True)
-        yield ProvedSway(limit=limit, bound=float(way["bound_m"]), seen=nan)
+        yield ProvedSway(limit=limit, bound=float(way["bound_m"]), largest_met=nan)

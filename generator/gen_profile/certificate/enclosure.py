@@ -92,12 +92,12 @@ class SwayBounds:
     ----------
     sway : (boxes, watches) array
         Greatest sway in m.
-    seen : (boxes, watches) array
+    largest_met : (boxes, watches) array
         Greatest sway in m that the approximation has at some nodes; nothing is proved of it.
     """
 
     sway: Array
-    seen: Array
+    largest_met: Array
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -136,18 +136,18 @@ class Enclosure:
         terms = self.approximation.series.shape[4:]
         return FEW_TIME_NODES, *(max(FEWEST_NODES, count - FEWER_NODES) for count in terms)
 
-    def bounds(self, enough: Array) -> SwayBounds:
+    def bounds(self, targets: Array) -> SwayBounds:
         """Carry the proof out.
 
         Parameters
         ----------
-        enough : (watches,) array
+        targets : (watches,) array
             Bounds in m below which lower ones are not sought.
         """
         with np.errstate(all="ignore"):  # what is not finite proves nothing
-            return self._bounds(enough)
+            return self._bounds(targets)
 
-    def _bounds(self, enough: Array) -> SwayBounds:
+    def _bounds(self, targets: Array) -> SwayBounds:
         defect = self.defect()
         scaling = self.approximation.scaling
         source = norm(matmul_most(scaling.most, defect))
@@ -162,7 +162,7 @@ class Enclosure:
                 break
             reach = np.where(closed[:, None], reach, WIDER * error)
         error = np.where(closed[:, None], error, np.nan)
-        return self._sway((slopes * error[..., None] + shift) * ROUND_UP, enough)
+        return self._sway((slopes * error[..., None] + shift) * ROUND_UP, targets)
 
     # the approximation
 
@@ -222,12 +222,12 @@ class Enclosure:
     def _parameters_at(self, counts: tuple[int, ...]) -> list[Ball]:
         """All parameters at nodes of those that vary."""
         a, size = self.approximation, self.variables
-        found: list[Ball] = [ball(value) for value in a.nominal.tolist()]
+        parameters: list[Ball] = [ball(value) for value in a.nominal.tolist()]
         for column, (number, count) in enumerate(zip(a.varied, counts, strict=True)):
             middle, half = (part.reshape(-1, *[1] * (1 + size)) for part in self._middle(column))
             nodes = chebyshev.nodes(count).reshape(*[1] * (3 + column), -1, *[1] * (size - 2 - column))
-            found[number] = shared(middle + half * nodes, tuple(range(2, 2 + size)))
-        return found
+            parameters[number] = shared(middle + half * nodes, tuple(range(2, 2 + size)))
+        return parameters
 
     def _middle(self, column: int) -> tuple[Ball, Ball]:
         """Give the middle and the half-width of a range of every box."""
@@ -236,14 +236,14 @@ class Enclosure:
 
     def _parameters(self, reach: Array | None = None) -> list[Ball | Affine]:
         """All parameters: of whole boxes, (boxes, 1), or on ellipses, (ellipses, boxes, 1)."""
-        found: list[Ball | Affine] = [ball(value) for value in self.approximation.nominal.tolist()]
+        parameters: list[Ball | Affine] = [ball(value) for value in self.approximation.nominal.tolist()]
         columns = range(len(self.approximation.varied))
         far = {k: np.ones(()) if reach is None else reach[:, 1 + k, None, None] for k in columns}
         for k, number in enumerate(self.approximation.varied):
             middle, half = (part[:, None] for part in self._middle(k))
             rad = (middle.rad + half.rad * far[k]) * ROUND_UP
-            found[number] = Affine(middle.mid, {k: half.mid}, rad, far)
-        return found
+            parameters[number] = Affine(middle.mid, {k: half.mid}, rad, far)
+        return parameters
 
     def _state_on_ellipses(self) -> tuple[list[Any], ...]:
         """List all that equations depend on, on ellipses: each (ellipses, boxes, pieces)."""
@@ -252,23 +252,23 @@ class Enclosure:
         q_a, v = (split(self._axes_on(over_time, order), -1) for order in (0, 1))
         return split(self._range[0], -1), q_a, v, self._parameters(reach)
 
-    def _missed(self, most: Array, counts: tuple[int, ...]) -> Array:
+    def _interpolation_error(self, most: Array, counts: tuple[int, ...]) -> Array:
         """Bound what interpolation misses, by what there is at most on ellipses, (ellipses, boxes, …)."""
         most = most.reshape(self.variables, len(ELLIPSES), *most.shape[1:])
-        return chebyshev.missed(most, ELLIPSES, counts)
+        return chebyshev.interpolation_error(most, ELLIPSES, counts)
 
     def _axes_on(self, reach: Array | float, order: int = 0, off: Array | None = None) -> Ball:
         """Enclose a derivative of the axes' smooth motion on ellipses, and what is as near, (pieces, m)."""
-        found = widened(self.axes.coefficients(), reach, order)
+        values = widened(self.axes.coefficients(), reach, order)
         for _ in range(order):
-            found = found / self.axes.halves[:, None]
-        return found if off is None else Ball(found.mid, (found.rad + off) * ROUND_UP)
+            values = values / self.axes.halves[:, None]
+        return values if off is None else Ball(values.mid, (values.rad + off) * ROUND_UP)
 
     def defect(self) -> Array:
         """Bound x̃' − f(x̃), (boxes, pieces, 2 n_u)."""
         series, half = self.approximation.series, self.axes.halves
         slopes = np.moveaxis(np.tensordot(series, chebyshev.derivative(series.shape[3]), axes=(3, 1)), -1, 3)
-        found = []
+        defects = []
         for rows in self._portions(self.fine):
             dx = split(chebyshev.evaluated(slopes[:, rows], self.fine), 2)
             f = self.equations.rate(*self._state_at(self.fine, rows))
@@ -279,11 +279,11 @@ class Enclosure:
             sums = [
                 chebyshev.total(chebyshev.interpolated(one, self.variables), self.variables) for one in each
             ]
-            found.append(np.stack(sums, axis=2))
+            defects.append(np.stack(sums, axis=2))
         rate = split(self._range[1], -1)
         f = self.equations.rate(*self._state_on_ellipses())
         most = stack([dx - row[0] for dx, row in zip(rate, f, strict=True)], axis=-1).most
-        return np.concatenate(found, axis=1) + self._missed(most, self.fine)
+        return np.concatenate(defects, axis=1) + self._interpolation_error(most, self.fine)
 
     def _size(self, values: Ball, counts: tuple[int, ...], rows: slice) -> Array:
         """Bound what is interpolated at nodes, (boxes, pieces)."""
@@ -312,12 +312,14 @@ class Enclosure:
         shape, p = around.shape[:2], self._parameters()
         near, shifted = self._near(around, tube)
         n_u = around.shape[-1] // 2
-        seen = split(near[..., :n_u], -1), split(self._axes_on(1.0, 0, self.gap.position), -1), p
-        gain = array(eq.sway_slopes(*seen), shape)
+        arguments = split(near[..., :n_u], -1), split(self._axes_on(1.0, 0, self.gap.position), -1), p
+        gain = array(eq.sway_slopes(*arguments), shape)
         back = chebyshev.spread(scaling.inverse, scaling.variables)[:, :, :n_u]
         slopes = norm(matmul(gain, back).most) * scaling.slack[..., None] * ROUND_UP
         shift = np.einsum("bplx,bpx->bpl", gain.most, shifted[..., :n_u])
-        shift += np.einsum("bpla,pa->bpl", array(eq.sway_by_position(*seen), shape).most, self.gap.position)
+        shift += np.einsum(
+            "bpla,pa->bpl", array(eq.sway_by_position(*arguments), shape).most, self.gap.position
+        )
         disturbance = norm(matmul_most(scaling.most, self._disturbance(near, shifted)))
         growth = self._growth(near, tube)
         return growth, disturbance, slopes, shift * ROUND_UP
@@ -358,12 +360,14 @@ class Enclosure:
         faster = times(lift, gap.velocity) + times(array(eq.by_position(*state), shape).most, gap.position)
         faster = (faster + second) * ROUND_UP
         bent = self._jacobian_change(near, Ball(0.0 * shifted, shifted)).most
-        turned = array(eq.lift_change(*state, split(Ball(0.0 * faster, faster), -1)), shape).most
+        lifted = array(eq.lift_change(*state, split(Ball(0.0 * faster, faster), -1)), shape).most
         changed = array(eq.pull_change(*state, ddq_a, rate, jerk), shape).most
-        found = times(pull, gap.mean) + times(changed, gap.integral) + times(turned, gap.position) + second
-        found += np.einsum("bpxy,bpy->bpx", jacobian, times(pull, gap.integral))
-        found += np.einsum("bpxy,bpy->bpx", bent, times(lift, gap.position))
-        return found * ROUND_UP
+        disturbance = (
+            times(pull, gap.mean) + times(changed, gap.integral) + times(lifted, gap.position) + second
+        )
+        disturbance += np.einsum("bpxy,bpy->bpx", jacobian, times(pull, gap.integral))
+        disturbance += np.einsum("bpxy,bpy->bpx", bent, times(lift, gap.position))
+        return disturbance * ROUND_UP
 
     @cached_property
     def _still(self) -> Array:
@@ -374,9 +378,9 @@ class Enclosure:
         mids, rests = [], []
         for rows in self._portions(counts):
             jacobian = self.equations.jacobian(*self._state_at(counts, rows))
-            turned = product(product(entries(to, rows), jacobian), entries(back, rows))
+            transformed = product(product(entries(to, rows), jacobian), entries(back, rows))
             for i, j in np.ndindex(size, size):
-                whole = self._whole(0.5 * (turned[i][j] + turned[j][i]), counts, rows)
+                whole = self._whole(0.5 * (transformed[i][j] + transformed[j][i]), counts, rows)
                 series = chebyshev.interpolated(whole, self.variables)
                 first = chebyshev.first(series.mid, self.variables)
                 mids.append(first)
@@ -388,7 +392,7 @@ class Enclosure:
             return whole.reshape(*whole.shape[:2], size, size)
 
         most = self._turned_on_ellipses()
-        rest = joined(rests) + self._missed(0.5 * (most + np.swapaxes(most, -1, -2)), counts)
+        rest = joined(rests) + self._interpolation_error(0.5 * (most + np.swapaxes(most, -1, -2)), counts)
         return gershgorin(Ball(joined(mids), (rest + 1e-14 * np.abs(joined(mids))) * ROUND_UP))
 
     def _turned_on_ellipses(self) -> Array:
@@ -407,10 +411,10 @@ class Enclosure:
         scaling = self.approximation.scaling
         jacobian = array(self.equations.jacobian(*self._state(near)), near.shape[:2]).most
         change = self._jacobian_change(near, Ball(0.0 * tube, tube)).most
-        turned, beside = (scaling.most @ one @ scaling.inverse_most for one in (jacobian, change))
+        transformed, beside = (scaling.most @ one @ scaling.inverse_most for one in (jacobian, change))
         symmetric = 0.5 * (beside + np.swapaxes(beside, -1, -2))
         rows = self._still + gershgorin(Ball(np.zeros_like(symmetric), symmetric))
-        whole = np.sqrt(((turned + beside) ** 2).sum(axis=(-1, -2)))
+        whole = np.sqrt(((transformed + beside) ** 2).sum(axis=(-1, -2)))
         return np.asarray((rows.max(axis=-1) + whole * (2.0 * scaling.slip + 1e-12)) * ROUND_UP)
 
     def _accumulated(self, growth: Array, source: Array) -> Array:
@@ -418,11 +422,11 @@ class Enclosure:
         a, lengths = self.approximation, 2.0 * self.axes.halves.most
         signs = (-1.0) ** np.arange(a.series.shape[3])
         ends = a.series.sum(axis=3)
-        begins = np.tensordot(a.series, signs, axes=(3, 0))
-        start = np.zeros((len(begins), 1, len(a.start), begins[0, 0, 0].size))
+        at_start = np.tensordot(a.series, signs, axes=(3, 0))
+        start = np.zeros((len(at_start), 1, len(a.start), at_start[0, 0, 0].size))
         start[..., 0] = a.start
-        before = np.concatenate([start.reshape(begins[:, :1].shape), ends[:, :-1]], axis=1)
-        between = np.abs(begins - before).sum(axis=tuple(range(3, begins.ndim))) * ROUND_UP
+        before = np.concatenate([start.reshape(at_start[:, :1].shape), ends[:, :-1]], axis=1)
+        between = np.abs(at_start - before).sum(axis=tuple(range(3, at_start.ndim))) * ROUND_UP
         leap = norm(matmul_most(a.scaling.most, between))
         changed = a.scaling.changes(len(lengths))
         error, greatest = np.zeros(len(source)), np.zeros(source.shape)
@@ -436,7 +440,7 @@ class Enclosure:
 
     # the sway
 
-    def _sway(self, off: Array, enough: Array) -> SwayBounds:
+    def _sway(self, off: Array, targets: Array) -> SwayBounds:
         """Bound every sway that is watched; approximate ones are off by so much, (boxes, pieces, loads)."""
         begun, n_u = min(watch.first for watch in self.watches), self.approximation.series.shape[2] // 2
         pieces = slice(begun, None)
@@ -445,19 +449,19 @@ class Enclosure:
         x, q_a, _, p = self._state_on_ellipses()
         shape = (*self._range[0].shape[:3],)
         far = [full(row[0], shape) for row in self.equations.sway(x[:n_u], q_a, p)]
-        bounds, seen = np.zeros((2, len(off), len(self.watches)))
+        bounds, largest_met = np.zeros((2, len(off), len(self.watches)))
         for column, watch in enumerate(self.watches):
             loads, since = watch.loads, slice(watch.first - begun, None)
             away = norm(off[:, watch.first :, loads]).max(axis=1)
-            bounds[:, column], seen[:, column] = self._greatest(
+            bounds[:, column], largest_met[:, column] = self._greatest(
                 [one[:, since] for one in at_nodes[loads]],
                 [one[:, :, watch.first :] for one in far[loads]],
-                enough[column] - away,
+                targets[column] - away,
             )
             bounds[:, column] = (bounds[:, column] + away) * ROUND_UP
-        return SwayBounds(sway=bounds, seen=seen)
+        return SwayBounds(sway=bounds, largest_met=largest_met)
 
-    def _greatest(self, at_nodes: list[Ball], far: list[Ball], enough: Array) -> tuple[Array, Array]:
+    def _greatest(self, at_nodes: list[Ball], far: list[Ball], targets: Array) -> tuple[Array, Array]:
         """Bound a vector of the approximate motions, and give its greatest length at nodes, each (boxes,).
 
         Of several components the squared length is interpolated, which is as smooth as they are.
@@ -468,7 +472,10 @@ class Enclosure:
         )
         series = chebyshev.interpolated(whole, self.variables)
         rounding = chebyshev.total(Ball(0.0 * series.mid, series.rad), self.variables)
-        off, enough = rounding + self._missed(most.most, self.fine), np.maximum(enough, 0.0) ** power
-        found = [chebyshev.greatest(*one) for one in zip(series.mid, off, enough.tolist(), strict=True)]
-        seen = np.abs(whole.mid).max(axis=tuple(range(1, whole.mid.ndim)))
-        return np.array(found) ** (1.0 / power) * ROUND_UP, seen ** (1.0 / power)
+        off, targets = (
+            rounding + self._interpolation_error(most.most, self.fine),
+            np.maximum(targets, 0.0) ** power,
+        )
+        bounds = [chebyshev.greatest(*one) for one in zip(series.mid, off, targets.tolist(), strict=True)]
+        largest_met = np.abs(whole.mid).max(axis=tuple(range(1, whole.mid.ndim)))
+        return np.array(bounds) ** (1.0 / power) * ROUND_UP, largest_met ** (1.0 / power)

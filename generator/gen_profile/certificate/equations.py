@@ -152,8 +152,8 @@ class Enclosed:
                 value = _applied(step.operation, arguments, angles[step.arguments[-1]])
                 angle = arguments[0] if step.operation == "SINH" else None
             memory[step.results[0]], angles[step.results[0]] = value, angle
-        found = [one if isinstance(one, Ball) else one.ball for _, one in sorted(results.items())]
-        return [found[row :: self._rows] for row in range(self._rows)]
+        entries = [one if isinstance(one, Ball) else one.ball for _, one in sorted(results.items())]
+        return [entries[row :: self._rows] for row in range(self._rows)]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -215,20 +215,20 @@ def enclosed_equations(plant: Plant) -> EnclosedEquations:
         They cannot be enclosed.
     """
     d = dynamics(plant)
-    if sym.depends(d.driven, sym.column([d.dq_u, d.dq_a])):
+    if sym.depends(d.input_matrix, sym.column([d.dq_u, d.dq_a])):
         raise CertificateError(
             f"The inertia of {plant.type} depends on velocities, for which no proof is written."
         )
     n_u, m = len(plant.unactuated), len(plant.actuated)
     q_a, v, ddq_a, jerk = d.q_a, d.dq_a, d.ddq_a, sym.symbols("jerk", m)
     x = sym.column([d.q_u, sym.symbols("w", n_u)])
-    rates = x[n_u:] + d.driven @ v
-    along = sym.directional(d.driven @ v, sym.column([d.q_u, q_a]), sym.column([d.dq_u, v]))
-    f = sym.column([rates, sym.substitute(d.free - along, d.dq_u, rates)])
+    rates = x[n_u:] + d.input_matrix @ v
+    along = sym.directional(d.input_matrix @ v, sym.column([d.q_u, q_a]), sym.column([d.dq_u, v]))
+    f = sym.column([rates, sym.substitute(d.drift - along, d.dq_u, rates)])
     slopes, lift, by_position = sym.jacobian(f, x), sym.jacobian(f, v), sym.jacobian(f, q_a)
     state = {"x": x, "q_a": q_a, "v": v, "p": d.p}
     smooth = {**state, "ddq_a": ddq_a}
-    seen = {"q_u": d.q_u, "q_a": q_a, "p": d.p}
+    arguments = {"q_u": d.q_u, "q_a": q_a, "p": d.p}
     d_x = sym.symbols("d_x", 2 * n_u)
     motion = sym.column([x, q_a, v, ddq_a])
 
@@ -258,8 +258,8 @@ def enclosed_equations(plant: Plant) -> EnclosedEquations:
             change(pull, motion, sym.column([d_x, v, ddq_a, jerk])),
             {**smooth, "d_x": d_x, "jerk": jerk},
         ),
-        sway=enclosed("sway", d.sway, seen),
-        sway_slopes=enclosed("sway_slopes", sym.jacobian(d.sway, d.q_u), seen),
-        sway_by_position=enclosed("sway_by_position", sym.jacobian(d.sway, q_a), seen),
-        jump=Function("jump", seen, d.driven),
+        sway=enclosed("sway", d.sway, arguments),
+        sway_slopes=enclosed("sway_slopes", sym.jacobian(d.sway, d.q_u), arguments),
+        sway_by_position=enclosed("sway_by_position", sym.jacobian(d.sway, q_a), arguments),
+        jump=Function("jump", arguments, d.input_matrix),
     )

@@ -111,29 +111,29 @@ def check_certificate(
         As of `gen_profile.check_artefact`.
     """
     artefact = _read(Path(path), spec)
-    found = parse(read_artefact(Path(certificate)))
-    theorem = _require_about(found, artefact)
-    stated = np.array([sway.bound for sway in found.sways])
-    bounds, seen, done = np.zeros(len(stated)), np.zeros(len(stated)), 0
+    claimed = parse(read_artefact(Path(certificate)))
+    theorem = _require_about(claimed, artefact)
+    stated = np.array([sway.bound for sway in claimed.sways])
+    bounds, largest_met, done = np.zeros(len(stated)), np.zeros(len(stated)), 0
     for count, again in in_order(
-        partial(_bound_again, theorem, found, stated), theorem.batches(range(len(found.boxes)))
+        partial(_bound_again, theorem, claimed, stated), theorem.batches(range(len(claimed.boxes)))
     ):
         bounds = np.maximum(bounds, again.sway.max(axis=0))  # which keeps nan
-        seen = np.fmax(seen, again.seen.max(axis=0))
+        largest_met = np.fmax(largest_met, again.largest_met.max(axis=0))
         done += count
-        progress(done, len(found.boxes))
-    for sway, said, bound in zip(found.sways, stated.tolist(), bounds.tolist(), strict=True):
+        progress(done, len(claimed.boxes))
+    for sway, said, bound in zip(claimed.sways, stated.tolist(), bounds.tolist(), strict=True):
         if not bound <= said:
             raise CertificateError(
                 f"The certificate does not prove what it says: the {sway.limit.load} is bounded by "
                 f"{1e3 * bound:.4g} mm, and it states {1e3 * said:.4g} mm."
             )
-    met = zip(found.sways, seen.tolist(), strict=True)
-    return attrs.evolve(found, sways=tuple(attrs.evolve(sway, seen=most) for sway, most in met))
+    met = zip(claimed.sways, largest_met.tolist(), strict=True)
+    return attrs.evolve(claimed, sways=tuple(attrs.evolve(sway, largest_met=most) for sway, most in met))
 
 
 def _bound_again(
-    theorem: Theorem, found: Certificate, enough: Array, rows: Sequence[int]
+    theorem: Theorem, claimed: Certificate, targets: Array, rows: Sequence[int]
 ) -> tuple[int, SwayBounds]:
     """Carry the proof out again for some boxes: how many, and their bounds.
 
@@ -141,13 +141,13 @@ def _bound_again(
     ------
     CertificateError
     """
-    boxes, scales = ([part[row] for row in rows] for part in (found.boxes, found.scales))
+    boxes, scales = ([part[row] for row in rows] for part in (claimed.boxes, claimed.scales))
     try:
-        coefficients = np.stack([found.motions[row].coefficients() for row in rows])
+        coefficients = np.stack([claimed.motions[row].coefficients() for row in rows])
     except (ValueError, TypeError, KeyError, zlib.error) as error:
         raise damaged(error) from error
     theorem.require_shapes(boxes, coefficients, np.array(scales))
-    return len(boxes), theorem.enclosure(boxes, coefficients, np.array(scales)).bounds(enough)
+    return len(boxes), theorem.enclosure(boxes, coefficients, np.array(scales)).bounds(targets)
 
 
 def _read(path: Path, spec: Spec | Path | str | None) -> _Artefact:
@@ -157,11 +157,15 @@ def _read(path: Path, spec: Spec | Path | str | None) -> _Artefact:
     return _Artefact(path=path, sha256=sha256(content), spec=spec, setpoints=setpoints)
 
 
-def _certificate(artefact: _Artefact, asked: Asked, found: Attempt) -> Certificate:
+def _certificate(artefact: _Artefact, asked: Asked, result: Attempt) -> Certificate:
     """State what came out."""
-    theorem = found.theorem
-    bounds = (found.bounds.max(axis=0) * (1.0 + SLACK)).tolist() if found.boxes else [None] * len(found.seen)
-    sways = zip(theorem.limits, bounds, found.seen.tolist(), strict=True)
+    theorem = result.theorem
+    bounds = (
+        (result.bounds.max(axis=0) * (1.0 + SLACK)).tolist()
+        if result.boxes
+        else [None] * len(result.largest_met)
+    )
+    sways = zip(theorem.limits, bounds, result.largest_met.tolist(), strict=True)
     return Certificate(
         spec_sha256=artefact.spec.sha256(),
         artefact_sha256=artefact.sha256,
@@ -169,13 +173,16 @@ def _certificate(artefact: _Artefact, asked: Asked, found: Attempt) -> Certifica
         arrival=theorem.arrival,
         until=theorem.until,
         asked=asked,
-        sways=tuple(ProvedSway(limit=limit, bound=bound, seen=seen) for limit, bound, seen in sways),
-        share=found.share,
+        sways=tuple(
+            ProvedSway(limit=limit, bound=bound, largest_met=largest_met)
+            for limit, bound, largest_met in sways
+        ),
+        fraction=result.fraction,
         axes=theorem.axes,
-        boxes=found.boxes,
+        boxes=result.boxes,
         terms=theorem.terms,
-        motions=found.motions,
-        scales=found.scales,
+        motions=result.motions,
+        scales=result.scales,
         rounded=bool(artefact.setpoints.resolution.any()),
     )
 
@@ -186,35 +193,37 @@ def _named(theorem: Theorem) -> dict[str, tuple[float, float]]:
     return dict(zip(ranges.names, ends, strict=True))
 
 
-def _require_about(found: Certificate, artefact: _Artefact) -> Theorem:
+def _require_about(claimed: Certificate, artefact: _Artefact) -> Theorem:
     """Refuse a certificate of anything else, or of a part of it.
 
     Raises
     ------
     CertificateError
     """
-    if found.artefact_sha256 != artefact.sha256:
+    if claimed.artefact_sha256 != artefact.sha256:
         raise CertificateError(
             f"The certificate is about another file than {artefact.path}, or that was altered."
         )
-    if found.spec_sha256 != artefact.spec.sha256():
+    if claimed.spec_sha256 != artefact.spec.sha256():
         raise CertificateError("The certificate is about another spec: other machines or limits.")
     theorem = Theorem(
         spec=artefact.spec,
         setpoints=artefact.setpoints,
         ranges=ranges_of(artefact.spec),
-        limits=tuple(sway.limit for sway in found.sways),
-        axes=found.axes,
-        terms=found.terms,
+        limits=tuple(sway.limit for sway in claimed.sways),
+        axes=claimed.axes,
+        terms=claimed.terms,
     )
-    if found.asked != asked_of_axes(artefact.spec, artefact.setpoints):
+    if claimed.asked != asked_of_axes(artefact.spec, artefact.setpoints):
         raise CertificateError("The certificate does not prove what it says of the setpoints.")
-    if not len(found.boxes) == len(found.motions) == len(found.scales):
+    if not len(claimed.boxes) == len(claimed.motions) == len(claimed.scales):
         raise CertificateError("The certificate is damaged: its arrays do not fit together.")
-    whole = dict(found.ranges) == _named(theorem) and covers(found.boxes)
-    if not (whole and theorem.limits == limits_of(artefact.spec) and found.proved):
+    whole = dict(claimed.ranges) == _named(theorem) and covers(claimed.boxes)
+    if not (whole and theorem.limits == limits_of(artefact.spec) and claimed.proved):
         raise CertificateError("The certificate does not cover all machines and limits of the spec.")
-    watched = isclose(found.until, theorem.until, rel_tol=SAME_TIME) and found.until <= found.axes.knots[-1]
-    if not watched or found.arrival != theorem.arrival:
+    watched = (
+        isclose(claimed.until, theorem.until, rel_tol=SAME_TIME) and claimed.until <= claimed.axes.knots[-1]
+    )
+    if not watched or claimed.arrival != theorem.arrival:
         raise CertificateError("The certificate is about another time.")
     return theorem

@@ -66,16 +66,16 @@ def _quantum(values: Array) -> float:
     return float(2.0 ** int((exponent - 53 + zeros).min()))
 
 
-def pack(array: Any, alike: int) -> dict[str, Any]:
+def pack(array: Any, leading: int) -> dict[str, Any]:
     """Compress an array whose first axes, so many, have numbers of like size, side by side."""
-    turned = np.ascontiguousarray(np.moveaxis(array, range(alike), range(-alike, 0)))
+    reordered = np.ascontiguousarray(np.moveaxis(array, range(leading), range(-leading, 0)))
     return {
         "shape": list(array.shape),
-        "zlib": base64.b64encode(zlib.compress(turned.tobytes(), LEVEL)).decode("ascii"),
+        "zlib": base64.b64encode(zlib.compress(reordered.tobytes(), LEVEL)).decode("ascii"),
     }
 
 
-def unpack(packed: Mapping[str, Any], kind: str, alike: int) -> Any:
+def unpack(packed: Mapping[str, Any], kind: str, leading: int) -> Any:
     """Decompress an array, as one of doubles.
 
     Raises
@@ -89,5 +89,5 @@ def unpack(packed: Mapping[str, Any], kind: str, alike: int) -> Any:
     if not 0 < size <= MOST_BYTES:
         raise ValueError("an array of such a size")
     content = inflater.decompress(base64.b64decode(packed["zlib"], validate=True), size)
-    array = np.frombuffer(content, dtype=kind).reshape(*shape[alike:], *shape[:alike])
-    return np.moveaxis(array, range(-alike, 0), range(alike)).astype(np.float64)
+    array = np.frombuffer(content, dtype=kind).reshape(*shape[leading:], *shape[:leading])
+    return np.moveaxis(array, range(-leading, 0), range(leading)).astype(np.float64)

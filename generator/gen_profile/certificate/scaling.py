@@ -37,10 +37,10 @@ class Scaling:
         counts = [terms + MORE_TERMS * (terms > 1) for terms in self.series.shape[4:]]
         values = np.moveaxis(chebyshev.evaluated(self.series, counts).mid, (2, 3), (-2, -1))
         try:
-            found = np.linalg.inv(values)
+            inverses = np.linalg.inv(values)
         except np.linalg.LinAlgError:
-            found = np.full(values.shape, np.nan)
-        return chebyshev.interpolate(np.moveaxis(found, (-2, -1), (2, 3)), self.variables)
+            inverses = np.full(values.shape, np.nan)
+        return chebyshev.interpolate(np.moveaxis(inverses, (-2, -1), (2, 3)), self.variables)
 
     @cached_property
     def slip(self) -> Array:
@@ -93,6 +93,6 @@ class Scaling:
 def _identity(like: Ball) -> Array:
     """Give the series of the unit matrix."""
     shape = np.shape(like.mid)
-    found = np.zeros((*shape[2:4], int(np.prod(shape[4:]))))
-    found[..., 0] = np.eye(shape[2])
-    return found.reshape(shape[2:])
+    series = np.zeros((*shape[2:4], int(np.prod(shape[4:]))))
+    series[..., 0] = np.eye(shape[2])
+    return series.reshape(shape[2:])

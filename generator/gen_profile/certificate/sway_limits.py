@@ -35,13 +35,13 @@ class ProvedSway:
     limit : SwayLimit
     bound : float or None
         Proved one in m, of all machines that there are any of.
-    seen : float
+    largest_met : float
         Greatest sway that was met, in m; of it nothing is proved.
     """
 
     limit: SwayLimit
     bound: float | None
-    seen: float
+    largest_met: float
 
     @property
     def reason(self) -> str | None:
@@ -55,7 +55,7 @@ class ProvedSway:
         return (
             f"The {limit.load} is proved to sway by at most {1e3 * bound:.4g} mm {when}, and "
             f"{1e3 * limit.allowed:.4g} mm are allowed ({place}); the greatest sway met is "
-            f"{1e3 * self.seen:.4g} mm."
+            f"{1e3 * self.largest_met:.4g} mm."
         )
 
 

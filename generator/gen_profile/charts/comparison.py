@@ -93,10 +93,10 @@ def _sways(comparison: Comparison, styles: Mapping[str, Style]) -> Iterator[Pane
     responses = {row.method: row.evaluation.swing.at(_until(row)) for row in rows}
     signs = (1.0, -1.0) if plant.directions == 1 else (1.0,)  # the sway in two directions is a length
     for index in extremes(spec):
-        swings = {method: found[index] for method, found in responses.items()}
+        swings = {method: response[index] for method, response in responses.items()}
         lines = [
-            Line(name=method, x=found.times, y=1e3 * end_load_sway(spec, found), style=styles[method])
-            for method, found in swings.items()
+            Line(name=method, x=response.times, y=1e3 * end_load_sway(spec, response), style=styles[method])
+            for method, response in swings.items()
         ]
         span = _without_outliers(lines)
         low, high = span or extent(lines)

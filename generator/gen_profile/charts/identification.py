@@ -18,11 +18,13 @@ LEFT, CHANCE = Style(colour=PALETTE[1], width=1.0), Style(colour=INK, dash="dash
 BELOW = 1.5  # decades that are shown below what chance does
 
 
-def identification_figure(found: Identification) -> Figure:
+def identification_figure(identified: Identification) -> Figure:
     """Draw the first log beside the identified machine."""
-    log, swing = found.logs[0], found.estimate.swings[0]
+    log, swing = identified.logs[0], identified.estimate.swings[0]
     left = log.values - swing
-    natural = linearize(found.spec.machine(), found.spec.plant.parameters, found.q_a).frequencies
+    natural = linearize(
+        identified.spec.machine(), identified.spec.plant.parameters, identified.q_a
+    ).frequencies
     shown = spectrum(log.times, left, float(natural[-1]))
     amplitude, chance = (2.0 * np.sqrt(power / len(left)) for power in (shown.power, shown.threshold))
     greatest = max(float(amplitude.max()), float(np.max(chance)))

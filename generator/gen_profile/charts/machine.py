@@ -72,15 +72,15 @@ class MachineView:
     def swung(self) -> Iterator[tuple[str, int, Array]]:
         """Find which point each swinging coordinate moves first, and where that is without it."""
         points, first = self.drawing.points, 1 + len(self.plant.actuated)
-        for number, free in enumerate(self.plant.unactuated, start=first):
+        for number, coordinate in enumerate(self.plant.unactuated, start=first):
             without = points[number]
             away = np.linalg.norm(points[0] - without, axis=1)
-            turned = [end for start, end in self.pieces() if _turn(points[0], without, start, end) > TURNED]
-            if turned:
-                yield free.name, turned[0], without[turned[0]]
+            rotated = [end for start, end in self.pieces() if _turn(points[0], without, start, end) > TURNED]
+            if rotated:
+                yield coordinate.name, rotated[0], without[rotated[0]]
             elif away.max() > VISIBLE * self.size:
                 point = int((away > 0.99 * away.max()).argmax())
-                yield free.name, point, without[point]
+                yield coordinate.name, point, without[point]
 
     def pieces(self) -> Iterator[tuple[int, int]]:
         """List the pieces of the lines that hold something: the points at their ends."""
@@ -129,11 +129,11 @@ def draw_machine(plant: Plant, parameters: Mapping[str, float], path: Path, titl
     """
     from matplotlib.figure import Figure as Canvas  # noqa: PLC0415  # an extra
 
-    seen = views(plant, parameters)
-    canvas = Canvas(figsize=(5.0 * len(seen) + 3.8, 5.0), layout="constrained")
-    widths = [5.0] * len(seen) + [3.6]
+    sides_shown = views(plant, parameters)
+    canvas = Canvas(figsize=(5.0 * len(sides_shown) + 3.8, 5.0), layout="constrained")
+    widths = [5.0] * len(sides_shown) + [3.6]
     *sides, table = canvas.subplots(1, len(widths), width_ratios=widths)
-    for axis, view in zip(sides, seen, strict=True):
+    for axis, view in zip(sides, sides_shown, strict=True):
         _draw(axis, view)
     table.axis("off")
     table.text(0.0, 1.0, _explained(plant, parameters), va="top", fontsize="small", family="monospace")
@@ -144,28 +144,28 @@ def draw_machine(plant: Plant, parameters: Mapping[str, float], path: Path, titl
 def views(plant: Plant, parameters: Mapping[str, float]) -> list[MachineView]:
     """Look at a machine from every side that shows something."""
     still = np.zeros((1, len(plant.unactuated)))
-    standing = np.array([plant.standing()])
-    reach = float(np.abs(pose_of(plant, parameters, standing, still, 0.0).loads()[1]).max()) or 1.0
+    at_probe = np.array([plant.probe_places()])
+    reach = float(np.abs(pose_of(plant, parameters, at_probe, still, 0.0).loads()[1]).max()) or 1.0
     places = [
         TURN if axis.unit == "rad" else np.clip(reach, axis.lower, axis.upper) for axis in plant.actuated
     ]
-    axes, free = len(plant.actuated), len(plant.unactuated)
-    q_a = np.tile(np.array(places, dtype=np.float64), (1 + axes + free, 1))
-    q_u = np.full((1 + axes + free, free), SWING)
+    axes, swings = len(plant.actuated), len(plant.unactuated)
+    q_a = np.tile(np.array(places, dtype=np.float64), (1 + axes + swings, 1))
+    q_u = np.full((1 + axes + swings, swings), SWING)
     q_a[1 : 1 + axes] += STEP * np.eye(axes)
-    q_u[1 + axes :] -= SWING * np.eye(free)
+    q_u[1 + axes :] -= SWING * np.eye(swings)
     size = body_size(plant, parameters, q_a)
 
-    def seen(changed: Mapping[str, float]) -> tuple[Drawing, ...]:
+    def drawn(changed: Mapping[str, float]) -> tuple[Drawing, ...]:
         return drawings(plant, pose_of(plant, changed, q_a, q_u, size))
 
     lengths = [one.name for one in plant.parameters if one.unit == "m"]
-    grown = {name: seen({**parameters, name: parameters[name] + STEP}) for name in lengths}
+    grown = {name: drawn({**parameters, name: parameters[name] + STEP}) for name in lengths}
     return [
         MachineView(
             drawing=one, plant=plant, grown={name: more[number].rest[0] for name, more in grown.items()}
         )
-        for number, one in enumerate(seen(parameters))
+        for number, one in enumerate(drawn(parameters))
     ]
 
 

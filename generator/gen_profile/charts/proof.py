@@ -52,14 +52,14 @@ def draw(spec: Spec, text: str, proof: Proof, path: Path, progress: Progress = n
     save(figures, path, spec.name, f"{spec.name}: history {proof.worst.number} of {proof.count}")
 
 
-def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
+def history_figure(spec: Spec, proof: Proof, trace: Trace) -> Figure:
     """Draw each axis, ropes that change, and the sway over time; shade what is not promised."""
-    few = slice(None, None, -(-len(found.times) // SAMPLES))
-    times, limit = found.times[few], 1e3 * list(proof.limit.values())[-1]
+    few = slice(None, None, -(-len(trace.times) // SAMPLES))
+    times, limit = trace.times[few], 1e3 * list(proof.limit.values())[-1]
     signs = (1.0, -1.0) if spec.machine().directions == 1 else (1.0,)
-    arrival = _arrival(found)
-    bands = [*_unpromised(found)]
-    panels = [panel for place in range(len(found.history.axes)) for panel in _axis_panels(spec, found, place)]
+    arrival = _arrival(trace)
+    bands = [*_unpromised(trace)]
+    panels = [panel for place in range(len(trace.history.axes)) for panel in _axis_panels(spec, trace, place)]
     panels += [
         Panel(
             title=f"What the block is told of {name}",
@@ -69,7 +69,7 @@ def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
             levels=[Level(value=value) for value in spec.planner.live[name]],
             bands=bands,
         )
-        for name, corners in found.history.hoisting.items()
+        for name, corners in trace.history.hoisting.items()
     ]
     styles = [Style(colour=INK, width=2.0), *(Style(colour=colour, width=1.2) for colour in PALETTE[2:])]
     panels.append(
@@ -79,7 +79,7 @@ def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
             y_label="sway (mm)",
             lines=[
                 Line(name=name, x=times, y=1e3 * sway[few], style=style)
-                for (name, sway), style in zip(found.sway.items(), styles, strict=False)
+                for (name, sway), style in zip(trace.sway.items(), styles, strict=False)
             ],
             levels=[Level(value=sign * limit, between=(arrival, times[-1])) for sign in signs],
             bands=bands,
@@ -92,32 +92,32 @@ def history_figure(spec: Spec, proof: Proof, found: Trace) -> Figure:
     )
 
 
-def _arrival(found: Trace) -> float:
+def _arrival(trace: Trace) -> float:
     """Say from when on no axis moves any more, so that what the load still does is what remains."""
-    axes = [np.abs(found.issued[axis.of("fVelocity")]) for axis in found.history.axes.values()]
-    return float(found.times[np.flatnonzero(np.max(axes, axis=0) > 0.0)[-1:]].sum())
+    axes = [np.abs(trace.issued[axis.of("fVelocity")]) for axis in trace.history.axes.values()]
+    return float(trace.times[np.flatnonzero(np.max(axes, axis=0) > 0.0)[-1:]].sum())
 
 
-def _axis_panels(spec: Spec, found: Trace, place: int) -> Iterator[Panel]:
+def _axis_panels(spec: Spec, trace: Trace, place: int) -> Iterator[Panel]:
     """Draw what an axis was told and led to, within its limits."""
-    number, axis = list(found.history.axes.items())[place]
-    own, few = spec.limits.of(number), slice(None, None, -(-len(found.times) // SAMPLES))
+    number, axis = list(trace.history.axes.items())[place]
+    own, few = spec.limits.of(number), slice(None, None, -(-len(trace.times) // SAMPLES))
     assert own.velocity and own.acceleration and own.travel
     of = f" of {axis.name}" if axis.name else ""
-    bands = [*_unpromised(found), *(Band(low=time, high=time) for time in _stops(found))]
+    bands = [*_unpromised(trace), *(Band(low=time, high=time) for time in _stops(trace))]
     for title, unit, output, levels, command in (
         ("Position", axis.unit, "fPosition", own.travel, "position"),
         ("Velocity", f"{axis.unit}/s", "fVelocity", (-own.velocity, own.velocity), "velocity"),
         ("Acceleration", f"{axis.unit}/s²", "fAcceleration", (-own.acceleration, own.acceleration), ""),
     ):
-        setpoints = found.issued[axis.of(output)][few]
+        setpoints = trace.issued[axis.of(output)][few]
         yield Panel(
             title=title + of,
             x_label=TIME,
             y_label=f"{title.lower()} ({unit})",
             lines=[
-                Line(name="setpoint", x=found.times[few], y=setpoints, style=SETPOINT),
-                *_commanded(found, command, place),
+                Line(name="setpoint", x=trace.times[few], y=setpoints, style=SETPOINT),
+                *_commanded(trace, command, place),
             ],
             levels=[Level(value=level) for level in levels],
             bands=bands,
@@ -127,7 +127,7 @@ def _axis_panels(spec: Spec, found: Trace, place: int) -> Iterator[Panel]:
 def map_figure(spec: Spec, proof: Proof) -> Figure:
     """Draw the worst share of the limit in cells of two live parameters, or of every history over one."""
     live = spec.planner.live
-    shares = 100.0 * np.array([proof.share(one) for one in proof.judged])
+    shares = 100.0 * np.array([proof.fraction(one) for one in proof.judged])
     title = "Worst residual sway"
     if len(live) == 2:
         (x, across), (y, upwards) = live.items()
@@ -166,23 +166,23 @@ def _labelled(spec: Spec, name: str) -> str:
     return f"{name} ({spec.machine().units[name]})"
 
 
-def _unpromised(found: Trace) -> Iterator[Band]:
+def _unpromised(trace: Trace) -> Iterator[Band]:
     """Find when the block is busy and does not promise."""
-    unkept = (found.issued["bPromise"] == 0.0) & (found.issued["bBusy"] != 0.0)
+    unkept = (trace.issued["bPromise"] == 0.0) & (trace.issued["bBusy"] != 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], unkept, [False]])))
-    last = len(found.times) - 1
+    last = len(trace.times) - 1
     for begin, end in edges.reshape(-1, 2):
-        yield Band(low=float(found.times[begin]), high=float(found.times[min(end, last)]))
+        yield Band(low=float(trace.times[begin]), high=float(trace.times[min(end, last)]))
 
 
-def _stops(found: Trace) -> list[float]:
-    return [one.time for one in found.history.commands if one.command not in {"position", "velocity"}]
+def _stops(trace: Trace) -> list[float]:
+    return [one.time for one in trace.history.commands if one.command not in {"position", "velocity"}]
 
 
-def _commanded(found: Trace, kind: str, place: int) -> list[Line]:
+def _commanded(trace: Trace, kind: str, place: int) -> list[Line]:
     """Draw targets or the stick while they hold, with gaps between."""
-    commands = found.history.commands
-    ends = [*[command.time for command in commands[1:]], float(found.times[-1])]
+    commands = trace.history.commands
+    ends = [*[command.time for command in commands[1:]], float(trace.times[-1])]
     held = [(one, end) for one, end in zip(commands, ends, strict=True) if one.command == kind]
     if not held:
         return []
@@ -204,10 +204,10 @@ def _cells(
 ) -> Array:
     """Find the greatest share in each cell; where no history was, not a number."""
     worst = np.full((CELLS, CELLS), np.nan)
-    for one, share in zip(judged, shares, strict=True):
+    for one, fraction in zip(judged, shares, strict=True):
         cell = tuple(
             min(CELLS - 1, int(CELLS * (one.history.live[name] - low) / (high - low)))
             for name, (low, high) in zip(names, ranges, strict=True)
         )
-        worst[cell] = np.fmax(worst[cell], share)
+        worst[cell] = np.fmax(worst[cell], fraction)
     return worst

@@ -13,7 +13,7 @@ from gen_profile.phrase import Phrase
 COLUMNS = 4  # of maps
 
 
-def robustness_figure(found: Robustness) -> Figure:
+def robustness_figure(curves: Robustness) -> Figure:
     """Draw residual sway over one or two parameters, and where it passes the limit.
 
     Raises
@@ -21,25 +21,25 @@ def robustness_figure(found: Robustness) -> Figure:
     OutputError
         No method has a motion.
     """
-    if not found.residual:
+    if not curves.residual:
         raise OutputError("plot: no method has a motion for this move; ask for no picture to see why.")
-    if len(found.errors) > 1:
-        return maps_figure(found)
-    return curves_figure(dict.fromkeys(found.errors, found), method_styles(found.residual))
+    if len(curves.errors) > 1:
+        return maps_figure(curves)
+    return curves_figure(dict.fromkeys(curves.errors, curves), method_styles(curves.residual))
 
 
-def curves_figure(found: Mapping[str, Robustness], styles: Mapping[str, Style]) -> Figure:
+def curves_figure(curves: Mapping[str, Robustness], styles: Mapping[str, Style]) -> Figure:
     """Draw curves over the errors of some parameters, each by its name."""
     return Figure(
         caption="Shaded: the range that the spec states; dashed in red: what is allowed.",
-        panels=[_curves(name, one, styles) for name, one in found.items()],
+        panels=[_curves(name, one, styles) for name, one in curves.items()],
     )
 
 
-def maps_figure(found: Robustness) -> Figure:
+def maps_figure(grid: Robustness) -> Figure:
     """Draw a map of every method over two parameters."""
-    (across, x), (upwards, y) = found.errors.items()
-    stated = found.spec.robustness.uncertain
+    (across, x), (upwards, y) = grid.errors.items()
+    stated = grid.spec.robustness.uncertain
     framed = across in stated and upwards in stated
     return Figure(
         caption=(
@@ -47,36 +47,36 @@ def maps_figure(found: Robustness) -> Figure:
             f"{upwards} are off at once. Thick line: all of it"
             + ("; dotted: the ranges that the spec states." if framed else ".")
         ),
-        columns=min(COLUMNS, len(found.residual)),
+        columns=min(COLUMNS, len(grid.residual)),
         panels=[
             Map(
                 title=Phrase(
                     "{method} over {across} and {upwards}", method=method, across=across, upwards=upwards
                 ),
-                x_label=_off(found, across),
-                y_label=_off(found, upwards),
+                x_label=_off(grid, across),
+                y_label=_off(grid, upwards),
                 unit="%",
                 x=100.0 * x,
                 y=100.0 * y,
-                values=100.0 * found.share(method).T,
+                values=100.0 * grid.fraction(method).T,
                 limit=100.0,
                 frame=(100.0 * stated[across], 100.0 * stated[upwards]) if framed else None,
             )
-            for method in found.residual
+            for method in grid.residual
         ],
     )
 
 
-def _curves(name: str, found: Robustness, styles: Mapping[str, Style]) -> Panel:
-    spec, limit = found.spec, 1e3 * found.tolerance
+def _curves(name: str, curve: Robustness, styles: Mapping[str, Style]) -> Panel:
+    spec, limit = curve.spec, 1e3 * curve.tolerance
     stated = spec.robustness.uncertain.get(name)
     lines = [
-        Line(name=method, x=100.0 * found.errors[name], y=1e3 * found.end_load(method), style=styles[method])
-        for method in found.residual
+        Line(name=method, x=100.0 * curve.errors[name], y=1e3 * curve.end_load(method), style=styles[method])
+        for method in curve.residual
     ]
     return Panel(
         title=Phrase("Residual sway of the {load} over {name}", load=spec.machine().end_load_name, name=name),
-        x_label=_off(found, name),
+        x_label=_off(curve, name),
         y_label="residual sway (mm)",
         lines=lines,
         levels=[Level(value=limit)],
@@ -85,7 +85,7 @@ def _curves(name: str, found: Robustness, styles: Mapping[str, Style]) -> Panel:
     )
 
 
-def _off(found: Robustness, name: str) -> str:
-    nominal = found.spec.plant.parameters[name]
-    (unit,) = (known.unit for known in found.spec.machine().parameters if known.name == name)
+def _off(curve: Robustness, name: str) -> str:
+    nominal = curve.spec.plant.parameters[name]
+    (unit,) = (known.unit for known in curve.spec.machine().parameters if known.name == name)
     return Phrase("{name} off {nominal:g} {unit} by (%)", name=name, nominal=nominal, unit=unit)

@@ -400,8 +400,8 @@ def plants(name: str | None, picture: Path | None, as_json: bool) -> None:
     try:
         known = [find_plant(type_) for type_ in ([name] if name else plant_types())]
     except KeyError as error:
-        told = suggestion(str(name), plant_types())
-        raise SpecError(f"plants {str(name)[:60]}: unknown machine{told}") from error
+        hint = suggestion(str(name), plant_types())
+        raise SpecError(f"plants {str(name)[:60]}: unknown machine{hint}") from error
     if picture is not None:
         from gen_profile.charts.machine import draw_machine
 
@@ -415,7 +415,7 @@ def _plant_document(plant: Plant) -> dict[str, Any]:
     return {
         "summary": plant.summary,
         "axes": {axis.name: axis.unit for axis in plant.actuated},
-        "swinging": {free.name: free.unit for free in plant.unactuated},
+        "swinging": {coordinate.name: coordinate.unit for coordinate in plant.unactuated},
         "loads": list(plant.loads),
         "parameters": {
             q.name: {"unit": q.unit, "nominal": q.nominal, "lower": q.lower, "upper": q.upper}
@@ -431,7 +431,7 @@ def _plant_words(plant: Plant) -> str:
     }
     named = {
         "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in plant.actuated),
-        "swinging": ", ".join(f"{free.name} ({free.unit})" for free in plant.unactuated),
+        "swinging": ", ".join(f"{coordinate.name} ({coordinate.unit})" for coordinate in plant.unactuated),
         "loads": ", ".join(plant.loads),
     }
     names = "".join(f"  {kind}: {listed}\n" for kind, listed in named.items())

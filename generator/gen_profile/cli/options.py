@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 import click
 from click.shell_completion import CompletionItem
 
-from gen_profile.cli.outcome import beware
+from gen_profile.cli.outcome import print_warnings
 from gen_profile.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
@@ -120,12 +120,12 @@ class SpecChoice(NamedTuple):  # attrs would take as long to load as half of cli
 
     def spec(self) -> Spec:
         """Read it; doubt its values aloud."""
-        from gen_profile.spec.plausibility import doubts
+        from gen_profile.spec.plausibility import plausibility_warnings
         from gen_profile.spec.reading import parse_spec
 
         text, source, folder = self.text()
         spec = parse_spec(text, self.overrides, source, folder)
-        beware(doubts(spec))
+        print_warnings(plausibility_warnings(spec))
         return spec
 
     def text(self) -> tuple[str, str, Path]:
@@ -279,5 +279,5 @@ def _require_apart(context: click.Context) -> None:
         other, own = files.setdefault(path.resolve(), parameter), parameter.type
         if other is not parameter and isinstance(own, OutputFile) and own.replaces != other.name:
             argument = isinstance(other, click.Argument)
-            told = other.human_readable_name.strip("[]") if argument else other.opts[0]
-            raise SpecError(f"{parameter.opts[0]} {path}: is the file of {told}; name another one.")
+            other_name = other.human_readable_name.strip("[]") if argument else other.opts[0]
+            raise SpecError(f"{parameter.opts[0]} {path}: is the file of {other_name}; name another one.")

@@ -38,10 +38,10 @@ def print_outcome(document: dict[str, Any], text: str, as_json: bool) -> None:
 
 def warn(check: Check | Proof | None) -> None:
     """Say what is wrong without counting."""
-    beware(() if check is None else check.warnings())
+    print_warnings(() if check is None else check.warnings())
 
 
-def beware(sentences: Iterable[str]) -> None:
+def print_warnings(sentences: Iterable[str]) -> None:
     """Say what a user should know, once in a run."""
     said = click.get_current_context().meta.setdefault(f"{__name__}.said", set())
     for sentence in sentences:
@@ -79,8 +79,8 @@ def print_error(error: Exception, as_json: bool) -> int:
         case _:
             code, message = 1, f"Internal error ({type(error).__name__}: {error}). Run again with --debug."
     if as_json:
-        told = error.to_dict() if isinstance(error, NoMotion) else {}
-        document = {"error": {"type": type(error).__name__, "message": message, "exit_code": code, **told}}
+        details = error.to_dict() if isinstance(error, NoMotion) else {}
+        document = {"error": {"type": type(error).__name__, "message": message, "exit_code": code, **details}}
         with suppress(OSError):  # the error may be that stdout takes nothing
             click.echo(_json(document))
     if isinstance(error, click.ClickException):

@@ -25,7 +25,7 @@ from gen_profile.cli.options import (
     scheduler_option,
     spec_options,
 )
-from gen_profile.cli.outcome import beware, fail, print_outcome, warn
+from gen_profile.cli.outcome import fail, print_outcome, print_warnings, warn
 from gen_profile.cli.signing import sign, sign_option, signing_key
 from gen_profile.errors import OutputError, SpecError
 from gen_profile.progress import Progress
@@ -125,7 +125,7 @@ def write(
         sign(folder, key)
     print_outcome(outcome.to_dict(), words.deployment(outcome), as_json)
     warn(outcome.proof)
-    beware(outcome.warnings)
+    print_warnings(outcome.warnings)
     if outcome.proof is not None and not outcome.proof.passed:
         before = f"; {folder} still holds what an earlier run wrote" if (folder / FILENAME).exists() else ""
         kept = "The block was kept." if outcome.files else f"Nothing was written{before}."

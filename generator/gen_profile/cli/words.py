@@ -63,22 +63,22 @@ METHODS = (
 def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingProxyType({})) -> str:
     """Tell what was designed, how it was judged, what is proved of each file, and where they lie."""
     solution, figures = outcome.plan.solution, outcome.figures
-    found = f"{outcome.spec.solver.method} shaper, fed with a {outcome.spec.solver.base} move"
+    solver = f"{outcome.spec.solver.method} shaper, fed with a {outcome.spec.solver.base} move"
     if solution is not None:
         status, seconds = solution.status.name.lower(), outcome.plan.solver_time
-        found = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
+        solver = f"{status} in {solution.iterations} iterations, {seconds:.2g} s"
     residual = (
         f"{mm(figures['sway_residual_peak_m'])} nominal, {mm(figures['sway_residual_worst_m'])} at worst"
     )
     rows = [
         ("move", _move(outcome.spec)),
-        ("solver", found),
+        ("solver", solver),
         *_peaks(outcome),
         ("sway on the way", mm(figures["sway_transient_peak_m"])),
         ("residual sway", residual),
         *([] if outcome.check is None else _groups(outcome.check)),
         ("check", _verdict(outcome.check)),
-        *(row for found in certificates.values() for row in _proved(found)),
+        *(row for certificate in certificates.values() for row in _proved(certificate)),
         *_cost_of_lag(figures, outcome.spec.cost.effort),
     ]
     if outcome.spec.plant.defaults:
@@ -87,51 +87,56 @@ def design(outcome: Design, certificates: Mapping[Path, Certificate] = MappingPr
         names = ", ".join(solution.redundant)
         rows.append(("left out", f"sensitivity to {names}: {solution.redundancy}"))
     rows += [("wrote", str(outcome.folder / artefact.path)) for artefact in outcome.artefacts]
-    rows += [row for path, found in certificates.items() for row in _written(path, found)]
+    rows += [row for path, certificate in certificates.items() for row in _written(path, certificate)]
     return _block(outcome.spec.name, rows)
 
 
-def judgement(found: Judgement, certificate: Certificate | None = None) -> str:
+def judgement(judged: Judgement, certificate: Certificate | None = None) -> str:
     """Tell how an artefact was judged, and what is proved of it."""
-    check = found.check
+    check = judged.check
     findings = [
         (finding.scenario.name, ", ".join(f"{load} {mm(sway)}" for load, sway in finding.residual.items()))
         for finding in check.findings
         if finding.scenario.group == "machines" or len(check.findings) == 1
     ]
     rows = [
-        ("move", _move(found.spec)),
-        *([("variant", found.variant)] if found.variant else []),
-        ("manifest", MANIFEST_WORDS[found.manifest]),
+        ("move", _move(judged.spec)),
+        *([("variant", judged.variant)] if judged.variant else []),
+        ("manifest", MANIFEST_WORDS[judged.manifest]),
         *findings,
         *_groups(check),
         ("check", _verdict(check)),
-        *([] if certificate is None else (*_proved(certificate), *_written(found.path, certificate))),
+        *([] if certificate is None else (*_proved(certificate), *_written(judged.path, certificate))),
     ]
-    return _block(str(found.path), rows)
+    return _block(str(judged.path), rows)
 
 
-def certificate(path: Path, found: Certificate) -> str:
+def certificate(path: Path, document: Certificate) -> str:
     """Tell what a certificate proves."""
-    return _block(str(path), list(_proved(found)))
+    return _block(str(path), list(_proved(document)))
 
 
-def _written(path: Path, found: Certificate) -> list[tuple[str, str]]:
-    return [("wrote", str(certificate_path(path)))] if found.proved else []
+def _written(path: Path, certificate: Certificate) -> list[tuple[str, str]]:
+    return [("wrote", str(certificate_path(path)))] if certificate.proved else []
 
 
-def _proved(found: Certificate) -> Iterator[tuple[str, str]]:
+def _proved(certificate: Certificate) -> Iterator[tuple[str, str]]:
     """Say what is proved, and of which machines."""
-    machines = ", ".join(f"{name} from {low:.6g} to {high:.6g}" for name, (low, high) in found.ranges.items())
-    share = "" if found.share == 1.0 else f"{100.0 * found.share:.3g} % of "
-    yield "machines", f"{share}all with {machines}" if machines else "the nominal one"
-    bounds = ", ".join(f"{load} {mm(bound)}" for load, bound in found.bounds.items())
-    said = [f"{bounds}, from {found.arrival:.4g} s on"] if bounds else []
-    if (way := found.on_the_way) is not None and way.bound is not None:
+    machines = ", ".join(
+        f"{name} from {low:.6g} to {high:.6g}" for name, (low, high) in certificate.ranges.items()
+    )
+    fraction = "" if certificate.fraction == 1.0 else f"{100.0 * certificate.fraction:.3g} % of "
+    yield "machines", f"{fraction}all with {machines}" if machines else "the nominal one"
+    bounds = ", ".join(f"{load} {mm(bound)}" for load, bound in certificate.bounds.items())
+    said = [f"{bounds}, from {certificate.arrival:.4g} s on"] if bounds else []
+    if (way := certificate.on_the_way) is not None and way.bound is not None:
         said.append(f"{way.limit.load} {mm(way.bound)} at any time")
-    yield "proved" if found.proved else "not proved", f"at most {'; '.join(said)}" if said else "no bound"
-    for axis, kinds in (found.asked or {}).items():
-        bounds = ", ".join(f"{told['bound']:.4g} {told['unit']}" for told in kinds.values())
+    yield (
+        "proved" if certificate.proved else "not proved",
+        f"at most {'; '.join(said)}" if said else "no bound",
+    )
+    for axis, kinds in (certificate.asked or {}).items():
+        bounds = ", ".join(f"{claim['bound']:.4g} {claim['unit']}" for claim in kinds.values())
         yield "setpoints", f"ask {axis} for at most {bounds}"
 
 
@@ -146,25 +151,25 @@ def deployment(outcome: Deployment) -> str:
     return _block(outcome.spec.name, rows)
 
 
-def block_judgement(found: BlockJudgement) -> str:
+def block_judgement(judged: BlockJudgement) -> str:
     """Tell how a planner block was judged, or what became of one history."""
-    rows = [("manifest", MANIFEST_WORDS[found.manifest])]
-    if found.history is None:
-        return _block(str(found.path), [*rows, *_proof(found.check)])
-    worst = found.check.worst
+    rows = [("manifest", MANIFEST_WORDS[judged.manifest])]
+    if judged.history is None:
+        return _block(str(judged.path), [*rows, *_proof(judged.check)])
+    worst = judged.check.worst
     commands = (
         f"{command.time:.3g} s {command.command}" + "".join(f" {value:.4g}" for value in command.values)
         for command in worst.history.commands
     )
     rows += [
         ("history", f"{worst.number}, {worst.group}, from {worst.history.start_words}"),
-        ("told", worst.history.told(found.spec.machine().units)),
+        ("told", worst.history.reported(judged.spec.machine().units)),
         ("commands", "; ".join(commands)),
         ("residual sway", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.residual.items())),
         ("sway on the way", ", ".join(f"{load} {mm(sway)}" for load, sway in worst.on_the_way.items())),
-        ("history kept", "passed" if found.check.passed else "FAILED"),
+        ("history kept", "passed" if judged.check.passed else "FAILED"),
     ]
-    return _block(str(found.path), rows)
+    return _block(str(judged.path), rows)
 
 
 def _proof(proof: Proof) -> list[tuple[str, str]]:
@@ -206,49 +211,49 @@ def _group(group: Mapping[str, Any]) -> str:
     return f"{verdict}{aside}: {peak}; end load {shares}"
 
 
-def comparison(found: Comparison) -> str:
+def comparison(compared: Comparison) -> str:
     """Lay the methods out side by side, below the recommendation."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("method\n")
-    first = found.spec.machine().actuated[0].unit
+    first = compared.spec.machine().actuated[0].unit
     for head, (unit, _, _) in COLUMNS.items():
         table.add_column(f"{head}\n{unit.replace('m/', f'{first}/')}", justify="right")
     table.add_column("limit\nkept", justify="center")
     table.add_column("Pareto\nfront", justify="center")
-    for row in found.rows:
+    for row in compared.rows:
         cells = (number(factor * row.figures[key]) for _, key, factor in COLUMNS.values())
-        marks = ("●" if mark else "" for mark in (row.safe, row.method in found.efficient))
+        marks = ("●" if mark else "" for mark in (row.safe, row.method in compared.efficient))
         table.add_row(row.method, *cells, *marks)
-    title = f"{found.spec.name}: {_move(found.spec)}"
-    return "\n".join([title, "", *found.advice(), _text(table), METHODS, *found.missing()])
+    title = f"{compared.spec.name}: {_move(compared.spec)}"
+    return "\n".join([title, "", *compared.advice(), _text(table), METHODS, *compared.missing()])
 
 
-def robustness(found: Robustness) -> str:
+def robustness(curves: Robustness) -> str:
     """Tell how much sway each method leaves at worst, and how far off the machine may be."""
     table = Table(box=box.SIMPLE_HEAD)
-    names = ", ".join(found.errors)
+    names = ", ".join(curves.errors)
     heads = ["method\n", f"worst over {names}\nmm", "machines within\nlimits"]
-    if len(found.errors) == 1:
+    if len(curves.errors) == 1:
         heads.append("all limits kept\nfrom … to")
     for index, head in enumerate(heads):
         table.add_column(head, justify="right" if index else "left")
-    for method in found.residual:
-        kept = 100.0 * float((found.share(method) <= 1.0).mean())
-        ends = found.insensitivity(method)
+    for method in curves.residual:
+        kept = 100.0 * float((curves.fraction(method) <= 1.0).mean())
+        ends = curves.insensitivity(method)
         span = "" if ends is None else f"{100.0 * ends[0]:+.1f} … {100.0 * ends[1]:+.1f} %"
-        cells = (method, number(1e3 * found.end_load(method).max()), f"{kept:.0f} %", span)
+        cells = (method, number(1e3 * curves.end_load(method).max()), f"{kept:.0f} %", span)
         table.add_row(*cells[: len(heads)])
     ranges = (
-        f"{name} {100.0 * off[0]:+.3g} … {100.0 * off[-1]:+.3g} %" for name, off in found.errors.items()
+        f"{name} {100.0 * off[0]:+.3g} … {100.0 * off[-1]:+.3g} %" for name, off in curves.errors.items()
     )
-    title = f"{found.spec.name}: {_move(found.spec)}; tried {', '.join(ranges)}"
-    left_out = [f"{method}: {reason}" for method, reason in found.left_out.items()]
+    title = f"{curves.spec.name}: {_move(curves.spec)}; tried {', '.join(ranges)}"
+    left_out = [f"{method}: {reason}" for method, reason in curves.left_out.items()]
     return "\n".join([title, _text(table), *left_out])
 
 
-def identification(found: Identification, path: Path) -> str:
+def identification(identified: Identification, path: Path) -> str:
     """Tell what was identified, how well, and how the measurements agree with it."""
-    document = found.to_dict()
+    document = identified.to_dict()
     rows = [
         (
             name,
@@ -268,24 +273,24 @@ def identification(found: Identification, path: Path) -> str:
         taken = f" ({row['averages']} averages over {row['lasts_s']:.4g} s)" if row["averages"] else ""
         samples = f"{row['samples']} samples of its {row['quantity']}{taken}"
         rows.append((f"log of {row['load']}", f"{samples}, {sizes}"))
-    rows += [("BEWARE", sentence) for sentence in found.warnings()]
-    rows += [*_stated_ranges(found), *_rests(found)]
+    rows += [("BEWARE", sentence) for sentence in identified.warnings()]
+    rows += [*_stated_ranges(identified), *_rests(identified)]
     rows += [("ranges hold", f"with {document['confidence']:.0%}, all at once"), ("wrote", str(path))]
-    return _block(found.spec.name, rows)
+    return _block(identified.spec.name, rows)
 
 
-def _stated_ranges(found: Identification) -> Iterator[tuple[str, str]]:
+def _stated_ranges(identified: Identification) -> Iterator[tuple[str, str]]:
     """Tell which range of the spec is wider than what the measurements leave open."""
-    for name, row in found.to_dict()["parameters"].items():
-        share = row["half_range"] / abs(row["value"] or 1.0)
-        if row["stated"] is not None and row["stated"] > share:
+    for name, row in identified.to_dict()["parameters"].items():
+        fraction = row["half_range"] / abs(row["value"] or 1.0)
+        if row["stated"] is not None and row["stated"] > fraction:
             yield "kept", f"the spec's range of {name}, ±{row['stated']:.2%}: it may change in service"
 
 
-def _rests(found: Identification) -> Iterator[tuple[str, str]]:
+def _rests(identified: Identification) -> Iterator[tuple[str, str]]:
     """Tell what a result rests on that was not measured, where a per cent of that matters."""
-    uncertain = found.given.robustness.uncertain
-    for name, row in found.to_dict()["parameters"].items():
+    uncertain = identified.given.robustness.uncertain
+    for name, row in identified.to_dict()["parameters"].items():
         for other, moved in row["rests_on"].items():
             if abs(moved) > RESTS * row["half_range"]:
                 range_ = f" (±{uncertain[other]:.2%})" if other in uncertain else ""
@@ -309,20 +314,20 @@ def sweep(done: Sweep) -> str:
     return _block(done.store.name, [*rows, ("wrote", str(done.table))])
 
 
-def found_profile(found: LookupResult) -> str:
+def found_profile(nearest: LookupResult) -> str:
     """Tell which profile is nearest, and what it costs to use it."""
-    expected, designed = found.sway
-    costs = [f"{key} {value:+g}" for key, value in found.costs.items() if value]
+    expected, designed = nearest.sway
+    costs = [f"{key} {value:+g}" for key, value in nearest.costs.items() if value]
     costs.append(f"worst residual sway {mm(expected)}, {mm(designed)} where it was designed for")
     rows = [
-        ("asked for", ", ".join(named(found.asked))),
-        ("nearest", f"{', '.join(named(found.used))} (case {found.row['case']})"),
+        ("asked for", ", ".join(named(nearest.asked))),
+        ("nearest", f"{', '.join(named(nearest.used))} (case {nearest.row['case']})"),
         ("costs", "; ".join(costs)),
-        ("check", _verdict(found.judgement.check)),
-        *(("passed over", f"case {case}: {reason}") for case, reason in found.passed_over.items()),
-        *(("file", str(found.judgement.path.parent / one["path"])) for one in found.row["artefacts"]),
+        ("check", _verdict(nearest.judgement.check)),
+        *(("passed over", f"case {case}: {reason}") for case, reason in nearest.passed_over.items()),
+        *(("file", str(nearest.judgement.path.parent / one["path"])) for one in nearest.row["artefacts"]),
     ]
-    return _block(found.judgement.spec.name, rows)
+    return _block(nearest.judgement.spec.name, rows)
 
 
 def library(written: Library) -> str:
@@ -349,9 +354,9 @@ def report(made: Report, path: Path) -> str:
 
 def planner_report(made: PlannerReport, path: Path) -> str:
     """Tell how the planner block was judged, and where the page lies."""
-    found = made.judgement
-    rows = [("manifest", MANIFEST_WORDS[found.manifest]), *_proof(found.check), ("wrote", str(path))]
-    return _block(str(found.path), rows)
+    judged = made.judgement
+    rows = [("manifest", MANIFEST_WORDS[judged.manifest]), *_proof(judged.check), ("wrote", str(path))]
+    return _block(str(judged.path), rows)
 
 
 def _cost_of_lag(figures: Mapping[str, float], effort: str) -> list[tuple[str, str]]:
@@ -373,7 +378,9 @@ def _move(spec: Spec) -> str:
         f"{name} {distance:g} {unit}"
         for name, distance, unit in zip(spec.axis, spec.move.distance, units, strict=True)
     )
-    uncertain = ", ".join(f"{name} ±{100 * share:g} %" for name, share in spec.robustness.uncertain.items())
+    uncertain = ", ".join(
+        f"{name} ±{100 * fraction:g} %" for name, fraction in spec.robustness.uncertain.items()
+    )
     duration = "the shortest time" if spec.move.shortest else f"{spec.move.duration:g} s"
     return f"{spec.plant.type}, {distances} in {duration}" + (f", {uncertain}" if uncertain else "")
 

@@ -88,8 +88,8 @@ def _least(
 
     def best(among: list[str]) -> str:
         least = min(rows[method][objective] for method in among)
-        alike = [method for method in among if rows[method][objective] <= least * (1.0 + SAME)]
-        return min(alike, key=lambda method: rows[method]["sway_residual_worst_m"])
+        tied = [method for method in among if rows[method][objective] <= least * (1.0 + SAME)]
+        return min(tied, key=lambda method: rows[method]["sway_residual_worst_m"])
 
     def figure(method: str) -> str:
         return f"{number(factor * rows[method][objective])} {of.format(unit)}"

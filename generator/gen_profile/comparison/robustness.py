@@ -83,7 +83,7 @@ class Robustness(Summarised):
         """Greatest residual sway of the end load in any direction in m, shape (points, …)."""
         return np.asarray(self.residual[method][..., self.spec.machine().end_load].max(axis=-1))
 
-    def share(self, method: str) -> Array:
+    def fraction(self, method: str) -> Array:
         """Greatest share of its limit that any load takes up, shape (points, …)."""
         return np.asarray((self.residual[method] / self.limits).max(axis=-1))
 
@@ -97,10 +97,10 @@ class Robustness(Summarised):
         if len(self.errors) != 1:
             return None
         (errors,) = self.errors.values()
-        share, zero = self.share(method), int(np.abs(errors).argmin())
-        if share[zero] > 1.0:
+        fraction, zero = self.fraction(method), int(np.abs(errors).argmin())
+        if fraction[zero] > 1.0:
             return None
-        return (-_crossing(-errors[zero::-1], share[zero::-1]), _crossing(errors[zero:], share[zero:]))
+        return (-_crossing(-errors[zero::-1], fraction[zero::-1]), _crossing(errors[zero:], fraction[zero:]))
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
@@ -117,7 +117,7 @@ class Robustness(Summarised):
                         for index, load in enumerate(self.spec.machine().loads)
                     },
                     "residual_worst_m": float(self.end_load(method).max()),
-                    "keeps_limits_share": float((self.share(method) <= 1.0).mean()),
+                    "keeps_limits_share": float((self.fraction(method) <= 1.0).mean()),
                     "insensitivity": self.insensitivity(method),
                 }
                 for method, found in self.residual.items()
@@ -141,13 +141,13 @@ class Robustness(Summarised):
         return text.getvalue()
 
 
-def _crossing(errors: Array, share: Array) -> float:
+def _crossing(errors: Array, fraction: Array) -> float:
     """Where a share passes 1 on the way outwards from the first point."""
-    over = np.flatnonzero(share > 1.0)
+    over = np.flatnonzero(fraction > 1.0)
     if not len(over):
         return float(errors[-1])
     at = int(over[0])
-    part = (1.0 - share[at - 1]) / (share[at] - share[at - 1])
+    part = (1.0 - fraction[at - 1]) / (fraction[at] - fraction[at - 1])
     return float(errors[at - 1] + part * (errors[at] - errors[at - 1]))
 
 

@@ -276,10 +276,10 @@ def _judged(
 ) -> Check:
     """Judge one artefact in all its scenarios, of which the evaluation's machines are the first."""
     machines, spacing = [row for row in rows if row.followed], sample_spacing(spec, setpoints)
-    found = cosimulate(spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, progress=progress)
-    compared = found[0].times[found[0].times >= judged_from(spec, setpoints)]
+    responses = cosimulate(spec, setpoints, machines, output_step=spacing, by_fmpy=by_fmpy, progress=progress)
+    compared = responses[0].times[responses[0].times >= judged_from(spec, setpoints)]
     expected = evaluation.followed(compared, machines[len(evaluation.machines) :])
-    check = judge(spec, setpoints, machines, found, expected)
+    check = judge(spec, setpoints, machines, responses, expected)
     further = [row for row in rows if not row.followed]
     return with_further(spec, setpoints, check, further, progress)
 

@@ -116,10 +116,10 @@ def _longer_shaped(spec: Spec, shaper: str) -> tuple[Suggestion, ...]:
         return error.suggestions
 
 
-def suggested(values: Mapping[str, Any], found: Draft) -> Suggestion:
+def suggested(values: Mapping[str, Any], drafted: Draft) -> Suggestion:
     """Suggest values with which a motion was found."""
-    fraction = share_of_residual_sway(found.spec, found.evaluation)
-    return Suggestion(values=values, spec=found.spec, fraction=fraction, passes=found.excess_sway <= 0.0)
+    fraction = share_of_residual_sway(drafted.spec, drafted.evaluation)
+    return Suggestion(values=values, spec=drafted.spec, fraction=fraction, passes=drafted.excess_sway <= 0.0)
 
 
 def lasting(spec: Spec, duration: float) -> Spec:

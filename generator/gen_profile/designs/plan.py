@@ -104,7 +104,7 @@ def draft(spec: Spec, progress: Progress = no_progress) -> Draft:
     return solved(spec, progress)
 
 
-def judged(found: Draft, progress: Progress = no_progress) -> Plan:
+def judged(drafted: Draft, progress: Progress = no_progress) -> Plan:
     """Try a drafted motion on all machines; say what would help where there is none within the limits.
 
     Raises
@@ -113,24 +113,24 @@ def judged(found: Draft, progress: Progress = no_progress) -> Plan:
     OutOfWork
         Nothing is left of a budget.
     """
-    spec = found.spec
-    if found.motion is None:
-        assert found.solution is not None  # a shaper has a motion, or raises
+    spec = drafted.spec
+    if drafted.motion is None:
+        assert drafted.solution is not None  # a shaper has a motion, or raises
         progress(EXPLAINING)
-        found = attrs.evolve(found, motion=optimal_profile(explained(spec, found.solution)))
-    if found.broken:
+        drafted = attrs.evolve(drafted, motion=optimal_profile(explained(spec, drafted.solution)))
+    if drafted.broken:
         progress(EXPLAINING)
         better = remedy(spec)
         raise LimitViolation(
-            *(one.sentence() for one in found.broken),
+            *(one.sentence() for one in drafted.broken),
             *filter(None, [better.advice]),
-            reasons=[one.reason() for one in found.broken],
+            reasons=[one.reason() for one in drafted.broken],
             suggestions=better.suggestions,
         )
     return Plan(
         spec=spec,
-        solution=found.solution,
-        solver_time=found.solver_time,
-        evaluation=found.evaluation,
-        figures=found.evaluation.figures,
+        solution=drafted.solution,
+        solver_time=drafted.solver_time,
+        evaluation=drafted.evaluation,
+        figures=drafted.evaluation.figures,
     )

@@ -129,14 +129,20 @@ def deploy_planner(
             proof, warnings = prove_on(spec, text), slow_axes(spec, block)
         artefacts = tuple(artefact_of(PLANNER, name, content) for name, content in written.items())
         kept = deliver_judged(staging, spec, artefacts, proof, profile_sha256="", keep_failed=keep_failed)
-    found: tuple[Suggestion, ...] = ()
+    suggestions: tuple[Suggestion, ...] = ()
     if proof is not None and not proof.passed and not keep_failed:
         progress("looking for what would pass")
-        found = planner_suggestions(
+        suggestions = planner_suggestions(
             spec, proof, lambda changed: prove_on(changed, planner_block(changed).text)
         )
     return Deployment(
-        spec=spec, block=block, proof=proof, folder=folder, files=kept, suggestions=found, warnings=warnings
+        spec=spec,
+        block=block,
+        proof=proof,
+        folder=folder,
+        files=kept,
+        suggestions=suggestions,
+        warnings=warnings,
     )
 
 

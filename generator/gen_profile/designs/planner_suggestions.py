@@ -38,8 +38,8 @@ def planner_suggestions(spec: Spec, proof: Proof, prove: Callable[[Spec], Proof]
     faults = {fault for judged in proof.judged for fault in judged.faults}
     if proof.faults or (faults and TAKEN_BACK not in faults):
         return ()
-    found = (_tried(spec, proof, prove, change, power) for change, power in CHANGES.items())
-    return tuple(suggestion for suggestion in found if suggestion is not None)
+    suggestions = (_tried(spec, proof, prove, change, power) for change, power in CHANGES.items())
+    return tuple(suggestion for suggestion in suggestions if suggestion is not None)
 
 
 def _tried(
@@ -51,7 +51,7 @@ def _tried(
     def excess(factor: float) -> float:
         changed, values = change(spec, 1.0 / factor)
         proof = failed if factor == 1.0 else prove(changed)
-        fraction = proof.share(proof.worst)
+        fraction = proof.fraction(proof.worst)
         if proof.passed:
             passed.append(Suggestion(values=values, spec=changed, fraction=fraction))
             return -math.inf

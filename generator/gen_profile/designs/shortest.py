@@ -64,7 +64,7 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
         return Draft(spec=lasting(spec, motion.duration), solution=None, motion=motion)
     try:
         with budget(SEARCHING):
-            found = _within_sway(spec, *_within_limits(spec, progress), progress)
+            least = _within_sway(spec, *_within_limits(spec, progress), progress)
     except OutOfWork as error:
         spend(0.0)
         longer = sufficient_duration(_slow(spec))
@@ -74,7 +74,7 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
             reasons=[Reason(code=Code.GIVEN_UP, place="move.duration")],
             suggestions=filter(None, [longer]),
         ) from error
-    if found is None:
+    if least is None:
         raise InfeasibleProblem(
             Phrase(
                 "check.residual_sway: no duration leaves so little sway on every machine of "
@@ -82,23 +82,23 @@ def shortest(spec: Spec, progress: Progress = no_progress) -> Draft:
             ),
             reasons=[Reason(code=Code.RESIDUAL_SWAY, place="check.residual_sway")],
         )
-    return found
+    return least
 
 
 def _within_limits(spec: Spec, progress: Progress) -> tuple[Problem, Relaxed]:
     """Find the shortest motion within the limits, and the problem with the spread that machines have then."""
     problem = problem_of(spec)
     swayed = transient_sway.limited(spec, problem)
-    found = choice.minimum_time(problem, progress, search=ROUGHLY if swayed else SHORTEST)
+    least = choice.minimum_time(problem, progress, search=ROUGHLY if swayed else SHORTEST)
     with suppress(OutOfWork), budget(SPREADING * left()):
         for _ in range(SPREADS):
-            if found is None or not swayed:
+            if least is None or not swayed:
                 break
-            more = transient_sway.spread(spec, found.solution)
+            more = transient_sway.spread(spec, least.solution)
             swayed = abs(more - problem.sway_spread) > NEARLY * more
             problem = attrs.evolve(problem, sway_spread=more)
-            found = choice.minimum_time(problem, progress, found)
-    if found is None:
+            least = choice.minimum_time(problem, progress, least)
+    if least is None:
         slow = _slow(spec)
         duration = {"move.duration": slow.move.duration}
         better = beside(duration, remedy(slow, in_time=True).suggestions)
@@ -109,7 +109,7 @@ def _within_limits(spec: Spec, progress: Progress) -> tuple[Problem, Relaxed]:
             reasons=[Reason(code=Code.INFEASIBLE, place="move.duration")],
             suggestions=better,
         )
-    return problem, found
+    return problem, least
 
 
 def _within_sway(spec: Spec, problem: Problem, shortest_kept: Relaxed, progress: Progress) -> Draft | None:

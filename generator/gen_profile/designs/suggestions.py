@@ -21,7 +21,7 @@ from gen_profile.phrase import Phrase
 from gen_profile.problem.limits import SWAY_TOLERANCE, rounded_up
 from gen_profile.problem.problem import problem_of
 from gen_profile.solvers import method_selection as choice
-from gen_profile.solvers.direct.relaxation import Relaxation, eased_by_time, least_duration
+from gen_profile.solvers.direct.relaxation import Relaxation, least_duration, time_dependent_limits
 from gen_profile.solvers.indirect import solver as indirect
 from gen_profile.solvers.search import Search, least
 from gen_profile.solvers.solution import LONGER, Solution, Status
@@ -76,9 +76,9 @@ def explained(spec: Spec, solution: Solution) -> Solution:
     known = solution.method == indirect.METHOD and not spec.limits.stated() and solution.advice != LONGER
     if solution.optimum is not None or known:
         return solution
-    found = remedy(spec, solution.problem.sway_spread)
-    advice = found.advice or ("" if found.suggestions else IN_VAIN)
-    return attrs.evolve(solution, advice=advice, suggestions=found.suggestions)
+    remedies = remedy(spec, solution.problem.sway_spread)
+    advice = remedies.advice or ("" if remedies.suggestions else IN_VAIN)
+    return attrs.evolve(solution, advice=advice, suggestions=remedies.suggestions)
 
 
 def remedy(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> Remedy:
@@ -107,8 +107,12 @@ def remedy(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> Remedy:
     stated = problem.limits.stated()
     wider = partial(_wider_limits, spec, relaxation)
     alone = [partial(wider, {place: value}) for place, value in stated.items()]
-    eased = {place: stated[place] for place in eased_by_time(problem)}
-    families = [limits for limits in ([eased] if eased == stated else [eased, stated]) if len(limits) > 1]
+    time_limits = {place: stated[place] for place in time_dependent_limits(problem)}
+    families = [
+        limits
+        for limits in ([time_limits] if time_limits == stated else [time_limits, stated])
+        if len(limits) > 1
+    ]
     together = [partial(wider, limits, WIDEST) for limits in families]
     with suppress(OutOfWork):  # of the budget for the whole answer: name what was found so far
         if not in_time:
@@ -123,8 +127,8 @@ def remedy(spec: Spec, spread: float = 1.0, *, in_time: bool = False) -> Remedy:
     if needed and needed > NEAR * problem.duration and not longer:
         template = "By an estimate that was not tried, it takes some {duration:g} s with these limits."
         advice = Phrase(template, duration=float(f"{needed:.2g}"))
-    found = [one for one in (longer, *others) if one]
-    return Remedy(suggestions=tuple(sorted(found, key=lambda one: not one.passes)), advice=advice)
+    tried = [one for one in (longer, *others) if one]
+    return Remedy(suggestions=tuple(sorted(tried, key=lambda one: not one.passes)), advice=advice)
 
 
 def beside(values: Mapping[str, Any], suggestions: Iterable[Suggestion]) -> tuple[Suggestion, ...]:
@@ -159,7 +163,9 @@ def tried(spec: Spec, *, coarse: bool = False) -> Solution:
 
 
 def _kept(spec: Spec, solution: Solution) -> bool:
-    return choice.keeps_limits(solution) and transient_sway.keeps_sway(spec, solution, transient_sway.ENOUGH)
+    return choice.keeps_limits(solution) and transient_sway.keeps_sway(
+        spec, solution, transient_sway.ACCEPTED
+    )
 
 
 def _relaxation(spec: Spec, spread: float) -> Relaxation:
@@ -249,7 +255,7 @@ def _longer(spec: Spec, relaxation: Relaxation, needed: float) -> Suggestion | N
     def change(factor: float) -> Mapping[str, Any]:
         return {"move.duration": float(rounded_up(factor * needed))}
 
-    most = MOST if eased_by_time(relaxation.problem) else FAR
+    most = MOST if time_dependent_limits(relaxation.problem) else FAR
     return least_change(spec, change, relaxation.problem.sway_spread, FRACTION, (most, LATER))
 
 
@@ -278,8 +284,8 @@ def _less_robust(spec: Spec) -> Suggestion | None:
         return None
     changes: list[dict[str, Any]] = [{"robustness.order": 1}] if robustness.order > 1 else []
     weakest = {"robustness.method": "none", **({"robustness.order": 1} if changes else {})}
-    found = (_tried(spec, change) for change in (*changes, weakest))
-    return next((one for one in found if one and one.passes), None)
+    tries = (_tried(spec, change) for change in (*changes, weakest))
+    return next((one for one in tries if one and one.passes), None)
 
 
 def _tried(spec: Spec, values: Mapping[str, Any]) -> Suggestion | None:

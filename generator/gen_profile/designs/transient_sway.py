@@ -28,8 +28,8 @@ from gen_profile.solvers.solution import Solution, Status
 from gen_profile.spec.model import Spec
 from gen_profile.spec.values import SolverName
 
-ENOUGH = 1.005  # times the limit that the worst machine may sway
-NEARLY_ENOUGH = 1.008  # likewise where solving again takes long
+ACCEPTED = 1.005  # times the limit that the worst machine may sway
+NEARLY_ACCEPTED = 1.008  # likewise where solving again takes long
 # the first spread that will do is taken; aimed at is a little more, for what lies between machines and times
 # looked at, and the worst machine's sway falls by at least a tenth as much as the nominal one's
 SPREAD = Search(precision=1e-3, aim=-2e-3, believed=(0.1, 10.0), tries=5)
@@ -60,7 +60,7 @@ def attempt(
     problem = attrs.evolve(problem_of(spec), sway_spread=spread)
     if near is not None and spec.solver.solver != "indirect":
         begun = partial(choice.attempt, method="direct", near=near)
-        return _kept(spec, problem, begun, NEARLY_ENOUGH, progress)
+        return _kept(spec, problem, begun, NEARLY_ACCEPTED, progress)
     return kept_by_all(spec, problem, spec.solver.solver, progress)
 
 
@@ -89,12 +89,12 @@ def kept_by_all(
     if not limited(spec, problem) or (method == "indirect" and problem.worst_case is None):
         return choice.attempt(problem, method, coarse=coarse)  # the indirect method knows no limits
     if coarse or problem.worst_case is None:
-        found = _kept(spec, problem, partial(choice.attempt, method=method, coarse=True))
-        if coarse or found.optimum is None or found.method == indirect.METHOD:
-            return found
-        problem = attrs.evolve(problem, sway_spread=found.problem.sway_spread)
+        solution = _kept(spec, problem, partial(choice.attempt, method=method, coarse=True))
+        if coarse or solution.optimum is None or solution.method == indirect.METHOD:
+            return solution
+        problem = attrs.evolve(problem, sway_spread=solution.problem.sway_spread)
     # where it finds a motion, so does "auto", and it is the quicker to fail
-    return _kept(spec, problem, partial(choice.attempt, method="direct"), NEARLY_ENOUGH, progress)
+    return _kept(spec, problem, partial(choice.attempt, method="direct"), NEARLY_ACCEPTED, progress)
 
 
 def limited(spec: Spec, problem: Problem) -> bool:
@@ -106,7 +106,7 @@ def _kept(
     spec: Spec,
     problem: Problem,
     solve: Callable[[Problem], Solution],
-    enough: float = ENOUGH,
+    accepted: float = ACCEPTED,
     progress: Progress = no_progress,
 ) -> Solution:
     """Find the least spread with which the worst machine sways no more than enough times its limit."""
@@ -120,7 +120,7 @@ def _kept(
         if solution.optimum is None or not limited(spec, problem):
             return -math.inf  # where no motion sways so little, none sways less
         nominal, worst = sways(spec, problem, optimal_profile(solution))
-        if _enough(problem, nominal, worst, enough):
+        if _is_accepted(problem, nominal, worst, accepted):
             return -math.inf
         if worst == math.inf:
             solutions.append(attrs.evolve(solution, status=Status.INFEASIBLE, optimum=None))
@@ -131,16 +131,16 @@ def _kept(
     return solutions[-1]
 
 
-def _enough(problem: Problem, nominal: float, worst: float, enough: float) -> bool:
+def _is_accepted(problem: Problem, nominal: float, worst: float, accepted: float) -> bool:
     """Whether the worst machine sways no more than so many times the limit, or than the nominal one."""
-    return worst <= max(enough * (problem.limits.sway or 0.0), nominal) < math.inf
+    return worst <= max(accepted * (problem.limits.sway or 0.0), nominal) < math.inf
 
 
-def keeps_sway(spec: Spec, solution: Solution, enough: float) -> bool:
+def keeps_sway(spec: Spec, solution: Solution, accepted: float) -> bool:
     """Whether no machine of a spec's ranges sways more on the way than so many times the limit."""
     problem = solution.problem
-    return not limited(spec, problem) or _enough(
-        problem, *sways(spec, problem, optimal_profile(solution)), enough
+    return not limited(spec, problem) or _is_accepted(
+        problem, *sways(spec, problem, optimal_profile(solution)), accepted
     )
 
 
@@ -156,7 +156,7 @@ def sways(spec: Spec, problem: Problem, motion: Profile) -> tuple[float, float]:
     """Find the greatest sway of the end load during a motion in m: nominal, and of the worst machine."""
     inside = machines_inside(problem, spec.checked_ranges())
     machines = [*(row.parameters for row in scenarios(spec)), *inside]
-    found = greatest_sway(
+    greatest = greatest_sway(
         spec.machine(), motion, machines, spec.move.initial, accuracy=ACCURACY, samples=SAMPLES
     )
-    return float(found[0]), float(found.max())
+    return float(greatest[0]), float(greatest.max())

@@ -71,21 +71,21 @@ class Trajectories:
 
     def positions(self, times: Array) -> Array:
         """Evaluate positions at rising times in s, shape (times, coordinates)."""
-        (found,) = self._evaluated(times, (self.position,))
-        return np.asarray(found)
+        (rows,) = self._evaluated(times, (self.position,))
+        return np.asarray(rows)
 
     def _evaluated(self, times: Array, polynomials: Sequence[Array]) -> Array:
         """Evaluate polynomials at rising times, shape (polynomials, times, coordinates)."""
-        found = np.empty((len(polynomials), len(times), self.position.shape[-1]))
+        values = np.empty((len(polynomials), len(times), self.position.shape[-1]))
         step = np.clip(np.searchsorted(self.knots, times, side="right") - 1, 0, len(self.knots) - 2)
         begin, end = self.knots[step], self.knots[step + 1]
         powers = legendre.legvander(2.0 * (times - begin) / (end - begin) - 1.0, NODES + 1)
         edges = np.searchsorted(step, np.arange(len(self.knots)))
-        for rows, coefficients in zip(found, polynomials, strict=True):
+        for rows, coefficients in zip(values, polynomials, strict=True):
             taken = powers[:, : coefficients.shape[1]]
             for own, (first, last) in zip(coefficients, pairwise(edges.tolist()), strict=True):
                 np.matmul(taken[first:last], own, out=rows[first:last])
-        return found
+        return values
 
 
 def integrate(
@@ -137,15 +137,17 @@ def integrate(
     while waiting:
         tried = waiting[-width:][::-1]
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is halved
-            found, fine = window.take(np.array(tried), state)
+            accepted, fine = window.take(np.array(tried), state)
         del waiting[-len(fine) :]
-        for (begin, end), well in reversed(list(zip(tried, fine.tolist(), strict=False))[len(found) :]):
+        for (begin, end), well in reversed(list(zip(tried, fine.tolist(), strict=False))[len(accepted) :]):
             middle = 0.5 * (begin + end)
             waiting += [(begin, end)] if well else [(middle, end), (begin, middle)]
-        if found:
-            pieces += found
-            knots += [end for _, end in tried[: len(found)]]
-            state = np.array([coefficients.sum(axis=0) for coefficients in found[-1]])  # Legendre's end at 1
+        if accepted:
+            pieces += accepted
+            knots += [end for _, end in tried[: len(accepted)]]
+            state = np.array(
+                [coefficients.sum(axis=0) for coefficients in accepted[-1]]
+            )  # Legendre's end at 1
         elif end - begin < shortest:
             raise CosimulationError(f"The {what} cannot be integrated beyond {begin:.4g} s.")
         width = min(2 * len(fine) + 1, widest)
@@ -191,11 +193,11 @@ class _Newton:
             [spread(ones, stiffness), spread(times, stiffness) + spread(ones, damping)], axis=2
         )
         end = spread(np.array([[length**2], [length]]) * _ENDS, unit) @ inverse
-        free = spread(np.array([[1.0, length], [0.0, 1.0]]), unit)
-        return cls(inverse, given, end, free - end @ given)
+        unforced = spread(np.array([[1.0, length], [0.0, 1.0]]), unit)
+        return cls(inverse, given, end, unforced - end @ given)
 
 
-_Alike = tuple[slice | list[int], _Newton]  # numbers of steps, and what they share
+_Group = tuple[slice | list[int], _Newton]  # numbers of steps, and what they share
 
 
 class _Window:
@@ -213,7 +215,7 @@ class _Window:
         of those that are settled, at least one, whether they are short enough.
         """
         length = np.diff(steps, axis=1)[:, 0]
-        alike = self._alike(steps, length)
+        groups = self._grouped(steps, length)
         accelerations = self._accelerations((steps[:, 0] + np.multiply.outer(TIMES, length)).ravel())
         a = np.zeros((NODES, len(steps), start.shape[1]))
         h, nodes = length[:, None], TIMES[:, None, None]
@@ -221,8 +223,8 @@ class _Window:
         for _ in range(MOST_ITERATIONS):
             q, v = _states(a, h, start)
             at = (q + nodes * h * v + h**2 * _along(_POSITION, a), v + h * _along(_VELOCITY, a))
-            found = accelerations(*(part.reshape(NODES * len(steps), -1) for part in at)).reshape(a.shape)
-            change = _solved(found - a, alike)
+            computed = accelerations(*(part.reshape(NODES * len(steps), -1) for part in at)).reshape(a.shape)
+            change = _solved(computed - a, groups)
             a += change
             allowed = self._least + self._accuracy * np.abs(at[0]).max(axis=(0, 2))
             moved = length**2 * np.abs(change).max(axis=(0, 2))
@@ -239,18 +241,18 @@ class _Window:
         fine = fine[:done] if done else np.array([False])
         return [(position[:, step], velocity[:, step]) for step in range(_leading(fine))], fine
 
-    def _alike(self, steps: Array, length: Array) -> list[_Alike]:
+    def _grouped(self, steps: Array, length: Array) -> list[_Group]:
         """Gather the steps that share their Newton matrices."""
         gathered: dict[bytes, list[int]] = {}
         terms: tuple[Array, ...] = ()
         rounded = length.astype(np.float32)  # lengths of one stretch differ by rounding
         for step, (middle, short) in enumerate(zip(steps.mean(axis=1).tolist(), rounded, strict=True)):
-            if (found := self._linear(middle)) is not terms:
-                terms, told = found, b"".join(term.tobytes() for term in found)
-            key = short.tobytes() + told
+            if (terms_here := self._linear(middle)) is not terms:
+                terms, terms_key = terms_here, b"".join(term.tobytes() for term in terms_here)
+            key = short.tobytes() + terms_key
             gathered.setdefault(key, []).append(step)
             if key not in self._known:
-                self._known[key] = _Newton.of(float(short), *found)
+                self._known[key] = _Newton.of(float(short), *terms_here)
         self._known = {key: self._known[key] for key in gathered}
         return [(_numbered(steps_alike), self._known[key]) for key, steps_alike in gathered.items()]
 
@@ -273,21 +275,21 @@ def _numbered(steps: list[int]) -> slice | list[int]:
     return slice(steps[0], steps[-1] + 1) if steps[-1] - steps[0] == len(steps) - 1 else steps
 
 
-def _solved(residual: Array, alike: list[_Alike]) -> Array:
+def _solved(residual: Array, groups: list[_Group]) -> Array:
     """Solve for the change of accelerations, (NODES, steps, machines n_u) as what they lack."""
     nodes, steps, width = residual.shape
-    machines = len(alike[0][1].inverse)
+    machines = len(groups[0][1].inverse)
     lacking = residual.reshape(nodes, steps, machines, -1).transpose(2, 0, 3, 1).reshape(machines, -1, steps)
     ends = np.empty((steps, machines, 2 * width // machines, 1))
-    onward = np.empty((steps, *alike[0][1].onward.shape))
-    for numbers, newton in alike:
+    onward = np.empty((steps, *groups[0][1].onward.shape))
+    for numbers, newton in groups:
         ends[numbers, :, :, 0] = (newton.end @ lacking[:, :, numbers]).transpose(2, 0, 1)
         onward[numbers] = newton.onward
     states = np.zeros_like(ends)
     for move, begin, added, end in zip(onward, states, ends, states[1:], strict=False):
         np.add(move @ begin, added, out=end)
     begun = states[..., 0].transpose(1, 2, 0)
-    for numbers, newton in alike:
+    for numbers, newton in groups:
         lacking[:, :, numbers] = newton.inverse @ (
             lacking[:, :, numbers] - newton.given @ begun[:, :, numbers]
         )

@@ -77,4 +77,7 @@ def move(spec: Spec) -> str:
 def uncertain(spec: Spec) -> str:
     """Say which parameters may be off, and by how much."""
     ranges = spec.robustness.uncertain
-    return ", ".join(f"{name} ±{number(100.0 * share)} %" for name, share in ranges.items()) or "none stated"
+    return (
+        ", ".join(f"{name} ±{number(100.0 * fraction)} %" for name, fraction in ranges.items())
+        or "none stated"
+    )

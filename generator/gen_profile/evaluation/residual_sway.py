@@ -25,18 +25,18 @@ def observation_time(spec: Spec) -> float:
     return max(SHORTEST_WATCH, 2.0 * 2.0 * np.pi / float(slowest))
 
 
-def modal_amplitudes(plant: Plant, parameters: Mapping[str, float], standing: Response) -> Array:
+def modal_amplitudes(plant: Plant, parameters: Mapping[str, float], at_rest: Response) -> Array:
     """Sum over the modes of what each adds to the sway of every load, in m, shape (loads,).
 
     Parameters
     ----------
     plant : Plant
     parameters : mapping of str to float
-    standing : Response
+    at_rest : Response
         Of the machine from the standstill of its axes on.
     """
-    linear = linearize(plant, parameters, standing.position[0])
-    q_u, dq_u = standing.q_u[0], standing.dq_u[0]
+    linear = linearize(plant, parameters, at_rest.position[0])
+    q_u, dq_u = at_rest.q_u[0], at_rest.dq_u[0]
     z, dz = np.linalg.solve(linear.modes, np.stack([q_u, dq_u], axis=1)).T
     amplitudes = np.hypot(z, dz / linear.frequencies)
     return np.asarray(np.abs(linear.sway_gain @ linear.modes) @ amplitudes)

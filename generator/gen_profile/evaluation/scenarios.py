@@ -94,7 +94,7 @@ def further_scenarios(spec: Spec, machines: Sequence[Scenario]) -> tuple[Scenari
         others += [
             attrs.evolve(corner, group="corners") for corner in _off_nominal(spec, _corners(ranges)[1:-1])
         ]
-    if path.bends:
+    if path.alters_setpoints:
         for lag in dict.fromkeys(path.lag or (None,)):
             words = "" if lag is None else f", lag {lag:.6g} s"
             others += [

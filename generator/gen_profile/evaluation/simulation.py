@@ -114,10 +114,10 @@ class PlantSimulation:
             linearize(plant, machines[growing], profile.target.tolist())  # which says what is wrong
         _require_pace(plant, fastest, until)
         first, last = (linear_terms(plant, p, q_a) for q_a in ends)
-        alike = all(map(np.array_equal, first, last))
+        constant = all(map(np.array_equal, first, last))
 
         def linear(time: float) -> tuple[Array, Array]:
-            return first if alike else linear_terms(plant, p, motion(np.array([time]))[0, : profile.axes])
+            return first if constant else linear_terms(plant, p, motion(np.array([time]))[0, : profile.axes])
 
         self._solution = integrate(
             _accelerations(plant, p, motion),
@@ -132,8 +132,8 @@ class PlantSimulation:
 
     def states(self, times: Array) -> Array:
         """Coordinates and rates at rising times in s, shape (2, machines, times, n_u)."""
-        found = self._solution(times).reshape(2, len(times), len(self._p), -1)
-        return np.ascontiguousarray(found.swapaxes(1, 2))
+        values = self._solution(times).reshape(2, len(times), len(self._p), -1)
+        return np.ascontiguousarray(values.swapaxes(1, 2))
 
     def at(self, times: Array) -> tuple[Response, ...]:
         """Evaluate every machine at rising times in s."""
@@ -147,10 +147,10 @@ class PlantSimulation:
                 velocity=velocity,
                 q_u=q_u,
                 dq_u=dq_u,
-                sway=seen[:, :loads],
-                angle=seen[:, loads:],
+                sway=observed[:, :loads],
+                angle=observed[:, loads:],
             )
-            for q_u, dq_u, seen in zip(*states, outputs, strict=True)
+            for q_u, dq_u, observed in zip(*states, outputs, strict=True)
         )
 
     def sway(self, times: Array) -> Array:
@@ -176,10 +176,10 @@ def greatest_sway(
     """
     try:
         swing = PlantSimulation(plant, motion, machines, motion.duration, initial, accuracy=accuracy)
-        found = swing.sway(np.linspace(0.0, motion.duration, samples))
+        sway = swing.sway(np.linspace(0.0, motion.duration, samples))
     except CosimulationError:
         return np.full(len(machines), np.inf)
-    return peak(length(found[:, :, plant.end_load]))[:, 0]
+    return peak(length(sway[:, :, plant.end_load]))[:, 0]
 
 
 def free_swing(
@@ -219,8 +219,8 @@ def free_swing(
     )
     q_u = np.ascontiguousarray(followed[0].swapaxes(0, 1))
     outputs, loads = equations_of(plant)[1], len(plant.loads)
-    seen = outputs(q_u, position, machines[:, None])[..., 0]
-    return seen[:, :, :loads], seen[:, :, loads:]
+    values = outputs(q_u, position, machines[:, None])[..., 0]
+    return values[:, :, :loads], values[:, :, loads:]
 
 
 def swing_from(
@@ -287,8 +287,8 @@ def _accelerations(plant: Plant, p: Array, motion: Callable[[Array], Array]) -> 
         def evaluate(q_u: Array, dq_u: Array) -> Array:
             spend(work)
             states = (values.reshape(each).swapaxes(0, 1) for values in (q_u, dq_u))
-            found = acceleration(*states, axes, p[:, None])[..., 0]
-            return found.swapaxes(0, 1).reshape(q_u.shape)
+            values = acceleration(*states, axes, p[:, None])[..., 0]
+            return values.swapaxes(0, 1).reshape(q_u.shape)
 
         return evaluate
 
@@ -309,8 +309,8 @@ def equations_of(plant: Plant) -> tuple[Function, Function]:
     d = dynamics(plant)
     axes = sym.column([d.q_a, d.dq_a, d.ddq_a])
     acceleration = Function("acceleration", {"q_u": d.q_u, "dq_u": d.dq_u, "axes": axes, "p": d.p}, d.ddq_u)
-    seen = sym.column([d.sway, d.angle])
-    return acceleration, Function("seen", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, seen)
+    outputs = sym.column([d.sway, d.angle])
+    return acceleration, Function("outputs", {"q_u": d.q_u, "q_a": d.q_a, "p": d.p}, outputs)
 
 
 @cache

@@ -23,8 +23,8 @@ from gen_profile.phrase import AND, OR_WITH, Phrase, joined
 from gen_profile.progress import Progress, no_progress
 
 CONFIDENCE = 0.99
-UNREST = 2.0  # times farther off at first, from which on the axes may still have moved then
-EARTH = "g"  # is known wherever a crane stands
+INITIAL_RESIDUAL_RATIO = 2.0  # times farther off at first, from which on the axes may still have moved then
+GRAVITY = "g"  # is known wherever a crane stands
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -42,7 +42,7 @@ class Estimate:
         What the identified machine would have shown instead of the readings.
     noise : tuple of float
         Standard deviation of every log's samples, in rad or m.
-    unrest : tuple of float
+    initial_residual_ratio : tuple of float
         How many times farther off the model than the rest every log's first period is: about 1, unless the
         axes still moved then.
     contradiction : float
@@ -62,7 +62,7 @@ class Estimate:
     half_range: dict[str, float]
     model: tuple[float, ...]
     noise: tuple[float, ...]
-    unrest: tuple[float, ...]
+    initial_residual_ratio: tuple[float, ...]
     contradiction: float
     misfits: tuple[Misfit | None, ...]
     widened: tuple[float, ...]
@@ -100,22 +100,24 @@ def estimate(
     progress("fitting")
     unknowns, noise = fit.solve()
     progress("looking at what the fit leaves")
-    around, found = uncertainty(fit, unknowns, noise), misfits(fit, unknowns)
-    if not any(found):
-        return _estimate(around, noise, found, noise, progress)
+    around, misfit_of_logs = uncertainty(fit, unknowns, noise), misfits(fit, unknowns)
+    if not any(misfit_of_logs):
+        return _estimate(around, noise, misfit_of_logs, noise, progress)
     progress("looking for parameters that explain it")
-    _require_unexplained(fit, found)
+    _require_unexplained(fit, misfit_of_logs)
     effective = [
         sigma if one is None else one.widened(sigma, len(model.log.times))
-        for one, sigma, model in zip(found, noise.tolist(), fit.models, strict=True)
+        for one, sigma, model in zip(misfit_of_logs, noise.tolist(), fit.models, strict=True)
     ]
-    return _estimate(uncertainty(fit, unknowns, np.array(effective)), noise, found, effective, progress)
+    return _estimate(
+        uncertainty(fit, unknowns, np.array(effective)), noise, misfit_of_logs, effective, progress
+    )
 
 
 def _estimate(
     around: Uncertainty,
     noise: Array,
-    found: tuple[Misfit | None, ...],
+    misfit_of_logs: tuple[Misfit | None, ...],
     effective: Sequence[float] | Array,
     progress: Progress,
 ) -> Estimate:
@@ -134,9 +136,9 @@ def _estimate(
         half_range=by_name(half_ranges),
         model=tuple(map(float, fit.predicted(unknowns))),
         noise=tuple(map(float, noise)),
-        unrest=around.unrest(),
+        initial_residual_ratio=around.initial_residual_ratio(),
         contradiction=around.contradiction,
-        misfits=found,
+        misfits=misfit_of_logs,
         widened=tuple(float(wide / sigma) for wide, sigma in zip(effective, noise, strict=True)),
         rests_on=_rests_on(around),
         swings=tuple(
@@ -147,10 +149,10 @@ def _estimate(
 
 def _taken_as_exact(fit: Fit) -> list[str]:
     """Name the parameters that are neither identified nor known anyway."""
-    return [q.name for q in fit.machine.plant.parameters if q.name not in (*fit.names, EARTH)]
+    return [q.name for q in fit.machine.plant.parameters if q.name not in (*fit.names, GRAVITY)]
 
 
-def _require_unexplained(fit: Fit, found: Sequence[Misfit | None]) -> None:
+def _require_unexplained(fit: Fit, misfit_of_logs: Sequence[Misfit | None]) -> None:
     """Refuse to identify some parameters by a log that tells that others are wrong.
 
     The range of a wrong model holds nothing.
@@ -158,7 +160,7 @@ def _require_unexplained(fit: Fit, found: Sequence[Misfit | None]) -> None:
     explained = explanations(fit, _taken_as_exact(fit))
     if not explained:
         return
-    model, left = next((m, one) for m, one in zip(fit.models, found, strict=True) if one is not None)
+    model, left = next((m, one) for m, one in zip(fit.models, misfit_of_logs, strict=True) if one is not None)
     units = {q.name: q.unit for q in fit.machine.plant.parameters}
     template = "another {freed} than the spec's ({values})"
     others = [

@@ -100,11 +100,11 @@ class Fit:
             left = self.left(unknowns)
         except (InfeasibleProblem, CosimulationError, np.linalg.LinAlgError):
             return None
-        alike = [
+        linear = [
             float(np.std(one)) < HALF * float(np.std(model.log.values))
             for model, one in zip(self.models, left, strict=True)
         ]
-        return unknowns if all(alike) else None
+        return unknowns if all(linear) else None
 
     def near(self, unknowns: Array) -> tuple[Array, Array]:
         """Find the unknowns that agree best with all that was logged, near a guess, and the noise."""
@@ -128,9 +128,9 @@ class Fit:
 
     def improved(self, guess: Array, noise: Array, until: float = np.inf) -> Array:
         """Find the unknowns that agree best up to a time in s, near a guess."""
-        free = np.full(len(guess) - len(self.names), np.inf)
+        unbounded = np.full(len(guess) - len(self.names), np.inf)
         lower, upper = self.bounds
-        bounds = (np.concatenate([lower, -free]), np.concatenate([upper, free]))
+        bounds = (np.concatenate([lower, -unbounded]), np.concatenate([upper, unbounded]))
         inside = np.nextafter(bounds[0], np.inf), np.nextafter(bounds[1], -np.inf)
 
         @lru_cache(maxsize=1)  # the solver asks for residuals first, then for slopes at the same place
@@ -174,17 +174,17 @@ class Fit:
         blocks, rows = [(predicted - measured) / spread], [slopes / spread[:, None]]
         first = p
         for model, sigma in zip(self.models, noise, strict=True):
-            found, by = model.residuals(
+            left, by = model.residuals(
                 self.parameters(unknowns),
                 self.names,
                 STEP * self.scale,
                 unknowns[first : first + model.unknowns],
                 until,
             )
-            wide = np.zeros((len(found), len(unknowns)))
+            wide = np.zeros((len(left), len(unknowns)))
             wide[:, :p] = by[:, :p] * self.scale
             wide[:, first : first + model.unknowns] = by[:, p:]
-            blocks.append(found / sigma)
+            blocks.append(left / sigma)
             rows.append(wide / sigma)
             first += model.unknowns
         if np.isfinite(until):
@@ -222,13 +222,17 @@ class Fit:
     def _noise(self, unknowns: Array, until: float, parameters: int) -> Array:
         """Estimate every log's standard deviation, widened where neighbouring residuals are alike."""
         noise = []
-        for model, found in zip(self.models, self.left(unknowns, until), strict=True):
-            count = len(found)
-            square = found @ found
-            alike = min(max(float(found[1:] @ found[:-1] / square), 0.0), 0.99) if square > 0.0 else 0.0
+        for model, residuals in zip(self.models, self.left(unknowns, until), strict=True):
+            count = len(residuals)
+            square = residuals @ residuals
+            correlation = (
+                min(max(float(residuals[1:] @ residuals[:-1] / square), 0.0), 0.99) if square > 0.0 else 0.0
+            )
             freedom = max(count - model.unknowns - parameters, 1)
             resolution = np.ptp(model.log.values) * 1e-9 or 1e-12  # an exact log has no noise at all
-            noise.append(max(np.sqrt(square / freedom * (1.0 + alike) / (1.0 - alike)), resolution))
+            noise.append(
+                max(np.sqrt(square / freedom * (1.0 + correlation) / (1.0 - correlation)), resolution)
+            )
         return np.array(noise)
 
 

@@ -13,7 +13,7 @@ import tomli_w
 
 from gen_profile.artefacts.writing import staged
 from gen_profile.errors import InfeasibleProblem, SpecError
-from gen_profile.identification.estimation import CONFIDENCE, UNREST, Estimate, estimate
+from gen_profile.identification.estimation import CONFIDENCE, INITIAL_RESIDUAL_RATIO, Estimate, estimate
 from gen_profile.identification.fit import SwingingMachine
 from gen_profile.identification.log_table import read_text
 from gen_profile.identification.measurements import (
@@ -82,24 +82,24 @@ class Identification(Summarised):
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        found, units = self.estimate, {q.name: q.unit for q in self.spec.machine().parameters}
+        estimated, units = self.estimate, {q.name: q.unit for q in self.spec.machine().parameters}
         return {
             "name": self.spec.name,
             "spec_sha256": self.spec.sha256(),
             "confidence": CONFIDENCE,
-            "contradiction": found.contradiction,
+            "contradiction": estimated.contradiction,
             "parameters": {
                 name: {
                     "unit": units[name],
                     "given": self.given.plant.parameters[name],
                     "value": value,
-                    "standard_uncertainty": found.standard_uncertainty[name],
-                    "half_range": found.half_range[name],
+                    "standard_uncertainty": estimated.standard_uncertainty[name],
+                    "half_range": estimated.half_range[name],
                     "stated": self.given.robustness.uncertain.get(name),
                     "uncertain": self.spec.robustness.uncertain.get(name),
-                    "rests_on": found.rests_on[name],
+                    "rests_on": estimated.rests_on[name],
                 }
-                for name, value in found.values.items()
+                for name, value in estimated.values.items()
             },
             "readings": [
                 {
@@ -107,7 +107,7 @@ class Identification(Summarised):
                     "model": model,
                     "unit": units[reading.parameter] if isinstance(reading, DirectReading) else "s",
                 }
-                for reading, model in zip(self.readings, found.model, strict=True)
+                for reading, model in zip(self.readings, estimated.model, strict=True)
             ],
             "logs": [
                 {
@@ -119,13 +119,18 @@ class Identification(Summarised):
                     "unit": log.unit,
                     "swing": float(np.ptp(log.values)) / 2.0,
                     "noise": noise,
-                    "unrest": unrest,
+                    "unrest": initial_residual_ratio,
                     "misfit": None
                     if left is None
                     else {"rms": left.rms, "frequency_rad_per_s": left.frequency, "widened": widened},
                 }
-                for log, noise, unrest, left, widened in zip(
-                    self.logs, found.noise, found.unrest, found.misfits, found.widened, strict=True
+                for log, noise, initial_residual_ratio, left, widened in zip(
+                    self.logs,
+                    estimated.noise,
+                    estimated.initial_residual_ratio,
+                    estimated.misfits,
+                    estimated.widened,
+                    strict=True,
                 )
             ],
         }
@@ -251,7 +256,7 @@ def identify(
         if isinstance(log, SwingLog)
     )
     with one_thread():
-        found = estimate(
+        estimated = estimate(
             SwingingMachine(plant=plant, parameters=spec.plant.parameters, q_a=stood),
             [q.name for q in plant.parameters if q.name in asked],
             readings,
@@ -260,10 +265,10 @@ def identify(
         )
     return Identification(
         given=spec,
-        spec=_identified(spec, found),
+        spec=_identified(spec, estimated),
         readings=readings,
         logs=logs,
-        estimate=found,
+        estimate=estimated,
         q_a=stood,
     )
 
@@ -292,7 +297,7 @@ def write_spec(spec: Spec, path: Path, text: str | None = None) -> None:
 def _doubts(row: Mapping[str, Any]) -> Iterator[str]:
     """Say what is wrong with a logged swing."""
     name, unit = Phrase("the log of {load}", load=row["load"]), row["unit"]
-    if row["unrest"] > UNREST:
+    if row["unrest"] > INITIAL_RESIDUAL_RATIO:
         template = (
             "{name} is {row[unrest]:.2g} times farther off the model at first; leave out what was logged "
             "before the axes stood still"
@@ -306,9 +311,9 @@ def _doubts(row: Mapping[str, Any]) -> Iterator[str]:
         )
         yield Phrase(template, left=left, unit=unit, name=name)
     if row["noise"] > NOISY * row["swing"]:
-        share = row["noise"] / row["swing"]
+        fraction = row["noise"] / row["swing"]
         template = "the noise in {name} is {share:.0%} of the swing; are unit and signal right?"
-        yield Phrase(template, name=name, share=share)
+        yield Phrase(template, name=name, share=fraction)
 
 
 def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], asked: set[str]) -> None:
@@ -339,31 +344,38 @@ def _require_known(plant: Plant, readings: Sequence[DirectReading | Period], ask
         raise SpecError(*faults)
 
 
-def _identified(spec: Spec, found: Estimate) -> Spec:
+def _identified(spec: Spec, estimated: Estimate) -> Spec:
     """Put the parameters and their ranges into a spec."""
     shares = {
-        name: found.half_range[name] / abs(value) for name, value in found.values.items() if value != 0.0
+        name: estimated.half_range[name] / abs(value)
+        for name, value in estimated.values.items()
+        if value != 0.0
     }
-    wide = {name: share for name, share in shares.items() if share > WIDEST}
+    wide = {name: fraction for name, fraction in shares.items() if fraction > WIDEST}
     if wide:
         template = "{name} to ±{percent:.0f} % only"
         words = joined(
-            AND, [Phrase(template, name=name, percent=100.0 * share) for name, share in wide.items()]
+            AND, [Phrase(template, name=name, percent=100.0 * fraction) for name, fraction in wide.items()]
         )
-        if found.contradiction > 1.0:
+        if estimated.contradiction > 1.0:
             template = (
                 "The measurements contradict one another by {contradiction:.2g} times their "
                 "uncertainties, so they determine {words}; look for the wrong one."
             )
-            raise InfeasibleProblem(template, contradiction=found.contradiction, words=words)
+            raise InfeasibleProblem(template, contradiction=estimated.contradiction, words=words)
         raise InfeasibleProblem(
             "The measurements determine {words}; measure better, or take it as known.", words=words
         )
-    values = {name: _rounded(value, found.standard_uncertainty[name]) for name, value in found.values.items()}
+    values = {
+        name: _rounded(value, estimated.standard_uncertainty[name])
+        for name, value in estimated.values.items()
+    }
     robustness = spec.robustness
     robust = robustness.method if robustness.uncertain else "sensitivity"
     stated = robustness.uncertain  # what a rope does in service: that it was measured once narrows nothing
-    found_shares = {name: max(_rounded_up(share), stated.get(name, 0.0)) for name, share in shares.items()}
+    found_shares = {
+        name: max(_rounded_up(fraction), stated.get(name, 0.0)) for name, fraction in shares.items()
+    }
     uncertain = {**stated, **found_shares}
     order = [name for name in spec.plant.parameters if name in uncertain]
     return attrs.evolve(
@@ -371,7 +383,7 @@ def _identified(spec: Spec, found: Estimate) -> Spec:
         plant=attrs.evolve(
             spec.plant,
             parameters={**spec.plant.parameters, **values},
-            defaults=tuple(name for name in spec.plant.defaults if name not in found.values),
+            defaults=tuple(name for name in spec.plant.defaults if name not in estimated.values),
         ),
         robustness=attrs.evolve(
             robustness, method=robust, uncertain={name: uncertain[name] for name in order}
@@ -384,7 +396,7 @@ def _rounded(value: float, uncertainty: float) -> float:
     return round(value, 2 - math.floor(math.log10(uncertainty)))
 
 
-def _rounded_up(share: float) -> float:
+def _rounded_up(fraction: float) -> float:
     """Keep two digits of a share, rounded up."""
-    digits = 1 - math.floor(math.log10(share))
-    return math.ceil(share * 10.0**digits) / 10.0**digits
+    digits = 1 - math.floor(math.log10(fraction))
+    return math.ceil(fraction * 10.0**digits) / 10.0**digits

@@ -111,8 +111,8 @@ class LogTable:
             return ""
         below = self.cell(head + 1, place).strip("[]() ") if head + 1 < len(self.rows) else ""
         name = self.cell(head, place)
-        found = _BRACKETED.fullmatch(name) or _BEHIND.fullmatch(name)
-        unit = found[1] if found else below
+        match = _BRACKETED.fullmatch(name) or _BEHIND.fullmatch(name)
+        unit = match[1] if match else below
         unit = SPELLINGS.get(unit.lower(), unit)
         return unit if _UNIT.fullmatch(unit) else ""
 
@@ -138,8 +138,8 @@ class LogTable:
             held = [self.cell(row, place) for place in places]
             if not all(held):
                 continue
-            found = [self.seconds(row, time), *(self.number(row, place) for place in places[1:])]
-            for place, text, value in zip(places, held, found, strict=True):
+            values_here = [self.seconds(row, time), *(self.number(row, place) for place in places[1:])]
+            for place, text, value in zip(places, held, values_here, strict=True):
                 if not abs(value) <= GREATEST:
                     name = (
                         self.cell(head, place)
@@ -148,7 +148,7 @@ class LogTable:
                     )
                     template = "{source}, row {row}: {name} holds {text!r}, which is no number of a log."
                     raise OutputError(template, source=source, row=row + 1, name=name, text=text[:40])
-            values.extend(found)
+            values.extend(values_here)
         table = np.array(values).reshape(-1, len(places))
         if len(table) and math.isnan(self.number(first, time)):  # a date
             table[:, 0] -= table[0, 0]

@@ -116,13 +116,13 @@ def parse_reading(text: str) -> DirectReading:
     ------
     SpecError
     """
-    found = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", text)
-    if found is None:
+    match = re.fullmatch(rf"\s*(\w+)\s*=\s*{_VALUE}\s*", text)
+    if match is None:
         comma = _decimal_points(text)
         raise SpecError(
             f"measured {text!r}: write NAME=VALUE±UNCERTAINTY, such as L1=0.47±0.005 (or +-){comma}."
         )
-    name, value, uncertainty = found.groups()
+    name, value, uncertainty = match.groups()
     return DirectReading(
         parameter=name,
         value=float(value),
@@ -137,13 +137,13 @@ def parse_period(text: str) -> Period:
     ------
     SpecError
     """
-    found = re.fullmatch(rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", text)
-    if found is None:
+    match = re.fullmatch(rf"\s*(?:([0-9]+)\s*:)?\s*{_VALUE}\s*(?:/\s*([0-9]+))?\s*", text)
+    if match is None:
         raise SpecError(
             f"period {text!r}: write SECONDS±UNCERTAINTY, such as 1.73±0.02, or 17.3±0.2/10 for ten "
             f"swings, or 2:0.70±0.01 for the second mode (+- will do for ±){_decimal_points(text)}."
         )
-    mode, seconds, uncertainty, swings = found.groups()
+    mode, seconds, uncertainty, swings = match.groups()
     where, total = f"period {text!r}", float(seconds)
     count = _positive(where, "number of swings", float(swings or 1))
     return Period(

@@ -31,7 +31,7 @@ CHANCE = 1e-4  # how rarely noise may look like a line
 DOUBT = 1.5  # by which a median of so few may be off
 ROUNDING = 0.35  # of a sensor's step: rounding errors repeat with the swing, and are seen to elsewhere
 EXACT = 1e-5  # of the swing, which is the integrator's business
-ALIKE = 1.1  # times the least sum of squares, within which parameters may explain the same
+EQUIVALENT = 1.1  # times the least sum of squares, within which parameters may explain the same
 DISTINCT = 12.0  # by which the squares of an explanation are more by chance once in 2000 times
 STARTS = (1.0, 0.5, 0.7, 1.4, 2.0)  # times a parameter of the spec, where it is looked for
 ROUGHLY = 1200  # samples, four of each of the fastest swings, by which parameters are chosen
@@ -106,19 +106,19 @@ def spectrum(times: Array, residuals: Array, fastest: float) -> Spectrum:
 def misfit(model: SwingModel, parameters: Mapping[str, float], residuals: Array) -> Misfit | None:
     """Look for lines in the residuals of a log, in rad or m; None where there is nothing but noise."""
     log, fastest = model.log, linearize(model.plant, parameters, model.q_a).frequencies[-1]
-    found = spectrum(log.times, residuals, float(fastest))
-    lines = found.power > found.threshold
+    periodogram = spectrum(log.times, residuals, float(fastest))
+    lines = periodogram.power > periodogram.threshold
     if not lines.any():
         return None
-    share = 1.0 / len(found.power)
+    bin_fraction = 1.0 / len(periodogram.power)
     square = float(np.square(residuals - residuals.mean()).mean())
-    in_lines = 2.0 / len(residuals) * float((found.power - found.background)[lines].sum())
-    rms = math.sqrt(min(in_lines, (1.0 - share) * square))
+    in_lines = 2.0 / len(residuals) * float((periodogram.power - periodogram.background)[lines].sum())
+    rms = math.sqrt(min(in_lines, (1.0 - bin_fraction) * square))
     if rms < max(ROUNDING * log.resolution, EXACT * float(np.ptp(log.values))):
         return None
     return Misfit(
         rms=rms,
-        frequency=float(found.frequencies[np.argmax(np.where(lines, found.power, 0.0))]),
+        frequency=float(periodogram.frequencies[np.argmax(np.where(lines, periodogram.power, 0.0))]),
         noise=math.sqrt(square - rms**2),
     )
 
@@ -154,8 +154,8 @@ class Explanation:
     @property
     def values(self) -> dict[str, float]:
         """All parameters that are then identified."""
-        found = self.fit.parameters(self.unknowns)
-        return {name: found[name] for name in self.fit.names}
+        parameters = self.fit.parameters(self.unknowns)
+        return {name: parameters[name] for name in self.fit.names}
 
     def squares(self, noise: Array) -> float:
         """Sum up the squares of what is left, in variances of some noise."""
@@ -188,24 +188,26 @@ def explanations(fit: Fit, more: Sequence[str]) -> tuple[Explanation, ...]:
         }
         tried = {freed: _of_small_swings(rough.freed(freed), freed[-1]) for freed in sets.values()}
         least = min(one.squares for one in tried.values())
-        alike = {freed: one for freed, one in tried.items() if one.squares <= ALIKE * least < math.inf}
-        found = [
+        equivalent = {
+            freed: one for freed, one in tried.items() if one.squares <= EQUIVALENT * least < math.inf
+        }
+        candidates = [
             explained
-            for freed, one in alike.items()
+            for freed, one in equivalent.items()
             if (explained := _nothing_left(attrs.evolve(one.fit, models=fit.models), freed)) is not None
         ]
-        if found:
-            return likeliest(found)
-        begun = list(alike)
+        if candidates:
+            return likeliest(candidates)
+        begun = list(equivalent)
     return ()
 
 
-def likeliest(found: Sequence[Explanation]) -> tuple[Explanation, ...]:
+def likeliest(candidates: Sequence[Explanation]) -> tuple[Explanation, ...]:
     """Leave out explanations that another one surpasses beyond chance."""
-    noise = np.min([one.noise for one in found], axis=0)
-    squares = [one.squares(noise) for one in found]
-    enough = min(squares) + DISTINCT
-    return tuple(one for one, left in zip(found, squares, strict=True) if left <= enough)
+    noise = np.min([one.noise for one in candidates], axis=0)
+    squares = [one.squares(noise) for one in candidates]
+    upper = min(squares) + DISTINCT
+    return tuple(one for one, left in zip(candidates, squares, strict=True) if left <= upper)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -227,8 +229,8 @@ class _SmallSwings:
 def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
     """Find the best fit of small swings, from some values of one parameter around the spec's."""
     stated = fit.machine.parameters
-    starts = [fit.beginning({**stated, name: share * stated[name]}) for share in STARTS if stated[name]]
-    found = [_SmallSwings(fit=fit)]
+    starts = [fit.beginning({**stated, name: factor * stated[name]}) for factor in STARTS if stated[name]]
+    fits = [_SmallSwings(fit=fit)]
     for start in starts or [fit]:
         small = start.small()
         try:
@@ -237,8 +239,8 @@ def _of_small_swings(fit: Fit, name: str) -> _SmallSwings:
         except (InfeasibleProblem, np.linalg.LinAlgError):
             continue
         squares = float(sum(residuals @ residuals for residuals in small.left(unknowns)))
-        found.append(_SmallSwings(fit=fit.beginning(fit.parameters(unknowns)), squares=squares))
-    return min(found, key=lambda one: one.squares)
+        fits.append(_SmallSwings(fit=fit.beginning(fit.parameters(unknowns)), squares=squares))
+    return min(fits, key=lambda one: one.squares)
 
 
 def _nothing_left(fit: Fit, freed: tuple[str, ...]) -> Explanation | None:

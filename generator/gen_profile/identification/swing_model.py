@@ -101,11 +101,11 @@ class SwingModel:
         starts = np.zeros((len(machines), 2 * len(self.plant.unactuated)))
         starts[:, self.shown] = start[:n]
         starts[1 + len(names) + np.arange(n), self.shown] += step
-        seen = self._seen(machines, starts, count)
-        slopes = (seen[1:] - seen[0]).T / np.concatenate([steps, np.full(n, step)])
-        return seen[0] + start[n] - self.log.values[:count], np.column_stack([slopes, np.ones(count)])
+        outputs = self._outputs(machines, starts, count)
+        slopes = (outputs[1:] - outputs[0]).T / np.concatenate([steps, np.full(n, step)])
+        return outputs[0] + start[n] - self.log.values[:count], np.column_stack([slopes, np.ones(count)])
 
-    def _seen(self, machines: Array, starts: Array, count: int) -> Array:
+    def _outputs(self, machines: Array, starts: Array, count: int) -> Array:
         """Say what the log would show of machines that begin so: (machines, count)."""
         if self.small:
             order = [q.name for q in self.plant.parameters]
@@ -120,8 +120,12 @@ class SwingModel:
         if self.log.quantity == "rate":  # half that time later, by which the start is another one
             times = np.stack([times, times + apart], axis=1).ravel()
         sway, angle = free_swing(self.plant, machines, q_a=self.q_a, starts=starts, times=times)
-        seen = (sway if self.log.quantity == "sway" else angle)[:, :, self.plant.loads.index(self.log.load)]
-        return np.asarray((seen[:, 1::2] - seen[:, ::2]) / apart if self.log.quantity == "rate" else seen)
+        outputs = (sway if self.log.quantity == "sway" else angle)[
+            :, :, self.plant.loads.index(self.log.load)
+        ]
+        return np.asarray(
+            (outputs[:, 1::2] - outputs[:, ::2]) / apart if self.log.quantity == "rate" else outputs
+        )
 
     def _small_swing(self, parameters: Mapping[str, float], start: Array, count: int) -> Array:
         """Say what the log would show of a machine of small swings; of two conjugate rates one tells all."""
@@ -178,16 +182,16 @@ def _require_swing(
 ) -> None:
     """Refuse a log of swings that no machine makes: it is in another unit."""
     linear = linearize(plant, parameters, q_a)
-    seen = _gain(plant, parameters, q_a, log) @ linear.modes
+    gains = _gain(plant, parameters, q_a, log) @ linear.modes
     angles = _gain(plant, parameters, q_a, attrs.evolve(log, quantity="angle")) @ linear.modes
     if log.quantity == "rate":
-        seen = seen * linear.frequencies
-    mode = int(np.argmax(np.abs(seen)))
+        gains = gains * linear.frequencies
+    mode = int(np.argmax(np.abs(gains)))
     swing = float(np.ptp(log.values)) / 2.0
     if swing < STILL:
         template = "The log's {quantity} does not swing; look at its columns, and at when it begins (after)."
         raise InfeasibleProblem(template, quantity=log.quantity)
-    angle = swing * abs(angles[mode] / seen[mode]) if seen[mode] else 0.0
+    angle = swing * abs(angles[mode] / gains[mode]) if gains[mode] else 0.0
     if angle > WIDEST_SWING:
         template = (
             "The log's {log.quantity} goes {swing:.3g} {log.unit} to either side, a swing of "
@@ -219,8 +223,8 @@ def _linear_modes(
     n_u = len(linear.frequencies)
     system = np.block([[np.zeros((n_u, n_u)), np.eye(n_u)], [-linear.stiffness, -linear.damping]])
     rates, vectors = np.linalg.eig(system)
-    seen = _gain(plant, parameters, q_a, log) @ vectors[:n_u]
-    return rates, seen * rates if log.quantity == "rate" else seen, np.linalg.inv(vectors)
+    gains = _gain(plant, parameters, q_a, log) @ vectors[:n_u]
+    return rates, gains * rates if log.quantity == "rate" else gains, np.linalg.inv(vectors)
 
 
 def _gain(plant: Plant, parameters: Mapping[str, float], q_a: tuple[float, ...], log: SwingLog) -> Array:

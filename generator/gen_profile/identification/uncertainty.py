@@ -74,15 +74,15 @@ class Uncertainty:
         """Find half of the range of so many standard deviations for every parameter, shape (p,)."""
         return np.array([self._half_range(index, factor) for index in range(len(self.fit.names))])
 
-    def unrest(self) -> tuple[float, ...]:
+    def initial_residual_ratio(self) -> tuple[float, ...]:
         """Say how many times farther off than the rest the first period of every log is."""
-        found, first = [], len(self.fit.readings)
+        ratios, first = [], len(self.fit.readings)
         for model in self.fit.models:
             residuals = self.residuals[first : first + len(model.log.times)]
             first += len(residuals)
             early, late = np.split(np.square(residuals), [model.samples(model.period)])
-            found.append(float(np.sqrt(early.mean() / late.mean())) if len(late) and late.any() else 1.0)
-        return tuple(found)
+            ratios.append(float(np.sqrt(early.mean() / late.mean())) if len(late) and late.any() else 1.0)
+        return tuple(ratios)
 
     def _by_resolution(self) -> Array:
         """Follow the logs' rounding errors through the fit, shape (p,)."""
@@ -151,8 +151,8 @@ class Uncertainty:
         pinned = attrs.evolve(fit, readings=(*fit.readings, pin), bounds=near)
         guess = self.unknowns + (place - self.unknowns[index]) * self._direction(index)
         best = pinned.improved(guess, self.noise)
-        found, _ = fit.residuals(best, self.noise)
-        return float(found @ found)
+        residuals, _ = fit.residuals(best, self.noise)
+        return float(residuals @ residuals)
 
     def _direction(self, index: int) -> Array:
         """Say how all unknowns follow where one of them moves by one, shape (u,)."""
@@ -206,7 +206,7 @@ def _require_determined(names: Sequence[str], slopes: Array) -> None:
         if len(singular) == len(names) and singular[-1] > INDISTINCT:
             return
         worst = np.abs(directions[-1])
-        blind = [name for name, share in zip(names, worst, strict=True) if share > 0.1]
+        blind = [name for name, fraction in zip(names, worst, strict=True) if fraction > 0.1]
     template = (
         "The measurements do not determine {blind}; measure {which} directly, or another mode's period."
     )

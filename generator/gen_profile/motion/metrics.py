@@ -19,8 +19,8 @@ def extremes(profile: Profile, order: int, axis: int = 0) -> tuple[float, float]
     slope, time = slopes[:, axis].reshape(-1, POINTS_PER_SEGMENT), times.reshape(-1, POINTS_PER_SEGMENT)
     before, after = slope[:, :-1], slope[:, 1:]
     turns = before * after < 0.0
-    share = before[turns] / (before - after)[turns]
-    turning = profile.derivative(time[:, :-1][turns] + share * np.diff(time)[turns], order)
+    fraction = before[turns] / (before - after)[turns]
+    turning = profile.derivative(time[:, :-1][turns] + fraction * np.diff(time)[turns], order)
     found = np.concatenate([values[:, axis], turning[:, axis]])
     return float(found.min()), float(found.max())
 

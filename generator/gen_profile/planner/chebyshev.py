@@ -25,14 +25,14 @@ class Interpolant:
 
     Attributes
     ----------
-    bends : sequence of float
+    curvatures : sequence of float
         k of each variable.
     exponents : (variables, terms) array of int
         Degree of the polynomial of each variable in each term.
     coefficients : (functions, terms) array
     """
 
-    bends: Sequence[float]
+    curvatures: Sequence[float]
     exponents: NDArray[np.int64]
     coefficients: Array
 
@@ -40,7 +40,7 @@ class Interpolant:
         """Evaluate all functions at a point, as the block does."""
         factors = [
             chebyshev.chebvander(np.array([(t + k) / (1.0 + k * t)]), int(degrees.max()))[0, degrees]
-            for t, k, degrees in zip(point, self.bends, self.exponents, strict=True)
+            for t, k, degrees in zip(point, self.curvatures, self.exponents, strict=True)
         ]
         return np.asarray(self.coefficients @ np.prod([np.ones(self.exponents.shape[1]), *factors], axis=0))
 
@@ -72,20 +72,20 @@ def bend(values: Sequence[float]) -> float:
 
 
 def interpolate(
-    function: Callable[[Sequence[float]], Array], bends: Sequence[float], degree: int
+    function: Callable[[Sequence[float]], Array], curvatures: Sequence[float], degree: int
 ) -> Interpolant:
     """Interpolate functions at the Chebyshev points of a degree.
 
     Parameters
     ----------
     function : point → (functions,) array
-    bends : sequence of float
+    curvatures : sequence of float
         k of each variable.
     degree : int
     """
-    variables = len(bends)
+    variables = len(curvatures)
     nodes = chebyshev.chebpts1(degree + 1)
-    straight = [(nodes - k) / (1.0 - k * nodes) for k in bends]
+    straight = [(nodes - k) / (1.0 - k * nodes) for k in curvatures]
     values = np.array([function(point) for point in product(*straight)])
     table = values.T.reshape(-1, *(degree + 1,) * variables)
     inverse = np.linalg.inv(chebyshev.chebvander(nodes, degree))
@@ -93,7 +93,7 @@ def interpolate(
         table = np.moveaxis(np.tensordot(inverse, table, axes=(1, axis)), 0, axis)
     exponents = np.array(list(product(range(degree + 1), repeat=variables)), dtype=np.int64)
     return Interpolant(
-        bends=bends,
+        curvatures=curvatures,
         exponents=exponents.T.reshape(variables, (degree + 1) ** variables),
         coefficients=table.reshape(len(table), -1),
     )

@@ -216,19 +216,19 @@ def _columns(axes: Sequence[BlockAxis]) -> dict[str, str]:
     return columns | {f"{axis.prefix}stop_distance_{axis.unit}": axis.of("fStopDistance") for axis in axes}
 
 
-def begins_of(commands: Sequence[Command], cycle: float) -> list[int]:
+def start_cycles_of(commands: Sequence[Command], cycle: float) -> list[int]:
     """Tell in which cycles commands begin.
 
     A stick waits for a cycle in which the block is enabled without it, as one that is deflected then does not
     count. A position waits for a cycle without bExecute, to be an edge.
     """
-    begins, edge = list[int](), -2
+    start_cycles, edge = list[int](), -2
     for command in commands:
-        begin = max(command.begin(cycle), *begins[-1:], int(command.command == "velocity"))
+        begin = max(command.begin(cycle), *start_cycles[-1:], int(command.command == "velocity"))
         if command.command == "position":
             edge = begin = begin + (begin == edge + 1)
-        begins.append(begin)
-    return begins
+        start_cycles.append(begin)
+    return start_cycles
 
 
 def input_rows(
@@ -247,13 +247,13 @@ def input_rows(
 
     Returns
     -------
-    begins : list of int
+    start_cycles : list of int
         Rising cycles; the first is 0.
     inputs : (rows, inputs) array
     """
     values = dict(values)
     rows = {0: list(values.values())}
-    for command, begin in zip(commands, begins_of(commands, cycle), strict=True):
+    for command, begin in zip(commands, start_cycles_of(commands, cycle), strict=True):
         if command.command == "position" and values["bExecute"]:
             values["bExecute"] = 0.0  # for a cycle, so that there is an edge
             rows[begin - 1] = list(values.values())
@@ -264,7 +264,7 @@ def input_rows(
 
 def inputs_of(command: Command, axes: Sequence[BlockAxis]) -> dict[str, float]:
     """Turn a command into the inputs that it changes, by name. bExecute stays until the next one."""
-    told = "fTarget" if command.command == "position" else "fVelocityCommand"
+    input_name = "fTarget" if command.command == "position" else "fVelocityCommand"
     limits = command.velocity_limits or (0.0,) * len(axes)
     return {
         **{f"f{name}": value for name, value in command.live.items()},
@@ -272,7 +272,7 @@ def inputs_of(command: Command, axes: Sequence[BlockAxis]) -> dict[str, float]:
         "bStop": float(command.command == "stop"),
         "bQuickStop": float(command.command == "quick-stop"),
         "bExecute": float(command.command == "position"),
-        **{axis.of(told): value for axis, value in zip(axes, command.values, strict=False)},
+        **{axis.of(input_name): value for axis, value in zip(axes, command.values, strict=False)},
         "rOverride": command.override,
         **{axis.of("fVelocityLimit"): limit for axis, limit in zip(axes, limits, strict=True)},
     }
@@ -280,8 +280,8 @@ def inputs_of(command: Command, axes: Sequence[BlockAxis]) -> dict[str, float]:
 
 def _issued(block: BlockInstance, commands: tuple[Command, ...], cycle: float) -> Iterator[Array]:
     """Give the outputs, row of inputs by row of inputs."""
-    begins, rows = input_rows(commands, block.axes, block.inputs | {"bEnable": 1.0}, cycle)
-    for row, begin, end in zip(rows, begins, begins[1:], strict=False):
+    start_cycles, rows = input_rows(commands, block.axes, block.inputs | {"bEnable": 1.0}, cycle)
+    for row, begin, end in zip(rows, start_cycles, start_cycles[1:], strict=False):
         for first in range(begin, end, CHUNK):
             yield block.call(np.tile(row, (min(CHUNK, end - first), 1)))
     yield from _until_still(block, rows[-1], cycle)

@@ -37,7 +37,7 @@ OPERATIONS, ZONED_OPERATIONS = (
     3000,
     5000,
 )  # least ones; a cycle may spend so many for each ms, if the spec states none
-CALM = 0.1  # of the allowed sway, which the block leaves as it is
+TOLERATED_FRACTION = 0.1  # of the allowed sway, which the block leaves as it is
 MARGIN = 2.0  # between targets and the travel's ends, relative to the allowed sway, for calming
 HALF_A_SLOT = 0.05  # of the allowed sway: where stated errors leave so much, it is worth that time
 TOLERANT = 3.0  # times that, where plans may spend a share of the allowed sway
@@ -77,12 +77,12 @@ def planner_block(spec: Spec) -> PlannerBlock:
     SpecError
         A limit is not stated, or the block does not take this machine.
     """
-    found = live_modes(spec)
+    modes_of_live = live_modes(spec)
     planned = planned_axes(spec)
     if faults := [fault for number, axis in planned.items() for fault in _faults(spec, number, axis.suffix)]:
         raise SpecError(*faults)
     axes = tuple(_axis(spec, number, axis.suffix) for number, axis in planned.items())
-    period = 2.0 * np.pi / max(_rates(found, point)[0][0] for point in corners(found.live))
+    period = 2.0 * np.pi / max(_rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live))
     if period / (SLOTS_PER_PERIOD * spec.export.cycle_time) < FEWEST_CYCLES:
         most = period / (SLOTS_PER_PERIOD * FEWEST_CYCLES)
         problem = Phrase("at most {most:.2g} s for a machine that swings this fast", most=most)
@@ -93,46 +93,48 @@ def planner_block(spec: Spec) -> PlannerBlock:
         raise SpecError(
             placed("planner.operations", Phrase(template, least=least, found=spec.planner.operations))
         )
-    exponents, (rates, others) = same_terms(found.interpolant, found.others)
+    exponents, (rates, others) = same_terms(modes_of_live.interpolant, modes_of_live.others)
     constants = PlannerConstants(
         name=spec.name,
         machine=spec.machine().type,
         axes=axes,
         cycle=spec.export.cycle_time,
-        live=found.live,
-        units=tuple(spec.machine().units[name] for name in found.live),
-        nominal=tuple(_nominal(spec, name) for name in found.live),
+        live=modes_of_live.live,
+        units=tuple(spec.machine().units[name] for name in modes_of_live.live),
+        nominal=tuple(_nominal(spec, name) for name in modes_of_live.live),
         drift=tuple(
             STEADY * high + 2.0 * spec.planner.live_noise.get(name, 0.0)
-            for name, (_, high) in found.live.items()
+            for name, (_, high) in modes_of_live.live.items()
         ),
         rates=spec.planner.live_rate,
-        lowers=lowered(spec),
+        rope_length_gain=lowered(spec),
         events=spec.planner.events,
         zones=spec.planner.zones,
         operations=spec.planner.operations or max(least, round(least * spec.export.cycle_time / 1e-3)),
-        periods=tuple(2.0 * np.pi / _rates(found, point)[0][0] for point in corners(found.live)),
+        periods=tuple(
+            2.0 * np.pi / _rates(modes_of_live, point)[0][0] for point in corners(modes_of_live.live)
+        ),
         sway_limit=min(spec.check.residual_sway.values()),
-        calm=CALM * min(spec.check.residual_sway.values()),
+        tolerated_sway=TOLERATED_FRACTION * min(spec.check.residual_sway.values()),
         doubt=float(frequency_errors(spec).max(initial=0.0)),
-        second_order=_second_order(spec, found),
+        second_order=_second_order(spec, modes_of_live),
         sway_share=_sway_share(spec),
         degrees=int(exponents.max(initial=0)) + 1,
-        bends=[*found.interpolant.bends, *found.others.bends],
+        curvatures=[*modes_of_live.interpolant.curvatures, *modes_of_live.others.curvatures],
         exponents=exponents,
-        modes=found.modes,
+        modes=modes_of_live.modes,
         model=np.vstack([rates, others]),
     )
     text = block_text(constants)
     declared = Counter(name.lower() for name in DECLARED.findall(text))  # the language has one case only
-    if taken := [name for name in found.live if declared[f"f{name}".lower()] > 1]:
+    if taken := [name for name in modes_of_live.live if declared[f"f{name}".lower()] > 1]:
         problems = {name: Phrase("the block has an {own} of its own", own=f"f{name}") for name in taken}
         raise SpecError(*(placed(f"planner.live.{name}", problem) for name, problem in problems.items()))
     return PlannerBlock(
         filename=f"{spec.name}.st",
         text=text,
-        modes=found.modes,
-        frequency_error=found.error,
+        modes=modes_of_live.modes,
+        frequency_error=modes_of_live.error,
         period=period,
     )
 
@@ -183,7 +185,7 @@ def _sway_share(spec: Spec) -> float:
     return spec.planner.sway_share * min(spec.check.residual_sway.values())
 
 
-def _second_order(spec: Spec, found: LiveModes) -> Array:
+def _second_order(spec: Spec, live_modes: LiveModes) -> Array:
     """Weigh what the stated errors leave in each mode, where it counts in a motion of usual length."""
     weights = second_order_sway(spec) / (HALF_A_SLOT * min(spec.check.residual_sway.values()))
     if _sway_share(spec) > 0.0:
@@ -192,7 +194,7 @@ def _second_order(spec: Spec, found: LiveModes) -> Array:
     slot_angle = 2.0 * np.pi / SLOTS_PER_PERIOD
     usual = [
         velocity * weights * slot_angle / rates[0] * (USUAL * slot_angle * rates / rates[0]) ** 2
-        for rates, _ in (_rates(found, point) for point in corners(found.live))
+        for rates, _ in (_rates(live_modes, point) for point in corners(live_modes.live))
     ]
     return np.where(np.max(usual, axis=0) > LITTLE, weights, 0.0)
 
@@ -225,6 +227,6 @@ def _nominal(spec: Spec, name: str) -> float:
     return min(max(value, low), high)
 
 
-def _rates(found: LiveModes, point: Sequence[float]) -> tuple[Array, Array]:
-    invariants, decays = np.split(found.interpolant(point), [found.modes])
+def _rates(live_modes: LiveModes, point: Sequence[float]) -> tuple[Array, Array]:
+    invariants, decays = np.split(live_modes.interpolant(point), [live_modes.modes])
     return frequencies(invariants), decays

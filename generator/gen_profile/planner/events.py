@@ -108,14 +108,14 @@ def read_events(text: str) -> list[Event]:
         raise SpecError(
             f"events: there is no column {missing[0]}; the first line must be {','.join(COLUMNS)}."
         )
-    found = []
+    events = []
     for row in rows:
         try:
             time, code, value = (float(row[name] or "") for name in COLUMNS)
-            found.append(Event(time, int(code), value))
+            events.append(Event(time, int(code), value))
         except (TypeError, ValueError, OverflowError):
             line = ",".join(str(cell) for cell in row.values())
             raise SpecError(
                 f"events, line {rows.line_num}: three numbers are wanted, found {line!r}."
             ) from None
-    return sorted((event for event in found if event.code), key=lambda event: event.time)
+    return sorted((event for event in events if event.code), key=lambda event: event.time)

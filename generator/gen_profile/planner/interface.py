@@ -64,13 +64,13 @@ def block_axes(text: str) -> tuple[BlockAxis, ...]:
     ExportError
         It is no planner block's text.
     """
-    found = tuple(
+    axes = tuple(
         BlockAxis(name=suffix.removeprefix("_"), unit=unit if unit in UNITS else "m")
         for suffix, unit in _TARGET.findall(text)
     )
-    if not found:
+    if not axes:
         raise ExportError("The function block has no input fTarget, so it is no planner block.")
-    return found
+    return axes
 
 
 def live_inputs(inputs: Iterable[str], axes: Iterable[BlockAxis]) -> dict[str, str]:

@@ -66,12 +66,12 @@ def live_modes(spec: Spec) -> LiveModes:
     _refuse_rates(spec)
 
     def invariants(point: Sequence[float]) -> Array:
-        found = _linearized(spec, point)
-        squares = found.distinct_frequencies**2
+        linear = _linearized(spec, point)
+        squares = linear.distinct_frequencies**2
         return np.array(
             [
                 *([squares.sum(), squares.prod()] if len(squares) == SYMMETRIC else squares),
-                *(found.distinct_damping_ratios * found.distinct_frequencies),
+                *(linear.distinct_damping_ratios * linear.distinct_frequencies),
             ]
         )
 
@@ -86,10 +86,12 @@ def live_modes(spec: Spec) -> LiveModes:
     between = list(product(np.linspace(-1.0, 1.0, 6), repeat=len(live)))
     exact = [_linearized(spec, point).distinct_frequencies for point in between]
     straight = [0.0] * len(live)
-    for degree, bends in product(DEGREES if live else (0,), (_bends(invariants, len(live)), straight)):
-        interpolant = interpolate(invariants, bends, degree).without(NEGLIGIBLE)
-        found = [frequencies(interpolant(point)[:modes]) for point in between]
-        error = float(np.abs(np.array(found) / exact - 1.0).max())
+    for degree, curvatures in product(
+        DEGREES if live else (0,), (_curvatures(invariants, len(live)), straight)
+    ):
+        interpolant = interpolate(invariants, curvatures, degree).without(NEGLIGIBLE)
+        interpolated = [frequencies(interpolant(point)[:modes]) for point in between]
+        error = float(np.abs(np.array(interpolated) / exact - 1.0).max())
         if error <= ACCURACY and interpolant.exponents.shape[1] <= MOST_TERMS:
             break
     else:
@@ -98,19 +100,19 @@ def live_modes(spec: Spec) -> LiveModes:
             "narrow the ranges, or write a block for each part of them."
         )
     if spec.planner.live_rate:
-        second = interpolate(others, bends, degree).without(NEGLIGIBLE)
+        second = interpolate(others, curvatures, degree).without(NEGLIGIBLE)
     else:
-        second = _raised(interpolate(others, _bends(others, len(live)), degree), others, between)
+        second = _raised(interpolate(others, _curvatures(others, len(live)), degree), others, between)
     ratios = [rates[-1] / rates[0] for rates in exact]
     if max(ratios) > MOST_RATIO:
         farthest = zip(live.items(), between[np.argmax(ratios)], strict=True)
         units = spec.machine().units
-        told = (
+        reported = (
             f"{name} = {0.5 * (low + high + t * (high - low)):g} {units[name]}"
             for (name, (low, high)), t in farthest
         )
         raise SpecError(
-            f"{'planner.live: at ' + ' and '.join(told) if live else 'plant:'} the fastest mode has "
+            f"{'planner.live: at ' + ' and '.join(reported) if live else 'plant:'} the fastest mode has "
             f"{max(ratios):.3g} times the frequency of the slowest, and the planner block takes "
             f"{MOST_RATIO:g} at most; {'narrow the ranges, or ' if live else ''}"
             "state a machine without the fast mode, such as a single pendulum."
@@ -118,7 +120,7 @@ def live_modes(spec: Spec) -> LiveModes:
     return LiveModes(modes=modes, live=live, interpolant=interpolant, others=second, error=error)
 
 
-def _bends(functions: Callable[[Sequence[float]], Array], variables: int) -> list[float]:
+def _curvatures(functions: Callable[[Sequence[float]], Array], variables: int) -> list[float]:
     """Find how each variable bends the first of some functions."""
     return [bend([functions((t * axis).tolist())[0] for t in (-1.0, 0.0, 1.0)]) for axis in np.eye(variables)]
 
@@ -165,9 +167,9 @@ def left_by_errors(spec: Spec, point: Sequence[float]) -> Array:
     """
     at = _linearized(spec, point)
     modes = np.abs(at.frequencies[:, None] - at.distinct_frequencies).argmin(axis=1)
-    shown, driven = at.sway_gain @ at.modes, np.linalg.solve(at.modes, at.input)
+    shown, excited = at.sway_gain @ at.modes, np.linalg.solve(at.modes, at.input)
     gains = [
-        np.abs(shown[:, modes == mode] @ driven[modes == mode, axis]).max()
+        np.abs(shown[:, modes == mode] @ excited[modes == mode, axis]).max()
         for axis in planned_axes(spec)
         for mode in range(len(at.distinct_frequencies))
     ]
@@ -180,16 +182,16 @@ def second_order_sway(spec: Spec) -> Array:
     For a motion that leaves the mode at rest whatever its frequency to first order: by the integral of its
     velocity times a wave of the mode, weighed by the square of the wave's phase.
     """
-    found = []
+    sways = []
     for point in corners(spec.planner.live):
         at = _linearized(spec, point)
         shown = np.abs(at.sway_gain @ at.modes).max(axis=0)
-        driven = np.abs(np.linalg.solve(at.modes, at.input)).max(axis=1)
+        excited = np.abs(np.linalg.solve(at.modes, at.input)).max(axis=1)
         modes = np.abs(at.frequencies[:, None] - at.distinct_frequencies).argmin(axis=1)
-        share = np.zeros_like(at.distinct_frequencies)
-        np.maximum.at(share, modes, shown * driven)
-        found.append(0.5 * share * _frequency_errors(spec, point) ** 2)
-    return np.asarray(np.max(found, axis=0))
+        amplitude = np.zeros_like(at.distinct_frequencies)
+        np.maximum.at(amplitude, modes, shown * excited)
+        sways.append(0.5 * amplitude * _frequency_errors(spec, point) ** 2)
+    return np.asarray(np.max(sways, axis=0))
 
 
 def corners(live: Collection[str]) -> list[Sequence[float]]:
@@ -198,13 +200,13 @@ def corners(live: Collection[str]) -> list[Sequence[float]]:
 
 
 def _frequency_errors(spec: Spec, point: Sequence[float]) -> Array:
-    nominal, told = spec.plant.parameters, _linearized(spec, point).distinct_frequencies
-    errors = np.zeros_like(told)
+    nominal, frequencies = spec.plant.parameters, _linearized(spec, point).distinct_frequencies
+    errors = np.zeros_like(frequencies)
     for name, ends in spec.checked_ranges().items():
         if nominal[name] == 0.0 or (name in spec.planner.live and name in spec.check.spans):
             continue  # of nothing there is no share, and a live one's span says where it may be
         wrong = [_linearized(spec, point, {name: end / nominal[name]}) for end in ends]
-        errors += np.max([np.abs(one.distinct_frequencies / told - 1.0) for one in wrong], axis=0)
+        errors += np.max([np.abs(one.distinct_frequencies / frequencies - 1.0) for one in wrong], axis=0)
     return errors
 
 
@@ -227,7 +229,7 @@ def _linearized(
     return linearize(plant, parameters, q_a)
 
 
-def _sway_matrix(found: Linearization) -> Array:
+def _sway_matrix(linear: Linearization) -> Array:
     """Find A of sway'' = acceleration − A sway, along every axis that makes loads sway.
 
     A rope's rate appears in it nowhere: a load's horizontal acceleration is the rope's force by its mass, and
@@ -238,10 +240,10 @@ def _sway_matrix(found: Linearization) -> Array:
     ValueError
         There is no such matrix, or not the same one for all axes.
     """
-    gain = found.sway_gain
+    gain = linear.sway_gain
     if gain.shape[0] != gain.shape[1]:
         raise ValueError("fewer loads than coordinates")
-    whole, pushed = gain @ found.stiffness @ np.linalg.inv(gain), gain @ found.input
+    whole, pushed = gain @ linear.stiffness @ np.linalg.inv(gain), gain @ linear.input
     along = [
         np.flatnonzero(np.abs(column - 1.0) <= SAME) for column in pushed.T if np.abs(column).max() > STILL
     ]

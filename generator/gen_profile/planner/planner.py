@@ -188,10 +188,10 @@ class Planner:
         """
         columns: dict[str, list[float]] = {}
         for what, rows, names in (("blocked", blocked, ZONES[:2]), ("slow", slow, ZONES[2:])):
-            found = [[float(_column(what, value, 1)[0]) for value in row] for row in rows]
-            if any(len(row) != len(names) for row in found):
+            numbers = [[float(_column(what, value, 1)[0]) for value in row] for row in rows]
+            if any(len(row) != len(names) for row in numbers):
                 raise SpecError(f"{what}: must be rows of {len(names)} numbers, found {list(rows)!r}.")
-            columns |= {name: [row[k] for row in found] for k, name in enumerate(names)}
+            columns |= {name: [row[k] for row in numbers] for k, name in enumerate(names)}
         suffix = self._axes[axis].suffix
         for name, values in columns.items():
             places = [known for known in self._inputs if known.startswith(f"{name}{suffix}[")]
@@ -261,7 +261,9 @@ class Planner:
         own = {name: self._own(output, issued)[0] for name, output in OWN.items()}
         if len(self._axes) == 1:
             own = {name: float(value) for name, value in own.items()}
-        return Setpoint(**own, **{name: outputs[told] for name, told in COMMON.items()}, outputs=outputs)
+        return Setpoint(
+            **own, **{name: outputs[name_in_block] for name, name_in_block in COMMON.items()}, outputs=outputs
+        )
 
     def hold(
         self,
@@ -295,8 +297,8 @@ class Planner:
         SpecError
             As of `step`; or there is no whole cycle, or an array of another length.
         """
-        share = float(_column("seconds", seconds, 1)[0]) / self.cycle_time
-        cycles = round(share) if math.isfinite(share) else 0
+        exact = float(_column("seconds", seconds, 1)[0]) / self.cycle_time
+        cycles = round(exact) if math.isfinite(exact) else 0
         if cycles < 1:
             raise SpecError(f"seconds: at least one cycle of {self.cycle_time:g} s, found {seconds!r}.")
         orders = _Orders(

@@ -59,8 +59,8 @@ def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
 
 def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place hook and payload below the cart."""
-    seen, (cart,) = outputs(q_u, q_a, p), q_a
-    places = [(cart - sway, 0.0, height) for sway, height in zip(seen.sway, seen.height, strict=True)]
+    output, (cart,) = outputs(q_u, q_a, p), q_a
+    places = [(cart - sway, 0.0, height) for sway, height in zip(output.sway, output.height, strict=True)]
     return Mechanics(mass=[p.m1, p.m2], place=places, gravity=p.g)
 
 

@@ -52,8 +52,10 @@ def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
 
 def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place the payload below the trolley."""
-    seen, (x, y) = outputs(q_u, q_a, p), q_a
-    return Mechanics(mass=[p.m], place=[(x - seen.sway[0], y - seen.sway[1], seen.height[0])], gravity=p.g)
+    output, (x, y) = outputs(q_u, q_a, p), q_a
+    return Mechanics(
+        mass=[p.m], place=[(x - output.sway[0], y - output.sway[1], output.height[0])], gravity=p.g
+    )
 
 
 def picture(pose: Pose) -> tuple[Drawing, ...]:

@@ -199,6 +199,6 @@ class Plant:
         """Nominal value of every parameter, by name."""
         return {parameter.name: parameter.nominal for parameter in self.parameters}
 
-    def standing(self) -> list[float]:
+    def probe_places(self) -> list[float]:
         """Where the axes can stand for a trial of the equations: off zero, where a radius may vanish."""
         return [min(max(1.0, axis.lower), axis.upper) for axis in self.actuated]

@@ -43,8 +43,8 @@ def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
 
 def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place the payload below the cart."""
-    seen, (cart, _) = outputs(q_u, q_a, p), q_a
-    return Mechanics(mass=[p.m], place=[(cart - seen.sway[0], 0.0, seen.height[0])], gravity=p.g)
+    output, (cart, _) = outputs(q_u, q_a, p), q_a
+    return Mechanics(mass=[p.m], place=[(cart - output.sway[0], 0.0, output.height[0])], gravity=p.g)
 
 
 def picture(pose: Pose) -> tuple[Drawing, ...]:

@@ -98,10 +98,11 @@ def picture(pose: Pose) -> tuple[Drawing, ...]:
         ]
         surface = [
             (
-                place + (share - 0.5) * a,
-                h + sum(rise * np.cos(odd * np.pi * share) for odd, rise in zip(ODD, heights, strict=True)),
+                place + (fraction - 0.5) * a,
+                h
+                + sum(rise * np.cos(odd * np.pi * fraction) for odd, rise in zip(ODD, heights, strict=True)),
             )
-            for share in along
+            for fraction in along
         ]
         left, right = place - 0.5 * a, place + 0.5 * a
         corners = [(left, height), (left, 0.0), (right, 0.0), (right, height)]

@@ -55,12 +55,12 @@ def _values(plant: Plant) -> Iterator[str]:
     """Evaluate the equations at rest, with the nominal parameters."""
     n_u, m, loads = len(plant.unactuated), len(plant.actuated), len(plant.loads)
     p = SimpleNamespace(**plant.nominal())
-    standing = plant.standing()
+    probe = plant.probe_places()
     try:
         with np.errstate(all="ignore"):
-            terms = plant.equations([0.0] * n_u, [0.0] * n_u, standing, [0.0] * m, p)
-            outputs = plant.outputs([0.0] * n_u, standing, p)
-            mechanics = plant.mechanics([0.0] * n_u, standing, p)
+            terms = plant.equations([0.0] * n_u, [0.0] * n_u, probe, [0.0] * m, p)
+            outputs = plant.outputs([0.0] * n_u, probe, p)
+            mechanics = plant.mechanics([0.0] * n_u, probe, p)
         found = {
             "M_uu": (terms.M_uu, (n_u, n_u)),
             "M_au": (terms.M_au, (m, n_u)),

@@ -56,11 +56,11 @@ def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNam
 
 def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
     """Place the payload below the trolley; at a slew angle of 0 the jib points along x."""
-    seen, (slew, radius) = outputs(q_u, q_a, p), q_a
-    along, across = radius - seen.sway[0], -seen.sway[1]
+    output, (slew, radius) = outputs(q_u, q_a, p), q_a
+    along, across = radius - output.sway[0], -output.sway[1]
     x = along * np.cos(slew) - across * np.sin(slew)
     y = along * np.sin(slew) + across * np.cos(slew)
-    return Mechanics(mass=[p.m], place=[(x, y, seen.height[0])], gravity=p.g)
+    return Mechanics(mass=[p.m], place=[(x, y, output.height[0])], gravity=p.g)
 
 
 def picture(pose: Pose) -> tuple[Drawing, ...]:

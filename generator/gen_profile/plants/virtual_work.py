@@ -31,10 +31,10 @@ def equation_inconsistencies(plant: Plant) -> Iterator[str]:
     p = SimpleNamespace(**plant.nominal())
     n_u, m = len(plant.unactuated), len(plant.actuated)
     random = np.random.default_rng(1)
-    standing = np.array(plant.standing())
+    probe = np.array(plant.probe_places())
     wrong, gaining = False, False
     for _ in range(STATES):
-        q = np.concatenate([random.uniform(-SWING, SWING, n_u), standing])
+        q = np.concatenate([random.uniform(-SWING, SWING, n_u), probe])
         dq, ddq_a = random.uniform(-RATE, RATE, n_u + m), random.uniform(-PUSH, PUSH, m)
         forwards, size = _imbalance(plant, p, q, dq, ddq_a)
         backwards, _ = _imbalance(plant, p, q, -dq, ddq_a)

@@ -26,9 +26,9 @@ class Dynamics:
         Actuated coordinates, rates and accelerations (the input).
     p : (parameters,) column
         In the order of `Plant.parameters`.
-    free : (n_u,) column
+    drift : (n_u,) column
         M_uu⁻¹ (K_u + G_u).
-    driven : (n_u, m) matrix
+    input_matrix : (n_u, m) matrix
         −M_uu⁻¹ M_auᵀ; also the jump of q̇_u per unit step of axis velocity.
     ddq_u : (n_u,) column
     sway, height, angle : (loads,) columns
@@ -44,8 +44,8 @@ class Dynamics:
     dq_a: Symbol
     ddq_a: Symbol
     p: Symbol
-    free: Symbol
-    driven: Symbol
+    drift: Symbol
+    input_matrix: Symbol
     ddq_u: Symbol
     sway: Symbol
     height: Symbol
@@ -54,7 +54,7 @@ class Dynamics:
     energy: Symbol
 
     @property
-    def seen(self) -> Symbol:
+    def outputs(self) -> Symbol:
         """All outputs as one column: of the loads first, then of the bodies."""
         return sym.column([self.sway, self.height, self.angle, self.place, self.energy])
 
@@ -86,8 +86,8 @@ def dynamics(plant: Plant) -> Dynamics:
             "on scalars, without branches on values."
         ) from error
     mass = sym.matrix(terms.M_uu)
-    free = sym.solve(mass, sym.column(terms.K_u) + sym.column(terms.G_u))
-    driven = -sym.solve(mass, sym.matrix(terms.M_au).T)
+    drift = sym.solve(mass, sym.column(terms.K_u) + sym.column(terms.G_u))
+    input_matrix = -sym.solve(mass, sym.matrix(terms.M_au).T)
     made = Dynamics(
         q_u=q_u,
         dq_u=dq_u,
@@ -95,9 +95,9 @@ def dynamics(plant: Plant) -> Dynamics:
         dq_a=dq_a,
         ddq_a=ddq_a,
         p=p,
-        free=free,
-        driven=driven,
-        ddq_u=free + driven @ ddq_a,
+        drift=drift,
+        input_matrix=input_matrix,
+        ddq_u=drift + input_matrix @ ddq_a,
         sway=sym.column(outputs.sway),
         height=sym.column(outputs.height),
         angle=sym.column(outputs.angle),
@@ -117,9 +117,9 @@ def _require_symbols(plant: Plant, made: Dynamics) -> None:
     """
     inputs = {name: getattr(made, name) for name in ("q_u", "dq_u", "q_a", "dq_a", "ddq_a", "p")}
     rest = {name: np.zeros((1, symbols.shape[0])) for name, symbols in inputs.items()}
-    rest["q_a"] = np.array([plant.standing()])
+    rest["q_a"] = np.array([plant.probe_places()])
     rest["p"] = parameter_column(plant, plant.nominal())
-    at_rest = Function("at_rest", inputs, sym.column([made.ddq_u, made.seen]))(*rest.values())
+    at_rest = Function("at_rest", inputs, sym.column([made.ddq_u, made.outputs]))(*rest.values())
     if np.isnan(at_rest).any():
         raise SpecError(
             f"plant.type: the equations of {plant.type!r} lose their symbols; write them with functions of "

@@ -22,14 +22,14 @@ from gen_profile.problem import symbolic as sym
 
 
 @cache
-def hoisted(plant: Plant, driven: tuple[str, ...]) -> Plant:
+def hoisted(plant: Plant, names: tuple[str, ...]) -> Plant:
     """Let some parameters be axes behind those of a machine.
 
     Parameters
     ----------
     plant : Plant
         Without damping, and with bodies.
-    driven : tuple of str
+    names : tuple of str
         Names of parameters, such as of a rope's length.
 
     Returns
@@ -37,19 +37,19 @@ def hoisted(plant: Plant, driven: tuple[str, ...]) -> Plant:
     Plant
         Whose equations take symbols only.
     """
-    if not driven:
+    if not names:
         return plant
     known = {parameter.name: parameter for parameter in plant.parameters}
     axes = len(plant.actuated)
 
-    def told(q_a: Vector, p: SimpleNamespace) -> tuple[Vector, SimpleNamespace]:
-        return q_a[:axes], SimpleNamespace(**(vars(p) | dict(zip(driven, q_a[axes:], strict=True))))
+    def substituted(q_a: Vector, p: SimpleNamespace) -> tuple[Vector, SimpleNamespace]:
+        return q_a[:axes], SimpleNamespace(**(vars(p) | dict(zip(names, q_a[axes:], strict=True))))
 
     def outputs(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Outputs:
-        return plant.outputs(q_u, *told(q_a, p))
+        return plant.outputs(q_u, *substituted(q_a, p))
 
     def mechanics(q_u: Vector, q_a: Vector, p: SimpleNamespace) -> Mechanics:
-        return plant.mechanics(q_u, *told(q_a, p))
+        return plant.mechanics(q_u, *substituted(q_a, p))
 
     def equations(q_u: Vector, dq_u: Vector, q_a: Vector, dq_a: Vector, p: SimpleNamespace) -> Equations:
         return _lagrange(mechanics(q_u, q_a, p), [q_u, q_a], [dq_u, dq_a])
@@ -60,13 +60,13 @@ def hoisted(plant: Plant, driven: tuple[str, ...]) -> Plant:
 
     return attrs.evolve(
         plant,
-        type=f"{plant.type} with {', '.join(driven)} driven",
-        parameters=tuple(parameter for parameter in plant.parameters if parameter.name not in driven),
+        type=f"{plant.type} with {', '.join(names)} driven",
+        parameters=tuple(parameter for parameter in plant.parameters if parameter.name not in names),
         actuated=(
             *plant.actuated,
             *(
                 Coordinate(name=name, unit="m", lower=known[name].lower, upper=known[name].upper)
-                for name in driven
+                for name in names
             ),
         ),
         equations=equations,
@@ -81,13 +81,13 @@ def _lagrange(bodies: Mechanics, q: Sequence[Vector], dq: Sequence[Vector]) -> E
     (q_u, q_a), (dq_u, dq_a) = (map(sym.column, columns) for columns in (q, dq))
     everything, rates = sym.column([q_u, q_a]), sym.column([dq_u, dq_a])
     n_u, n_a = len(q[0]), len(q[1])
-    free, driven, bend = sym.zeros(n_u, n_u), sym.zeros(n_a, n_u), sym.zeros(n_u, 1)
+    M_uu, M_au, bend = sym.zeros(n_u, n_u), sym.zeros(n_a, n_u), sym.zeros(n_u, 1)
     for mass, place in zip(bodies.mass, bodies.place, strict=True):
         at = sym.column(place)
         along = sym.jacobian(at, q_u)
         velocity = sym.directional(at, everything, rates)
-        free += mass * along.T @ along
-        driven += mass * sym.jacobian(at, q_a).T @ along
+        M_uu += mass * along.T @ along
+        M_au += mass * sym.jacobian(at, q_a).T @ along
         bend += mass * along.T @ sym.directional(velocity, everything, rates)
     pull = sym.gradient(bodies.potential, q_u)
-    return Equations(M_uu=sym.rows(free), M_au=sym.rows(driven), K_u=sym.split(-pull), G_u=sym.split(-bend))
+    return Equations(M_uu=sym.rows(M_uu), M_au=sym.rows(M_au), K_u=sym.split(-pull), G_u=sym.split(-bend))

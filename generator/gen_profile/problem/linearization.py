@@ -159,13 +159,13 @@ def _linearized(
     still_u, still_a = np.zeros((1, n_u)), np.zeros((1, m))
     rest = (still_u, still_u, np.array([q_a]), still_a, parameter_column(plant, dict(parameters)))
     motion_terms, sway_terms, _ = _terms(plant)
-    free_q, free_dq, driven = np.split(motion_terms(*rest)[0], [n_u, 2 * n_u], axis=1)
+    free_q, free_dq, input_matrix = np.split(motion_terms(*rest)[0], [n_u, 2 * n_u], axis=1)
     frequencies, modes = _modes(plant, -free_q)
     modal_damping = np.linalg.solve(modes, -free_dq @ modes)
     return Linearization(
         stiffness=-free_q,
         damping=-free_dq,
-        input=driven,
+        input=input_matrix,
         sway_gain=sway_terms(*rest)[0],
         frequencies=frequencies,
         damping_ratios=np.diag(modal_damping) / (2.0 * frequencies),
@@ -181,13 +181,15 @@ def _terms(plant: Plant) -> tuple[Function, Function, list[float | None]]:
     """
     d = dynamics(plant)
     inputs = {"q_u": d.q_u, "dq_u": d.dq_u, "q_a": d.q_a, "dq_a": d.dq_a, "p": d.p}
-    motion = sym.matrix([[sym.jacobian(d.free, d.q_u), sym.jacobian(d.free, d.dq_u), d.driven]])
+    motion = sym.matrix([[sym.jacobian(d.drift, d.q_u), sym.jacobian(d.drift, d.dq_u), d.input_matrix]])
     sway = sym.jacobian(d.sway, d.q_u)
     moving = sym.column([d.q_u, d.dq_u, d.dq_a])
     still = sym.column([0.0] * moving.shape[0])
     at_rest = [sym.substitute(terms, moving, still) for terms in (motion, sway)]
     depends = [any(sym.depends(terms, q) for terms in at_rest) for q in sym.split(d.q_a)]
-    places = [None if matters else place for matters, place in zip(depends, plant.standing(), strict=True)]
+    places = [
+        None if matters else place for matters, place in zip(depends, plant.probe_places(), strict=True)
+    ]
     return Function("motion_terms", inputs, motion), Function("sway_terms", inputs, sway), places
 
 

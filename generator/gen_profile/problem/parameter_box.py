@@ -79,11 +79,11 @@ class Box:
     def machines(self, places: Array) -> Array:
         """Parameters at some places, shape (places, parameters), in the plant's order."""
         names = self._names()
-        found = np.tile([float(self.nominal[name]) for name in names], (len(places), 1))
-        for (name, (low, high)), share in zip(self.ranges.items(), places.T, strict=True):
+        machines = np.tile([float(self.nominal[name]) for name in names], (len(places), 1))
+        for (name, (low, high)), fraction in zip(self.ranges.items(), places.T, strict=True):
             if name in names:
-                found[:, names.index(name)] = low + share * (high - low)
-        return found
+                machines[:, names.index(name)] = low + fraction * (high - low)
+        return machines
 
     def parameters(self, places: Array) -> list[dict[str, float]]:
         """Parameters at some places by name."""
@@ -146,19 +146,19 @@ def machines_inside(
     return [] if box is None else box.parameters(start(box.phases, len(box.ranges), most).places)
 
 
-def start(turned: Phases, ranges: int, most: int = MOST) -> Start:
+def start(phase_of: Phases, ranges: int, most: int = MOST) -> Start:
     """Choose places all over a box: on the lines through its middle, at its corners, and spread within.
 
     Parameters
     ----------
-    turned : callable
+    phase_of : callable
         Such as `Box.phases`.
     ranges : int
         At least 1.
     most : int
         Number of places to spread within at most; on all lines together twice as many.
     """
-    lines = [_line(turned, ranges, axis, max(2 * most // ranges, FEWEST)) for axis in range(ranges)]
+    lines = [_line(phase_of, ranges, axis, max(2 * most // ranges, FEWEST)) for axis in range(ranges)]
     steps = np.array([1.0 / (len(line) - 1) for line in lines])
     if ranges == 1:
         return Start(places=lines[0], steps=steps)
@@ -167,18 +167,18 @@ def start(turned: Phases, ranges: int, most: int = MOST) -> Start:
 
     sequence = qmc.Halton(ranges, scramble=False)
     coarse = sequence.random(min(FEWEST_SPREAD * ranges, most))
-    span = np.ptp(turned(np.concatenate([coarse, *lines])), axis=0)
+    span = np.ptp(phase_of(np.concatenate([coarse, *lines])), axis=0)
     count = int(min(np.prod(1.0 + span), most))
     spread = [coarse, sequence.random(max(count - len(coarse), 0))]
     return Start(places=np.concatenate([np.array(corners).reshape(-1, ranges), *lines, *spread]), steps=steps)
 
 
-def _line(turned: Phases, ranges: int, axis: int, most: int) -> Array:
+def _line(phase_of: Phases, ranges: int, axis: int, most: int) -> Array:
     """Choose places on the line along one range through the middle, evenly by the fastest turning mode."""
     fine = np.linspace(0.0, 1.0, FINE)
     places = np.full((FINE, ranges), 0.5)
     places[:, axis] = fine
-    turns = np.abs(np.diff(turned(places), axis=0)).max(axis=1)
+    turns = np.abs(np.diff(phase_of(places), axis=0)).max(axis=1)
     measure = np.concatenate([[0.0], np.cumsum(turns / TURN)]) + (FEWEST - 1) * fine
     count = min(int(np.ceil(measure[-1])) + 1, most)
     line = np.full((count, ranges), 0.5)

@@ -124,31 +124,31 @@ def check_block(
     spec, manifest = spec_and_manifest(path, content, spec, planner=True)
     text = block_in(path, content)
     _require_inputs(path, text, planner_block(spec).text)
-    standing = provenance(manifest, content, spec)
-    known = _record(manifest) if standing != "none" else {}
+    agreement = provenance(manifest, content, spec)
+    known = _record(manifest) if agreement != "none" else {}
     count = histories or known.get("histories", HISTORIES)
     if history is not None and not 0 <= history < count:
         raise SpecError(f"history {history}: the histories are numbered from 0 to {count - 1}.")
     proof = partial(prove, spec, text, histories=count, scheduler=scheduler, progress=progress)
     if history is None:
-        found = proof()
+        replayed = proof()
     else:
         if known.get("histories") != count:  # the search's histories depend on what it has found
             known = proof().to_dict()
         seed, parents = known["seed"], known["search_parents"]
         numbering = Numbering.of(Histories.of(spec), count, seed, parents)
-        found = replay(spec, text, numbering, history, progress)
-    check = attrs.evolve(found, faults=alterations(path, standing))
-    return BlockJudgement(path=path, text=text, spec=spec, check=check, manifest=standing, history=history)
+        replayed = replay(spec, text, numbering, history, progress)
+    check = attrs.evolve(replayed, faults=alterations(path, agreement))
+    return BlockJudgement(path=path, text=text, spec=spec, check=check, manifest=agreement, history=history)
 
 
 def _require_inputs(path: Path, text: str, due: str) -> None:
     """Refuse a block of other axes or live parameters than a spec's."""
-    found, expected = (
+    inputs, expected = (
         [v.name for v in parse_function_block(block).variables if v.section == "VAR_INPUT"]
         for block in (text, due)
     )
-    if differing := [name for name in (*found, *expected) if (name in found) != (name in expected)]:
+    if differing := [name for name in (*inputs, *expected) if (name in inputs) != (name in expected)]:
         raise SpecError(
             f"{path} is no block of this spec: only one of them has an input {differing[0]}; name the spec "
             "that it was written of."

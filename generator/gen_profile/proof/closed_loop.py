@@ -118,9 +118,9 @@ class ClosedLoop:
         ExportError, CosimulationError
         """
         script, block = self._script(history), self._block.called()
-        told = self._watch.orders(script)
-        run = self._followed(history, block, script, rows=told[-1].end, marks=self._watch.marks(told))
-        faults = () if run.fault else self._watch.faults(period, script, told, block, run)
+        orders = self._watch.orders(script)
+        run = self._followed(history, block, script, rows=orders[-1].end, marks=self._watch.marks(orders))
+        faults = () if run.fault else self._watch.faults(period, script, orders, block, run)
         return attrs.evolve(run, trace=None, copies=None), faults
 
     def run(self, history: History, *, rows: int = 0, max_step: float | None = None) -> BlockRun:
@@ -179,9 +179,9 @@ class ClosedLoop:
         for number, axis in self._histories.axes.items():
             position[1:, number] = traced[:, self.outputs.index(axis.of("fPosition"))]
         script = self._script(history)
-        row = np.searchsorted(script.begins, np.arange(len(traced)), side="right") - 1
+        row = np.searchsorted(script.start_cycles, np.arange(len(traced)), side="right") - 1
         for hoist in self._hoists(history):
-            position[1:, hoist.axis] = hoist.ratio * script.inputs[row, hoist.told]
+            position[1:, hoist.axis] = hoist.ratio * script.inputs[row, hoist.column]
         with PlantCosimulation(self._machine) as fmu:
             response = fmu.run(
                 SampledProfile(cycle_time=self.cycle, position=position),
@@ -198,10 +198,10 @@ class ClosedLoop:
         actual = [axis.of("fActPosition") for axis in axes.values()]
         values = self._block.inputs | {"bEnable": 1.0, **dict.fromkeys(actual, 0.0)}
         values |= {f"f{name}": value for name, value in history.live.items()}
-        begins, inputs = self._hoisted(
+        start_cycles, inputs = self._hoisted(
             history, *input_rows(history.commands, [*axes.values()], values, self.cycle)
         )
-        begins, inputs = self._changed(history, *self._noisy(begins, inputs))
+        start_cycles, inputs = self._changed(history, *self._noisy(start_cycles, inputs))
         period = self._histories.period
         patience = PATIENCE * period + max(map(self._crossing, axes))
         watch = max(SHORTEST_WATCH, WATCHED * period)
@@ -209,7 +209,7 @@ class ClosedLoop:
         longest, settled, watched = (math.ceil(time / self.cycle) for time in (patience, settle, watch))
         return Script(
             cycle=self.cycle,
-            begins=begins,
+            start_cycles=start_cycles,
             inputs=inputs,
             actual=[list(values).index(name) for name in actual],
             longest=longest,
@@ -232,14 +232,16 @@ class ClosedLoop:
         )
         return sum(alone)
 
-    def _hoisted(self, history: History, begins: list[int], inputs: Array) -> tuple[Sequence[int], Array]:
+    def _hoisted(
+        self, history: History, start_cycles: list[int], inputs: Array
+    ) -> tuple[Sequence[int], Array]:
         """Give a row to every cycle in which live parameters change, and what they truly are at its end."""
         if not history.hoisting:
-            return begins, inputs
+            return start_cycles, inputs
         starting = math.ceil(HOIST_STARTS * self._histories.period / self.cycle)
         end = max(corners[-1][0] for corners in history.hoisting.values())
-        cycles = np.arange(max(begins[-1], math.ceil(end / self.cycle) + starting) + 1)
-        inputs = inputs[np.searchsorted(begins, cycles, side="right") - 1]
+        cycles = np.arange(max(start_cycles[-1], math.ceil(end / self.cycle) + starting) + 1)
+        inputs = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
         for name, corners in history.hoisting.items():
             low, high = self._spec.planner.live[name]
             line = np.interp(np.arange(1 - starting, len(cycles)) * self.cycle, *np.transpose(corners))
@@ -248,30 +250,34 @@ class ClosedLoop:
         true = [inputs[:, list(self._block.inputs).index(f"f{name}")] for name in history.hoisting]
         return range(len(cycles)), np.column_stack([inputs, *true])
 
-    def _noisy(self, begins: Sequence[int], inputs: Array) -> tuple[Sequence[int], Array]:
+    def _noisy(self, start_cycles: Sequence[int], inputs: Array) -> tuple[Sequence[int], Array]:
         """Let what is told of live parameters be off by their noise, another one in every cycle."""
         noise, random = self._spec.planner.live_noise, np.random.default_rng(0)
         if not noise:
-            return begins, inputs
-        cycles = np.arange(begins[-1] + math.ceil(NOISY_ON * self._histories.period / self.cycle))
-        inputs = inputs[np.searchsorted(begins, cycles, side="right") - 1]
+            return start_cycles, inputs
+        cycles = np.arange(start_cycles[-1] + math.ceil(NOISY_ON * self._histories.period / self.cycle))
+        inputs = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
         for name, most in noise.items():
-            told = inputs[:, list(self._block.inputs).index(f"f{name}")]
-            told[:] = np.clip(told + random.uniform(-most, most, len(cycles)), *self._spec.planner.live[name])
+            reported = inputs[:, list(self._block.inputs).index(f"f{name}")]
+            reported[:] = np.clip(
+                reported + random.uniform(-most, most, len(cycles)), *self._spec.planner.live[name]
+            )
         return range(len(cycles)), inputs
 
-    def _changed(self, history: History, begins: Sequence[int], inputs: Array) -> tuple[Sequence[int], Array]:
+    def _changed(
+        self, history: History, start_cycles: Sequence[int], inputs: Array
+    ) -> tuple[Sequence[int], Array]:
         """Let inputs differ for some time."""
         if not history.changes:
-            return begins, inputs
+            return start_cycles, inputs
         spans = [
             (first, first + max(1, round(min(change.lasts / self.cycle, LONGEST))), change)
             for change in history.changes
             for first in [round(change.time / self.cycle)]
         ]
         edges = {edge for begin, end, _ in spans for edge in (begin, end) if edge < LONGEST}
-        cycles = sorted({*begins, *edges})
-        inputs = inputs[np.searchsorted(begins, cycles, side="right") - 1]
+        cycles = sorted({*start_cycles, *edges})
+        inputs = inputs[np.searchsorted(start_cycles, cycles, side="right") - 1]
         for begin, end, change in spans:
             within = slice(bisect_left(cycles, begin), bisect_left(cycles, end))
             for name, value in change.inputs.items():
@@ -285,14 +291,14 @@ class ClosedLoop:
         return [
             Hoist(
                 axis=axes.index(name),
-                told=inputs + place,
+                column=inputs + place,
                 ratio=history.parameters[name] / history.live[name] if name in history.parameters else 1.0,
             )
             for place, name in enumerate(history.hoisting)
         ]
 
     def _places(self, history: History) -> list[float]:
-        return [*history.places, *(history.parameters[name] for name in self._histories.driven)]
+        return [*history.places, *(history.parameters[name] for name in self._histories.hoisted_names)]
 
     def _parameters(self, history: History) -> dict[str, float]:
         return {known.name: history.parameters[known.name] for known in self._machine.parameters}

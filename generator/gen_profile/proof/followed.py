@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_profile.motion.profile import Array
 from gen_profile.planner.interface import BlockAxis
-from gen_profile.proof.orders import DISABLED, POSITION, Ends, Flags, TimedOrder, Told
+from gen_profile.proof.orders import DISABLED, POSITION, Ends, Flags, ReceivedOrders, TimedOrder
 
 EXACT = 1e-9  # m, by which an axis may miss its target, and a stop its stated ends
 
@@ -55,7 +55,7 @@ class Followed:
     axes : sequence of BlockAxis
     limits : sequence of Ends
         Of the same axes.
-    told : Told
+    received : Told
     issued : mapping of str to (cycles,) array
         By names of the block's outputs.
     reserve : float
@@ -64,7 +64,7 @@ class Followed:
         m, that calming may lead away from a target.
     sway_limit : float
         m, for all that stated errors may leave.
-    seen : sequence of int
+    rest_reports : sequence of int
         Cycles in which the load is seen to hang still.
     zones : sequence of Zone
     drifts : (cycles,) array of bool
@@ -79,12 +79,12 @@ class Followed:
     reaction: float
     axes: Sequence[BlockAxis]
     limits: Sequence[Ends]
-    told: Told
+    received: ReceivedOrders
     issued: Mapping[str, Array]
     reserve: float = 0.0
     wander: float = 0.0
     sway_limit: float = inf
-    seen: Sequence[int] = ()
+    rest_reports: Sequence[int] = ()
     zones: Sequence[Zone] = ()
     drifts: Flags = attrs.field(factory=lambda: np.zeros(1, dtype=bool))
     steps: Array = attrs.field(factory=lambda: np.zeros((1, 0)))
@@ -108,7 +108,7 @@ class Followed:
     @property
     def orders(self) -> Sequence[TimedOrder]:
         """Of what it is told."""
-        return self.told.orders
+        return self.received.orders
 
     def room(self, axis: int, position: Array, way: Array) -> Array:
         """Tell how far an axis may go from positions, (cycles,), in the direction of ways, (cycles,)."""
@@ -175,8 +175,8 @@ class IssuedMotion:
             np.repeat([(order.kind == kind) == is_it for order in followed.orders], lengths)
             for kind, is_it in ((DISABLED, False), (POSITION, True))
         )
-        told = np.repeat([order.values or still for order in followed.orders], lengths, axis=0).T
-        way = told - position * goes
+        commanded = np.repeat([order.values or still for order in followed.orders], lengths, axis=0).T
+        way = commanded - position * goes
         return cls(
             position=position,
             velocity=velocity,
@@ -250,10 +250,12 @@ def reaching(followed: Followed, before: Array, wanted: Sequence[float]) -> floa
 def arriving(followed: Followed, place: Array, before: Array, order: TimedOrder) -> float:
     """Tell the time in s in which axes come from places and velocities, (axes,), to an order's targets."""
     periods = (ON_WAY if before.any() else FROM_REST) + calmed(followed)
-    share, ways = 1.0 - followed.reserve, map(float, np.abs(place - order.values))
+    usable, ways = 1.0 - followed.reserve, map(float, np.abs(place - order.values))
     slow = followed.slowest
     slowest = max(
-        FAR * way / (share * min(top, slow)) + (top + abs(v)) / own.acceleration + own.acceleration / own.jerk
+        FAR * way / (usable * min(top, slow))
+        + (top + abs(v)) / own.acceleration
+        + own.acceleration / own.jerk
         for way, v, top, own in zip(ways, map(float, before), order.tops, followed.limits, strict=True)
     )
     return slowest + periods * followed.period + (0.0 if before.any() else followed.reaction)

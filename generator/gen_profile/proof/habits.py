@@ -106,14 +106,16 @@ class Surroundings:
             }
         return {f"aBlockedLow{end}": begin, f"aBlockedHigh{end}": until}
 
-    def target(self, share: float) -> tuple[float, ...]:
+    def target(self, fraction: float) -> tuple[float, ...]:
         """Choose a place."""
-        return tuple(low + _share(share, k) * (high - low) for k, (low, high) in enumerate(self.targets))
+        return tuple(
+            low + _fraction(fraction, k) * (high - low) for k, (low, high) in enumerate(self.targets)
+        )
 
-    def speed(self, share: float) -> tuple[float, ...]:
+    def speed(self, fraction: float) -> tuple[float, ...]:
         """Choose a velocity of at least a third of the greatest."""
         return tuple(
-            (high if _share(share, k) > 0.5 else low) * (0.3 + 0.7 * _share(share, k + 1))
+            (high if _fraction(fraction, k) > 0.5 else low) * (0.3 + 0.7 * _fraction(fraction, k + 1))
             for k, (low, high) in enumerate(self.speeds)
         )
 
@@ -134,23 +136,23 @@ def manner(command: Command, which: float, how: float, around: Surroundings) -> 
     return habits[min(int(2.0 * len(habits) * (which - 0.5)), len(habits) - 1)](command, how, around)
 
 
-def _between(ends: tuple[float, float], share: float) -> float:
-    return ends[0] + share * (ends[1] - ends[0])
+def _between(ends: tuple[float, float], fraction: float) -> float:
+    return ends[0] + fraction * (ends[1] - ends[0])
 
 
-def _share(share: float, number: int) -> float:
-    return (share + _MORE * (number + 1)) % 1.0
+def _fraction(fraction: float, number: int) -> float:
+    return (fraction + _MORE * (number + 1)) % 1.0
 
 
-def _log(low: float, high: float, share: float) -> float:
-    return float(low * (high / low) ** share)
+def _log(low: float, high: float, fraction: float) -> float:
+    return float(low * (high / low) ** fraction)
 
 
-def _towards(command: Command, share: float, around: Surroundings) -> Command:
+def _towards(command: Command, fraction: float, around: Surroundings) -> Command:
     """Give the command, or one to a position where it is another."""
     if command.command == "position":
         return command
-    return attrs.evolve(command, command="position", values=around.target(share))
+    return attrs.evolve(command, command="position", values=around.target(fraction))
 
 
 def _followed(first: Command, after: float, **changes: Any) -> Command:
@@ -167,7 +169,7 @@ def _again(command: Command, how: float, around: Surroundings) -> Manner:
 def _creeping(command: Command, how: float, around: Surroundings) -> Manner:
     """Let a target creep towards the middle, every few cycles."""
     wait, first = _log(2.0 * around.cycle, 20.0 * around.cycle, how), _towards(command, how, around)
-    step = _log(5e-6, 1e-3, _share(how, 5))
+    step = _log(5e-6, 1e-3, _fraction(how, 5))
     commands = []
     for k in range(CREEPING):
         values = tuple(
@@ -197,7 +199,7 @@ def _reversal(command: Command, how: float, around: Surroundings) -> Manner:
     """Throw the stick over for a short time."""
     lasts = _log(around.cycle, 0.5 * around.period, how)
     stick = attrs.evolve(command, command="velocity", values=around.speed(how))
-    back, again = around.period * (0.3 + _share(how, 4)), tuple(-value for value in stick.values)
+    back, again = around.period * (0.3 + _fraction(how, 4)), tuple(-value for value in stick.values)
     return Manner(commands=(stick, _followed(stick, back, values=again), _followed(stick, back + lasts)))
 
 
@@ -205,7 +207,7 @@ def _changed_mind(command: Command, how: float, around: Surroundings) -> Manner:
     """Command something else before the first was planned."""
     wait, first = _log(around.cycle, SOON * around.cycle, how), _towards(command, how, around)
     others = (
-        ("position", around.target(_share(how, 6))),
+        ("position", around.target(_fraction(how, 6))),
         ("stop", ()),
         ("velocity", around.speed(how)),
         ("position", first.values),
@@ -217,7 +219,7 @@ def _changed_mind(command: Command, how: float, around: Surroundings) -> Manner:
                 _followed(first, (k + 1) * wait, command=kind, values=values)
                 for k, (kind, values) in enumerate(others)
             ),
-        )[: 2 + int(3.0 * _share(how, 7))]
+        )[: 2 + int(3.0 * _fraction(how, 7))]
     )
 
 
@@ -233,12 +235,12 @@ def _stop_and_go(command: Command, how: float, around: Surroundings) -> Manner:
 
 def _slowed_on_the_way(command: Command, how: float, around: Surroundings) -> Manner:
     """Change override or velocity limit while the axis moves, without a new command."""
-    later, lasts = 3.0 * around.period * _share(how, 3), around.period * (1.0 + 6.0 * _share(how, 4))
-    share = 0.3 + 0.5 * how
-    inputs = {"rOverride": share}
-    if _share(how, 5) < 0.5:
+    later, lasts = 3.0 * around.period * _fraction(how, 3), around.period * (1.0 + 6.0 * _fraction(how, 4))
+    fraction = 0.3 + 0.5 * how
+    inputs = {"rOverride": fraction}
+    if _fraction(how, 5) < 0.5:
         inputs = {
-            f"fVelocityLimit{end}": share * most
+            f"fVelocityLimit{end}": fraction * most
             for end, (_, most) in zip(around.suffixes, around.speeds, strict=True)
         }
     slowed = Change(time=command.time + later, lasts=lasts, inputs=inputs)
@@ -252,7 +254,7 @@ def _patient(command: Command, how: float, around: Surroundings) -> Manner:
 
 def _held(command: Command, how: float, around: Surroundings) -> Manner:
     """Hold by an override of 0, and go on."""
-    later, lasts = around.period * _share(how, 3), _log(around.cycle, 3.0 * around.period, how)
+    later, lasts = around.period * _fraction(how, 3), _log(around.cycle, 3.0 * around.period, how)
     return Manner(
         commands=(command,),
         changes=(Change(time=command.time + later, lasts=lasts, inputs={"rOverride": 0.0}),),
@@ -267,16 +269,16 @@ def _wild(command: Command, how: float, around: Surroundings) -> Manner:
         {f"fVelocityLimit{around.suffixes[0]}": -1.0},
     ]
     for name, (low, high) in around.live.items():
-        spike = low + _share(how, 8) * (high - low)
+        spike = low + _fraction(how, 8) * (high - low)
         values += [{f"f{name}": wild} for wild in (nan, inf, 0.9 * low - 1.0, 1.001 * high, spike, spike)]
     inputs = values[int(how * len(values)) % len(values)]
-    later = around.period * _share(how, 3)
+    later = around.period * _fraction(how, 3)
     return Manner(commands=(command,), changes=(Change(time=command.time + later, lasts=0.0, inputs=inputs),))
 
 
 def _wrong(command: Command, how: float, around: Surroundings) -> Manner:
     """Give a live parameter, override or velocity limit that cannot be for long; acknowledge the error."""
-    later, lasts = around.period * _share(how, 3), WRONG * (1.0 + _share(how, 4))
+    later, lasts = around.period * _fraction(how, 3), WRONG * (1.0 + _fraction(how, 4))
     values: list[dict[str, float]] = [
         {"rOverride": -0.1},
         {"rOverride": 1.01},
@@ -303,19 +305,19 @@ def _correction(command: Command, how: float, around: Surroundings) -> Manner:
     """Give the last axis alone another target, not far away, on the way or after the arrival."""
     first, (low, high) = _towards(command, how, around), around.targets[-1]
     step = (
-        _log(1e-4, 0.1, _share(how, 3))
+        _log(1e-4, 0.1, _fraction(how, 3))
         * (high - low)
         * (1.0 if first.values[-1] < 0.5 * (low + high) else -1.0)
     )
     other = (*first.values[:-1], first.values[-1] + step)
     return Manner(
-        commands=(first, _followed(first, around.period * (1.0 + 8.0 * _share(how, 4)), values=other))
+        commands=(first, _followed(first, around.period * (1.0 + 8.0 * _fraction(how, 4)), values=other))
     )
 
 
 def _refused(command: Command, how: float, around: Surroundings) -> Manner:
     """Give a target that is none, on the way to another."""
-    first, wait = _towards(command, how, around), around.period * _share(how, 3)
+    first, wait = _towards(command, how, around), around.period * _fraction(how, 3)
     low, high = around.targets[-1]
     wrong = (*first.values[:-1], (nan, inf, low - OUTSIDE, high + OUTSIDE)[int(4.0 * how) % 4])
     return Manner(
@@ -325,8 +327,8 @@ def _refused(command: Command, how: float, around: Surroundings) -> Manner:
 
 def _denied(command: Command, how: float, around: Surroundings) -> Manner:
     """Command a position while the axis is to stop."""
-    stop = _followed(command, around.period * (0.2 + _share(how, 3)), command="stop", values=())
-    edge = stop.time + around.period * _share(how, 4)
+    stop = _followed(command, around.period * (0.2 + _fraction(how, 3)), command="stop", values=())
+    edge = stop.time + around.period * _fraction(how, 4)
     return Manner(
         commands=(command, stop, _followed(stop, 1.5 * around.period)),
         changes=(
@@ -337,7 +339,7 @@ def _denied(command: Command, how: float, around: Surroundings) -> Manner:
 
 def _mistimed(command: Command, how: float, around: Surroundings) -> Manner:
     """Call the block in another task for a while."""
-    later, lasts = around.period * _share(how, 3), _log(around.cycle, 0.5 * around.period, how)
+    later, lasts = around.period * _fraction(how, 3), _log(around.cycle, 0.5 * around.period, how)
     inputs = {"fCycleTime": around.cycle * (0.5 if how < 0.5 else 1.01)}
     again = _followed(command, later + lasts + 10.0 * around.cycle, command="stop", values=())
     return Manner(
@@ -349,15 +351,15 @@ def _mistimed(command: Command, how: float, around: Surroundings) -> Manner:
 def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
     """Let the last axis be elsewhere than its setpoint: with a limit of that, and before without one."""
     first, suffix = _towards(command, how, around), around.suffixes[-1]
-    begin = first.time + around.period * (0.2 + _share(how, 3))
+    begin = first.time + around.period * (0.2 + _fraction(how, 3))
     limit = 0.1 + how
     away = {
         f"fActPosition{suffix}": (nan, -FAR, FAR, -1.01 * limit, 1.01 * limit, 0.99 * limit)[
             int(6.0 * how) % 6
         ]
     }
-    most, lasts = {f"fFollowingLimit{suffix}": limit}, around.period * _share(how, 4)
-    within = around.period * (1.0 + _share(how, 5))
+    most, lasts = {f"fFollowingLimit{suffix}": limit}, around.period * _fraction(how, 4)
+    within = around.period * (1.0 + _fraction(how, 5))
     return Manner(
         commands=(first, _followed(first, begin - first.time + within, command="stop", values=())),
         changes=(
@@ -370,21 +372,21 @@ def _strayed(command: Command, how: float, around: Surroundings) -> Manner:
 
 def _braked(command: Command, how: float, around: Surroundings) -> Manner:
     """Brake at once, and say that the load hangs still, true or not."""
-    first, wait = _towards(command, how, around), around.period * (0.3 + _share(how, 3))
-    seen = Change(time=first.time + 2.5 * wait, lasts=0.0, inputs={"bLoadAtRest": 1.0})
+    first, wait = _towards(command, how, around), around.period * (0.3 + _fraction(how, 3))
+    rest_report = Change(time=first.time + 2.5 * wait, lasts=0.0, inputs={"bLoadAtRest": 1.0})
     return Manner(
         commands=(
             first,
             _followed(first, wait, command="quick-stop", values=()),
             _followed(first, 3.0 * wait, command="stop", values=()),
         ),
-        changes=() if around.hoists else (seen,),  # one that calms by a model believes that
+        changes=() if around.hoists else (rest_report,),  # one that calms by a model believes that
     )
 
 
 def _released(command: Command, how: float, around: Surroundings) -> Manner:
     """Drop bExecute, on the way or long before it rises again."""
-    later, lasts = 5.0 * around.period * how, _log(around.cycle, 3.0 * around.period, _share(how, 3))
+    later, lasts = 5.0 * around.period * how, _log(around.cycle, 3.0 * around.period, _fraction(how, 3))
     dropped = Change(time=command.time + later, lasts=lasts, inputs={"bExecute": 0.0})
     return Manner(commands=(_towards(command, how, around),), changes=(dropped,))
 
@@ -402,15 +404,15 @@ def _contradicted(command: Command, how: float, around: Surroundings) -> Manner:
             _followed(stick, gone, values=(0.0,) * len(around.speeds)),
             _followed(stick, 1.2 * gone),
         ),
-        changes=(Change(time=stick.time + around.period * _share(how, 4), lasts=lasts, inputs=wrong),),
+        changes=(Change(time=stick.time + around.period * _fraction(how, 4), lasts=lasts, inputs=wrong),),
     )
 
 
 def _fenced(command: Command, how: float, around: Surroundings) -> Manner:
     """Block an interval for some time, or make it slow, wherever the axis is."""
-    later, lasts = around.period * _share(how, 3), around.period * (2.0 + 6.0 * _share(how, 4))
+    later, lasts = around.period * _fraction(how, 3), around.period * (2.0 + 6.0 * _fraction(how, 4))
     k = int(how * len(around.suffixes)) % len(around.suffixes)
-    zone = around.zone(k, _share(how, 5), _share(how, 6), ZONES - 1, slow=_share(how, 7) < 0.5)
+    zone = around.zone(k, _fraction(how, 5), _fraction(how, 6), ZONES - 1, slow=_fraction(how, 7) < 0.5)
     begin = command.time + later
     reset = Change(time=begin + lasts + 2.0 * around.cycle, lasts=0.0, inputs={"bReset": 1.0})
     again = _followed(command, later + lasts + 0.5 * around.period)
@@ -419,11 +421,11 @@ def _fenced(command: Command, how: float, around: Surroundings) -> Manner:
 
 def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
     """Drop bEnable, mostly on the way; let the axis stand, or move it by hand, until it is set again."""
-    later, lasts = around.period * _share(how, 3), _log(around.cycle, around.period, _share(how, 4))
+    later, lasts = around.period * _fraction(how, 3), _log(around.cycle, around.period, _fraction(how, 4))
     begin, taken = command.time + later, dict[str, float]()
     if how < 0.6:
         for k, ((_, most), suffix) in enumerate(zip(around.speeds, around.suffixes, strict=True)):
-            speed = most * HAND * max(0.0, 1.5 * _share(how, 5 + k) - 0.5) * (1.0 if how < 0.45 else -1.0)
+            speed = most * HAND * max(0.0, 1.5 * _fraction(how, 5 + k) - 0.5) * (1.0 if how < 0.45 else -1.0)
             taken |= {f"fActPosition{suffix}": speed * around.cycle, f"fActVelocity{suffix}": speed}
     goes = how > 0.3  # still, as it is taken over
     if how > 0.8 and not around.hoists:  # nowhere, and so not taken over yet
@@ -433,16 +435,16 @@ def _disabled(command: Command, how: float, around: Surroundings) -> Manner:
         Change(time=begin, lasts=lasts + 4.0 * around.cycle * (not goes), inputs={"bEnable": 0.0}),
         Change(time=begin, lasts=lasts + 1.5 * around.cycle * goes, inputs=taken),
     ]
-    seen = begin + lasts + 3.0 * around.period
-    changes.append(Change(time=seen, lasts=0.0, inputs={"bLoadAtRest": 1.0}))
+    rest_report = begin + lasts + 3.0 * around.period
+    changes.append(Change(time=rest_report, lasts=0.0, inputs={"bLoadAtRest": 1.0}))
     again = _followed(command, later + lasts + around.period)
     return Manner(commands=(command, again), changes=tuple(changes if not around.hoists else changes[:-1]))
 
 
 def _respooled(command: Command, how: float, around: Surroundings) -> Manner:
     """Tell another live parameter on the way, faster than may be, and that of before later."""
-    later, lasts = around.period * _share(how, 3), _log(0.1, around.period, _share(how, 4))
-    inputs = {f"f{name}": _between(ends, _share(how, 5)) for name, ends in around.live.items()}
+    later, lasts = around.period * _fraction(how, 3), _log(0.1, around.period, _fraction(how, 4))
+    inputs = {f"f{name}": _between(ends, _fraction(how, 5)) for name, ends in around.live.items()}
     changes = (Change(time=command.time + later, lasts=lasts, inputs=inputs),) if inputs else ()
     return Manner(commands=(command,), changes=() if around.hoists else changes)
 

@@ -92,7 +92,7 @@ class History:
             for number, axis in self.axes.items()
         )
 
-    def told(self, units: Mapping[str, str]) -> str:
+    def reported(self, units: Mapping[str, str]) -> str:
         """Say what the block is told of live parameters, whose units are given by name."""
         return ", ".join(
             f"{name} {phrases.number(value)} {units[name]}" + " at first" * (name in self.hoisting)
@@ -187,12 +187,12 @@ class Histories:
             if not (name in live and (name in spec.check.spans or nominal[name] == 0.0))
         }
         ends = product(*live.values(), *([low, high] for low, high in ranges.values()))
-        found = []
+        by_machine = []
         for chosen in islice(ends, 2**MOST_CORNERS):
-            told = dict(zip(live, chosen, strict=False))
+            live_values = dict(zip(live, chosen, strict=False))
             errors = dict(zip(ranges, chosen[len(live) :], strict=True))
-            found.append(linearize(spec.machine(), *_machine(spec, told, errors)).frequencies)
-        slowest, fastest = float(np.min(found)), float(np.max(found))
+            by_machine.append(linearize(spec.machine(), *_machine(spec, live_values, errors)).frequencies)
+        slowest, fastest = float(np.min(by_machine)), float(np.max(by_machine))
         period = 2.0 * np.pi / slowest
         return cls(
             spec=spec,
@@ -212,20 +212,20 @@ class Histories:
         plant = self.spec.machine()
         return float(
             max(
-                2.0 * np.pi / linearize(plant, *_machine(self.spec, told, {})).frequencies.min()
-                for told in ends
+                2.0 * np.pi / linearize(plant, *_machine(self.spec, live_values, {})).frequencies.min()
+                for live_values in ends
             )
         )
 
     @property
-    def driven(self) -> tuple[str, ...]:
+    def hoisted_names(self) -> tuple[str, ...]:
         """Live parameters that change on the way and are no axes of the machine."""
         return tuple(name for name in self.spec.planner.live_rate if name in self.spec.plant.parameters)
 
     @property
     def machine(self) -> Plant:
-        """The machine that follows, where what is `driven` are the last axes."""
-        return hoisted(self.spec.machine(), self.driven)
+        """The machine that follows, where what is `hoisted_names` are the last axes."""
+        return hoisted(self.spec.machine(), self.hoisted_names)
 
     @property
     def box(self) -> int:
@@ -291,12 +291,14 @@ class Histories:
         axes, live, uncertain = len(self.axes), self.spec.planner.live, self.uncertain
         parts = np.split(choices[: self._first_command], np.cumsum([axes, self.box, 3]))
         starts, box, (first, manner, amount), ending = (part.tolist() for part in parts)
-        told = {name: _between(ends, share) for (name, ends), share in zip(live.items(), box, strict=False)}
-        errors = {
-            name: _between(ends, share)
-            for (name, ends), share in zip(uncertain.items(), box[len(live) :], strict=True)
+        live_values = {
+            name: _between(ends, fraction) for (name, ends), fraction in zip(live.items(), box, strict=False)
         }
-        parameters, places = _machine(self.spec, told, errors)
+        errors = {
+            name: _between(ends, fraction)
+            for (name, ends), fraction in zip(uncertain.items(), box[len(live) :], strict=True)
+        }
+        parameters, places = _machine(self.spec, live_values, errors)
         for number, start in zip(self.axes, starts, strict=True):
             travel = self.spec.limits.of(number).travel
             assert travel is not None
@@ -305,12 +307,12 @@ class Histories:
         manners = [*self._manners(rows[: int(amount * MOST_COMMANDS)], first, manner, ending)]
         commands = tuple(command for one in manners for command in one.commands)
         return History(
-            live=told,
+            live=live_values,
             parameters=parameters,
             places=tuple(places),
             commands=commands,
             axes=self.axes,
-            hoisting=self._hoisting(choices[self._first_leg :], told, commands[-1].time),
+            hoisting=self._hoisting(choices[self._first_leg :], live_values, commands[-1].time),
             changes=(
                 *self._zones(starts, first, amount),
                 *(change for one in manners for change in one.changes),
@@ -318,19 +320,21 @@ class Histories:
         )
 
     def _hoisting(
-        self, choices: Array, told: Mapping[str, float], last: float
+        self, choices: Array, live_values: Mapping[str, float], last: float
     ) -> dict[str, tuple[tuple[float, float], ...]]:
         """Let live parameters change, leg by leg, at their greatest rates or below."""
         rates = self.spec.planner.live_rate
-        until, found = last + HOISTED_ON * self.period, {}
+        until, hoisting = last + HOISTED_ON * self.period, {}
         for (name, rate), legs in zip(
             rates.items(), choices.reshape(len(rates), LEGS, _PER_LEG), strict=True
         ):
-            speeds = [rate * _between((-1.0, 1.0), _widened(share, 0.25)) for share in legs[:, 0].tolist()]
+            speeds = [
+                rate * _between((-1.0, 1.0), _widened(fraction, 0.25)) for fraction in legs[:, 0].tolist()
+            ]
             shares = 0.1 + legs[:, 1]
             times = list(accumulate((until * shares / shares.sum()).tolist(), initial=0.0))
-            found[name] = _bouncing(told[name], speeds, times, self.spec.planner.live[name])
-        return found
+            hoisting[name] = _bouncing(live_values[name], speeds, times, self.spec.planner.live[name])
+        return hoisting
 
     def perturbed(self, history: History, errors: Mapping[str, float]) -> dict[str, float]:
         """Parameters of a machine that differs by some errors from what the block is told in a history."""
@@ -347,10 +351,10 @@ class Histories:
                 break
             command = self._command(time, int(np.searchsorted(np.cumsum(likely), row[0])), row[1:last])
             slowed, which, how = row[last + 1 :]
-            found = habit(self._slowed(command, slowed), which, how, around)
-            earliest = found.commands[-1].time + 2.0 * around.cycle
-            yield found
-            time = found.commands[-1].time + self.period * SHORTEST * (LONGEST / SHORTEST) ** row[last]
+            behaviour = habit(self._slowed(command, slowed), which, how, around)
+            earliest = behaviour.commands[-1].time + 2.0 * around.cycle
+            yield behaviour
+            time = behaviour.commands[-1].time + self.period * SHORTEST * (LONGEST / SHORTEST) ** row[last]
         time = max(min(time, within), earliest)
         how, *others = ending
         if how < 0.05:
@@ -365,7 +369,7 @@ class Histories:
         if not self.spec.planner.zones:
             return
         for k, start in enumerate(starts):
-            place, width = ((share + _MORE * (k + 1)) % 1.0 for share in shares)
+            place, width = ((fraction + _MORE * (k + 1)) % 1.0 for fraction in shares)
             zone = around.zone(
                 k, 0.8 + 0.15 * place if start < 0.5 else 0.05 + 0.1 * place, 0.3 * width, 0, slow=False
             )
@@ -392,8 +396,8 @@ class Histories:
             return command
         if choice < 0.75:
             return attrs.evolve(command, override=_between((SLOWEST, 1.0), 4.0 * choice - 2.0))
-        share = _between((SLOWEST, 1.0), 4.0 * choice - 3.0)
-        return attrs.evolve(command, velocity_limits=tuple(share * self._velocity(k) for k in self.axes))
+        fraction = _between((SLOWEST, 1.0), 4.0 * choice - 3.0)
+        return attrs.evolve(command, velocity_limits=tuple(fraction * self._velocity(k) for k in self.axes))
 
     def _command(self, time: float, which: int, values: Sequence[float]) -> Command:
         match which:
@@ -423,14 +427,14 @@ def written(value: float) -> float | str:
     return value if isfinite(value) else str(value)
 
 
-def _between(ends: tuple[float, float], share: float) -> float:
+def _between(ends: tuple[float, float], fraction: float) -> float:
     low, high = ends
-    return float(low + share * (high - low)) if share < 1.0 else high
+    return float(low + fraction * (high - low)) if fraction < 1.0 else high
 
 
-def _widened(share: float, margin: float = 0.05) -> float:
+def _widened(fraction: float, margin: float = 0.05) -> float:
     """Stretch, so that both ends are chosen with a share of `margin` each."""
-    return min(max((share - margin) / (1.0 - 2.0 * margin), 0.0), 1.0)
+    return min(max((fraction - margin) / (1.0 - 2.0 * margin), 0.0), 1.0)
 
 
 def _bouncing(
@@ -454,14 +458,14 @@ def _bouncing(
 
 
 def _machine(
-    spec: Spec, told: Mapping[str, float], errors: Mapping[str, float]
+    spec: Spec, live_values: Mapping[str, float], errors: Mapping[str, float]
 ) -> tuple[dict[str, float], list[float]]:
     """Parameters of a machine and places of its axes: as the block is told, but for the errors."""
     plant, parameters = spec.machine(), dict(spec.plant.parameters)
     for known in plant.parameters:
-        value = told.get(known.name, parameters[known.name])
+        value = live_values.get(known.name, parameters[known.name])
         if known.name in errors:
-            value = errors[known.name] * (value if known.name in told else 1.0)
+            value = errors[known.name] * (value if known.name in live_values else 1.0)
         parameters[known.name] = min(max(value, known.lower), known.upper)
     axes = zip(plant.actuated, spec.move.start, strict=True)
-    return parameters, [told.get(axis.name, start) for axis, start in axes]
+    return parameters, [live_values.get(axis.name, start) for axis, start in axes]

@@ -96,9 +96,9 @@ def _axis_faults(
 ) -> Iterator[str]:
     of, which = (f" of {named.name}", f"axis {named.name}") if named.name else ("", "axis")
     for name in ("velocity", "acceleration", "jerk"):
-        share = limits[f"{named.prefix}{name}"]
-        if not share <= 1.0 + ROUNDING:
-            yield f"the {name}{of} is above its limit by {100.0 * (share - 1.0):.3g} %"
+        ratio = limits[f"{named.prefix}{name}"]
+        if not ratio <= 1.0 + ROUNDING:
+            yield f"the {name}{of} is above its limit by {100.0 * (ratio - 1.0):.3g} %"
     beyond = limits[f"{named.prefix}beyond_travel_{named.unit}"]
     if not beyond <= ROUNDING and not history.moved:
         yield f"the {which} leaves its travel by {beyond:.3g} {named.unit}"

@@ -61,7 +61,7 @@ WORDS = {
     "not aborted": "bCommandAborted is not set though a command was replaced",
     "error": "bError and nErrorId contradict each other",
     "refused": "nErrorId does not tell an error, or not as long as stated",
-    "untold": "nErrorId tells an error without a cause, or another one",
+    "wrong error": "nErrorId tells an error without a cause, or another one",
     "disabled": "bEnabled is not what bEnable asks for",
     "blocked": "the axis or the stated end of a stop lies within a blocked interval by {needed:.3g} m",
     "zone": "nZone is not the number of the blocked interval",
@@ -256,14 +256,16 @@ def _reactions(
     for order in followed.orders:
         if order.begin not in reactions:
             continue
-        found, before = reactions[order.begin], motion.velocity[:, order.begin]
+        reacted_after, before = reactions[order.begin], motion.velocity[:, order.begin]
         allowed = followed.reaction + calmed(followed) * followed.period
         if before.any():
             allowed = followed.reaction + slowing(followed, before, RUN_OUT)
         late = followed.after(allowed)
-        if found is None or (found > late and _obeys_anyway(motion, order, order.begin + late)):
+        if reacted_after is None or (
+            reacted_after > late and _obeys_anyway(motion, order, order.begin + late)
+        ):
             continue  # what came before ends or goes on as the order asks
-        yield Allowance("reaction", order.begin, found * followed.cycle, allowed)
+        yield Allowance("reaction", order.begin, reacted_after * followed.cycle, allowed)
 
 
 def _obeys_anyway(motion: IssuedMotion, order: TimedOrder, at: int) -> bool:

@@ -113,7 +113,7 @@ class Facts:
 
 
 @attrs.frozen(kw_only=True)
-class Told:
+class ReceivedOrders:
     """What a block is told, and what it must say of that.
 
     Attributes
@@ -131,12 +131,14 @@ class Told:
     holds: Flags
 
 
-def told(begins: Sequence[int], rows: Array, inputs: Inputs, last: int, facts: Facts | None = None) -> Told:
+def read_orders(
+    start_cycles: Sequence[int], rows: Array, inputs: Inputs, last: int, facts: Facts | None = None
+) -> ReceivedOrders:
     """Read rows of inputs as the block's header tells.
 
     Parameters
     ----------
-    begins : (rows,) sequence of int
+    start_cycles : (rows,) sequence of int
         From which cycle each row holds.
     rows : (rows, inputs) array
     inputs : Inputs
@@ -145,9 +147,13 @@ def told(begins: Sequence[int], rows: Array, inputs: Inputs, last: int, facts: F
     facts : Facts, optional
         Of the run that these inputs led to.
     """
-    reader, found, seen = _Reader(inputs, facts), list[TimedOrder](), list[tuple[int, bool, int, bool]]()
-    places, row, values, due = [*begins, last], 0, rows.tolist(), None
-    pending = sorted({*begins, *(_events(begins, facts) if facts else ())}, reverse=True)
+    reader, timed, flags_by_cycle = (
+        _Reader(inputs, facts),
+        list[TimedOrder](),
+        list[tuple[int, bool, int, bool]](),
+    )
+    places, row, values, due = [*start_cycles, last], 0, rows.tolist(), None
+    pending = sorted({*start_cycles, *(_events(start_cycles, facts) if facts else ())}, reverse=True)
     while pending and (cycle := pending.pop()) < last:
         while places[row + 1] <= cycle:
             row += 1
@@ -155,22 +161,24 @@ def told(begins: Sequence[int], rows: Array, inputs: Inputs, last: int, facts: F
         for at in (cycle + 1 if cycle == due else None, due := reader.due):
             if at is not None and cycle < at < (pending[-1] if pending else last):
                 pending.append(at)
-        seen.append((cycle, reader.aborted > 0, reader.error, reader.command in (POSITION, VELOCITY)))
-        if not found or not _same(order, found[-1]):
-            found.append(order)
-    ends = [*(order.begin for order in found[1:]), last]
-    cycles, *flags = zip(*seen, strict=True)
+        flags_by_cycle.append(
+            (cycle, reader.aborted > 0, reader.error, reader.command in (POSITION, VELOCITY))
+        )
+        if not timed or not _same(order, timed[-1]):
+            timed.append(order)
+    ends = [*(order.begin for order in timed[1:]), last]
+    cycles, *flags = zip(*flags_by_cycle, strict=True)
     lengths = np.diff([*cycles, last])
     aborted, error, holds = (np.repeat(flag, lengths) for flag in flags)
-    orders = tuple(attrs.evolve(order, end=end) for order, end in zip(found, ends, strict=True))
-    return Told(orders=orders, aborted=aborted, error=error, holds=holds)
+    orders = tuple(attrs.evolve(order, end=end) for order, end in zip(timed, ends, strict=True))
+    return ReceivedOrders(orders=orders, aborted=aborted, error=error, holds=holds)
 
 
-def _events(begins: Sequence[int], facts: Facts) -> list[int]:
+def _events(start_cycles: Sequence[int], facts: Facts) -> list[int]:
     """Cycles in which something may change though no input does."""
     flags = np.stack([facts.done, facts.stands, facts.errors == BLOCKED])
     changes = np.flatnonzero(np.diff(flags, prepend=False).any(axis=0)).tolist()
-    return [begin + 1 for begin in begins] + [at + k for at in changes for k in (0, 1)]
+    return [begin + 1 for begin in start_cycles] + [at + k for at in changes for k in (0, 1)]
 
 
 def _same(order: TimedOrder, before: TimedOrder) -> bool:
@@ -362,6 +370,6 @@ class _Reader:
         if facts is None or not any(fences) or facts.errors[cycle] != BLOCKED:
             self._in_the_way = False
             return False
-        begins = facts.errors[cycle - 1] != BLOCKED and not (row["bExecute"] and not self._execute)
-        self._in_the_way |= begins and (self._fenced or cycle == self._edge + 1)
+        starts = facts.errors[cycle - 1] != BLOCKED and not (row["bExecute"] and not self._execute)
+        self._in_the_way |= starts and (self._fenced or cycle == self._edge + 1)
         return self._in_the_way

@@ -72,7 +72,7 @@ def prove(
         judge = judge or partial(_judge, spec, loop, progress)
         judged = judge(numbering, range(len(numbering.drawn)))
         for numbers in numbering.rounds:
-            worst = sorted(judged, key=lambda one: _share(spec, one), reverse=True)[:KEPT]
+            worst = sorted(judged, key=lambda one: _fraction(spec, one), reverse=True)[:KEPT]
             numbering = numbering.after_round([one.number for one in worst])
             judged += judge(numbering, numbers)
         return _verdict(spec, loop, numbering, judged, progress)
@@ -135,9 +135,9 @@ def _on_cluster(
     return judged_on_cluster(spec, text, histories, scheduler, progress)
 
 
-def _share(spec: Spec, judged: JudgedHistory) -> float:
+def _fraction(spec: Spec, judged: JudgedHistory) -> float:
     """Tell how near a history comes to a limit; a fault is beyond all."""
-    return np.inf if judged.faults else judged.share(spec.check.residual_sway, 0.0)
+    return np.inf if judged.faults else judged.fraction(spec.check.residual_sway, 0.0)
 
 
 def _verdict(
@@ -149,7 +149,7 @@ def _verdict(
 ) -> Proof:
     """Bound the error at the worst histories, and let FMPy judge these and some others."""
     sound = [one for one in judged if not one.faults]
-    worst = sorted(sound, key=lambda one: _share(spec, one), reverse=True)[:KEPT]
+    worst = sorted(sound, key=lambda one: _fraction(spec, one), reverse=True)[:KEPT]
     halved = 0.5 * min(loop.max_step, loop.cycle)
     error = ERROR_FLOOR
     for one in worst:

@@ -50,20 +50,20 @@ def truths(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     done, busy, aborted, error, enabled = (
         followed.issued[name] != 0.0 for name in ("bDone", "bBusy", "bCommandAborted", "bError", "bEnabled")
     )
-    told, number = followed.told, followed.issued["nErrorId"]
-    there = told.holds & motion.goes & motion.stands & (motion.away <= EXACT)
+    received, number = followed.received, followed.issued["nErrorId"]
+    there = received.holds & motion.goes & motion.stands & (motion.away <= EXACT)
     yield from never("disabled", enabled != motion.guided)
     yield from never("error", error != (number != 0.0))
-    yield from never("untold", (number != told.error) & (number != 0.0))
-    yield from never("refused", (number != told.error) & (number == 0.0))
-    yield from never("aborted", aborted & ~told.aborted)
-    yield from never("not aborted", told.aborted & ~aborted)
+    yield from never("wrong error", (number != received.error) & (number != 0.0))
+    yield from never("refused", (number != received.error) & (number == 0.0))
+    yield from never("aborted", aborted & ~received.aborted)
+    yield from never("not aborted", received.aborted & ~aborted)
     yield from never("busy", motion.guided & ~(motion.stands | busy))
     yield from never("done", done & (busy | ~there))
-    yield from never("vanished", told.holds & motion.goes & ~busy & ~done)
+    yield from never("vanished", received.holds & motion.goes & ~busy & ~done)
     if not followed.reserve:  # calming goes on as long as it must
         yield from _lasting(followed, "not done", there & ~done)
-        yield from _lasting(followed, "not busy", busy & motion.stands & ~(told.holds & motion.goes))
+        yield from _lasting(followed, "not busy", busy & motion.stands & ~(received.holds & motion.goes))
 
 
 def _lasting(followed: Followed, what: str, flags: Flags) -> Iterator[Allowance]:
@@ -89,7 +89,7 @@ def velocities(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
 
 def numbers(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge the outputs that are distances and times."""
-    wrong = followed.of("fDistanceToGo") - motion.way * (motion.goes & followed.told.holds)
+    wrong = followed.of("fDistanceToGo") - motion.way * (motion.goes & followed.received.holds)
     yield from greatest("distance", np.abs(wrong), max(EXACT, followed.wander))
     if followed.reserve:
         return  # calming goes on as long as it must
@@ -160,7 +160,7 @@ def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
         elif order.kind == QUICK_STOP:
             may_be[at:] |= moving or bool(followed.issued["bBusy"][max(0, at - 1)])
             must_be[at:] |= moving
-        later = [at for at in followed.seen if order.begin <= at < order.end and motion.guided[at]]
+        later = [at for at in followed.rest_reports if order.begin <= at < order.end and motion.guided[at]]
         for at in later:
             if motion.stands[at]:
                 must_be[at:] = False
@@ -171,8 +171,8 @@ def _unknown(followed: Followed, motion: IssuedMotion) -> tuple[Flags, Flags]:
 def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
     """Judge where a stop leads by the ends that are stated in every cycle."""
     low, high = followed.of("fStopLow"), followed.of("fStopHigh")
-    told, turns = motion.guided & ~_fenced(followed, motion), _turning(followed, motion)
-    up, down = (high - motion.position) * told, (motion.position - low) * told
+    applies, turns = motion.guided & ~_fenced(followed, motion), _turning(followed, motion)
+    up, down = (high - motion.position) * applies, (motion.position - low) * applies
     apart = np.abs(followed.of("fStopDistance") - np.maximum(high - motion.position, motion.position - low))
     yield from greatest("stop distance", apart, EXACT)
     yield from greatest("ends", -np.minimum(up, down) - turns, STATED)
@@ -188,7 +188,7 @@ def stops(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:
             most.accumulate(place[:, ::-1], axis=1)[:, ::-1] for most in (np.minimum, np.maximum)
         )
         if not (followed.reserve and begin in followed.enabled):  # what swings as it is taken over is calmed
-            leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * told[own] - turns[:, own]
+            leaves = np.maximum(low[:, own] - lowest, highest - high[:, own]) * applies[own] - turns[:, own]
             calms = CALMS * max(limits.margin for limits in followed.limits)
             yield from greatest("ends", leaves, STATED + calms, begin)
         known = np.abs(np.array([*targets, place[:, 0]]) - place[:, 0]).max(axis=0)
@@ -213,14 +213,14 @@ def _turning(followed: Followed, motion: IssuedMotion) -> Array:
 
 def _fenced(followed: Followed, motion: IssuedMotion) -> Flags:
     """Tell when an axis is within an interval that was blocked where it was, or beyond its travel."""
-    found = np.zeros(followed.cycles, dtype=bool)
+    fenced = np.zeros(followed.cycles, dtype=bool)
     for place, limits in zip(motion.position, followed.limits, strict=True):
         low, high = limits.targets
-        found |= (place < low - limits.margin) | (place > high + limits.margin)
+        fenced |= (place < low - limits.margin) | (place > high + limits.margin)
     for zone in followed.zones:
         own, place = slice(zone.begin, zone.end), motion.position[zone.axis, zone.begin : zone.end]
-        found[own] |= (not zone.limit) & (place > zone.low) & (place < zone.high)
-    return found
+        fenced[own] |= (not zone.limit) & (place > zone.low) & (place < zone.high)
+    return fenced
 
 
 def blocked(followed: Followed, motion: IssuedMotion) -> Iterator[Allowance]:

@@ -51,8 +51,8 @@ def trace(
     """
     progress("following a history")
     end_load = spec.machine().end_load
-    told, *perturbed = [histories.perturbed(history, errors) for errors in _errors(histories)]
-    machines = {"this history": history.parameters, "as told": told}
+    reported, *perturbed = [histories.perturbed(history, errors) for errors in _errors(histories)]
+    machines = {"this history": history.parameters, "as told": reported}
     machines |= {f"perturbed {number}": machine for number, machine in enumerate(perturbed, start=1)}
     sways = {}
     with ClosedLoop(spec, text, histories) as loop:

@@ -60,7 +60,7 @@ class JudgedHistory:
     limits: Mapping[str, float]
     faults: tuple[str, ...]
 
-    def share(self, limit: Mapping[str, float], error_bound: float) -> float:
+    def fraction(self, limit: Mapping[str, float], error_bound: float) -> float:
         """Share of the limits of residual sway that it takes up; 0 where the block promises nothing."""
         if not self.promise:
             return 0.0
@@ -130,22 +130,22 @@ class Proof(Summarised, Examination):
         return {
             "proof": "passed" if self.passed else "failed",
             "histories": len(self.judged),
-            "worst": f"history {self.worst.number}, {100.0 * self.share(self.worst):.3g} % of the limit",
+            "worst": f"history {self.worst.number}, {100.0 * self.fraction(self.worst):.3g} % of the limit",
         }
 
-    def share(self, judged: JudgedHistory) -> float:
+    def fraction(self, judged: JudgedHistory) -> float:
         """Share of the limit of residual sway that a history takes up, the error bound included."""
-        return judged.share(self.limit, self.error_bound)
+        return judged.fraction(self.limit, self.error_bound)
 
     @property
     def worst(self) -> JudgedHistory:
         """The history that takes up the greatest share of the limit."""
-        return max(self.judged, key=self.share)
+        return max(self.judged, key=self.fraction)
 
     def reasons(self) -> tuple[str, ...]:
         """Say why the proof failed, a sentence each; none when it passed."""
         sentences = []
-        if self.share(self.worst) > 1.0:
+        if self.fraction(self.worst) > 1.0:
             load = max(self.limit, key=lambda name: self.worst.residual[name] / self.limit[name])
             sentences.append(
                 f"The {load} sways by {1e3 * self.worst.residual[load]:.4g} mm after history "
@@ -181,7 +181,7 @@ class Proof(Summarised, Examination):
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON and the manifest."""
-        ranked = sorted(self.judged, key=self.share, reverse=True)
+        ranked = sorted(self.judged, key=self.fraction, reverse=True)
         return {
             "passed": self.passed,
             "limits_m": dict(self.limit),
@@ -191,9 +191,9 @@ class Proof(Summarised, Examination):
             "slowed": True,  # as those of the first manifests were not
             "habits": True,
             "search_parents": [list(numbers) for numbers in self.parents],
-            "share": self.share(self.worst),
+            "share": self.fraction(self.worst),
             "worst": self.described(self.worst),
-            "next_worst": [{"number": one.number, "share": self.share(one)} for one in ranked[1:LISTED]],
+            "next_worst": [{"number": one.number, "share": self.fraction(one)} for one in ranked[1:LISTED]],
             "groups": [self._group(name) for name in GROUPS if self._of(name)],
             "limits": {name: max(one.limits[name] for one in self.judged) for name in self.judged[0].limits},
             "longest_rest_s": max((one.rests_after or 0.0 for one in self.judged), default=0.0),
@@ -203,13 +203,13 @@ class Proof(Summarised, Examination):
 
     def described(self, judged: JudgedHistory) -> dict[str, Any]:
         """Nest plain values of a history for JSON, its share of the limit among them."""
-        return {**judged.to_dict(), "share": self.share(judged)}
+        return {**judged.to_dict(), "share": self.fraction(judged)}
 
     def _of(self, group: str) -> list[JudgedHistory]:
         return [one for one in self.judged if one.group == group]
 
     def _group(self, name: str) -> dict[str, Any]:
-        shares = [self.share(one) for one in self._of(name)]
+        shares = [self.fraction(one) for one in self._of(name)]
         quantiles = np.quantile(shares, QUANTILES)
         return {
             "group": name,

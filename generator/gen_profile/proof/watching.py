@@ -27,7 +27,7 @@ from gen_profile.proof.orders import (
     Flags,
     Inputs,
     TimedOrder,
-    told,
+    read_orders,
 )
 from gen_profile.spec.model import Spec
 from gen_profile_exporters.planner.block import RESERVE
@@ -97,26 +97,26 @@ class BlockWatch:
 
     def orders(self, script: Script) -> tuple[TimedOrder, ...]:
         """Read what a script tells the block."""
-        begins, rows = self._changes(script)
-        last = script.begins[-1] + script.longest + script.settle + script.watch
-        return told(begins, rows, self.known, last).orders
+        start_cycles, rows = self._changes(script)
+        last = script.start_cycles[-1] + script.longest + script.settle + script.watch
+        return read_orders(start_cycles, rows, self.known, last).orders
 
     def _changes(self, script: Script) -> tuple[list[int], Array]:
         """Leave out rows in which but live parameters change, within their ranges."""
-        begins, rows = np.asarray(script.begins), script.inputs[:, : len(self.inputs)]
+        start_cycles, rows = np.asarray(script.start_cycles), script.inputs[:, : len(self.inputs)]
         kept = rows.copy()
         for name, (low, high) in self.known.live.items():
             live = kept[:, self.inputs.index(f"f{name}")]
             live[(live >= low) & (live <= high)] = low
         changed = np.flatnonzero(np.concatenate([[True], (kept[1:] != kept[:-1]).any(axis=1)]))
-        return begins[changed].tolist(), kept[changed]
+        return start_cycles[changed].tolist(), kept[changed]
 
-    def marks(self, told: Sequence[TimedOrder]) -> list[int]:
+    def marks(self, orders: Sequence[TimedOrder]) -> list[int]:
         """Tell before which cycles the block is to be copied: those of orders that hold long enough."""
         least = self.reaction / self.cycle
         return [
             one.begin
-            for one in told
+            for one in orders
             if 0 < one.begin == one.edge
             and one.end - one.begin > least
             and one.kind not in (QUICK_STOP, DISABLED)
@@ -159,8 +159,8 @@ class BlockWatch:
         assert run.trace is not None
         reserve = RESERVE if self.spec.planner.live_rate else 0.0
         issued = dict(zip(self.outputs, run.trace.T, strict=False))
-        begins, rows = self._changes(script)
-        now = np.searchsorted(script.begins, np.arange(run.cycles), side="right") - 1
+        start_cycles, rows = self._changes(script)
+        now = np.searchsorted(script.start_cycles, np.arange(run.cycles), side="right") - 1
         given = dict(zip(self.inputs, script.inputs.T, strict=False))
         steps, speeds = (
             np.stack([given.get(axis.of(name), np.zeros(len(rows)))[now] for axis in self.known.axes])
@@ -172,13 +172,13 @@ class BlockWatch:
             reaction=self.reaction,
             axes=self.known.axes,
             limits=self.known.limits,
-            told=told(begins, rows, self.known, run.cycles, self._facts(issued)),
+            received=read_orders(start_cycles, rows, self.known, run.cycles, self._facts(issued)),
             issued=issued,
             reserve=reserve,
             wander=WANDER * max(self.spec.check.residual_sway.values()) if reserve else 0.0,
             sway_limit=min(self.spec.check.residual_sway.values()),
-            seen=self._seen(script, run.cycles),
-            zones=list(self._zones(begins, rows, run.cycles)),
+            rest_reports=self._rest_reports(script, run.cycles),
+            zones=list(self._zones(start_cycles, rows, run.cycles)),
             drifts=self._drifts(script, now),
             steps=steps,
             speeds=speeds,
@@ -207,7 +207,7 @@ class BlockWatch:
             high=high,
         )
 
-    def _zones(self, begins: Sequence[int], rows: Array, cycles: int) -> Iterator[Zone]:
+    def _zones(self, start_cycles: Sequence[int], rows: Array, cycles: int) -> Iterator[Zone]:
         """Find intervals that are blocked or slow for some time."""
         kinds = (("aBlockedLow", "aBlockedHigh", None), ("aSlowLow", "aSlowHigh", "aSlowLimit"))
         if "nZone" not in self.outputs:
@@ -218,37 +218,37 @@ class BlockWatch:
             changes = [0, *(np.flatnonzero((values[1:] != values[:-1]).any(axis=1)) + 1).tolist()]
             for row, end in zip(changes, [*changes[1:], None], strict=True):
                 low, high, limit = values[row].tolist()
-                until = cycles if end is None else min(begins[end], cycles)
-                if low < high and begins[row] < until:
+                until = cycles if end is None else min(start_cycles[end], cycles)
+                if low < high and start_cycles[row] < until:
                     yield Zone(
                         axis=k,
                         low=low,
                         high=high,
                         limit=limit,
-                        begin=begins[row],
+                        begin=start_cycles[row],
                         end=until,
                         number=number + 1,
                     )
 
     def _drifts(self, script: Script, now: NDArray[np.int64]) -> Flags:
         """Tell where a live parameter is other than at first for as long as counts."""
-        found, held = np.zeros(len(now), dtype=bool), self.known.held
+        drifts, held = np.zeros(len(now), dtype=bool), self.known.held
         for name, (low, high) in self.known.live.items():
             if name in self.spec.planner.live_rate:
                 continue
             value = script.inputs[:, self.inputs.index(f"f{name}")][now]
             apart = (np.abs(value - value[0]) > STEADY * high) & (value >= low) & (value <= high)
             for begin, end in runs_of(apart):
-                found[begin + held // 2 : end] |= end - begin > held // 2
-        return found
+                drifts[begin + held // 2 : end] |= end - begin > held // 2
+        return drifts
 
-    def _seen(self, script: Script, cycles: int) -> list[int]:
+    def _rest_reports(self, script: Script, cycles: int) -> list[int]:
         """Tell when bLoadAtRest rises; blocks of earlier versions have none."""
         if "bLoadAtRest" not in self.inputs:
             return []
         given = script.inputs[:, self.inputs.index("bLoadAtRest")]
         rows = np.flatnonzero(np.diff(given, prepend=0.0) > 0.0).tolist()
-        return [begin for row in rows if (begin := script.begins[row]) < cycles]
+        return [begin for row in rows if (begin := script.start_cycles[row]) < cycles]
 
     def _first_difference(
         self, script: Script, cycles: tuple[int, int], block: CalledBlock, memory: Any, issued: Array
@@ -258,12 +258,12 @@ class BlockWatch:
         play, places = _PLAY(block.play), [self.outputs.index(name) for axis in block.axes for name in axis]
         live = [self.inputs.index(f"f{name}") for name in self.spec.planner.live]
         actual = list(script.actual)
-        row, inputs = int(np.searchsorted(script.begins, begin - 1, side="right")) - 1, len(self.inputs)
+        row, inputs = int(np.searchsorted(script.start_cycles, begin - 1, side="right")) - 1, len(self.inputs)
         first, many = begin, AT_ONCE
         while first < end:
             part = np.arange(first, min(first + many, end))
             given = np.tile(script.inputs[row, :inputs], (len(part), 1))
-            now = np.searchsorted(script.begins, part, side="right") - 1
+            now = np.searchsorted(script.start_cycles, part, side="right") - 1
             given[:, live] = script.inputs[now[:, None], live]
             given[:, actual] += issued[part - 1, ::3]
             outputs = np.empty((len(part), len(self.outputs)))

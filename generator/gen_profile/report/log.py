@@ -156,8 +156,10 @@ def _known_columns(
     if columns is None:
         head = _head(table, ())
         names = list(table.rows[head])
-        told = {name: _column(_with_unit(name, unit), spec, where) for name, unit in _headings(table, head)}
-        known = {name: column for name, column in told.items() if column is not None}
+        by_name = {
+            name: _column(_with_unit(name, unit), spec, where) for name, unit in _headings(table, head)
+        }
+        known = {name: column for name, column in by_name.items() if column is not None}
         places = [names.index(name) for name in known]
     else:
         chosen = _chosen(columns)
@@ -175,15 +177,15 @@ def _known_columns(
 
 def _in_stated_unit(meaning: str, unit: str, where: str) -> str:
     """Put the unit that a column's name states behind what it is chosen for, where that tells none."""
-    found = _COLUMN.fullmatch(meaning)
-    if found is None or found["unit"] or not unit:
+    match = _COLUMN.fullmatch(meaning)
+    if match is None or match["unit"] or not unit:
         return meaning
     if not _COLUMN.fullmatch(f"time_{unit}"):
         template = (
             "{where}: the column of {meaning} is in {unit}, which measures no {quantity}; choose "
             "another one, or say the unit behind the meaning if the name is wrong."
         )
-        raise OutputError(template, where=where, meaning=meaning, unit=unit, quantity=found["quantity"])
+        raise OutputError(template, where=where, meaning=meaning, unit=unit, quantity=match["quantity"])
     return f"{meaning}_{unit}"
 
 
@@ -217,12 +219,12 @@ def column_meanings(text: str, source: str, spec: Spec) -> list[tuple[str, str]]
 def _meaning(name: str, spec: Spec, where: str) -> str:
     """Write what a column holds in the words of `read_log`."""
     try:
-        found, column = _COLUMN.fullmatch(name), _column(name, spec, where)
+        match, column = _COLUMN.fullmatch(name), _column(name, spec, where)
     except OutputError:  # in a unit of something else, which `parse_log` tells
         return ""
-    if found is None or column is None:
+    if match is None or column is None:
         return ""
-    return "_".join(filter(None, (column.owner, column.quantity, (found["unit"] or "").lower())))
+    return "_".join(filter(None, (column.owner, column.quantity, (match["unit"] or "").lower())))
 
 
 def _chosen(columns: str) -> dict[str, str]:
@@ -239,15 +241,15 @@ def _chosen(columns: str) -> dict[str, str]:
 def _required(meaning: str, spec: Spec, where: str) -> _Column:
     counted = _COUNTED.fullmatch(meaning)
     plain = counted["meaning"] + counted["unit"] if counted else meaning
-    found, step = _column(plain, spec, where), float(counted["step"]) if counted else 1.0
-    if found is None or step == 0.0:
+    column, step = _column(plain, spec, where), float(counted["step"]) if counted else 1.0
+    if column is None or step == 0.0:
         plant = spec.machine()
         template = (
             "columns: {meaning!r} is nothing of this machine; write time_s, {axis}_position, "
             "{load}_sway or {load}_angle, with a unit behind such as _mm or _deg."
         )
         raise OutputError(template, meaning=meaning, axis=plant.actuated[0].name, load=plant.loads[-1])
-    return attrs.evolve(found, divisor=found.divisor / step)
+    return attrs.evolve(column, divisor=column.divisor / step)
 
 
 def _head(table: LogTable, chosen: Collection[str]) -> int:
@@ -272,19 +274,19 @@ def _headings(table: LogTable, head: int) -> list[tuple[str, str]]:
 
 def _with_unit(name: str, below: str) -> str:
     """Put the unit that stands in the row below a name behind it, where the name has none."""
-    found, unit = _COLUMN.fullmatch(name), below.strip("[]() ")
-    if found is None or found["unit"] or not _COLUMN.fullmatch(f"time_{unit}"):
+    match, unit = _COLUMN.fullmatch(name), below.strip("[]() ")
+    if match is None or match["unit"] or not _COLUMN.fullmatch(f"time_{unit}"):
         return name
     return f"{name}_{unit}"
 
 
 def _column(name: str, spec: Spec, where: str) -> _Column | None:
     """Tell what a column holds from its name; None where it is somebody else's."""
-    found = _COLUMN.fullmatch(name)
-    if found is None:
+    match = _COLUMN.fullmatch(name)
+    if match is None:
         return None
-    owner, unit = found["owner"] or "", (found["unit"] or "").lower()
-    quantity = WORDS[found["quantity"].lower()]
+    owner, unit = match["owner"] or "", (match["unit"] or "").lower()
+    quantity = WORDS[match["quantity"].lower()]
     if quantity == "time":
         seconds = {"": 1.0, "s": 1.0, "ms": 1e3}
         return (

@@ -263,8 +263,8 @@ def _zero(times: Array, values: Array, frequencies: Array) -> float:
     """
     stride = -(-len(times) // MOST_FITTED)
     t, y = times[::stride] - times[0], values[::stride]
-    seen = frequencies[frequencies * np.diff(t).max() < np.pi]
-    waves = (wave(frequency * t) for frequency in seen for wave in (np.cos, np.sin))
+    resolved = frequencies[frequencies * np.diff(t).max() < np.pi]
+    waves = (wave(frequency * t) for frequency in resolved for wave in (np.cos, np.sin))
     weights = np.sin(np.pi * (t + t[1]) / (t[-1] + 2.0 * t[1]))  # root of the window; no sample has none
     basis = np.column_stack([np.ones_like(t), *waves])
     return float(np.linalg.lstsq(basis * weights[:, None], y * weights)[0][0])
@@ -286,8 +286,8 @@ def _best_start(evaluation: MotionEvaluation, log: MeasuredLog) -> float:
     else:
         name, signal = next(iter({**log.sways, **log.angles}.items()))
         (nominal, *_) = evaluation.swing.at(grid)
-        seen = nominal.sway if name in log.sways else nominal.angle
-        planned = seen[:, plant.loads.index(name)]
+        outputs = nominal.sway if name in log.sways else nominal.angle
+        planned = outputs[:, plant.loads.index(name)]
     times = log.times
 
     def apart(start: float) -> float:
@@ -326,7 +326,7 @@ def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Arr
     measured = np.stack(list(move.angles.values()))
     q_u = np.linalg.lstsq(gain, measured, rcond=None)[0]
     unknown = null_space(gain).sum(axis=1)[:, None]
-    told, other = (
+    sways, other = (
         [
             np.broadcast_to(np.asarray(sway, dtype=np.float64), len(q_a)).copy()
             for sway in plant.outputs(list(q), list(q_a.T), p).sway
@@ -335,6 +335,6 @@ def _sways_of_angles(spec: Spec, move: MeasuredLog, q_a: Array) -> dict[str, Arr
     )
     return {
         name: sway
-        for name, sway, same in zip(plant.loads, told, other, strict=True)
+        for name, sway, same in zip(plant.loads, sways, other, strict=True)
         if np.allclose(sway, same, rtol=1e-9, atol=1e-12)
     }

@@ -102,9 +102,9 @@ def _row(name: str, signal: Signal, sway: MeasuredSway | None = None) -> TableRo
     cells = [name, *(f"{number(1e3 * value)} m{signal.unit}" for value in (signal.rms, signal.peak))]
     if sway is None or sway.residual is None:
         return TableRow(cells=[*cells, "", "", ""])
-    share = Share(_share(sway))
+    fraction = Share(_share(sway))
     return TableRow(
-        cells=[*cells, mm(sway.residual), mm(sway.limit), share], mark="" if sway.passed else "failed"
+        cells=[*cells, mm(sway.residual), mm(sway.limit), fraction], mark="" if sway.passed else "failed"
     )
 
 
@@ -134,8 +134,8 @@ def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Ite
         )
     loads = list(spec.machine().loads)
     for load, sway in measured.sways.items():
-        times, found, planned, _ = _thinned(sway.signal)
-        lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * found)]
+        times, values, planned, _ = _thinned(sway.signal)
+        lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * values)]
         if measured.nearest:
             like = evaluation.swing.at(times)[measured.nearest].sway[:, loads.index(load)]
             name = machine(evaluation.machines[measured.nearest].name)
@@ -145,8 +145,8 @@ def _panels(spec: Spec, evaluation: MotionEvaluation, measured: Measured) -> Ite
         levels = sway_levels(spec, load, measured.arrival, float(times[-1]))
         yield _swinging(Phrase("Sway of the {load}", load=load), "sway (mm)", lines, levels, arrival)
     for load, signal in measured.angles.items():
-        times, found, planned, _ = _thinned(signal)
-        lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * found)]
+        times, values, planned, _ = _thinned(signal)
+        lines = [_planned(times, 1e3 * planned), _measured(times, 1e3 * values)]
         yield _swinging(Phrase("Angle of the {load}", load=load), "angle (mrad)", lines, [], arrival)
 
 

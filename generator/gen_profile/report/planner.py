@@ -118,7 +118,7 @@ def _facts(proof: Proof) -> list[tuple[str, str]]:
     return [
         ("Histories", f"{len(proof.judged)}"),
         (f"Residual sway of the {load}, worst", mm(worst.residual[load])),
-        ("Share of its limit", Share(proof.share(worst)).percent),
+        ("Share of its limit", Share(proof.fraction(worst)).percent),
         ("Sway on the way, worst", mm(swaying)),
         ("Standstill after the last command", f"{number(resting)} s at most"),
     ]
@@ -128,13 +128,13 @@ def _sections(judgement: BlockJudgement, followed: Trace) -> Iterator[Section]:
     """Put the page in the order in which an engineer asks."""
     spec, proof = judgement.spec, judgement.check
     worst = proof.worst
-    told = worst.history.told(spec.machine().units)
+    reported = worst.history.reported(spec.machine().units)
     commands = len(worst.history.commands)
     yield Section(
         title="The worst history",
         words=(
             f"History {worst.number}: {commands} commands from {worst.history.start_words} on"
-            + (f"; the block is told {told}." if told else "."),
+            + (f"; the block is told {reported}." if reported else "."),
         ),
         blocks=[
             history_figure(spec, proof, followed),
@@ -182,18 +182,18 @@ def _cells(command: Command, axes: Sequence[BlockAxis]) -> list[str]:
 
 
 def _ranking(spec: Spec, proof: Proof) -> Table:
-    ranked = sorted(proof.judged, key=proof.share, reverse=True)[:LISTED]
+    ranked = sorted(proof.judged, key=proof.fraction, reverse=True)[:LISTED]
     live, units = list(ranked[0].history.live), spec.machine().units
 
     def row(one: JudgedHistory) -> TableRow:
         values = [number(one.history.live[name]) for name in live]
         load = _worst_load(proof, one)
         residual = f"{load} {mm(one.residual[load])}"
-        cells: list[str | Share] = [f"{one.number}", one.group, *values, residual, Share(proof.share(one))]
-        return TableRow(cells=cells, mark="failed" if proof.share(one) > 1.0 else "")
+        cells: list[str | Share] = [f"{one.number}", one.group, *values, residual, Share(proof.fraction(one))]
+        return TableRow(cells=cells, mark="failed" if proof.fraction(one) > 1.0 else "")
 
-    told = (f"{name} ({units[name]})" for name in live)
-    head = ("history", "group", *told, "residual sway", "share of its limit")
+    live_columns = (f"{name} ({units[name]})" for name in live)
+    head = ("history", "group", *live_columns, "residual sway", "share of its limit")
     return Table(head=head, rows=[row(one) for one in ranked], words=2)
 
 
@@ -203,11 +203,11 @@ def _limits(spec: Spec, proof: Proof) -> Table:
     for column, axis in proof.worst.history.axes.items():
         own = spec.limits.of(column)
         for name, per in (("velocity", "/s"), ("acceleration", "/s²"), ("jerk", "/s³")):
-            share = max(one.limits[f"{axis.prefix}{name}"] for one in proof.judged)
+            fraction = max(one.limits[f"{axis.prefix}{name}"] for one in proof.judged)
             limit, unit = getattr(own, name), f"{axis.unit}{per}"
             title = f"{name} of {axis.name}" if axis.name else name
-            cells = (title, f"{number(share * limit)} {unit}", f"{number(limit)} {unit}", Share(share))
-            rows.append(TableRow(cells=cells, mark="passed" if share <= 1.0 + 1e-9 else "failed"))
+            cells = (title, f"{number(fraction * limit)} {unit}", f"{number(limit)} {unit}", Share(fraction))
+            rows.append(TableRow(cells=cells, mark="passed" if fraction <= 1.0 + 1e-9 else "failed"))
     for load, limit in proof.limit.items():
         worst = max(one.residual[load] for one in proof.judged if one.promise) + proof.error_bound
         cells = (f"residual sway of the {load}, error included", mm(worst), mm(limit), Share(worst / limit))

@@ -36,13 +36,13 @@ def require_browser() -> str:
     OutputError
         There is none.
     """
-    found = next((place for name in BROWSERS if (place := shutil.which(name))), None)
-    if found is None:
+    browser = next((place for name in BROWSERS if (place := shutil.which(name))), None)
+    if browser is None:
         raise OutputError(
             "out: printing to PDF needs Chromium, Chrome or Edge, and none was found; install one, or "
             "write a .html and print it from a browser."
         )
-    return found
+    return browser
 
 
 def printed(page: bytes) -> bytes:

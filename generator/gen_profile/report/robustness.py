@@ -37,9 +37,9 @@ def robustness_section(
     names = list(spec.robustness.uncertain)
     if not names:
         return None
-    found = {name: robustness_of(spec, motions, error_grid(spec, (name,))) for name in names}
-    telling = sorted(names, key=lambda name: float(found[name].share(own).max()), reverse=True)
-    figure = curves_figure({name: one for name, one in found.items() if name in telling[:MOST]}, styles)
+    curves = {name: robustness_of(spec, motions, error_grid(spec, (name,))) for name in names}
+    telling = sorted(names, key=lambda name: float(curves[name].fraction(own).max()), reverse=True)
+    figure = curves_figure({name: one for name, one in curves.items() if name in telling[:MOST]}, styles)
     if len(names) > MOST:
         more = f" Of {len(names)} uncertain parameters those {MOST} with which it sways most."
         figure = attrs.evolve(figure, caption=figure.caption + more)
@@ -51,18 +51,18 @@ def robustness_section(
         figures.append(maps_figure(robustness_of(spec, both, error_grid(spec, pair))))
     return Section(
         title="Robustness",
-        words=[" ".join(_reach(name, one, own) for name, one in found.items())],
+        words=[" ".join(_reach(name, one, own) for name, one in curves.items())],
         blocks=figures,
     )
 
 
-def _reach(name: str, found: Robustness, own: str) -> str:
+def _reach(name: str, curve: Robustness, own: str) -> str:
     """Say between which errors every load keeps its limit."""
-    reach = found.insensitivity(own)
+    reach = curve.insensitivity(own)
     if reach is None:
         return f"On the machine as specified a load exceeds its limit, whatever {name}."
     low, high = (f"{100.0 * end:+.3g}\N{NO-BREAK SPACE}%".replace("-", "−") for end in reach)
-    (errors,) = found.errors.values()
+    (errors,) = curve.errors.values()
     if reach == (errors[0], errors[-1]):
         return f"Every load keeps its limit over all errors of {name} tried, {low} to {high}."
     return f"Every load keeps its limit while the error of {name} is between {low} and {high}."

@@ -209,8 +209,8 @@ class Linearized:
         nodes, stages = self.current.nodes, self.current.stages
         n, free = len(initial), np.isnan(final)
         ends = np.where(free, np.arange(n) + n, np.arange(n))
-        missed = np.where(free, 0.0, final) - nodes[-1, ends]
-        correction = _solve_nodes(self.transition, self.offset, initial - nodes[0, :n], missed, ends)
+        residual = np.where(free, 0.0, final) - nodes[-1, ends]
+        correction = _solve_nodes(self.transition, self.offset, initial - nodes[0, :n], residual, ends)
         answer = self.response[..., 0] + np.einsum("kiab,kb->kia", self.response[..., 1:], correction[:-1])
         return attrs.evolve(self.current, nodes=nodes + correction, stages=stages + answer)
 

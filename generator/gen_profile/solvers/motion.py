@@ -29,12 +29,12 @@ def optimal_profile(solution: Solution) -> Profile:
     for order in reversed(range(optimum.top_order)):
         coefficients, end = _integrate(coefficients, lengths, start if order == 0 else np.zeros_like(start))
         ends.append(end)
-    missed = np.array(ends[::-1])
-    missed[0] -= target
-    missed[1] -= problem.final_velocity
+    residual = np.array(ends[::-1])
+    residual[0] -= target
+    residual[1] -= problem.final_velocity
     return Profile(
         knots=optimum.knots,
-        coefficients=coefficients - _closing(missed, optimum.knots, coefficients.shape[1]),
+        coefficients=coefficients - _closing(residual, optimum.knots, coefficients.shape[1]),
         target=target,
         method="optimal",
         final_velocity=np.array(problem.final_velocity),
@@ -58,25 +58,25 @@ def _integrate(coefficients: Array, lengths: Array, initial: Array) -> tuple[Arr
     return np.concatenate([values[:-1, None], integral], axis=1), values[-1]
 
 
-def _closing(missed: Array, knots: Array, size: int) -> Array:
+def _closing(residual: Array, knots: Array, size: int) -> Array:
     """Polynomial that rises from rest to the missed derivatives at the end, in each segment's own time.
 
     Parameters
     ----------
-    missed : (orders, axes) array
+    residual : (orders, axes) array
         Value at the end of the derivatives 0, 1, …
     knots : (segments + 1,) array
     size : int
         Number of coefficients per segment.
     """
-    orders, _ = missed.shape
+    orders, _ = residual.shape
     duration = knots[-1]
     powers = np.arange(orders, 2 * orders)
     falling = np.array([[math.perm(int(p), d) for p in powers] for d in range(orders)], dtype=np.float64)
-    scaled = missed * duration ** np.arange(orders)[:, None]
-    whole = np.zeros((2 * orders, missed.shape[1]))
+    scaled = residual * duration ** np.arange(orders)[:, None]
+    whole = np.zeros((2 * orders, residual.shape[1]))
     whole[orders:] = np.linalg.solve(falling, scaled)
-    local = np.zeros((len(knots) - 1, size, missed.shape[1]))
+    local = np.zeros((len(knots) - 1, size, residual.shape[1]))
     for d in range(min(size, 2 * orders)):
         values = polynomial.polyval(knots[:-1] / duration, polynomial.polyder(whole, d))
         local[:, d] = np.asarray(values).T / (math.factorial(d) * duration**d)

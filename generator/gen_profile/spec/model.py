@@ -287,7 +287,7 @@ class PathSpec(Checked, table="check.path"):
         return self.latency > 0.0 or self.jitter > 0.0 or self.lost > 0.0
 
     @property
-    def bends(self) -> bool:
+    def alters_setpoints(self) -> bool:
         """Whether the drive makes something else of setpoints that come in time than straight lines."""
         return self.quantum > 0.0 or self.between != "linear" or self.lag is not None
 
@@ -408,7 +408,8 @@ class Spec(Summarised, Checked):
             "machine": self.plant.type,
             "move": f"{list(move.start)} to {list(move.target)}",
             "duration": "the shortest" if move.shortest else f"{move.duration:g} s",
-            "uncertain": ", ".join(f"{name} ±{100.0 * share:g} %" for name, share in ranges) or "nothing",
+            "uncertain": ", ".join(f"{name} ±{100.0 * fraction:g} %" for name, fraction in ranges)
+            or "nothing",
         }
 
     def machine(self) -> Plant:
@@ -428,8 +429,8 @@ class Spec(Summarised, Checked):
         """Least and greatest value of every parameter that the check changes, in the machine's order."""
         shares = self.robustness.uncertain if self.check.uncertain is None else self.check.uncertain
         ranges = dict(self.check.spans)
-        for name, share in shares.items():
-            low, high = (self.plant.parameters[name] * (1.0 + sign * share) for sign in (-1, +1))
+        for name, fraction in shares.items():
+            low, high = (self.plant.parameters[name] * (1.0 + sign * fraction) for sign in (-1, +1))
             ranges.setdefault(name, (low, high))
         return {name: ranges[name] for name in self.plant.parameters if name in ranges}
 

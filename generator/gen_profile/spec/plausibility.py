@@ -86,7 +86,7 @@ def refuse_implausible(spec: Spec) -> None:
         raise SpecError(*refused)
 
 
-def doubts(spec: Spec) -> tuple[str, ...]:
+def plausibility_warnings(spec: Spec) -> tuple[str, ...]:
     """Say which values are hardly meant, a sentence each."""
     return tuple(doubt.sentence for doubt in _doubts(spec) if not doubt.refused)
 
@@ -183,7 +183,7 @@ def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
     """Doubt limits of the residual sway that every motion keeps."""
     limits = spec.check.residual_sway
     usual = RESIDUAL_SHARE * spec.move.longest(spec.machine())
-    alike = len(set(limits.values())) == 1
+    one_limit = len(set(limits.values())) == 1
     from_rest = not spec.move.initial and spec.move.stops
     end_load = spec.machine().end_load
     ends = spec.machine().loads[end_load]  # others, such as a hook, may be left to swing
@@ -191,7 +191,7 @@ def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
         if spec.check.default or math.isclose(limit, usual):
             continue  # what nobody typed is no slip
         column = list(limits).index(load)
-        place = "check.residual_sway" if alike else f"check.residual_sway.{load}"
+        place = "check.residual_sway" if one_limit else f"check.residual_sway.{load}"
         directions = end_load if load in ends else slice(column, column + 1)
         depth, way, sway = (float(of[directions].max()) for of in (scale.depth, scale.way, scale.sway))
         cure = _thousandth(limit, "lengths are in m")
@@ -215,7 +215,7 @@ def _residual(spec: Spec, scale: Scale) -> Iterator[Doubt]:
             yield Doubt(place=place, problem=problem)
         else:
             continue
-        if alike:
+        if one_limit:
             return
 
 
@@ -265,9 +265,9 @@ def _scale_at_target(spec: Spec) -> Scale:
     plant, target = spec.machine(), list(spec.move.target)
     named = SimpleNamespace(**spec.plant.parameters)
     still = [0.0] * len(plant.unactuated)
-    standing = [0.0] * len(target)
+    at_rest = [0.0] * len(target)
     swung: list[list[float]] = (STEP * np.eye(len(still))).tolist()
-    rest, *near = (plant.equations(q_u, still, target, standing, named) for q_u in (still, *swung))
+    rest, *near = (plant.equations(q_u, still, target, at_rest, named) for q_u in (still, *swung))
     level, *views = (plant.outputs(q_u, target, named) for q_u in (still, *swung))
     stiffness = -np.array([one.K_u for one in near], dtype=float).T / STEP
     inputs = np.array(rest.M_au, dtype=float).T

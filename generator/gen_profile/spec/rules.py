@@ -158,14 +158,17 @@ def _shares(spec: Spec, plant: Plant) -> Iterator[Fault]:
         "robustness": spec.robustness.uncertain,
         "check": spec.check.uncertain or {},
     }
-    cures = {"robustness": "", "check": "; state check.spans"}
+    cure_by_table = {"robustness": "", "check": "; state check.spans"}
     for table, shares in tables.items():
         for parameter in plant.parameters:
             if parameter.name not in shares:
                 continue
             where, value = place(f"{table}.uncertain", parameter.name), spec.plant.parameters[parameter.name]
             if value == 0.0:
-                yield where, Phrase("its value is 0, so a relative range is empty{cure}", cure=cures[table])
+                yield (
+                    where,
+                    Phrase("its value is 0, so a relative range is empty{cure}", cure=cure_by_table[table]),
+                )
             for end in (value * (1.0 + sign * shares[parameter.name]) for sign in (-1.0, 1.0)):
                 if not parameter.lower <= end <= parameter.upper:
                     bounds = Phrase("{own.lower:g} to {own.upper:g} {own.unit}", own=parameter)

@@ -49,7 +49,7 @@ class Faults:
 
     def _told(self, place: str) -> bool:
         """Whether something is wrong at a place, around it or inside it."""
-        pairs = ((f"{told}.", f"{place}.") for told in self._sentences)
+        pairs = ((f"{inner}.", f"{place}.") for inner in self._sentences)
         return any(one.startswith(other) or other.startswith(one) for one, other in pairs)
 
     def raise_any(self) -> None:

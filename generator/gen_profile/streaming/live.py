@@ -78,9 +78,9 @@ class Glance:
     @classmethod
     def at(cls, book: Book, view: View) -> Glance:
         """Look into the streamer's record as it is now."""
-        sent, told = np.flatnonzero(book.late), book.told != 0
-        actual = np.where(told[:, None], book.actual / view.scale, np.nan)
-        apart = np.abs(actual - view.planned)[told]
+        sent, answered = np.flatnonzero(book.late), book.answered != 0
+        actual = np.where(answered[:, None], book.actual / view.scale, np.nan)
+        apart = np.abs(actual - view.planned)[answered]
         return cls(
             phase=book.state,
             cycle=int(sent[-1]) + 1 if sent.size else 0,

@@ -42,8 +42,8 @@ def picture(view: View, glance: Glance, width: int) -> Group:
     parts = [head]
     for column, (axis, unit) in enumerate(zip(view.axes, view.units, strict=True)):
         planned, actual = view.planned[:, column], glance.actual[:, column]
-        told = actual[~np.isnan(actual)]
-        place = f"{told[-1]:.4g} {unit}, " if told.size else ""
+        answered = actual[~np.isnan(actual)]
+        place = f"{answered[-1]:.4g} {unit}, " if answered.size else ""
         parts.append(Text(f"{axis}: {place}at most {1e3 * glance.apart[column]:.3g} m{unit} off the motion"))
         parts += curves(planned, actual, max(10, width - MARGIN), HEIGHT)
     return Group(*parts)
@@ -82,7 +82,7 @@ def _cells(values: Array, low: float, high: float, width: int, height: int) -> N
     if not known.size:
         return cells
     x = known * (columns - 1) // max(1, len(values) - 1)
-    share = (values[known] - low) / ((high - low) or 1.0)
-    y = np.rint((1.0 - share) * (rows - 1)).astype(np.int64)
+    fraction = (values[known] - low) / ((high - low) or 1.0)
+    y = np.rint((1.0 - fraction) * (rows - 1)).astype(np.int64)
     np.bitwise_or.at(cells, (y // 4, x // 2), DOTS[y % 4, x % 2])
     return cells

@@ -68,25 +68,25 @@ class StreamOutcome:
     @property
     def actual(self) -> Array:
         """Position that each drive told at each SYNC, in m; not a number where none was told."""
-        return np.where(self._told[:, None], self.source.si(self._actual), np.nan)
+        return np.where(self._answered[:, None], self.source.si(self._actual), np.nan)
 
     @property
     def standstills(self) -> tuple[Standstill, ...]:
         """Axes that stood still while their setpoints went on."""
         period = self.source.plan.target.can.sync_period
-        return standstills(self.source.plan.at_sync, self._actual, self._told, period)
+        return standstills(self.source.plan.at_sync, self._actual, self._answered, period)
 
     def to_dict(self) -> dict[str, Any]:
         """Nest plain values for JSON."""
-        told, goal = self._told, self.source.plan.goal
-        apart = np.abs(self.actual - self.planned)[told]
+        answered, goal = self._answered, self.source.plan.goal
+        apart = np.abs(self.actual - self.planned)[answered]
         final = np.array(self.record.final)
-        missed = final - (final if goal is None else goal)
+        final_error = final - (final if goal is None else goal)
         drive = {
-            "position_error_m": float(np.abs(self.source.si(missed)).max()),
-            "following_error_max_m": float(apart.max()) if told.any() else None,
+            "position_error_m": float(np.abs(self.source.si(final_error)).max()),
+            "following_error_max_m": float(apart.max()) if answered.any() else None,
             "sway_residual_peak_m": self.sway,
-            "cycles_unanswered": self.record.sent - int(told.sum()),
+            "cycles_unanswered": self.record.sent - int(answered.sum()),
             "cycles_standing": sum(len(found.cycles) for found in self.standstills),
         }
         return {
@@ -95,7 +95,7 @@ class StreamOutcome:
             "cycles_planned": self.source.plan.planned,
             "lateness_us": self.record.lateness.to_dict(),
             "drift_s": self.record.lateness.drift,
-            "drive": drive if told.any() else None,
+            "drive": drive if answered.any() else None,
             "planner": self._planner(),
             "reason": self.record.reason,
             "notes": [*self.notes, *map(self._standstill_words, self.standstills)],
@@ -136,9 +136,9 @@ class StreamOutcome:
         )
 
     @property
-    def _told(self) -> NDArray[np.bool_]:
+    def _answered(self) -> NDArray[np.bool_]:
         """For which cycles there is a position; the record may have room for more of them."""
-        return self.record.told[: len(self.source.plan.at_sync)]
+        return self.record.answered[: len(self.source.plan.at_sync)]
 
     @property
     def _actual(self) -> Integers:

@@ -11,7 +11,7 @@ import numpy as np
 
 from gen_profile.errors import GenProfileError, SpecError, StreamAborted
 from gen_profile.motion.profile import SampledProfile
-from gen_profile.planner.commands import STILL, Command, begins_of, inputs_of
+from gen_profile.planner.commands import STILL, Command, inputs_of, start_cycles_of
 from gen_profile.planner.design import quick_limits
 from gen_profile.planner.execution import BlockInstance
 from gen_profile.planner.interface import ISSUED, LOST, live_inputs
@@ -76,7 +76,7 @@ class CommandList:
     attends, commanded = False, ""
 
     def __init__(self, commands: Sequence[Command], cycle: float) -> None:
-        self._left = list(zip(begins_of(commands, cycle), commands, strict=True))
+        self._left = list(zip(start_cycles_of(commands, cycle), commands, strict=True))
 
     @property
     def over(self) -> bool:
@@ -190,9 +190,9 @@ class PlannedMotion:
         """Hold what commands are taken from."""
         return self._operator.operated()
 
-    def begin(self, standing: Sequence[int]) -> Step:
+    def begin(self, rest_counts: Sequence[int]) -> Step:
         """Enable the block where the axes stand, in counts."""
-        for axis, scale, counts in zip(self._axes, self.target.axes, standing, strict=True):
+        for axis, scale, counts in zip(self._axes, self.target.axes, rest_counts, strict=True):
             self._values[axis.of("fActPosition")] = counts / scale.counts_per_si
         first = self.step(0)
         assert first is not None  # an axis stands for a while before a motion is over

@@ -16,7 +16,7 @@ from gen_profile.evaluation.residual_sway import observation_time
 from gen_profile.progress import Progress
 from gen_profile.spec.model import Spec
 from gen_profile.streaming.outcome import Source
-from gen_profile.streaming.stream import designed, standing
+from gen_profile.streaming.stream import actual_positions, designed
 from gen_profile.suggestion import suggestion
 from gen_profile_exporters.can.following_window import LEAST_USEFUL
 from gen_profile_exporters.can.host.port import Port
@@ -38,7 +38,7 @@ def to_start(source: Source, port: Port, *, simulate_drive: bool, tell: Progress
         There is no such motion.
     """
     spec = source.spec
-    at = spec.move.start if simulate_drive else standing(source, port, tell)
+    at = spec.move.start if simulate_drive else actual_positions(source, port, tell)
     apart = [abs(there - here) for here, there in zip(at, spec.move.start, strict=True)]
     if max(apart) <= spec.can.start_tolerance:
         return None
@@ -58,7 +58,7 @@ def jog(
         As `to_start`.
     """
     by_axis = _distances(distances, list(source.spec.axis))
-    at = source.spec.move.start if simulate_drive else standing(source, port, tell)
+    at = source.spec.move.start if simulate_drive else actual_positions(source, port, tell)
     target = [here + by_axis.get(name, 0.0) for name, here in zip(source.spec.axis, at, strict=True)]
     return designed(slow(source, at, target), tell)
 

@@ -134,7 +134,7 @@ def designed(spec: Spec, tell: Progress) -> Source:
         return verified(Path(folder) / outcome.artefacts[0].path)
 
 
-def standing(source: Source, port: Port, tell: Progress) -> tuple[float, ...]:
+def actual_positions(source: Source, port: Port, tell: Progress) -> tuple[float, ...]:
     """Ask the drives where their axes stand, in m (or rad); changes nothing.
 
     Raises

@@ -30,8 +30,8 @@ RIVALS = 3  # methods beside the design's own in it
 def depth(question: Question) -> Iterator[Part]:
     """Show what takes longer: the spectrum, other methods, and residual sway over the parameters' errors."""
     try:
-        found = plan(question.spec())
-        spec, evaluation = found.spec, found.evaluation
+        planned = plan(question.spec())
+        spec, evaluation = planned.spec, planned.evaluation
         yield {"part": "spectrum", "panels": curves_json(spectrum_figure(spec, evaluation))}
         own = own_method(spec)
         yield _robustness(spec, own, {own: evaluation.motion})
@@ -44,8 +44,8 @@ def depth(question: Question) -> Iterator[Part]:
         return
 
 
-def _comparison(found: Comparison, own: str) -> Part:
-    spec = found.spec
+def _comparison(compared: Comparison, own: str) -> Part:
+    spec = compared.spec
     return {
         "part": "comparison",
         "own": own,
@@ -55,13 +55,15 @@ def _comparison(found: Comparison, own: str) -> Part:
             {
                 **point(row.method, row.figures),
                 "safe": row.safe,
-                "pareto": row.method in found.efficient,
+                "pareto": row.method in compared.efficient,
                 "edits": _taking(spec, row.method, own),
             }
-            for row in found.rows
+            for row in compared.rows
         ],
-        "missing": found.missing(),
-        "recommended": {advice.aim: advice.method for advice in found.recommended.values() if advice.method},
+        "missing": compared.missing(),
+        "recommended": {
+            advice.aim: advice.method for advice in compared.recommended.values() if advice.method
+        },
     }
 
 
@@ -82,9 +84,9 @@ def _taking(spec: Spec, method: str, own: str) -> dict[str, Any]:
     return {**optimal, **kinds.get(method, {})}
 
 
-def _rivals(found: Comparison, own: str) -> Sequence[ComparedMethod]:
+def _rivals(compared: Comparison, own: str) -> Sequence[ComparedMethod]:
     """Choose the methods that leave the least sway, the best shaper among them."""
-    others = [row for row in found.rows if row.method != own]
+    others = [row for row in compared.rows if row.method != own]
     others.sort(key=lambda row: row.figures["sway_residual_worst_m"])
     shapers = [row for row in others if not row.method.startswith("optimal")]
     return list({row.method: row for row in [*shapers[:1], *others]}.values())[:RIVALS]
@@ -113,6 +115,6 @@ def _map(panel: Map) -> dict[str, Any]:
 
 def _robustness(spec: Spec, own: str, motions: Mapping[str, Profile]) -> Part:
     names = list(spec.robustness.uncertain)[:CURVES]
-    found = {name: robustness_of(spec, motions, error_grid(spec, (name,))) for name in names}
+    curves = {name: robustness_of(spec, motions, error_grid(spec, (name,))) for name in names}
     styles = method_styles(motions, [own])
-    return {"part": "robustness", "panels": curves_json(curves_figure(found, styles)) if found else []}
+    return {"part": "robustness", "panels": curves_json(curves_figure(curves, styles)) if curves else []}

@@ -110,7 +110,7 @@ class Drive:
             "part": "driven",
             "animation": frames.to_json(self._bounds),
             "seconds": MOMENT,
-            "axes": self._told(position[-1], velocity[-1], [end[-1] for end in ends]),
+            "axes": self._facts(position[-1], velocity[-1], [end[-1] for end in ends]),
             "live": [self._ranges(name, value) for name, value in self._live.items()],
             "target": None if self._target is None else self._target.tolist(),
             "marks": [] if self._target is None else self._marks(self._target).tolist(),
@@ -163,20 +163,20 @@ class Drive:
             raise SpecError(f"There is no command 'point' with {len(values)} such values.")
         low, high = self._ends()[:, self._columns]
         view, *place = values
-        found = least_squares(
+        result = least_squares(
             lambda target: self._marks(target)[int(view)] - place,
             np.clip(self._axes[0, self._columns], low, high),
             bounds=(low, high),
             method="dogbox",  # the other one stays where it begins at a bound
         )
-        return tuple(found.x.tolist())
+        return tuple(result.x.tolist())
 
     def _marks(self, target: Array) -> Array:
         """Tell where in every picture the nominal machine's end load hangs at a target, shape (views, 2)."""
         q_a = np.concatenate([self._ends(), self._places[None]])
         q_a[-1, self._columns] = target
-        seen = self._drawn(self._parameters()[0], q_a, np.zeros((len(q_a), len(self._plant.unactuated))))
-        return np.array([drawing.rest[-1, _load(drawing)] for drawing in seen])
+        drawings = self._drawn(self._parameters()[0], q_a, np.zeros((len(q_a), len(self._plant.unactuated))))
+        return np.array([drawing.rest[-1, _load(drawing)] for drawing in drawings])
 
     def _tell_live(self, live: Mapping[str, float]) -> None:
         """Give the machines the ropes that the planner was told of."""
@@ -253,13 +253,13 @@ class Drive:
         views: list[list[float]] = [view["bounds"] for view in frames["views"]]
         return views
 
-    def _told(self, position: Array, velocity: Array, stops: Sequence[Array]) -> list[Part]:
+    def _facts(self, position: Array, velocity: Array, stops: Sequence[Array]) -> list[Part]:
         """Tell of every planned axis where it is, where a stop would lead, and what it may do."""
-        told = []
+        facts = []
         for index, column in enumerate(self._columns):
             axis, limits = self._plant.actuated[column], self._spec.limits.of(column)
             unit, factor = place_unit(self._spec, column)
-            told.append(
+            facts.append(
                 {
                     "name": axis.name,
                     "unit": unit,
@@ -273,7 +273,7 @@ class Drive:
                     "travel": limits.travel,
                 }
             )
-        return told
+        return facts
 
     def _ranges(self, name: str, value: float) -> Part:
         low, high = self._spec.planner.live[name]
@@ -296,9 +296,9 @@ def _followers(spec: Spec) -> Sequence[Follower]:
     }
     if not ends:
         return [Follower(name="nominal", off={})]
-    found = [Follower(name="nominal", off={})]
+    followers = [Follower(name="nominal", off={})]
     for side in (0, 1):
         off = {name: both[side] for name, both in ends.items()}
-        words = ", ".join(f"{name} {100.0 * (share - 1.0):+.3g} %" for name, share in off.items())
-        found.append(Follower(name=machine(words), off=off))
-    return found
+        words = ", ".join(f"{name} {100.0 * (factor - 1.0):+.3g} %" for name, factor in off.items())
+        followers.append(Follower(name=machine(words), off=off))
+    return followers

@@ -200,9 +200,9 @@ class Guarded(RequestHandler):
         )
         self.set_header("Referrer-Policy", "same-origin")  # without it, the answer's origin would be null
         german = self.request.headers.get("Accept-Language", "").lower().startswith("de")
-        told = {key: escape(both[german]) for key, both in texts.items() if key.startswith("code.")}
-        told |= {"lang": "de" if german else "en", "hidden": "" if wrong else "hidden"}
-        page = re.sub(r"{([\w.]+)}", lambda found: told[found[1]], _asset("code.html"))
+        fields = {key: escape(both[german]) for key, both in texts.items() if key.startswith("code.")}
+        fields |= {"lang": "de" if german else "en", "hidden": "" if wrong else "hidden"}
+        page = re.sub(r"{([\w.]+)}", lambda match: fields[match[1]], _asset("code.html"))
         self.set_status(403)
         self.finish(page.replace("STYLE", style))
 

@@ -25,23 +25,23 @@ ZIPPED = (1980, 1, 1, 0, 0, 0)  # no clock in what is delivered
 
 def files(order: Order) -> Iterator[Part]:
     """Run the full check, and give what it passes."""
-    told: queue.Queue[Part | None] = queue.Queue()
+    parts: queue.Queue[Part | None] = queue.Queue()
 
     def tell(stage: str, done: int = 0, total: int = 0, remark: str = "") -> None:
-        told.put({"part": "progress", "stage": stage, "done": done, "total": total, "remark": remark})
+        parts.put({"part": "progress", "stage": stage, "done": done, "total": total, "remark": remark})
 
     def work() -> None:
         try:
-            told.put(_made(order, tell))
+            parts.put(_made(order, tell))
         except GenProfileError as error:
-            told.put({"part": "made", "passed": False, "sentences": error.sentences, "file": None})
+            parts.put({"part": "made", "passed": False, "sentences": error.sentences, "file": None})
         except Exception as error:
             sentence = f"Internal error ({type(error).__name__}: {error})."
-            told.put({"part": "made", "passed": False, "sentences": [sentence], "file": None})
-        told.put(None)
+            parts.put({"part": "made", "passed": False, "sentences": [sentence], "file": None})
+        parts.put(None)
 
     Thread(target=work, daemon=True).start()
-    while (part := told.get()) is not None:
+    while (part := parts.get()) is not None:
         yield part
 
 
@@ -60,15 +60,15 @@ def _made(order: Order, tell: Progress) -> Part:
 
 
 def _report(spec: Spec, order: Order, tell: Progress) -> tuple[Check | None, str, bytes | None]:
-    found = report(spec, order.formats, progress=tell)
-    return found.check, f"{spec.name}.html", found.content
+    made = report(spec, order.formats, progress=tell)
+    return made.check, f"{spec.name}.html", made.content
 
 
 def _artefacts(spec: Spec, order: Order, tell: Progress) -> tuple[Check | None, str, bytes | None]:
     with temporary_folder(Path(gettempdir()), "gen-profile-studio-") as parent:
         folder = parent / "out"
-        found = design(spec, order.formats, folder, progress=tell)
-        return found.check, f"{spec.name}.zip", _zipped(folder) if found.artefacts else None
+        outcome = design(spec, order.formats, folder, progress=tell)
+        return outcome.check, f"{spec.name}.zip", _zipped(folder) if outcome.artefacts else None
 
 
 def _zipped(folder: Path) -> bytes:

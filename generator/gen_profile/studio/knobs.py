@@ -277,9 +277,9 @@ def _of_parameter(one: Parameter, group: str, kind: str, value: Any) -> Knob:
 def _intervals(spec: Spec) -> Iterator[Knob]:
     """Tell the range of every parameter in its own unit: metres of rope, not a share of them."""
     for one in spec.machine().parameters:
-        nominal, share = spec.plant.parameters[one.name], spec.robustness.uncertain.get(one.name)
+        nominal, fraction = spec.plant.parameters[one.name], spec.robustness.uncertain.get(one.name)
         if nominal > 0.0:
-            ends = None if share is None else [nominal * (1.0 - share), nominal * (1.0 + share)]
+            ends = None if fraction is None else [nominal * (1.0 - fraction), nominal * (1.0 + fraction)]
             yield _of_parameter(one, "robustness", "interval", ends)
 
 
@@ -325,8 +325,8 @@ def _of_axes(spec: Spec, listed: Iterator[Knob]) -> Iterator[Knob]:
     """Write units of axes that turn, where all do."""
     turning = all(axis.unit == "rad" for axis in spec.machine().actuated)
     for knob in listed:
-        turned = turning and knob.unit.startswith("m")
-        yield attrs.evolve(knob, unit=f"rad{knob.unit[1:]}") if turned else knob
+        rotary = turning and knob.unit.startswith("m")
+        yield attrs.evolve(knob, unit=f"rad{knob.unit[1:]}") if rotary else knob
 
 
 def _limits(spec: Spec) -> Iterator[Knob]:

@@ -97,14 +97,14 @@ def _reading(asked: LogQuestion, spec: Spec, columns: list[tuple[str, str]], use
 def _swing(asked: LogQuestion, spec: Spec, read: MeasuredLog, places: Mapping[str, str]) -> Part:
     """Identify parameters."""
     swing = _only_swing(read, asked.after)
-    found = identify(spec, [swing], asked.free, asked.at or None)
+    identified = identify(spec, [swing], asked.free, asked.at or None)
     return {
         "part": "identified",
         "confidence": CONFIDENCE,
-        "parameters": [{"name": name, **row} for name, row in found.to_dict()["parameters"].items()],
-        "warnings": list(found.warnings()),
-        "panels": curves_json(identification_figure(found)),
-        "edits": _edits(found),
+        "parameters": [{"name": name, **row} for name, row in identified.to_dict()["parameters"].items()],
+        "warnings": list(identified.warnings()),
+        "panels": curves_json(identification_figure(identified)),
+        "edits": _edits(identified),
         "command": _identify_command(asked, swing, places),
     }
 
@@ -129,8 +129,8 @@ def _identify_command(asked: LogQuestion, swing: SwingLog, places: Mapping[str, 
     """Write the command line that identifies the same."""
     time = next(meaning for meaning in places if meaning.startswith("time"))
     signal = f"{swing.load}_{swing.quantity}"
-    told = re.compile(rf"{re.escape(signal)}(_[0-9.]*[a-z]+)?")
-    value = next(filter(told.fullmatch, places))
+    pattern = re.compile(rf"{re.escape(signal)}(_[0-9.]*[a-z]+)?")
+    value = next(filter(pattern.fullmatch, places))
     words = ["--swing", asked.name, "--columns", f"{places[time]},{places[value]}"]
     words += ["--signal", f"{swing.quantity}:{swing.load}"]
     words += ["--unit", value.rpartition("_")[2]] if value != signal else []
@@ -142,9 +142,9 @@ def _identify_command(asked: LogQuestion, swing: SwingLog, places: Mapping[str, 
     return f"{command_of(start, state.edits, 'identify')} {shlex.join(words)}"
 
 
-def _edits(found: Identification) -> Mapping[str, Any]:
+def _edits(identified: Identification) -> Mapping[str, Any]:
     """Say what to change in the spec in order to take over what was found."""
-    spec, names = found.spec, found.estimate.values
+    spec, names = identified.spec, identified.estimate.values
     uncertain = spec.robustness.uncertain
     return {
         **{f"plant.{name}": spec.plant.parameters[name] for name in names},
@@ -155,12 +155,12 @@ def _edits(found: Identification) -> Mapping[str, Any]:
 
 def _move(asked: LogQuestion, spec: Spec, read: MeasuredLog) -> Part:
     """Hold a move against the plan."""
-    found = draft(spec)
-    if found.motion is None:
+    drafted = draft(spec)
+    if drafted.motion is None:
         raise InfeasibleProblem("There is no such motion, so nothing to hold the log against.")
-    evaluation = sketch(found.spec, found.motion)
-    measured = compare_measured(found.spec, evaluation, read, evaluation.motion.duration)
-    section = measured_section(found.spec, evaluation, measured)
+    evaluation = sketch(drafted.spec, drafted.motion)
+    measured = compare_measured(drafted.spec, evaluation, read, evaluation.motion.duration)
+    section = measured_section(drafted.spec, evaluation, measured)
     figures = [block for block in section.blocks if isinstance(block, Figure)]
     verdict = measured_verdict(measured)
     start, state = asked.question.start, asked.question.state

@@ -21,9 +21,9 @@ import tornado.websocket
 from gen_profile.errors import GenProfileError, OutputError, SpecError
 from gen_profile.spec.reading import presets
 from gen_profile.strict_json import parse_json
-from gen_profile.studio.desk import Desk
 from gen_profile.studio.entrance import PATIENCE, BoundedServer, Entering, Entrance, Guarded, started_browser
 from gen_profile.studio.orders import DriveQuestion, LogQuestion, Order, Question
+from gen_profile.studio.session import Session
 from gen_profile.studio.state import StudioState, WrittenSpec, opened_start, preset_start
 from gen_profile.studio.workers import Message, Part, Workers, failure
 from gen_profile_exporters.registry import find_exporter, formats
@@ -87,7 +87,7 @@ class Studio:
     workers: Workers
     agreed: dict[Path, str] = attrs.field(factory=dict)
     opened: dict[str, WrittenSpec] = attrs.field(factory=dict)
-    first: Desk | None = None
+    first: Session | None = None
 
     def question(self, state: StudioState) -> Question:
         """Say what a page asks for.
@@ -196,8 +196,8 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         self._serial, self._made = 0, list[str]()
         self._pending: tuple[StudioState, list[Path]] | None = None
         self._dropped: tuple[str, bytes] | None = None
-        desk, self._studio.first = self._studio.first, None
-        self._desk = desk or Desk(self._studio.workers, asyncio.get_running_loop())
+        session, self._studio.first = self._studio.first, None
+        self._session = session or Session(self._studio.workers, asyncio.get_running_loop())
         self._tell(
             {
                 "part": "hello",
@@ -208,7 +208,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
                 "formats": {name: form.summary for name, form in formats().items()},
             }
         )
-        self._desk.attach(self._pass_on)
+        self._session.attach(self._pass_on)
 
     def on_message(self, message: str | bytes) -> None:
         """Take what the page asks for; whatever it says wrong is answered in a sentence."""
@@ -223,12 +223,12 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
                 "show": self._show,
                 "agree": self._agree,
                 "make": self._make,
-                "stop": lambda _: self._desk.leave_off(),
+                "stop": lambda _: self._session.cancel(),
                 "drop": lambda said: self._drop(said, content),
                 "read": self._read,
                 "forget": lambda _: self._forget(),
                 "drive": self._drive,
-                "park": lambda _: self._desk.leave_drive(),
+                "park": lambda _: self._session.leave_drive(),
             }
             act[said["say"]](said)
         except GenProfileError as error:
@@ -239,7 +239,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
 
     def on_close(self) -> None:
         """Let go of the page's workers and files."""
-        self._desk.close()
+        self._session.close()
         for name in self._made:
             self.settings["made"].pop(name, None)
 
@@ -262,7 +262,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         """Ask for a picture, once the user lets run what the spec wants to run."""
         question = self._permitted(state)
         if question is not None:
-            self._desk.show(self._serial, question)
+            self._session.show(self._serial, question)
 
     def _permitted(self, state: StudioState) -> Question | None:
         """Say what is asked for, or ask the user first whether he lets its programs run."""
@@ -289,7 +289,9 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
         for name in names:
             find_exporter(name)
         if question is not None:
-            self._desk.make(Order(question=question, formats=names or ("csv",), report=bool(said["report"])))
+            self._session.make(
+                Order(question=question, formats=names or ("csv",), report=bool(said["report"]))
+            )
 
     def _drop(self, said: dict[str, Any], content: bytes) -> None:
         """Take a file that was dropped on the page: a spec to start with, or a log."""
@@ -323,7 +325,7 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             at=at,
             free=tuple(map(str, said["free"])),
         )
-        self._desk.read(int(said["number"]), asked)
+        self._session.read(int(said["number"]), asked)
 
     def _drive(self, said: dict[str, Any]) -> None:
         """Let a planner block go on for a moment, once its spec may run what it wants to run."""
@@ -337,12 +339,12 @@ class Conversation(Guarded, tornado.websocket.WebSocketHandler):
             values=tuple(map(float, said["values"])),
             live={str(name): float(value) for name, value in said["live"].items()},
         )
-        self._desk.drive(int(said["number"]), asked)
+        self._session.drive(int(said["number"]), asked)
 
     def _forget(self) -> None:
         """Read no log any more."""
         self._dropped = None
-        self._desk.leave_log()
+        self._session.leave_log()
 
     def _tell(self, part: Part) -> None:
         self._write(json.dumps({**part, "serial": self._serial}))
@@ -409,7 +411,7 @@ async def _serve(
         stack.callback(workers.close)
         studio = Studio(start=start, workers=workers)
         if not start.programs:  # the first picture is on its way before the browser is
-            studio.first = Desk(workers, asyncio.get_running_loop())
+            studio.first = Session(workers, asyncio.get_running_loop())
             studio.first.show(0, studio.question(StudioState()))
         try:
             sockets = tornado.netutil.bind_sockets(port, LOOPBACK)

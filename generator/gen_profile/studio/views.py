@@ -25,7 +25,7 @@ from gen_profile.report.actors import animation
 from gen_profile.solvers.method_selection import ANSWER
 from gen_profile.solvers.solution import Status
 from gen_profile.spec.model import Spec
-from gen_profile.spec.plausibility import doubts
+from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.studio.curves_json import curves_json
 from gen_profile.studio.knobs import knobs
 from gen_profile.studio.orders import Question
@@ -52,18 +52,18 @@ def picture(question: Question) -> Iterator[Part]:
     try:
         spec = question.spec()
         with budget(*ANSWER):
-            found = draft(spec)
-            if found.motion is None:
+            drafted = draft(spec)
+            if drafted.motion is None:
                 yield failure("none", [SEARCHING])
             else:
-                yield from _seen(found.spec, sketch(found.spec, found.motion))
+                yield from _shown(drafted.spec, sketch(drafted.spec, drafted.motion))
             yield _setting(question, spec)
-            yield _verdict(judged(found))
+            yield _verdict(judged(drafted))
     except (GenProfileError, OutOfWork) as error:
         yield from _failure(question, error)
 
 
-def _seen(spec: Spec, evaluation: MotionEvaluation) -> Iterator[Part]:
+def _shown(spec: Spec, evaluation: MotionEvaluation) -> Iterator[Part]:
     """Draw the motion, and the machines under it."""
     arrival = evaluation.motion.duration
     shown = [one for one in select_machines(evaluation, RANKED) if one.rank <= SHOWN]
@@ -89,7 +89,7 @@ def _setting(question: Question, spec: Spec) -> Part:
         "command": command_of(start, state.edits),
         "text": text_of(start, state.edits),
         "address": state.address,
-        "doubts": [fault(sentence) for sentence in doubts(spec)],
+        "doubts": [fault(sentence) for sentence in plausibility_warnings(spec)],
     }
 
 
@@ -97,10 +97,10 @@ def _json(knob: Any) -> dict[str, Any]:
     """Leave out what is as by default; the page knows."""
     fields = attrs.fields(type(knob))
     values = {field.name: getattr(knob, field.name) for field in fields}
-    told = (
+    names = (
         name for name, value in values.items() if value != getattr(fields, name).default or name == "value"
     )
-    return {name: values[name] for name in told}
+    return {name: values[name] for name in names}
 
 
 def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any]]:
@@ -134,14 +134,14 @@ def _margins(spec: Spec, evaluation: MotionEvaluation) -> Iterator[dict[str, Any
             }
 
 
-def _verdict(found: Plan) -> Part:
+def _verdict(planned: Plan) -> Part:
     """Judge the motion on all machines of the ranges; a file that is written is judged by the check alone."""
-    spec, evaluation = found.spec, found.evaluation
+    spec, evaluation = planned.spec, planned.evaluation
     begin, limits = evaluation.motion.duration, np.array(list(spec.check.residual_sway.values()))
     times = np.linspace(begin, begin + evaluation.watch, RANKED)
     peaks = np.array([peak(one.sway) for one in evaluation.swing.at(times)])
     worst, load = np.unravel_index((peaks / limits).argmax(), peaks.shape)
-    figures = found.figures
+    figures = planned.figures
     inside = load in range(*spec.machine().end_load.indices(len(limits)))
     return {
         "part": "verdict",
@@ -156,8 +156,8 @@ def _verdict(found: Plan) -> Part:
         "sway_worst": figures["sway_transient_worst_m"],
         "sway_allowed": spec.limits.sway,
         "point": point(own_method(spec), figures),
-        "solver_time": found.solver_time,
-        "iterations": None if found.solution is None else found.solution.iterations,
+        "solver_time": planned.solver_time,
+        "iterations": None if planned.solution is None else planned.solution.iterations,
     }
 
 

@@ -62,7 +62,7 @@ class Message:
     file: tuple[str, bytes] | None = None
 
 
-def failure(answer: str, sentences: Sequence[str], cures: Sequence[Mapping[str, Any]] = ()) -> Part:
+def failure(answer: str, sentences: Sequence[str], suggestions: Sequence[Mapping[str, Any]] = ()) -> Part:
     """Say why there is no picture, and what would help.
 
     Parameters
@@ -70,14 +70,14 @@ def failure(answer: str, sentences: Sequence[str], cures: Sequence[Mapping[str, 
     answer : {"none", "faulty", "unanswered"}
         Whether there is no such motion, a value does not fit, or no answer was found.
     sentences : sequence of str
-    cures : sequence of mapping
+    suggestions : sequence of mapping
         Edits of the spec.
     """
     return {
         "part": "failure",
         "answer": answer,
         "sentences": [*sentences],
-        "cures": [dict(one) for one in cures],
+        "cures": [dict(one) for one in suggestions],
     }
 
 
@@ -223,8 +223,10 @@ def _answer(connection: Connection, job: Job) -> None:
         os.nice(NICENESS)
     connection.send(Message(number=job.number, kind=job.kind, name=BEGUN))
     for part in _parts(job):
-        file, told = part.get("file"), {**part, "of": job.kind, "serial": job.number}
-        text = json.dumps(plain(told if file is None else {**told, "file": None}), separators=(",", ":"))
+        file, document = part.get("file"), {**part, "of": job.kind, "serial": job.number}
+        text = json.dumps(
+            plain(document if file is None else {**document, "file": None}), separators=(",", ":")
+        )
         connection.send(Message(number=job.number, kind=job.kind, name=part["part"], text=text, file=file))
         if connection.poll(FRAME if part["part"] == "curves" else 0.0):
             return

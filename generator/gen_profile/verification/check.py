@@ -118,16 +118,16 @@ def check_artefact(
     spec, manifest = spec_and_manifest(path, content, spec)
     setpoints = find_exporter(format_).replay(content, target_of(spec))
     variant = parse_variant(spec, *map(as_names, (scale, mirror, offset)))
-    standing = provenance(manifest, content, spec)
+    agreement = provenance(manifest, content, spec)
     if samples is not None:
         spec = attrs.evolve(spec, check=attrs.evolve(spec.check, samples=samples))
-    judged = varied(spec, setpoints, variant) if variant.told() else (spec, setpoints)
+    judged = varied(spec, setpoints, variant) if variant.described() else (spec, setpoints)
     rows, searched = _rows(*judged, row, progress)
     check = _verdict(*judged, rows, progress)
-    faults = (*check.faults, *alterations(path, standing))
+    faults = (*check.faults, *alterations(path, agreement))
     check = attrs.evolve(check, strict=strict, faults=faults, searched=searched)
     return Judgement(
-        path=path, format=format_, spec=spec, check=check, manifest=standing, variant=variant.told()
+        path=path, format=format_, spec=spec, check=check, manifest=agreement, variant=variant.described()
     )
 
 
@@ -241,9 +241,9 @@ def provenance(manifest: Manifest | None, content: bytes, spec: Spec) -> str:
     return "differs"
 
 
-def alterations(path: Path, standing: str) -> tuple[str, ...]:
+def alterations(path: Path, agreement: str) -> tuple[str, ...]:
     """Say that a file is none of those that were exported."""
-    if standing != "differs":
+    if agreement != "differs":
         return ()
     return (
         f"{path.name} is none of the files that {FILENAME} beside it lists: it was altered after its export, "

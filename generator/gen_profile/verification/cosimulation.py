@@ -22,7 +22,7 @@ from gen_profile.motion.profile import Array, SampledProfile
 from gen_profile.problem.linearization import linearize
 from gen_profile.progress import Progress, no_progress
 from gen_profile.spec.model import Spec
-from gen_profile.spec.plausibility import doubts
+from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.verification.plausibility import implausibilities
 from gen_profile.verification.verdict import Check, Finding
 from gen_profile_fmu.running.cosimulation import PlantCosimulation
@@ -84,17 +84,17 @@ def cosimulate(
                 by_fmpy=by_fmpy,
             )
 
-        found = tuple(run(machine) for machine in machines)
-        if by_fmpy and not np.array_equal(run(machines[0], by_fmpy=True).sway, found[0].sway):
+        responses = tuple(run(machine) for machine in machines)
+        if by_fmpy and not np.array_equal(run(machines[0], by_fmpy=True).sway, responses[0].sway):
             raise CosimulationError("FMPy and the compiled loop move the FMU differently; report this.")
-    return found
+    return responses
 
 
 def judge(
     spec: Spec,
     setpoints: SampledProfile,
     machines: Sequence[Scenario],
-    found: Sequence[Response],
+    responses: Sequence[Response],
     expected: Sequence[Sway],
     *,
     followed: SampledProfile | None = None,
@@ -103,43 +103,45 @@ def judge(
 
     Parameters
     ----------
-    found : sequence of Response
+    responses : sequence of Response
         Of `cosimulate`, one per machine.
     expected : sequence of Sway
         Of another simulation, all at some of the same times, such that how far the two are apart bounds the
-        error of `found`.
+        error of `responses`.
     followed : SampledProfile, optional
-        What `found` followed, where it goes on for longer than the setpoints.
+        What `responses` followed, where it goes on for longer than the setpoints.
     """
-    standing = arrival(spec, followed or setpoints)
-    after = [_from(response, standing) for response in found]
-    error = _greatest_distance(found, expected, judged_from(spec, followed or setpoints))
+    arrival_time = arrival(spec, followed or setpoints)
+    after = [_from(response, arrival_time) for response in responses]
+    error = _greatest_distance(responses, expected, judged_from(spec, followed or setpoints))
     between = max(above_samples(response.sway) for response in after)
     if spec.limits.sway is not None:  # until the last setpoint samples are farther apart
         moving = len(setpoints.times)
-        between = max(between, *(above_samples(response.sway[:moving]) for response in found))
+        between = max(between, *(above_samples(response.sway[:moving]) for response in responses))
     return Check(
         limit=dict(spec.check.residual_sway),
         error_bound=error + between + ERROR_FLOOR,
         arrival=arrival(spec, setpoints),
         findings=tuple(
-            _finding(spec, machine, response, standing)
-            for machine, response in zip(machines, found, strict=True)
+            _finding(spec, machine, response, arrival_time)
+            for machine, response in zip(machines, responses, strict=True)
         ),
         sway_limit=spec.limits.sway,
         directions=spec.machine().directions,
         faults=implausibilities(spec, setpoints),
-        doubts=(*doubts(spec), *beyond_equations(spec, machines, found)),
+        plausibility_warnings=(*plausibility_warnings(spec), *beyond_equations(spec, machines, responses)),
     )
 
 
-def beyond_equations(spec: Spec, machines: Sequence[Scenario], found: Sequence[Response]) -> Iterator[str]:
+def beyond_equations(
+    spec: Spec, machines: Sequence[Scenario], responses: Sequence[Response]
+) -> Iterator[str]:
     """Warn of the machine that sways farthest beyond what its equations hold for."""
     plant = spec.machine()
     if plant.small_sway is None:
         return
     small = [plant.small_sway(SimpleNamespace(**machine.parameters)) for machine in machines]
-    swayed = [float(np.abs(response.sway[:, plant.end_load]).max()) for response in found]
+    swayed = [float(np.abs(response.sway[:, plant.end_load]).max()) for response in responses]
     worst = int(np.argmax(np.divide(swayed, small)))
     if swayed[worst] > small[worst]:
         yield (
@@ -154,13 +156,13 @@ def judged_from(spec: Spec, setpoints: SampledProfile) -> float:
     return (1.0 - ROUNDING) * arrival(spec, setpoints) if spec.limits.sway is None else 0.0
 
 
-def _greatest_distance(found: Sequence[Sway], expected: Sequence[Sway], since: float) -> float:
+def _greatest_distance(responses: Sequence[Sway], expected: Sequence[Sway], since: float) -> float:
     """Greatest difference of sways in m from a time on, at the expected times, which the others have, too."""
     times = expected[0].times
     compared = times >= since * (1.0 - ROUNDING)
-    own = found[0].times
+    own = responses[0].times
     rows = np.searchsorted(0.5 * (own[:-1] + own[1:]), times[compared])
-    apart = (one.sway[rows] - other.sway[compared] for one, other in zip(found, expected, strict=True))
+    apart = (one.sway[rows] - other.sway[compared] for one, other in zip(responses, expected, strict=True))
     return max(float(np.abs(distance).max()) for distance in apart)
 
 
@@ -199,12 +201,12 @@ def _from(response: Response, since: float) -> Response:
 
 
 def _finding(spec: Spec, machine: Scenario, response: Response, arrival: float) -> Finding:
-    plant, standing = spec.machine(), _from(response, arrival)
-    modal = modal_amplitudes(plant, machine.parameters, standing)
+    plant, after = spec.machine(), _from(response, arrival)
+    modal = modal_amplitudes(plant, machine.parameters, after)
     end_load = length(response.sway[:, plant.end_load])
     return Finding(
         scenario=machine,
-        residual=dict(zip(plant.loads, map(float, peak(standing.sway)), strict=True)),
+        residual=dict(zip(plant.loads, map(float, peak(after.sway)), strict=True)),
         modal=dict(zip(plant.loads, map(float, modal), strict=True)),
         on_the_way=None if spec.limits.sway is None else float(np.abs(end_load).max()),
     )

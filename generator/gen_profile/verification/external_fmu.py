@@ -12,7 +12,7 @@ from gen_profile.evaluation.scenarios import TIMING, Scenario
 from gen_profile.motion.metrics import peak
 from gen_profile.motion.profile import Array, SampledProfile, grid_length, grid_times
 from gen_profile.spec.model import ExternalFmu, Spec
-from gen_profile.spec.plausibility import doubts
+from gen_profile.spec.plausibility import plausibility_warnings
 from gen_profile.verification.batch import Feed
 from gen_profile.verification.cosimulation import ERROR_FLOOR, above_samples, arrival
 from gen_profile.verification.monte_carlo import standstill
@@ -56,8 +56,8 @@ def judge_external(
     error = 0.0
     together = [list(rows) for _, rows in groupby(machines, _driven_alike)]
     for rows in together:
-        found, apart = _judged(spec, foreign, setpoints, rows)
-        findings += found
+        own_findings, apart = _judged(spec, foreign, setpoints, rows)
+        findings += own_findings
         error = max(error, apart)
     return Check(
         limit={load: spec.check.residual_sway[load] for load in foreign.sway},
@@ -65,7 +65,7 @@ def judge_external(
         arrival=arrival(spec, setpoints),
         findings=tuple(findings),
         faults=implausibilities(spec, setpoints),
-        doubts=doubts(spec),
+        plausibility_warnings=plausibility_warnings(spec),
     )
 
 
@@ -91,12 +91,12 @@ def _judged(
     rest = inputs[-1:] if foreign.input == "setpoint" else np.zeros_like(inputs[-1:])
     times = np.concatenate([times, times[-1] + held])
     inputs = np.concatenate([inputs, np.repeat(rest, len(held), axis=0)])
-    found = _sways(foreign, times, inputs, rows)
+    responses = _sways(foreign, times, inputs, rows)
     finer = _sways(foreign, *_halved(foreign, times, inputs), rows)[:, ::2]
-    standing = times >= since * (1.0 - 1e-12)
-    found, finer = found[:, standing], finer[:, standing]
-    error = float(np.abs(found - finer).max()) + max(above_samples(sways) for sways in found)
-    return [_finding(foreign, row, sways) for row, sways in zip(rows, found, strict=True)], error
+    after = times >= since * (1.0 - 1e-12)
+    responses, finer = responses[:, after], finer[:, after]
+    error = float(np.abs(responses - finer).max()) + max(above_samples(sways) for sways in responses)
+    return [_finding(foreign, row, sways) for row, sways in zip(rows, responses, strict=True)], error
 
 
 def _finding(foreign: ExternalFmu, machine: Scenario, sways: Array) -> Finding:

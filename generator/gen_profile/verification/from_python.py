@@ -48,8 +48,8 @@ def cosimulate(
         raise SpecError("parameters: one value of each; residual_sways takes many machines.")
     names = (parameter.name for parameter in spec.machine().parameters)
     machine = Scenario(name="asked for", parameters=dict(zip(names, values, strict=True)))
-    (found,) = cosimulation.cosimulate(spec, setpoints, [machine], output_step=setpoints.cycle_time)
-    return found
+    (response,) = cosimulation.cosimulate(spec, setpoints, [machine], output_step=setpoints.cycle_time)
+    return response
 
 
 def residual_sways(

@@ -71,7 +71,7 @@ def with_further(
             batch = rows[first]
             peaks, apart = _batch(spec, setpoints, batch, runs)
             error = max(error, apart)
-            findings += [_finding(spec, row, found) for row, found in zip(batch, peaks, strict=True)]
+            findings += [_finding(spec, row, peak) for row, peak in zip(batch, peaks, strict=True)]
             if 10 * first.stop // len(rows) > 10 * first.start // len(rows):
                 progress(CHECKING, first.stop, len(rows))
     return attrs.evolve(check, findings=tuple(findings), error_bound=check.error_bound + error)
@@ -108,14 +108,14 @@ def _batch(
         )
 
     feed = transmitted(spec, setpoints, rows)
-    found = peaks(feed, max_step)
+    greatest = peaks(feed, max_step)
     straight = rows[0].group == "samples" and spec.check.path.between == "linear"
     if straight or follows_exactly(rows[0]):
         other = peaks(_every_other(feed), max_step)
     else:
         other = peaks(feed, 0.5 * np.minimum(max_step, setpoints.cycle_time))
-    between = CURVATURE * SAMPLE_PHASE**2 / 8.0 * float(found.max())
-    return found, float(np.abs(found - other).max()) + between
+    between = CURVATURE * SAMPLE_PHASE**2 / 8.0 * float(greatest.max())
+    return greatest, float(np.abs(greatest - other).max()) + between
 
 
 def watched(spec: Spec, setpoints: SampledProfile, phase: float = SAMPLE_PHASE) -> Array:

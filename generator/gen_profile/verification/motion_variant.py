@@ -40,7 +40,7 @@ class MotionVariant:
         """Offset of every axis."""
         return np.array([self.offset.get(name, 0.0) for name in axes])
 
-    def told(self) -> str | None:
+    def described(self) -> str | None:
         """Say it in words, or nothing where the motion is as planned."""
         words = [f"{name} {value:g} times as far" for name, value in self.scale.items()]
         words += [f"{name} the other way" for name in self.mirror]

@@ -78,8 +78,8 @@ def _missed_time(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
         return
     times, asked = setpoints.times, spec.move.duration
     onward = setpoints.position[-1] + np.outer(times - times[-1], spec.move.final_velocity)
-    standing = STANDING * _sizes(spec).max() + 0.5 * setpoints.resolution
-    moving = np.flatnonzero((np.abs(setpoints.position - onward) > standing).any(axis=1))
+    standstill = STANDING * _sizes(spec).max() + 0.5 * setpoints.resolution
+    moving = np.flatnonzero((np.abs(setpoints.position - onward) > standstill).any(axis=1))
     last = int(moving[-1]) if len(moving) else 0
     late = times[last] >= asked * (1.0 - ROUNDING)
     early = times[-1] + setpoints.cycle_time <= asked * (1.0 + ROUNDING)
@@ -100,13 +100,13 @@ def _contradiction(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
     noise = float(setpoints.resolution.max()) / setpoints.cycle_time
     apart: Array = np.abs(setpoints.velocity - central)[1:-1]
     worst, column = np.unravel_index(apart.argmax(), apart.shape)
-    found, axis = apart[worst, column], spec.machine().actuated[column]
-    if found > VELOCITY_TOLERANCE * size + noise + _missed_by_central(setpoints.velocity, central):
+    difference, axis = apart[worst, column], spec.machine().actuated[column]
+    if difference > VELOCITY_TOLERANCE * size + noise + _missed_by_central(setpoints.velocity, central):
         template = (
             "The velocity at {time:.6g} s contradicts the positions around it by {found:.3g} "
             "{unit}/s: the artefact was altered; export it again."
         )
-        yield Phrase(template, time=setpoints.times[worst + 1], found=found, unit=axis.unit)
+        yield Phrase(template, time=setpoints.times[worst + 1], found=difference, unit=axis.unit)
 
 
 def _central(spec: Spec, setpoints: SampledProfile) -> Array:
@@ -133,9 +133,9 @@ def _off_their_places(spec: Spec, setpoints: SampledProfile) -> Iterator[str]:
     """Say which setpoint lies off the curve through the others."""
     if len(setpoints.position) < FEWEST_SETPOINTS:
         return
-    bends = np.abs(_differences(spec, setpoints, 2))
+    curvatures = np.abs(_differences(spec, setpoints, 2))
     noise = 4.0 * setpoints.resolution + STANDING * _sizes(spec).max()
-    for axis, bend, unsure in zip(spec.machine().actuated, bends.T, noise, strict=True):
+    for axis, bend, unsure in zip(spec.machine().actuated, curvatures.T, noise, strict=True):
         worst = int(bend.argmax())
         usual = max(
             bend[: max(worst - NEIGHBOURS, 0)].max(initial=0.0),

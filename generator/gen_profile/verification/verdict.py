@@ -89,7 +89,7 @@ class Check(Summarised, Examination):
         Allowed sway of the end load at any time in m.
     searched : int
         Number of machines that were looked at for the worst ones in the ranges.
-    doubts : tuple of str
+    plausibility_warnings : tuple of str
         What the spec states and hardly means, a sentence each.
     """
 
@@ -102,7 +102,7 @@ class Check(Summarised, Examination):
     strict: bool = False
     sway_limit: float | None = None
     searched: int = 0
-    doubts: tuple[str, ...] = ()
+    plausibility_warnings: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, object]:
         """Tell what a reader looks for first."""
@@ -117,14 +117,17 @@ class Check(Summarised, Examination):
     def groups(self) -> dict[str, tuple[Finding, ...]]:
         """Findings by group, in the order of `GROUPS`."""
         by_name = {
-            name: tuple(found for found in self.findings if found.scenario.group == name) for name in GROUPS
+            name: tuple(finding for finding in self.findings if finding.scenario.group == name)
+            for name in GROUPS
         }
         return {name: findings for name, findings in by_name.items() if findings}
 
     @property
     def judged(self) -> tuple[Finding, ...]:
         """Findings that the verdict rests on."""
-        counted = tuple(found for found in self.findings if self.strict or found.scenario.group != TIMING)
+        counted = tuple(
+            finding for finding in self.findings if self.strict or finding.scenario.group != TIMING
+        )
         return counted or self.findings
 
     def keeps_limit(self, finding: Finding) -> bool:
@@ -170,7 +173,7 @@ class Check(Summarised, Examination):
         timing = () if self.strict else self.groups.get(TIMING, ())
         template = "{sentence} It counts where the check is strict."
         late = (Phrase(template, sentence=sentence) for sentence in self._sentences(timing))
-        return (*self.doubts, *late)
+        return (*self.plausibility_warnings, *late)
 
     def _sentences(self, findings: Sequence[Finding]) -> Iterator[str]:
         """Say which limits the worst of some scenarios break."""
@@ -238,8 +241,8 @@ class Check(Summarised, Examination):
         """Choose the findings worth a line: all of a small group, the first and the worst of a large one."""
         kept: list[Finding] = []
         for first, *rest in self.groups.values():
-            share = sorted(map(self._share, rest), reverse=True)
-            least = share[MOST_LISTED - 2] if len(rest) >= MOST_LISTED else 0.0
+            fractions = sorted(map(self._share, rest), reverse=True)
+            least = fractions[MOST_LISTED - 2] if len(rest) >= MOST_LISTED else 0.0
             kept += [first, *[finding for finding in rest if self._share(finding) >= least]]
         return tuple(kept)
 
@@ -259,6 +262,8 @@ class Check(Summarised, Examination):
             "rows": len(findings),
             "passed": all(map(self.keeps_limit, findings)),
             "counts": self.strict or name != TIMING,
-            "quantiles_m": {f"{share:g}": float(q) for share, q in zip(QUANTILES, quantiles, strict=True)},
+            "quantiles_m": {
+                f"{quantile:g}": float(q) for quantile, q in zip(QUANTILES, quantiles, strict=True)
+            },
             "worst": {"load": load, "row": worst.scenario.row, "residual_peak_m": worst.residual[load]},
         }

@@ -109,8 +109,8 @@ def worst_machines(
             places, looked_at = _searched(way, setpoints, runs)
             tried += looked_at
             exact = way.group == SEARCH
-            alike = [row for row in rows if (follows_exactly(row) if exact else row.group == way.group)]
-            machines += [way.scenario(place) for place in _new(places, [way.place(row) for row in alike])]
+            matching = [row for row in rows if (follows_exactly(row) if exact else row.group == way.group)]
+            machines += [way.scenario(place) for place in _new(places, [way.place(row) for row in matching])]
     numbered = (attrs.evolve(row, row=len(rows) + index) for index, row in enumerate(machines))
     return RangeSearch(machines=tuple(numbered), tried=tried)
 
@@ -127,7 +127,7 @@ def _ways(spec: Spec, duration: float) -> Iterator[_Way]:
     if box.ranges:
         yield _Way(spec=spec, box=box, group=SEARCH, lag=None)
     path = spec.check.path
-    if path.bends:
+    if path.alters_setpoints:
         low, high = path.lag or (None, None)
         if low is not None and high is not None and high > low:
             box = attrs.evolve(box, ranges={**box.ranges, LAG: (low, high)})
@@ -181,8 +181,8 @@ def _coarse(way: _Way, setpoints: SampledProfile, step: float) -> Feed:
 
 def _new(places: Array, known: Sequence[Array]) -> Iterator[Array]:
     """Leave out places that are known or come twice."""
-    seen = list(known)
+    taken = list(known)
     for place in places:
-        if not any(np.abs(place - other).max() < SAME for other in seen):
-            seen.append(place)
+        if not any(np.abs(place - other).max() < SAME for other in taken):
+            taken.append(place)
             yield place

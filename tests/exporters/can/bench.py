@@ -250,8 +250,8 @@ class Bench:
 
     def positions(self):
         """What the first drive told: instants, and positions in counts."""
-        told = self.of(0x180 + self.target.can.node)
-        return [(frame.at, int.from_bytes(frame.data[2:6], "little", signed=True)) for frame in told]
+        answers = self.of(0x180 + self.target.can.node)
+        return [(frame.at, int.from_bytes(frame.data[2:6], "little", signed=True)) for frame in answers]
 
     def asked(self, index):
         """Ask the first drive by SDO for an object, as anybody on the bus may; None without an answer."""

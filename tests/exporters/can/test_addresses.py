@@ -54,9 +54,17 @@ def test_files_tell_them():
         file.filename: file.content for file in encode(PROFILE, target("bridge", "trolley", **ADDRESSES))
     }
     database = cantools.database.load_string(files["bay-3.dbc"].decode(), "dbc")
-    told = {message.name: message.frame_id for message in database.messages}
-    assert {told[f"trolley_{what}"] for what in ("Command", "Setpoint", "Feedback")} == {0x22A, 0x33A, 0x19A}
-    assert {told[f"bridge_{what}"] for what in ("Command", "Setpoint", "Feedback")} == {0x209, 0x309, 0x189}
+    identifiers = {message.name: message.frame_id for message in database.messages}
+    assert {identifiers[f"trolley_{what}"] for what in ("Command", "Setpoint", "Feedback")} == {
+        0x22A,
+        0x33A,
+        0x19A,
+    }
+    assert {identifiers[f"bridge_{what}"] for what in ("Command", "Setpoint", "Feedback")} == {
+        0x209,
+        0x309,
+        0x189,
+    }
     rows = csv.DictReader(files["bay-3.startup.csv"].decode().splitlines())
     on = [row["value"] for row in rows if (row["node"], row["meaning"]) == ("4", "setpoint: on")]
     assert on == ["0x0000033A"]

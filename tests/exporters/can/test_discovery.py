@@ -45,9 +45,9 @@ def linux(tmp_path, monkeypatch):
 
 
 def test_channels_with_their_bit_rates_and_states(linux):
-    told = run_here("can", "list", "--interface", "socketcan", "--json").document
-    (interface,) = told["interfaces"]
-    assert told["nodes"] is None
+    document = run_here("can", "list", "--interface", "socketcan", "--json").document
+    (interface,) = document["interfaces"]
+    assert document["nodes"] is None
     assert interface["channels"] == [
         {"name": "can0", "bitrate": 250000, "state": "ERROR-ACTIVE"},
         {"name": "can1", "bitrate": None, "state": "DOWN"},

@@ -123,8 +123,8 @@ class TestTwoAnswers:
         own = target(fixed_pdos=SPLIT, sync_period=0.01, cob_ids={"cart": CobIdsSpec(position=0x2AA)})
         files = {file.filename.partition(".")[2]: file.content for file in encode(PROFILE, own)}
         database = cantools.database.load_string(files["dbc"].decode(), "dbc")
-        told = [database.get_message_by_name(f"cart_{name}") for name in ("Feedback", "Position")]
-        assert [(m.frame_id, m.length) for m in told] == [(0x181, 3), (0x2AA, 4)]
+        messages = [database.get_message_by_name(f"cart_{name}") for name in ("Feedback", "Position")]
+        assert [(m.frame_id, m.length) for m in messages] == [(0x181, 3), (0x2AA, 4)]
         rows = {
             (r["object"], r["meaning"]): r["value"]
             for r in csv.DictReader(files["startup.csv"].decode().splitlines())

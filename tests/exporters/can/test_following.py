@@ -16,7 +16,7 @@ PERIOD = 0.004
 
 
 def found(bench, record):
-    return standstills(bench.plan.motion.at_sync, record.actual, record.told, PERIOD)
+    return standstills(bench.plan.motion.at_sync, record.actual, record.answered, PERIOD)
 
 
 @pytest.mark.parametrize("many", [1, 2, 3])
@@ -44,13 +44,13 @@ def test_setpoints_that_a_drive_leaves_out(many, goal):
     assert stood.apart == pytest.approx(many * step, rel=0.02)
     machine = SimpleNamespace(actuated=[SimpleNamespace(name="cart", unit="m")])
     source = Source(plan=bench.plan, spec=SimpleNamespace(machine=lambda: machine))
-    told = StreamOutcome(source=source, record=record, notes=("first",)).to_dict()
-    assert (told["drive"]["cycles_standing"], told["drive"]["cycles_unanswered"]) == (many, 0)
+    document = StreamOutcome(source=source, record=record, notes=("first",)).to_dict()
+    assert (document["drive"]["cycles_standing"], document["drive"]["cycles_unanswered"]) == (many, 0)
     cycles = "1 cycle" if many == 1 else f"{many} cycles"
     pattern = (
         rf"axis cart: it stood still in {cycles} of the motion, from cycle 12\d on, and came [\d.]+ mm off"
     )
-    assert re.match(pattern, told["notes"][1])
+    assert re.match(pattern, document["notes"][1])
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.8])
@@ -64,10 +64,10 @@ def test_an_axis_that_follows_or_lags_stands_still_nowhere(lag):
 def test_a_delay_is_no_standstill_and_neither_are_lost_answers():
     led = np.rint(1e6 * quintic((0.0, 0.3))(np.arange(251) * PERIOD).position).astype(np.int64)
     late = np.concatenate([np.repeat(led[:1], 10, axis=0), led[:-10]])
-    told = np.ones(251, dtype=bool)
-    assert standstills(led, late, told, PERIOD) == ()
+    answered = np.ones(251, dtype=bool)
+    assert standstills(led, late, answered, PERIOD) == ()
     frozen = late.copy()
     frozen[100:103] = frozen[99]
-    told[100:103] = False
-    assert standstills(led, frozen, told, PERIOD) == ()
-    assert standstills(led[:5], led[:5], told[:5], PERIOD) == ()
+    answered[100:103] = False
+    assert standstills(led, frozen, answered, PERIOD) == ()
+    assert standstills(led[:5], led[:5], answered[:5], PERIOD) == ()

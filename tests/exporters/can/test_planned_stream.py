@@ -225,17 +225,17 @@ def test_keys_are_a_stick_and_buttons():
     keys = Keys(AXES, [2.0])
     sent = (b"\x1b[C\x1b", b"[C", b"\x1bOD", b" 1.5", b"\x7f25\r", b"\x1b[D", b"q", b"..\r", b"x")
     taken = [one for some in sent for one in keys.take(some)]
-    told = [(one.command, *(round(value, 9) for value in one.values)) for one in taken]
+    commands = [(one.command, *(round(value, 9) for value in one.values)) for one in taken]
     stick = [("velocity", 0.2), ("velocity", 0.4), ("velocity", 0.2)]
     then = [("stop",), ("position", 1.25), ("velocity", -0.2), ("quick-stop",), ("stop",)]
-    assert told == [*stick, *then]
+    assert commands == [*stick, *then]
     assert keys.over
 
 
 def test_of_two_axes_each_has_arrows_and_places():
     keys = Keys((BlockAxis(name="x"), BlockAxis(name="y")), [2.0, 1.0])
-    told = [(one.command, one.values) for one in keys.take(b"\x1b[C\x1b[B3,1.5\r7\r")]
-    assert told == [("velocity", (0.2, 0.0)), ("velocity", (0.2, -0.1)), ("position", (3.0, 1.5))]
+    commands = [(one.command, one.values) for one in keys.take(b"\x1b[C\x1b[B3,1.5\r7\r")]
+    assert commands == [("velocity", (0.2, 0.0)), ("velocity", (0.2, -0.1)), ("position", (3.0, 1.5))]
     assert keys.shown == "7: a position for each of 2 axes, please"
 
 

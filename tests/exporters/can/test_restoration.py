@@ -105,10 +105,10 @@ def test_what_is_not_taken_back_is_told():
 def test_a_drive_that_still_brakes_keeps_its_ramp():
     """It says that it is in fault, and brakes all the same."""
     with Bench(quick_stop=2.0) as bench:
-        before, told, ramps = held(bench.drive), bench.drive.feedback, []
+        before, plain_feedback, ramps = held(bench.drive), bench.drive.feedback, []
         lie = b"\x08\x02"
         bench.at_cycle(
-            120, lambda: setattr(bench.drive, "feedback", lambda: [(0x181, lie + told()[0][1][2:])])
+            120, lambda: setattr(bench.drive, "feedback", lambda: [(0x181, lie + plain_feedback()[0][1][2:])])
         )
         braking = (State.QUICK_STOP, State.FAULT_REACTION)
         look = lambda: bench.drive.state in braking and ramps.append(bench.drive.value(0x6085))  # noqa: E731

@@ -224,8 +224,8 @@ def answer(bench, index, sub, data):
     bench.heard.clear()
     bench.say(0x601, struct.pack("<BHB", 0x23 | 4 - len(data) << 2, index, sub) + data.ljust(4, b"\0"))
     bench.wait(1)
-    (told,) = bench.of(0x581)
-    return struct.unpack("<I", told.data[4:])[0] if told.data[0] == 0x80 else 0
+    (reply,) = bench.of(0x581)
+    return struct.unpack("<I", reply.data[4:])[0] if reply.data[0] == 0x80 else 0
 
 
 class TestRefusals:

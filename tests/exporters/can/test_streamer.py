@@ -58,7 +58,7 @@ class TestWholeStream:
             record = bench.run()
         assert record.final == (400_000,)
         np.testing.assert_array_equal(record.actual[1:, 0], bench.plan.motion.position[:-1, 0])
-        assert record.told.all()
+        assert record.answered.all()
         assert bench.positions()[-1][1] == 400_000
 
     def test_several_axes_in_interpolated_position_mode(self):
@@ -218,10 +218,10 @@ def tamper_feedback(change):
     """Change the statusword that the drive tells."""
 
     def act(bench):
-        told = bench.drive.feedback
+        plain_feedback = bench.drive.feedback
         bench.drive.feedback = lambda: [
             (cob_id, change(int.from_bytes(data[:2], "little")).to_bytes(2, "little") + data[2:])
-            for cob_id, data in told()
+            for cob_id, data in plain_feedback()
         ]
 
     return act

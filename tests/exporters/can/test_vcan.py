@@ -67,10 +67,10 @@ def scenario(scenarios, request):
         at = float(stamp.strip("()"))  # launch times are those of another clock
         at += ended["epoch"] if at < YEAR else 0.0
         frames.append((at, int(cob_id, 16), bytes.fromhex(data)))
-    told, drive = (place / "stream.json").read_text(), (place / "drive.json").read_text()
+    report, drive = (place / "stream.json").read_text(), (place / "drive.json").read_text()
     return SimpleNamespace(
         frames=frames,
-        stream=json.loads(told) if told else None,
+        stream=json.loads(report) if report else None,
         drive=json.loads(drive) if drive else None,
         log=(scenarios / "paper.log").read_text(),
         codes=(ended["stream"], ended["drive"]),

@@ -87,12 +87,12 @@ def run(place, log, queue, disturb):
     (place / "codes.json").write_text(
         json.dumps({**codes, "launches": launches, "epoch": time.time() - time.monotonic()})
     )
-    told = (place / "stream.json").read_text()
+    report = (place / "stream.json").read_text()
     if disturb is None:
-        running = '"state": "done"' in told and '"cycles_unanswered": 0' in told
-    late = [float(ms) / 1e3 for ms in re.findall(r"([\d.]+) ms late at cycle", told)]
+        running = '"state": "done"' in report and '"cycles_unanswered": 0' in report
+    late = [float(ms) / 1e3 for ms in re.findall(r"([\d.]+) ms late at cycle", report)]
     stalled = any(seconds < FROZEN - 0.1 for seconds in late) if disturb is _freeze else bool(late)
-    return running and not stalled and "no heartbeat" not in told
+    return running and not stalled and "no heartbeat" not in report
 
 
 def _begun(arguments, out, err):

@@ -36,7 +36,7 @@ def dbc(target: Target) -> bytes:
         ]
         blocks += [
             _message(own[pdo], f"{name}_{NAMES[layout.role(pdo)]}", fields, axis, (name, MASTER_NAME))
-            for pdo, fields in layout.told.items()
+            for pdo, fields in layout.transmitted.items()
         ]
     return ("\n\n".join(blocks) + "\n").encode("ascii")
 

@@ -73,9 +73,9 @@ def _of_linux() -> tuple[Channel, ...]:
     program = shutil.which("ip") or shutil.which("ip", path="/usr/sbin:/sbin")
     if program is None:
         return ()
-    told = subprocess.run([program, "-details", "-json", "link", "show"], capture_output=True, check=False)
+    listing = subprocess.run([program, "-details", "-json", "link", "show"], capture_output=True, check=False)
     try:
-        links = json.loads(told.stdout)
+        links = json.loads(listing.stdout)
     except ValueError:  # an ip that knows no JSON
         return ()
     return tuple(_channel(link) for link in links if link.get("link_type") == "can")

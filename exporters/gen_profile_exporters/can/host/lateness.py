@@ -31,9 +31,9 @@ class Lateness:
     late: NDArray[np.int64]
     period: int
 
-    def percentile(self, share: float) -> float:
-        """Lateness in µs that `share` percent of the cycles keep; 0 without any."""
-        return float(np.percentile(self.late, share)) / 1e3 if self.late.size else 0.0
+    def percentile(self, percent: float) -> float:
+        """Lateness in µs that `percent` percent of the cycles keep; 0 without any."""
+        return float(np.percentile(self.late, percent)) / 1e3 if self.late.size else 0.0
 
     @property
     def drift(self) -> float:

@@ -72,11 +72,11 @@ class DriveVariant:
 
 def dictionary(node: int, make: DriveVariant) -> canopen.ObjectDictionary:
     """Build the object dictionary of one node."""
-    found = canopen.ObjectDictionary()
-    found.node_id = node
-    _identify(found.device_information, make)
+    objects = canopen.ObjectDictionary()
+    objects.node_id = node
+    _identify(objects.device_information, make)
     for index, name, of, access, value in _variables(make):
-        found.add_object(_variable(index, 0, name, of, access=access, value=value))
+        objects.add_object(_variable(index, 0, name, of, access=access, value=value))
     for index, name, kind, access, values in _records(node, make):
         record = ODRecord(name, index) if index != 0x1016 else ODArray(name, index)
         record.add_member(_count(index, values, "const" if access == "const" else "rw"))
@@ -85,8 +85,8 @@ def dictionary(node: int, make: DriveVariant) -> canopen.ObjectDictionary:
                 continue
             of = kind[sub] if isinstance(kind, dict) else kind
             record.add_member(_variable(index, sub, f"{name} {sub}", of, access=access, value=value))
-        found.add_object(record)
-    return found
+        objects.add_object(record)
+    return objects
 
 
 def eds(node: int, make: DriveVariant, file_name: str = "drive.eds") -> str:
@@ -102,21 +102,21 @@ def eds(node: int, make: DriveVariant, file_name: str = "drive.eds") -> str:
     }
     for change in ("Creation", "Modification"):
         about |= {f"{change}Date": "01-01-2026", f"{change}Time": "12:00AM"}
-    found = dictionary(node, make)
-    for variable in _variables_of(found):
+    objects = dictionary(node, make)
+    for variable in _variables_of(objects):
         value = variable.default
         if variable.index in PDO_PARAMETERS and variable.subindex == 1:
             variable.default_raw = f"$NODEID+0x{value - node:X}"
         elif value < 0:  # decimal: two's complement in hexadecimal is read as a positive number by some
             variable.default_raw = str(value)
     text = StringIO()
-    export_eds(found, text, about)
+    export_eds(objects, text, about)
     return text.getvalue()
 
 
 def refusal(
     make: DriveVariant,
-    found: canopen.ObjectDictionary,
+    objects: canopen.ObjectDictionary,
     held: Callable[[int, int], int],
     place: tuple[int, int],
     value: int,
@@ -126,7 +126,7 @@ def refusal(
     Parameters
     ----------
     make : DriveVariant
-    found : canopen.ObjectDictionary
+    objects : canopen.ObjectDictionary
     held : callable
         What an object (index, subindex) holds.
     place : (int, int)
@@ -148,7 +148,7 @@ def refusal(
         entries = [value] if sub else [held(index, n) for n in range(1, min(value, MAPPED) + 1)]
         if (not sub and value > MAPPED) or sum(entry & 0xFF for entry in entries) > PDO_BITS:
             return PDO_TOO_LONG
-        if not all(_may_carry(found, index, entry) for entry in entries):
+        if not all(_may_carry(objects, index, entry) for entry in entries):
             return NOT_MAPPABLE
     return None
 
@@ -167,17 +167,17 @@ def _refusal_of_parameter(index: int, cob_id: int, sub: int, value: int) -> int 
     return OUT_OF_RANGE if sub == 2 and (acyclic or value not in TRANSMISSION_TYPES) else None
 
 
-def _may_carry(found: canopen.ObjectDictionary, mapping: int, entry: int) -> bool:
+def _may_carry(objects: canopen.ObjectDictionary, mapping: int, entry: int) -> bool:
     """Tell whether a PDO may carry an object: one that is there, whole, and to be written by an RPDO."""
     sub, bits = entry >> 8 & 0xFF, entry & 0xFF
-    variable = found.get_variable(entry >> 16, sub)
+    variable = objects.get_variable(entry >> 16, sub)
     if variable is None or variable.subindex != sub or len(variable) != bits:
         return False
     return bool(variable.pdo_mappable and (variable.writable or mapping >= 0x1A00))
 
 
-def _variables_of(found: canopen.ObjectDictionary) -> Iterator[Any]:
-    for entry in found.values():
+def _variables_of(objects: canopen.ObjectDictionary) -> Iterator[Any]:
+    for entry in objects.values():
         yield from [entry] if isinstance(entry, ODVariable) else entry.values()
 
 

@@ -74,7 +74,7 @@ class SimulatedDrive:
         self._heard: dict[int, int] = {}  # by RPDO, when
         self._master_heard: int | None = None
         self._syncs = 0
-        self._told: dict[int, tuple[int, bytes]] = {}  # by TPDO that is sent on change: when, and what
+        self._last_sent: dict[int, tuple[int, bytes]] = {}  # by TPDO that is sent on change: when, and what
         self.local: Any = _Node(node, make, self.value)
         self.local.add_write_callback(self._written)
         self._pack_feedback()
@@ -186,16 +186,16 @@ class SimulatedDrive:
 
     def events(self, now: int) -> list[tuple[int, bytes]]:
         """List the TPDOs due at an event: a change, but for the inhibit time, or the event timer's end."""
-        sent, told = [], self._told
-        self._told = {}
+        sent, last_sent = [], self._last_sent
+        self._last_sent = {}
         for pdo, cob_id, data in self._tpdos(AT_ONCE.__contains__):
             inhibit, timer = self.value(0x1800 + pdo, 3), self.value(0x1800 + pdo, 5)
-            at, last = told.get(pdo, (now, None))
+            at, last = last_sent.get(pdo, (now, None))
             changed = data != last and now - at >= inhibit * INHIBIT_UNIT
             if last is None or changed or (timer and _over(now, at, timer)):
                 sent.append((cob_id, data))
                 at, last = now, data
-            self._told[pdo] = at, last
+            self._last_sent[pdo] = at, last
         return sent
 
     def fault(self, code: int) -> None:

@@ -23,12 +23,12 @@ CREEP = 0.001  # m/s and m/s² (or rad) of an axis that the motion leaves at res
 PEAK_VELOCITY, PEAK_ACCELERATION = 15 / 8, 10 / 3**0.5  # of the polynomial, for unit distance and time
 
 
-def approach(standing: Sequence[int], demand: Demand, target: Target) -> Setpoints:
+def approach(rest_counts: Sequence[int], demand: Demand, target: Target) -> Setpoints:
     """Lead all axes to the first setpoint, to arrive there together.
 
     Parameters
     ----------
-    standing : sequence of int
+    rest_counts : sequence of int
         Where the axes stand, in counts.
     demand : Demand
         Of the motion.
@@ -40,12 +40,14 @@ def approach(standing: Sequence[int], demand: Demand, target: Target) -> Setpoin
         Of no cycle, where the axes stand at the first setpoint already, or the motion begins anywhere.
     """
     period = target.can.sync_period
-    distance = np.array(standing if demand.start is None else demand.start) - np.array(standing)
+    distance = np.array(rest_counts if demand.start is None else demand.start) - np.array(rest_counts)
     cycles = ceil(max(_durations(distance, demand, target)) / period)
-    share = np.arange(cycles + 1)[:, None] / max(1, cycles)
-    position = np.rint(standing + distance * share**3 * (10 - 15 * share + 6 * share**2)).astype(np.int64)
+    fraction = np.arange(cycles + 1)[:, None] / max(1, cycles)
+    position = np.rint(rest_counts + distance * fraction**3 * (10 - 15 * fraction + 6 * fraction**2)).astype(
+        np.int64
+    )
     offsets = len(pdos.setpoint_fields(target.can)) - 1
-    rest = np.zeros((cycles, len(standing), offsets), dtype=np.int64)
+    rest = np.zeros((cycles, len(rest_counts), offsets), dtype=np.int64)
     if target.can.mode != "csv":
         return Setpoints(period=period, position=position[1:], offsets=rest)
     velocity = np.diff(np.rint(position / period), axis=0).astype(np.int64)  # rounding adds nothing up

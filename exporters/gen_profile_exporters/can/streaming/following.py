@@ -39,7 +39,7 @@ class Standstill:
 
 
 def standstills(
-    led: Integers, actual: Integers, told: NDArray[np.bool_], period: float
+    led: Integers, actual: Integers, answered: NDArray[np.bool_], period: float
 ) -> tuple[Standstill, ...]:
     """Find the cycles in which axes moved less than half of the least that the latest setpoints asked for.
 
@@ -49,7 +49,7 @@ def standstills(
         Where the axes were to be by each SYNC, in counts.
     actual : (cycles, axes) integer array
         Where they were.
-    told : (cycles,) boolean array
+    answered : (cycles,) boolean array
         For which cycles that is known.
     period : float
         SYNC period in s.
@@ -65,9 +65,9 @@ def standstills(
         back = np.where((latest < 0).all(axis=1), latest.max(axis=1), 0)
         least = ahead + back
         moved = np.diff(actual[:, column])[window - 1 :] * np.sign(least)
-        enough = np.abs(least) >= max(LEAST_STEP, SLOW * np.abs(steps[:, column]).max())
-        known = (told[1:] & told[:-1])[window - 1 :]
-        cycles = np.flatnonzero(enough & known & (moved < 0.5 * np.abs(least))) + window
+        moving = np.abs(least) >= max(LEAST_STEP, SLOW * np.abs(steps[:, column]).max())
+        known = (answered[1:] & answered[:-1])[window - 1 :]
+        cycles = np.flatnonzero(moving & known & (moved < 0.5 * np.abs(least))) + window
         if cycles.size:
             apart = np.abs(actual[cycles, column] - led[cycles, column]).max()
             found.append(Standstill(column=column, cycles=tuple(map(int, cycles)), apart=int(apart)))

@@ -37,7 +37,7 @@ class Pacer:
         Instant of the next cycle, in ns.
     launch : int
         Instant of the latest cycle handed over, in ns.
-    standing : tuple of can.Message
+    last_sent : tuple of can.Message
         Setpoints that lead no axis any further: the latest ones, or no velocity.
     """
 
@@ -45,7 +45,7 @@ class Pacer:
         self.link, self._clock = link, link.clock
         self._commands = _Commands(target)
         self._by_velocity = target.can.mode == "csv"
-        self.standing: Cycle = ()
+        self.last_sent: Cycle = ()
         self.period = frames.period_microseconds(target.can) * 1000
         self.timeout = startup.timeout_ms(target.can) * NANOSECONDS // 1000
         self.due = self.launch = 0
@@ -67,7 +67,7 @@ class Pacer:
         """Have the first cycle one period from now."""
         self.due = self._clock.now() + self.period
 
-    def missed(self) -> int:
+    def skipped(self) -> int:
         """Sleep until the next cycle, unless the bus waits for it; count the periods it is late."""
         if self.link.launching is None:
             self._clock.sleep_until(self.due)
@@ -82,7 +82,7 @@ class Pacer:
         """
         self.launch = self.due
         if not self._by_velocity:
-            self.standing = messages
+            self.last_sent = messages
         for frame in messages:
             self.link.send(frame, self.due)
         self.link.send(self._sync, self.due)
@@ -118,7 +118,7 @@ class Pacer:
 
     def commands(self, word: int) -> Cycle:
         """Make controlwords, one for each drive, which lead no axis any further."""
-        return self._commands.alone(word) or self._commands.within(word, self.standing)
+        return self._commands.alone(word) or self._commands.within(word, self.last_sent)
 
 
 class _Commands:

@@ -84,7 +84,7 @@ class SetpointSource(Protocol):
     def operated(self) -> AbstractContextManager[object]:
         """Hold what commands are taken from, as long as axes may move."""
 
-    def begin(self, standing: Sequence[int]) -> Step:
+    def begin(self, rest_counts: Sequence[int]) -> Step:
         """Begin where the axes stand, in counts; return the first cycle's setpoints."""
 
     def step(self, cycle: int) -> Step | None:
@@ -139,9 +139,9 @@ class StreamPlan:
         """Nobody commands it."""
         return nullcontext()
 
-    def begin(self, standing: Sequence[int]) -> Step:
+    def begin(self, rest_counts: Sequence[int]) -> Step:
         """Begin where the motion does; the axes were led there."""
-        del standing
+        del rest_counts
         return self._step(0)
 
     def step(self, cycle: int) -> Step | None:

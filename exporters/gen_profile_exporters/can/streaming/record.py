@@ -46,7 +46,7 @@ class Record:
     lateness : Lateness
     actual : (cycles, axes) integer array
         Position that each drive told after each cycle's SYNC, in counts.
-    told : (cycles,) boolean array
+    answered : (cycles,) boolean array
         For which cycles there is one.
     final : tuple of int
         Last position that each drive told.
@@ -59,7 +59,7 @@ class Record:
     sent: int
     lateness: Lateness
     actual: NDArray[np.int64]
-    told: NDArray[np.bool_]
+    answered: NDArray[np.bool_]
     final: tuple[int, ...]
 
 
@@ -79,7 +79,7 @@ class Book:
         Number of the `Phase` in its order.
     late : (cycles,) integer array
         How late each was sent, in ns, plus one; zero for one that was not.
-    told : (cycles,) integer array
+    answered : (cycles,) integer array
         Not zero where the drives answered.
     actual : (cycles, axes) integer array
         Where they then were, in counts.
@@ -87,7 +87,7 @@ class Book:
 
     def __init__(self, memory: Any, cycles: int, axes: int) -> None:
         table = np.frombuffer(memory, dtype=np.int64, count=1 + cycles * (2 + axes))
-        self.phase, self.late, self.told, actual = np.split(table, [1, 1 + cycles, 1 + 2 * cycles])
+        self.phase, self.late, self.answered, actual = np.split(table, [1, 1 + cycles, 1 + 2 * cycles])
         self.actual = actual.reshape(cycles, axes)
 
     @staticmethod
@@ -136,7 +136,7 @@ class Recorder:
     def take_answer(self, cycle: int, position: Sequence[int]) -> None:
         """Take down where the drives were at a cycle's SYNC."""
         self._book.actual[cycle] = position
-        self._book.told[cycle] = 1
+        self._book.answered[cycle] = 1
 
     def record(
         self,
@@ -159,6 +159,6 @@ class Recorder:
             sent=self.sent,
             lateness=Lateness(cycles=cycles, late=book.late[cycles] - 1, period=period),
             actual=book.actual.copy(),
-            told=book.told != 0,
+            answered=book.answered != 0,
             final=final,
         )

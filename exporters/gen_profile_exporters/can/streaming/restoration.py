@@ -57,11 +57,11 @@ class Restoration:
         trembling : mapping of int to int
             By how many counts the axis of each node may tremble while it stands.
         """
-        standing = _standing(link, {node: Standing(trembling[node]) for node in self._found})
-        return tuple(words for node in self._found for words in self._put_back_one(link, node, standing))
+        at_rest = _at_rest(link, {node: Standing(trembling[node]) for node in self._found})
+        return tuple(words for node in self._found for words in self._put_back_one(link, node, at_rest))
 
-    def _put_back_one(self, link: Link, node: int, standing: Container[int]) -> Iterator[str]:
-        if node not in standing:
+    def _put_back_one(self, link: Link, node: int, at_rest: Container[int]) -> Iterator[str]:
+        if node not in at_rest:
             yield f"Node {node} is not known to stand; its settings stay those of the motion."
             return
         for index, sub, data in self._found[node]:
@@ -74,20 +74,20 @@ class Restoration:
                 return
 
 
-def _standing(link: Link, measured: Mapping[int, Standing]) -> set[int]:
+def _at_rest(link: Link, measured: Mapping[int, Standing]) -> set[int]:
     """Wait until drives are not powered to move and their axes stand; asked by SDO, not believed."""
-    waiting, standing, deadline = set(measured), set[int](), link.clock.now() + PATIENCE
+    waiting, at_rest, deadline = set(measured), set[int](), link.clock.now() + PATIENCE
     while waiting and link.clock.now() < deadline:
         for node in sorted(waiting):
             try:
                 if _is_off(link, node):
                     measured[node].take(_asked(link, node, pdos.ACTUAL_POSITION), link.clock.now())
-                    standing |= {node} if measured[node].proved() else set()
+                    at_rest |= {node} if measured[node].proved() else set()
             except SILENCE:
                 waiting.discard(node)
-        waiting -= standing
+        waiting -= at_rest
         link.wait_until(link.clock.now() + PATIENCE // 100)
-    return standing
+    return at_rest
 
 
 def _is_off(link: Link, node: int) -> bool:
@@ -95,8 +95,8 @@ def _is_off(link: Link, node: int) -> bool:
 
 
 def _asked(link: Link, node: int, field: pdos.Field) -> int:
-    told = link.sdo(node).upload(field.index, field.sub)
-    (value,) = pdos.packing([field]).unpack_from(told)
+    answer = link.sdo(node).upload(field.index, field.sub)
+    (value,) = pdos.packing([field]).unpack_from(answer)
     return int(value)
 
 

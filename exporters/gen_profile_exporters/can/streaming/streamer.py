@@ -109,11 +109,11 @@ class Streamer:
         """Go through all phases; always ends with drives that do not move, or says so."""
         try:
             self._listen()
-            standing = self._configure()
-            self._align(standing)
+            rest_counts = self._configure()
+            self._align(rest_counts)
             self._enable()
-            self._approach(standing)
-            last = self._stream(standing)
+            self._approach(rest_counts)
+            last = self._stream(rest_counts)
             self._hold(last)
             self._disable(last.messages)
         except StreamAborted as error:
@@ -145,7 +145,7 @@ class Streamer:
     def _configure(self) -> tuple[int, ...]:
         """Set the drives up; find out where they stand, in counts."""
         self._watch.raise_alert(SupervisionLevel.CONFIGURING)
-        standing = configuration.configure(
+        rest_counts = configuration.configure(
             self._link,
             self._target,
             self._source.demand,
@@ -154,19 +154,19 @@ class Streamer:
             reset_fault=self._reset_fault,
         )
         self._require_well()
-        return standing
+        return rest_counts
 
     def _attend(self) -> None:
         """Keep our heartbeat going while the drives are set up, as long as all is well."""
         self._require_well()
         self._pacer.beat()
 
-    def _align(self, standing: Sequence[int]) -> None:
+    def _align(self, rest_counts: Sequence[int]) -> None:
         """Make the drives' setpoints equal to where they stand, before power goes on."""
         self._begin(Phase.ALIGN)
         self._commanded = True
-        self._pacer.standing = self._preload = preload(self._target, standing)
-        self._following.lead(np.array(standing))
+        self._pacer.last_sent = self._preload = preload(self._target, rest_counts)
+        self._following.lead(np.array(rest_counts))
         configuration.start(self._link, self._target)
         self._pacer.begin()
         for _ in range(ALIGN_CYCLES):
@@ -180,19 +180,19 @@ class Streamer:
         self._command(pdos.enabling(self._target.can), State.ENABLED, self._preload, bits=FOLLOWS)
         self._watch.raise_alert(SupervisionLevel.FOLLOWING)
 
-    def _approach(self, standing: Sequence[int]) -> None:
+    def _approach(self, rest_counts: Sequence[int]) -> None:
         """Lead axes that stand off the first setpoint to it, slowly."""
-        way = approach(standing, self._source.demand, self._target)
+        way = approach(rest_counts, self._source.demand, self._target)
         if len(way.position):
             self._begin(Phase.APPROACH)
         for messages, led in zip(cycles_of(way, self._target), way.at_sync, strict=True):
             self._cycle(messages, led)
 
-    def _stream(self, standing: Sequence[int]) -> Step:
+    def _stream(self, rest_counts: Sequence[int]) -> Step:
         """Send every cycle at its instant; return the last."""
         self._begin(Phase.STREAM)
         source, pacer, cycle = self._source, self._pacer, 0
-        due: Step | None = source.begin(standing)
+        due: Step | None = source.begin(rest_counts)
         start, self._can_end = pacer.due, True
         assert due is not None  # a motion has a first cycle
         last = sent = due
@@ -200,10 +200,10 @@ class Streamer:
             last = due
             pacer.due = start + cycle * pacer.period
             self._judge()
-            if missed := pacer.missed():
-                due = source.step(cycle + missed)
-                self._require_skippable(sent, due or last, cycle, missed)
-                cycle += missed
+            if skipped := pacer.skipped():
+                due = source.step(cycle + skipped)
+                self._require_skippable(sent, due or last, cycle, skipped)
+                cycle += skipped
                 continue
             pacer.send(last.messages)
             self._sent_at = self._clock.now()
@@ -283,7 +283,7 @@ class Streamer:
     def _cycle(self, messages: Cycle, led: Integers | None = None) -> None:
         """Send frames and SYNC at the next instant, by which the axes are led to a place; judged before."""
         self._judge()
-        self._pacer.missed()
+        self._pacer.skipped()
         self._pacer.send(messages)
         self._sent_at = self._clock.now()
         if led is not None:
@@ -294,8 +294,8 @@ class Streamer:
         """Take in the answers, shortly before the next cycle."""
         self._link.wait_until(self._pacer.look)
         self._require_well()
-        told = all(axis.heard >= self._sent_at for axis in self._watch.axes)
-        if told and self._answers_for >= 0:
+        answered = all(axis.heard >= self._sent_at for axis in self._watch.axes)
+        if answered and self._answers_for >= 0:
             self._recorder.take_answer(self._answers_for, [axis.position for axis in self._watch.axes])
         self._answers_for = -1
         self._following.require()
@@ -308,14 +308,14 @@ class Streamer:
                 raise StreamAborted(asked)
             self._ended = asked
 
-    def _require_skippable(self, sent: Step, following: Step, cycle: int, missed: int) -> None:
+    def _require_skippable(self, sent: Step, following: Step, cycle: int, skipped: int) -> None:
         """Pass over one setpoint that is too late, if the next one is no greater a step than any other."""
         greatest = self._source.demand.velocity
         apart = abs(following.position - sent.position)
         steps = [velocity * self._pacer.period / NANOSECONDS for velocity in greatest]
-        if missed > 1 or any(far > step + 0.5 for far, step in zip(apart, steps, strict=True)):
+        if skipped > 1 or any(far > step + 0.5 for far, step in zip(apart, steps, strict=True)):
             raise StreamAborted(
-                f"This machine was {missed * self._pacer.period / 1e6:g} ms late at cycle {cycle}; relieve "
+                f"This machine was {skipped * self._pacer.period / 1e6:g} ms late at cycle {cycle}; relieve "
                 "it, permit real-time priority, or choose a longer can.sync_period (the self-test measures "
                 "it)."
             )
@@ -337,14 +337,14 @@ class Streamer:
 
 def _watched(target: Target) -> list[WatchedAxis]:
     """Make an axis to be watched for each of a target's."""
-    told = pdos.layout(target.can).told
+    transmitted = pdos.layout(target.can).transmitted
     drives = zip(target.axes, frames.nodes(target), frames.cob_ids(target), strict=True)
     return [
         WatchedAxis(
             name=axis.name,
             node=node,
-            feedback={own[pdo]: fields for pdo, fields in told.items()},
-            standing=Standing(trembling(axis)),
+            feedback={own[pdo]: fields for pdo, fields in transmitted.items()},
+            standstill=Standing(trembling(axis)),
         )
         for axis, node, own in drives
     ]

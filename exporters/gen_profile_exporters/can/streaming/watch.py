@@ -43,7 +43,7 @@ class WatchedAxis:
     node : int
     feedback : mapping of int to tuple of Field
         What the drive tells at each SYNC, by COB-ID: statusword and position, together or apart.
-    standing : Standing
+    standstill : Standing
         Whether it stands, by what it told of its position.
     statusword, position : int
         The latest; 0 before the first ones.
@@ -54,7 +54,7 @@ class WatchedAxis:
     name: str
     node: int
     feedback: Mapping[int, tuple[Field, ...]]
-    standing: Standing
+    standstill: Standing
     statusword: int = 0
     position: int = 0
     stated: int = 0
@@ -77,11 +77,11 @@ class WatchedAxis:
             self.statusword, self.stated = value, now
         elif field == pdos.ACTUAL_POSITION:
             self.position, self.placed = value, now
-            self.standing.take(value, now)
+            self.standstill.take(value, now)
 
     def stands(self, since: int) -> bool:
         """Whether the drive said after an instant that it is not powered to move, and the axis stood."""
-        return self.stated > since and self.state not in MOVING and self.standing.proved(since)
+        return self.stated > since and self.state not in MOVING and self.standstill.proved(since)
 
     def obeys(self, since: int) -> bool:
         """Whether the drive said after an instant that it no longer follows setpoints."""
@@ -93,8 +93,8 @@ class WatchedAxis:
             return "no answer"
         if self.state is State.UNKNOWN:
             return f"statusword {self.statusword:04X}h, which is no state of CiA 402"
-        seen = "" if self.state in MOVING else ", but not seen to stand"
-        return f"{self.state.words!r}{seen}"
+        doubt = "" if self.state in MOVING else ", but not seen to stand"
+        return f"{self.state.words!r}{doubt}"
 
 
 class Watch:

@@ -25,7 +25,7 @@ typedef struct {
 typedef struct {
     double cycle;
     size_t n_rows;
-    const long *begins;                  /* cycle from which each row of inputs holds; the first is 0 */
+    const long *start_cycles;                  /* cycle from which each row of inputs holds; the first is 0 */
     const double *inputs;                /* n_rows x n_inputs */
     const size_t *actual;                /* places of the axes' actual positions, which are given relative to the setpoint before */
     long longest;                        /* cycles after the last row within which the axes must stand */
@@ -36,7 +36,7 @@ typedef struct {
     double *setpoints;                   /* where axes stand that the block does not lead */
     const size_t *led;                   /* n_axes: places among the setpoints */
     size_t n_hoists;                     /* axes that follow an input of the block */
-    const size_t *hoists, *told;         /* their places among the setpoints, and of the inputs */
+    const size_t *hoists, *columns;         /* their places among the setpoints, and of the inputs */
     const double *ratios;                /* of the axis's position to the input */
     size_t n_marks;
     const long *marks;                   /* rising cycles, before which the block's instance is copied */
@@ -114,13 +114,13 @@ static void take_loads(const History *history, const double *sway, bool counts, 
 EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history, double *room, Found *found) {
     double *before = NULL, *now = room;
     double *sway = room + 2 * block->n_outputs, *stood = sway + history->n_loads, *inputs = stood + block->n_axes;
-    long last = history->begins[history->n_rows - 1], end = last + history->longest;
+    long last = history->start_cycles[history->n_rows - 1], end = last + history->longest;
     size_t row = 0, mark = 0;
     begin_axes(block, found);
     found->stands = -1;
     found->status = begin(fmu, 0.0, history->parameter_references, history->n_parameters, history->parameters);
     for (long k = 0; k < end && found->status == GOOD; k++, found->cycles = k) {
-        while (row + 1 < history->n_rows && history->begins[row + 1] <= k) row++;
+        while (row + 1 < history->n_rows && history->start_cycles[row + 1] <= k) row++;
         memcpy(inputs, history->inputs + row * block->n_inputs, block->n_inputs * sizeof(double));
         for (size_t i = 0; i < block->n_axes; i++) inputs[history->actual[i]] += history->setpoints[history->led[i]];
         for (; mark < history->n_marks && history->marks[mark] == k; mark++) {
@@ -143,7 +143,7 @@ EXPORT void block_run(const Fmu *fmu, const Block *block, const History *history
             history->setpoints[history->led[i]] = position;
         }
         for (size_t i = 0; i < history->n_hoists; i++) {
-            history->setpoints[history->hoists[i]] = history->ratios[i] * inputs[history->told[i]];
+            history->setpoints[history->hoists[i]] = history->ratios[i] * inputs[history->columns[i]];
         }
         found->status = set(fmu, history->setpoint_references, history->n_setpoints, history->setpoints);
         if (found->status == GOOD) found->status = step(fmu, (double)k * history->cycle, history->cycle);

@@ -51,9 +51,9 @@ class Affine:
         """Bound what slopes add up to."""
         return np.asarray(sum((np.abs(slope) * self.reach[k] for k, slope in slopes.items()), start=0.0))
 
-    def _made(self, mid: Array, slopes: Mapping[int, Array], missed: Array, size: Array) -> Affine:
+    def _made(self, mid: Array, slopes: Mapping[int, Array], error: Array, size: Array) -> Affine:
         """Add rounding, of numbers that are at most so large."""
-        return Affine(mid, slopes, (missed + 8.0 * UNIT * size) * UPWARD + LEAST, self.reach)
+        return Affine(mid, slopes, (error + 8.0 * UNIT * size) * UPWARD + LEAST, self.reach)
 
     def _like(self, value: AffineOperand) -> Affine:
         return value if isinstance(value, Affine) else constant(value, self.reach)
@@ -81,8 +81,8 @@ class Affine:
         b = self._like(other)
         mid, slopes = self.mid * b.mid, _sum(self.slopes, b.mid, b.slopes, self.mid)
         sizes, offs = (np.abs(self.mid), np.abs(b.mid)), (self.off, b.off)
-        missed = sizes[0] * b.rad + sizes[1] * self.rad + offs[0] * offs[1]
-        return self._made(mid, slopes, missed, np.abs(mid) + sizes[0] * offs[1] + sizes[1] * offs[0])
+        error = sizes[0] * b.rad + sizes[1] * self.rad + offs[0] * offs[1]
+        return self._made(mid, slopes, error, np.abs(mid) + sizes[0] * offs[1] + sizes[1] * offs[0])
 
     def __truediv__(self, other: AffineOperand) -> Affine:
         """Divide; by what may be zero gives everything: a/b = q + n/m − n (b − m)/(m b), with n = a − q b."""
@@ -91,9 +91,9 @@ class Affine:
         slopes = {k: s / b.mid for k, s in _sum(self.slopes, 1.0, b.slopes, -mid).items()}
         rest = self.rad + np.abs(mid) * b.rad + 4.0 * UNIT * np.abs(self.mid) + LEAST
         whole = rest + self._turned({k: s * b.mid for k, s in slopes.items()})
-        share = np.where(off < size, off / (size - off) + LEAST, np.inf)
-        missed = rest / size + whole / size * share
-        return self._made(mid, slopes, missed, np.abs(mid) + (self.off + np.abs(mid) * off) / size)
+        ratio = np.where(off < size, off / (size - off) + LEAST, np.inf)
+        error = rest / size + whole / size * ratio
+        return self._made(mid, slopes, error, np.abs(mid) + (self.off + np.abs(mid) * off) / size)
 
     def __rtruediv__(self, other: AffineOperand) -> Affine:
         """Divide another."""
@@ -116,10 +116,10 @@ def _sum(
     a: Mapping[int, Array], by_a: Array | float, b: Mapping[int, Array], by_b: Array | float
 ) -> dict[int, Array]:
     """Add multiples of slopes."""
-    found = {k: slope * by_a for k, slope in a.items()}
+    total = {k: slope * by_a for k, slope in a.items()}
     for k, slope in b.items():
-        found[k] = found[k] + slope * by_b if k in found else slope * by_b
-    return found
+        total[k] = total[k] + slope * by_b if k in total else slope * by_b
+    return total
 
 
 def sine_like(value: Callable[[Array], Array], slope: Callable[[Array], Array]) -> Callable[[Affine], Affine]:

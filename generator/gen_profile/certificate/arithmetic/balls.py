@@ -67,8 +67,8 @@ class Ball:
         b = ball(other)
         mid = self.mid / b.mid
         away = np.abs(b.mid) - b.rad
-        missed = self.rad + np.abs(mid) * b.rad + UNIT * np.abs(self.mid) + LEAST  # before it is divided
-        return _rounded(mid, _shared(np.where(away > 0.0, missed / away, np.inf), self.rad, b.rad))
+        error = self.rad + np.abs(mid) * b.rad + UNIT * np.abs(self.mid) + LEAST  # before it is divided
+        return _rounded(mid, _shared(np.where(away > 0.0, error / away, np.inf), self.rad, b.rad))
 
     def __neg__(self) -> Ball:
         """Negate, exactly."""
@@ -141,10 +141,10 @@ def matmul(a: Operand, b: Operand) -> Ball:
     terms = np.shape(mid_a)[-1] + 2
     sizes = np.abs(mid_b)
     if isinstance(a.rad, float) and a.rad == 0.0:
-        missed = np.abs(mid_a) @ (rad_b + terms * UNIT * sizes)
+        error = np.abs(mid_a) @ (rad_b + terms * UNIT * sizes)
     else:
-        missed = np.abs(mid_a) @ (rad_b + terms * UNIT * sizes) + rad_a @ (sizes + rad_b)
-    return Ball(mid_a @ mid_b, missed * (1.0 + 2 * terms * UNIT) * UPWARD + LEAST)
+        error = np.abs(mid_a) @ (rad_b + terms * UNIT * sizes) + rad_a @ (sizes + rad_b)
+    return Ball(mid_a @ mid_b, error * (1.0 + 2 * terms * UNIT) * UPWARD + LEAST)
 
 
 def shared(x: Ball, axes: tuple[int, ...]) -> Ball:
@@ -167,14 +167,14 @@ def _sizes(a: Ball, b: Ball) -> tuple[Any, Any]:
     return _shared(np.abs(a.mid), a.rad, b.rad), _shared(np.abs(b.mid), a.rad, b.rad)
 
 
-def _rounded(mid: Any, missed: Any, unit: float = UNIT) -> Ball:
+def _rounded(mid: Any, error: Any, unit: float = UNIT) -> Ball:
     """Add the rounding of a midpoint to what else it misses."""
-    return Ball(mid, (missed + unit * _shared(np.abs(mid), missed)) * UPWARD + LEAST)
+    return Ball(mid, (error + unit * _shared(np.abs(mid), error)) * UPWARD + LEAST)
 
 
-def _evaluated(mid: Any, missed: Any, x: Ball) -> Ball:
+def _evaluated(mid: Any, error: Any, x: Ball) -> Ball:
     """Take what a function of NumPy's gives, and what it misses over x."""
-    return _rounded(mid, _shared(missed, x.rad), FUNCTION)
+    return _rounded(mid, _shared(error, x.rad), FUNCTION)
 
 
 def _sine_like(value: Callable[[Any], Any], slope: Callable[[Any], Any]) -> Callable[[Ball], Ball]:
@@ -202,17 +202,17 @@ def exp(x: Ball) -> Ball:
 
 def sqrt(x: Ball) -> Ball:
     """Enclose the root: off by most at the end next to zero."""
-    share = np.where(x.rad < x.mid, x.rad / x.mid, np.nan) * UPWARD
+    ratio = np.where(x.rad < x.mid, x.rad / x.mid, np.nan) * UPWARD
     mid = np.sqrt(np.where(x.mid > 0.0, x.mid, np.nan))
     exact = (np.asarray(x.mid) == 0.0) & (np.asarray(x.rad) == 0.0)
-    found = _evaluated(mid, mid * share / (1.0 + np.sqrt(np.maximum(1.0 - share, 0.0))), x)
-    return Ball(np.where(exact, 0.0, found.mid), _shared(np.where(exact, 0.0, found.rad), x.rad))
+    root = _evaluated(mid, mid * ratio / (1.0 + np.sqrt(np.maximum(1.0 - ratio, 0.0))), x)
+    return Ball(np.where(exact, 0.0, root.mid), _shared(np.where(exact, 0.0, root.rad), x.rad))
 
 
 def log(x: Ball) -> Ball:
     """Enclose the natural logarithm: off by most at the end next to zero."""
-    share = np.where(x.rad < x.mid, x.rad / x.mid, np.nan) * UPWARD
-    return _evaluated(np.log(np.where(x.mid > 0.0, x.mid, np.nan)), -np.log1p(-share), x)
+    ratio = np.where(x.rad < x.mid, x.rad / x.mid, np.nan) * UPWARD
+    return _evaluated(np.log(np.where(x.mid > 0.0, x.mid, np.nan)), -np.log1p(-ratio), x)
 
 
 def tanh(x: Ball) -> Ball:

@@ -136,7 +136,7 @@ def derivative(terms: int) -> Array:
 @cache
 def halves(terms: int) -> tuple[Array, Array]:
     """Matrices from coefficients to those on [−1, 0] and [0, 1], dyadic numbers, shape (terms, terms)."""
-    found = []
+    matrices = []
     for shift in (-1.0, 1.0):  # T_k((x ± 1)/2), by T_(k+1)(u) = 2 u T_k(u) − T_(k−1)(u)
         matrix = np.eye(terms, terms)
         if terms > 1:
@@ -147,11 +147,11 @@ def halves(terms: int) -> tuple[Array, Array]:
             matrix[1:, power] += 0.5 * before[:-1]
             matrix[1, power] += 0.5 * before[0]
             matrix[:-1, power] += 0.5 * before[1:]
-        found.append(matrix)
-    return found[0], found[1]
+        matrices.append(matrix)
+    return matrices[0], matrices[1]
 
 
-def missed(most: Array, rhos: Sequence[float], counts: Sequence[int]) -> Array:
+def interpolation_error(most: Array, rhos: Sequence[float], counts: Sequence[int]) -> Array:
     """Bound how far interpolants are off.
 
     Parameters
@@ -162,17 +162,17 @@ def missed(most: Array, rhos: Sequence[float], counts: Sequence[int]) -> Array:
     counts : (variables,) sequence of int
         Nodes.
     """
-    found, lebesgue = np.zeros(most.shape[2:]), 1.0
+    error, lebesgue = np.zeros(most.shape[2:]), 1.0
     for bounds, count in zip(most, counts, strict=True):
         each = [
             4.0 * rho**-count / (1.0 - 1.0 / rho) * bound for rho, bound in zip(rhos, bounds, strict=True)
         ]
-        found = found + lebesgue * np.fmin.reduce(each)
+        error = error + lebesgue * np.fmin.reduce(each)
         lebesgue *= 1.0 + 2.0 / np.pi * np.log(count)
-    return np.asarray(found * ROUND_UP)
+    return np.asarray(error * ROUND_UP)
 
 
-def greatest(series: Array, off: Array, enough: float) -> float:
+def greatest(series: Array, off: Array, target: float) -> float:
     """Bound absolute values of series closely, by halving wherever they may exceed what was seen.
 
     Parameters
@@ -180,24 +180,24 @@ def greatest(series: Array, off: Array, enough: float) -> float:
     series : (items, terms, …) array
     off : (items,) array
         How far values are from those of the series.
-    enough : float
+    target : float
         A bound that is low enough.
     """
-    variables, bound, seen = series.ndim - 1, 0.0, 0.0
+    variables, bound, largest = series.ndim - 1, 0.0, 0.0
     waiting, work = [(series, off)], 0
     while waiting:
         items, missing = waiting.pop()
         if not (np.isfinite(items).all() and np.isfinite(missing).all()):
             return float("nan")
-        seen = max(seen, float(np.abs(_turned([_ends(n) for n in items.shape[1:]], items)).max()))
+        largest = max(largest, float(np.abs(_turned([_ends(n) for n in items.shape[1:]], items)).max()))
         sizes = (_sum(np.abs(items), variables).ravel() + missing) * ROUND_UP
-        wide = sizes > max(enough, NEAR * seen)
+        wide = sizes > max(target, NEAR * largest)
         work += items.size
         if work > MOST_WORK:
             wide &= False
         bound = max(bound, float(sizes[~wide].max(initial=0.0)))
         if wide.any():
-            waiting += _halved(*_shortened(items[wide], missing[wide], TINY * max(enough, seen)))
+            waiting += _halved(*_shortened(items[wide], missing[wide], TINY * max(target, largest)))
     return bound
 
 
@@ -221,15 +221,15 @@ def _halved(items: Array, off: Array) -> list[tuple[Array, Array]]:
     whole = _sum(bent, variables).ravel()
     still = [_sum(bent.take([0], axis=axis), variables).ravel() for axis in range(1, variables + 1)]
     chosen = 1 + np.argmax(whole - np.array(still), axis=0)
-    found = []
+    parts = []
     for axis in np.unique(chosen).tolist():
         own, rest, terms = items[chosen == axis], off[chosen == axis], items.shape[axis]
         rest = rest + 2.0 * terms * (terms + 4) * UNIT * _sum(np.abs(own), variables).ravel()
         for matrix in halves(terms):
             part = np.moveaxis(np.tensordot(own, matrix, axes=(axis, 1)), -1, axis)
             portions = -(-part.size // PORTION)
-            found += list(zip(np.array_split(part, portions), np.array_split(rest, portions), strict=True))
-    return [one for one in found if len(one[1])]
+            parts += list(zip(np.array_split(part, portions), np.array_split(rest, portions), strict=True))
+    return [one for one in parts if len(one[1])]
 
 
 @cache

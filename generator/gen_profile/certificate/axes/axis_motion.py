@@ -52,11 +52,19 @@ class AxisMotion:
         half = self.halves[:, None]
         first, last = ball(self.position[:-1]), ball(self.position[1:])
         speeds = half * self.velocity[:-1], half * self.velocity[1:]
-        bends = half * half * self.acceleration[:, 0], half * half * self.acceleration[:, 1]
-        mean, turn, bend = 0.5 * (first + last), 0.5 * (speeds[1] - speeds[0]), 0.5 * (bends[0] + bends[1])
+        curvatures = half * half * self.acceleration[:, 0], half * half * self.acceleration[:, 1]
+        mean, turn, bend = (
+            0.5 * (first + last),
+            0.5 * (speeds[1] - speeds[0]),
+            0.5 * (curvatures[0] + curvatures[1]),
+        )
         fourth = 0.125 * (bend - turn)
         second = 0.25 * (3.0 * turn - bend)
-        way, lead, twist = 0.5 * (last - first), 0.5 * (speeds[0] + speeds[1]), 0.5 * (bends[1] - bends[0])
+        way, lead, twist = (
+            0.5 * (last - first),
+            0.5 * (speeds[0] + speeds[1]),
+            0.5 * (curvatures[1] - curvatures[0]),
+        )
         fifth = 0.125 * (twist - 3.0 * (lead - way))
         third = 0.5 * (lead - way) - 2.0 * fifth
         return stack([mean - second - fourth, way - third - fifth, second, third, fourth, fifth])
@@ -141,9 +149,9 @@ def fitted(track: Track, near: float, longest: float, watch: float) -> AxisMotio
             break
         knots = np.unique([*knots, *halved])
     begun, ended = (np.nextafter(times[knots], side) for side in (times[-1], times[0]))
-    bends = np.stack([spline(begun[:-1], nu=2), spline(ended[1:], nu=2)], axis=1)
+    accelerations = np.stack([spline(begun[:-1], nu=2), spline(ended[1:], nu=2)], axis=1)
     values = [spline(times[knots], nu=order) for order in range(2)]
-    return _balanced(track, _with_rest(track, times[knots], (*values, bends), longest, watch))
+    return _balanced(track, _with_rest(track, times[knots], (*values, accelerations), longest, watch))
 
 
 def _spread(times: Array, first: int, last: int, longest: float) -> Array:
@@ -167,7 +175,7 @@ def _with_rest(
     track: Track, knots: Array, values: tuple[Array, Array, Array], longest: float, watch: float
 ) -> AxisMotion:
     """Begin at rest at the first setpoint, and go on after the last one."""
-    position, velocity, bends = values
+    position, velocity, accelerations = values
     position[0], velocity[0] = track.position.mid[0], 0.0
     position[-1], velocity[-1] = track.position.mid[-1], track.velocity
     after = knots[-1] + np.linspace(0.0, watch, 1 + int(np.ceil(watch / longest)))[1:]
@@ -176,7 +184,7 @@ def _with_rest(
         knots=np.concatenate([knots, after]),
         position=np.concatenate([position, onward]),
         velocity=np.concatenate([velocity, np.tile(track.velocity, (len(after), 1))]),
-        acceleration=np.concatenate([bends, np.zeros((len(after), 2, position.shape[1]))]),
+        acceleration=np.concatenate([accelerations, np.zeros((len(after), 2, position.shape[1]))]),
     )
 
 
@@ -258,10 +266,10 @@ def _piece_gap(c: Ball, half: Ball, bend: Array, track: Track) -> list[Array]:
     x_of = partial(_place, 0.5 * (begin + end), half)
     step = times[1:] - times[:-1]
     middle = 0.5 * (times[1:] + times[:-1])
-    longest, bends = step.most.max(), bend + track.bend.max(axis=0)
+    longest, curvature = step.most.max(), bend + track.bend.max(axis=0)
     faster = ((at[1:] - at[:-1]) / step[:, None] - powers(c, x_of(middle), 1)[0] / half).most.max(axis=0)
-    faster = faster + bends * longest / 2.0
-    apart = (at - powers(c, x_of(times), 0)[0]).most.max(axis=0) + bends * longest**2 / 8.0
+    faster = faster + curvature * longest / 2.0
+    apart = (at - powers(c, x_of(times), 0)[0]).most.max(axis=0) + curvature * longest**2 / 8.0
     primitives = stack([0.0 * c[0], *(c[k] / (k + 1.0) for k in range(DEGREE + 1))])
     primitive = powers(primitives, x_of(times), 0)[0]
     gone = _running_sum(track.areas) - half * (primitive - primitive[:1])

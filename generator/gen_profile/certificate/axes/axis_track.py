@@ -78,8 +78,8 @@ def _on_lines(times: Array, asked: Ball, velocity: Array, parts: tuple[int, ...]
     shares = np.arange(FINER) / FINER
     fine = (times[:-1, None] + np.diff(times)[:, None] * shares).ravel()
     before = np.arange(len(fine)) // FINER
-    share = (ball(fine) - times[before]) / (ball(times[1:]) - times[:-1])[before]
-    between = asked[before] + (asked[1:] - asked[:-1])[before] * share[:, None]
+    fraction = (ball(fine) - times[before]) / (ball(times[1:]) - times[:-1])[before]
+    between = asked[before] + (asked[1:] - asked[:-1])[before] * fraction[:, None]
     fine, position = np.append(fine, times[-1]), concatenate([between, asked[-1:]])
     step, nothing = (ball(fine[1:]) - fine[:-1])[:, None], np.zeros(len(velocity))
     return Track(
@@ -117,10 +117,10 @@ def _trail(kept: Ball, led: Ball) -> Ball:
 
     Plain numbers that nearly do are off by no more than the greatest error of a step over 1 − E.
     """
-    share, lost = kept.mid, ((1.0 - kept) * led).mid
-    near = np.zeros((len(share) + 1, lost.shape[1]))
-    for point, (factor, less) in enumerate(zip(share, lost, strict=True)):
+    decay, lost = kept.mid, ((1.0 - kept) * led).mid
+    near = np.zeros((len(decay) + 1, lost.shape[1]))
+    for point, (factor, less) in enumerate(zip(decay, lost, strict=True)):
         near[point + 1] = factor * near[point] - less
-    missed = (kept * near[:-1] - (1.0 - kept) * led - near[1:]).most.max(axis=0)
-    off = missed / (1.0 - kept.upper.max()) * (1.0 + 1e-12)
+    defect = (kept * near[:-1] - (1.0 - kept) * led - near[1:]).most.max(axis=0)
+    off = defect / (1.0 - kept.upper.max()) * (1.0 + 1e-12)
     return Ball(near, np.broadcast_to(off, near.shape))

@@ -49,8 +49,8 @@ def asked_of_axes(spec: Spec, setpoints: SampledProfile) -> Asked:
                     f"The setpoints ask {axis.name} for {bound:.4g} {unit}, and "
                     f"{spec.limits.place(column, kind)} allows {limit:.4g} {unit}."
                 )
-            told = {"bound": bound, "limit": limit, "rounding": rounding, "unit": unit}
-            asked.setdefault(axis.name, {})[kind] = told
+            claim = {"bound": bound, "limit": limit, "rounding": rounding, "unit": unit}
+            asked.setdefault(axis.name, {})[kind] = claim
     return asked
 
 
@@ -61,5 +61,5 @@ def _quotients(spec: Spec, setpoints: SampledProfile, order: int) -> list[float]
     quotients = concatenate([position[:1]] * (order - 1) + [position, after + setpoints.position[-1]])
     for _ in range(order):
         quotients = (quotients[1:] - quotients[:-1]) / cycle
-    found: list[float] = quotients.most.max(axis=0).tolist()
-    return found
+    greatest: list[float] = quotients.most.max(axis=0).tolist()
+    return greatest

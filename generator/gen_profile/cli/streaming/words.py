@@ -44,7 +44,7 @@ def _value(entry: dict[str, Any]) -> str:
 
 def lateness_words(late: Lateness) -> str:
     """Say how late cycles were."""
-    half, most, all_ = (f"{late.percentile(share):.0f} µs" for share in (50, 99, 100))
+    half, most, all_ = (f"{late.percentile(percent):.0f} µs" for percent in (50, 99, 100))
     return f"half below {half}, 99 % below {most}, all below {all_}"
 
 
@@ -52,13 +52,13 @@ def outcome_words(outcome: StreamOutcome) -> str:
     """Say what became of a stream."""
     from gen_profile.evaluation.phrases import mm, number
 
-    told, late = outcome.to_dict(), outcome.record.lateness
-    of_all = "" if told["cycles_planned"] is None else f" of {told['cycles_planned']}"
-    lines = [f"{told['state']}: {told['cycles_sent']}{of_all} setpoints sent"]
-    if told["cycles_sent"]:
+    document, late = outcome.to_dict(), outcome.record.lateness
+    of_all = "" if document["cycles_planned"] is None else f" of {document['cycles_planned']}"
+    lines = [f"{document['state']}: {document['cycles_sent']}{of_all} setpoints sent"]
+    if document["cycles_sent"]:
         lines.append(f"lateness: {lateness_words(late)}; drift {number(1e6 * late.drift)} µs")
-    lines += told["notes"]
-    drive = told["drive"]
+    lines += document["notes"]
+    drive = document["drive"]
     if drive is not None:
         unit = " or ".join(f"m{unit}" for unit in dict.fromkeys(units(outcome.source)))
         lines.append(

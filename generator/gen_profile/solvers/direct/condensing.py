@@ -120,18 +120,18 @@ def interval_maps(
 
 
 def _linearized(
-    equations: MotionEquations, parameters: Array, felt: Array, stages: Array
+    equations: MotionEquations, parameters: Array, axis_inputs: Array, stages: Array
 ) -> tuple[Array, Array, Array]:
     """Evaluate ẏ and its derivatives by y and by the axes' motion, each (intervals, STAGES, n, …)."""
     intervals, _, n = stages.shape
-    values = equations.rate(stages.reshape(-1, n), felt.reshape(intervals * STAGES, -1), parameters)
+    values = equations.rate(stages.reshape(-1, n), axis_inputs.reshape(intervals * STAGES, -1), parameters)
     if not np.isfinite(values).all():
         raise np.linalg.LinAlgError("the equations of motion overflow")
     values = values.reshape(intervals, STAGES, n, -1)
     return values[..., 0], values[..., 1 : 1 + n], values[..., 1 + n :]
 
 
-def _eliminated(constant: Array, by_state: Array, driven: Array, integration: Array) -> IntervalMaps:
+def _eliminated(constant: Array, by_state: Array, by_input: Array, integration: Array) -> IntervalMaps:
     """Solve ``Y = y_k + h A (constant + by_state Y + driven ξ)`` for the stages Y of every interval."""
     intervals, _, n = constant.shape
     inner = np.einsum("kij,kjab->kiajb", -integration, by_state).reshape(intervals, STAGES * n, -1)
@@ -141,7 +141,7 @@ def _eliminated(constant: Array, by_state: Array, driven: Array, integration: Ar
         [
             np.einsum("kij,kja->kia", integration, constant)[..., None],
             np.broadcast_to(np.eye(n), (intervals, STAGES, n, n)),
-            np.einsum("kij,kjal->kial", integration, driven),
+            np.einsum("kij,kjal->kial", integration, by_input),
         ],
         axis=-1,
     )

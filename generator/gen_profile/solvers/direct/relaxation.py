@@ -48,27 +48,27 @@ class Relaxed:
     ----------
     wider : float
         How many times as wide they must be.
-    found : ProgramSequence
+    sequence_result : ProgramSequence
         By which the motion was found.
     """
 
     wider: float
-    found: ProgramSequence
+    sequence_result: ProgramSequence
 
     @property
     def duration(self) -> float:
         """Of the motion, in s."""
-        return self.found.setup.problem.duration
+        return self.sequence_result.setup.problem.duration
 
     def start(self, problem: Problem) -> Iterate | None:
         """Give the motion, on its mesh, to begin at; nothing for a problem that is not about as long."""
         nearby = abs(math.log(problem.duration / self.duration)) < NEARBY
-        return self.found.iterate if nearby else None
+        return self.sequence_result.iterate if nearby else None
 
     @property
     def solution(self) -> Solution:
         """The motion as a solution, unless it swings too far."""
-        return conclude(self.found, self.found.iterations)
+        return conclude(self.sequence_result, self.sequence_result.iterations)
 
 
 class Relaxation:
@@ -101,7 +101,7 @@ class Relaxation:
             setup = unbounded
         rest = setup.transcription.rest()
         if self._near is not None and (start := self._near.start(problem)) and start.like(rest):
-            return setup, self._near.found
+            return setup, self._near.sequence_result
         free = attrs.evolve(unbounded, problem=attrs.evolve(setup.problem, limits=LimitsSpec()))
         return setup, sequence(rest, Goal(setup=free, sway_limit=None), ROUGH)
 
@@ -130,15 +130,15 @@ class Relaxation:
                 worst=RESTS,
                 widened=widened,
             )
-            found = sequence(unlimited.iterate, goal)
-            if found.verdict is ConicStatus.SOLVED:
-                return Relaxed(wider=float(found.solutions[-1].x[-1]), found=found)
-            if found.verdict is ConicStatus.INFEASIBLE or found.iterations == MAX_ITERATIONS:
+            result = sequence(unlimited.iterate, goal)
+            if result.verdict is ConicStatus.SOLVED:
+                return Relaxed(wider=float(result.solutions[-1].x[-1]), sequence_result=result)
+            if result.verdict is ConicStatus.INFEASIBLE or result.iterations == MAX_ITERATIONS:
                 break
         return None
 
 
-def eased_by_time(problem: Problem) -> tuple[str, ...]:
+def time_dependent_limits(problem: Problem) -> tuple[str, ...]:
     """Name the limits of which a longer move asks for less: all but travel, where others are stated.
 
     A move that begins at an end of its travel asks for all of it, however long it takes.
@@ -157,15 +157,15 @@ def least_duration(relaxation: Relaxation) -> float | None:
         nothing more is known, the duration that was come to.
     """
     problem = relaxation.problem
-    places, settled, unsettled = eased_by_time(problem), [0.0], list[float]()
+    places, settled, unsettled = time_dependent_limits(problem), [0.0], list[float]()
 
     def excess(duration: float) -> float:
         asked = duration == problem.duration
         lasting = relaxation if asked else Relaxation(attrs.evolve(problem, duration=duration))
-        found = lasting.least(places)
-        if found is not None:
+        relaxed = lasting.least(places)
+        if relaxed is not None:
             settled.append(duration)
-            return math.log(max(found.wider, TINY)) - ENOUGH
+            return math.log(max(relaxed.wider, TINY)) - ENOUGH
         unsettled.append(duration)
         return -math.inf if unsettled[0] < duration > max(settled) else math.inf
 
@@ -201,7 +201,7 @@ def shortest(
     Relaxed or None
         None where no duration was found to do.
     """
-    found, places = dict[float, Relaxed](), eased_by_time(problem)
+    by_duration, places = dict[float, Relaxed](), time_dependent_limits(problem)
     last, start = (guess, guess.duration) if isinstance(guess, Relaxed) else (None, guess)
 
     def excess(duration: float) -> float:
@@ -210,9 +210,9 @@ def shortest(
         last = Relaxation(attrs.evolve(problem, duration=duration), tried, last).least(places)
         if last is None:
             return math.inf
-        found[duration] = last
+        by_duration[duration] = last
         return math.log(max(last.wider, TINY)) - math.log(1.0 - KEPT)
 
     with budget(SEARCHING * left()):
         duration = least(excess, start, search)
-    return None if duration is None else found[duration]
+    return None if duration is None else by_duration[duration]

@@ -192,8 +192,8 @@ def _amplitudes(
 def _mesh(problem: Problem) -> Array:
     """Choose relative lengths of intervals: resolve the fastest mode and, for snap, layers at the ends."""
     fastest = linearize(problem.plant, problem.parameters, problem.target).frequencies[-1]
-    enough = fastest * problem.duration / RADIANS_PER_INTERVAL
-    longest = 1.0 / float(np.clip(np.ceil(enough), INTERVALS, MAX_INTERVALS))
+    needed = fastest * problem.duration / RADIANS_PER_INTERVAL
+    longest = 1.0 / float(np.clip(np.ceil(needed), INTERVALS, MAX_INTERVALS))
     shortest = SNAP_TIME / problem.duration if problem.effort == "snap" else longest
     graded = longest * GROWTH ** -np.arange(1.0, MAX_GRADED)
     graded = graded[graded > shortest / GROWTH][::-1]

@@ -184,11 +184,11 @@ def solve(problem: Problem, near: Iterate | None = None, *, coarse: bool = False
         nonlocal setup, iterations, start
         goal = Goal(setup=setup, sway_cost=sway_cost, sway_limit=sway_limit)
         if problem.limits.stated() and not coarse:
-            found = refined(start, goal)
+            result = refined(start, goal)
         else:
-            found = sequence(start, goal, COARSE if coarse else STEP_TOLERANCE)
-        setup, start, iterations = found.setup, found.iterate, iterations + found.iterations
-        return conclude(found, iterations)
+            result = sequence(start, goal, COARSE if coarse else STEP_TOLERANCE)
+        setup, start, iterations = result.setup, result.iterate, iterations + result.iterations
+        return conclude(result, iterations)
 
     return attrs.evolve(within_sway(problem, attempt), problem=problem, redundant=redundant)
 
@@ -210,10 +210,10 @@ def resolve_sway_cost(problem: Problem) -> tuple[SwayCost, int]:
 def refined(start: Iterate, goal: Goal) -> ProgramSequence:
     """Solve programs on a mesh that is bisected as long as that pays and the work reaches."""
     begun: list[tuple[Iterate, Goal]] = []
-    found = afford(lambda: _refined(start, goal, begun), BISECTING * left())
-    if found is None and not begun:
+    result = afford(lambda: _refined(start, goal, begun), BISECTING * left())
+    if result is None and not begun:
         raise OutOfWork
-    return found or sequence(*begun[0])
+    return result or sequence(*begun[0])
 
 
 def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> ProgramSequence:
@@ -221,11 +221,11 @@ def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> P
     solutions: tuple[ConicSolution, ...] = ()
     cost = float("inf")
     for _ in range(MAX_BISECTIONS):
-        found = sequence(start, goal, ROUGH)
-        solutions += found.solutions
-        if found.verdict is not ConicStatus.SOLVED:
+        result = sequence(start, goal, ROUGH)
+        solutions += result.solutions
+        if result.verdict is not ConicStatus.SOLVED:
             break
-        start, before, cost = found.iterate, cost, goal.setup.cost(found.iterate, goal.sway_cost)
+        start, before, cost = result.iterate, cost, goal.setup.cost(result.iterate, goal.sway_cost)
         begun.append((start, goal))
         where = switching(goal.setup, start, goal.sway_limit)
         if abs(before - cost) < WORTH_BISECTING * cost or not where.any():
@@ -235,11 +235,11 @@ def _refined(start: Iterate, goal: Goal, begun: list[tuple[Iterate, Goal]]) -> P
     else:
         begun.append((start, goal))
     for start, goal in reversed(begun):  # where programs on the finest mesh fail, a coarser one does
-        found = sequence(start, goal)
-        solutions += found.solutions
-        if found.verdict is ConicStatus.SOLVED:
+        result = sequence(start, goal)
+        solutions += result.solutions
+        if result.verdict is ConicStatus.SOLVED:
             break
-    return attrs.evolve(found, solutions=solutions)
+    return attrs.evolve(result, solutions=solutions)
 
 
 def sequence(start: Iterate, goal: Goal, tolerance: float = STEP_TOLERANCE) -> ProgramSequence:
@@ -277,39 +277,39 @@ def _stalled(step: float, before: float, *, exact: bool) -> bool:
     return (step < STALLED and not (shrinks and exact)) or (step < STALLED_INEXACT and not (shrinks or exact))
 
 
-def conclude(found: ProgramSequence, iterations: int) -> Solution:
+def conclude(result: ProgramSequence, iterations: int) -> Solution:
     """Turn the outcome of programs into a solution."""
-    problem = found.setup.problem
+    problem = result.setup.problem
     status, advice = Status.CONVERGED, ""
-    if found.verdict is ConicStatus.INFEASIBLE:
+    if result.verdict is ConicStatus.INFEASIBLE:
         status, advice = Status.INFEASIBLE, WIDER
-    elif found.verdict is not ConicStatus.SOLVED:
+    elif result.verdict is not ConicStatus.SOLVED:
         status, advice = Status.DIVERGED, LATER
-    elif greatest_angle(found) > HORIZONTAL:
+    elif greatest_angle(result) > HORIZONTAL:
         status, advice = Status.SWINGS_TOO_FAR, LONGER
     return Solution(
         status=status,
         method=METHOD,
         problem=problem,
-        optimum=_optimum(found) if status is Status.CONVERGED else None,
+        optimum=_optimum(result) if status is Status.CONVERGED else None,
         iterations=iterations,
-        residual=found.step,
+        residual=result.step,
         advice=advice,
     )
 
 
-def _optimum(found: ProgramSequence) -> Optimum:
+def _optimum(result: ProgramSequence) -> Optimum:
     """Return to SI units."""
-    problem, transcription = found.setup.problem, found.setup.transcription
+    problem, transcription = result.setup.problem, result.setup.transcription
     piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
     intervals, axes = transcription.intervals, len(reach)
-    local = found.iterate.local.reshape(intervals, axes, piece.size)
+    local = result.iterate.local.reshape(intervals, axes, piece.size)
     lengths = duration * piece.length
     instants = np.append(0.0, np.cumsum(piece.length))
     knots = duration * (instants / instants[-1])  # the last one is the duration, to the last bit
     control = np.einsum("pb,kab->kpa", power_basis(3), local[:, :, piece.order :])
-    equations, points = transcription.machines[0].equations, transcription.nominal_points(found.iterate)
-    states, costates = _nodes(found)
+    equations, points = transcription.machines[0].equations, transcription.nominal_points(result.iterate)
+    states, costates = _nodes(result)
     return Optimum(
         knots=knots,
         states=states,
@@ -320,27 +320,27 @@ def _optimum(found: ProgramSequence) -> Optimum:
         / lengths[:, None, None] ** np.arange(control.shape[1])[:, None],
         top_order=piece.order,
         sway=equations.sway(*points)[:, :, 0],
-        angle=greatest_angle(found),
-        cost=found.setup.cost(found.iterate, found.goal.sway_cost),
-        sway_weight=found.goal.sway_cost.beta,
-        sway_scale=found.goal.sway_cost.gamma,
+        angle=greatest_angle(result),
+        cost=result.setup.cost(result.iterate, result.goal.sway_cost),
+        sway_weight=result.goal.sway_cost.beta,
+        sway_scale=result.goal.sway_cost.gamma,
         defect=None,
         hamiltonian_variation=None,
     )
 
 
-def _nodes(found: ProgramSequence) -> tuple[Array, Array]:
+def _nodes(result: ProgramSequence) -> tuple[Array, Array]:
     """Read the nominal machine's states and costates at the nodes off a program, in SI units.
 
     A costate is what the cost would lose if its state were displaced there, which is the multiplier of the
     constraint that carries the state to the node.
     """
-    problem, transcription = found.setup.problem, found.setup.transcription
+    problem, transcription = result.setup.problem, result.setup.transcription
     piece, reach, duration = transcription.piece, axis_reach(problem), problem.duration
     axes, orders, intervals = len(reach), piece.order, transcription.intervals
     x, multipliers, scale = (
-        found.solutions[-1].x,
-        found.solutions[-1].multipliers,
+        result.solutions[-1].x,
+        result.solutions[-1].multipliers,
         transcription.machines[0].scale,
     )
     local = x[: intervals * transcription.breadth].reshape(intervals, axes, piece.size)
@@ -359,12 +359,12 @@ def _nodes(found: ProgramSequence) -> tuple[Array, Array]:
     start[:, 0] = problem.start
     return (
         in_order(swung * scale, moved * units + start),
-        found.setup.cost_scale * duration * in_order(swung_costates / scale, moved_costates / units),
+        result.setup.cost_scale * duration * in_order(swung_costates / scale, moved_costates / units),
     )
 
 
-def greatest_angle(found: ProgramSequence) -> float:
+def greatest_angle(result: ProgramSequence) -> float:
     """Greatest rope angle of the nominal machine at the collocation points, in rad."""
-    transcription = found.setup.transcription
-    angles = transcription.machines[0].equations.angle(*transcription.nominal_points(found.iterate))
+    transcription = result.setup.transcription
+    angles = transcription.machines[0].equations.angle(*transcription.nominal_points(result.iterate))
     return float(np.abs(angles).max())

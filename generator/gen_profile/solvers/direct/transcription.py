@@ -231,30 +231,30 @@ class Transcription:
 
         Returns
         -------
-        found : (points, directions) array
+        sway : (points, directions) array
             At the iterate, in m.
         matrix : (points * directions, width) sparse matrix
         offset : (points * directions,) array
             The sway is ``matrix x + offset``, the directions of a point side by side.
         """
         machine, stages = self.machines[0], iterate.stages[0]
-        n, felt = len(machine.scale), self.axes(iterate.local)
+        n, axis_inputs = len(machine.scale), self.axes(iterate.local)
         points = self.intervals * STAGES
         values = machine.equations.end_sway(*self.nominal_points(iterate))
         values = values.reshape(self.intervals, STAGES, -1, values.shape[2])
-        found, by_state, by_axes = values[..., 0], values[..., 1 : 1 + n], values[..., 1 + n :]
+        sway, by_state, by_axes = values[..., 0], values[..., 1 : 1 + n], values[..., 1 + n :]
         by_local = by_axes @ self.axes.matrix + by_state @ maps.stage_drive
         by_node = by_state @ maps.stage_transition
-        directions = found.shape[2]
+        directions = sway.shape[2]
         rows = (self.intervals, STAGES * directions, -1)
         matrix = place(by_local.reshape(rows), self.local_columns, width)
         matrix = matrix + place(by_node.reshape(rows), self.node_columns[:-1], width)
         offset = (
-            found
+            sway
             + np.einsum("ksda,ksa->ksd", by_state, maps.stage_offset - stages)
-            + np.einsum("ksda,ksa->ksd", by_axes, self.axes.offset - felt)
+            + np.einsum("ksda,ksa->ksd", by_axes, self.axes.offset - axis_inputs)
         )
-        return found.reshape(points, directions), matrix, offset.ravel()
+        return sway.reshape(points, directions), matrix, offset.ravel()
 
     def end_sway_found(self, iterate: Iterate) -> Array:
         """Evaluate the end load's sway of the nominal machine in m, shape (points, directions)."""
@@ -285,8 +285,8 @@ class Transcription:
     def followed(self, machine: TranscribedMachine, linear: IntervalMaps, local: Array) -> Array:
         """Carry a machine's dimensionless states from node to node of a motion."""
         states = [machine.start]
-        driven = np.einsum("kal,kl->ka", linear.drive, local) + linear.offset
-        for transition, added in zip(linear.transition, driven, strict=True):
+        inputs = np.einsum("kal,kl->ka", linear.drive, local) + linear.offset
+        for transition, added in zip(linear.transition, inputs, strict=True):
             states.append(transition @ states[-1] + added)
         return np.array(states)
 

@@ -130,15 +130,15 @@ def shortest_motion(
     progress : Progress
     """
     worst_case, problem = _taken_apart(problem)
-    tried, found = ends(problem, worst_case), guess
+    tried, shortest_known = ends(problem, worst_case), guess
     for _ in range(ROUNDS):
-        shortest_yet = shortest(problem, found, tried, progress)
+        shortest_yet = shortest(problem, shortest_known, tried, progress)
         if shortest_yet is None or shortest_yet.solution.optimum is None:
             return shortest_yet
-        found = shortest_yet
-        worse = worse_machines(problem, worst_case, optimal_profile(found.solution), 1.0)
+        shortest_known = shortest_yet
+        worse = worse_machines(problem, worst_case, optimal_profile(shortest_known.solution), 1.0)
         if not worse:
-            return found
+            return shortest_known
         tried = [*tried, *worse]
     return None
 
@@ -150,32 +150,32 @@ def _rounds(problem: Problem) -> Iterator[Solution]:
     """
     worst_case, problem = _taken_apart(problem)
     sway_cost, iterations = resolve_sway_cost(problem)
-    tried, bound, found, precision = ends(problem, worst_case), 0.0, None, COARSE
+    tried, bound, result, precision = ends(problem, worst_case), 0.0, None, COARSE
     swaying = problem.nominal_sway
     for _ in range(ROUNDS):
         setup, _ = set_up(problem, tried)
         goal = Goal(setup=setup, sway_cost=sway_cost, sway_limit=swaying, worst=GOOD_ENOUGH)
-        start = _begun(setup, found)
+        start = _begun(setup, result)
         # the bound only rises with more machines: what was not good enough before is not now
-        found = sequence(start, goal, precision) if bound <= GOOD_ENOUGH else None
-        if found is None or found.verdict is not ConicStatus.SOLVED:
+        result = sequence(start, goal, precision) if bound <= GOOD_ENOUGH else None
+        if result is None or result.verdict is not ConicStatus.SOLVED:
             best = _least_worst(goal)
             iterations += best.iterations
-            bound, enough = float(best.solutions[0].x[-1]), SLACK * float(best.solutions[-1].x[-1]) + MARGIN
+            bound, upper = float(best.solutions[0].x[-1]), SLACK * float(best.solutions[-1].x[-1]) + MARGIN
             if best.verdict is ConicStatus.FAILED and (bisected := _bisected(start, goal)) is not None:
-                bound, enough = bisected / math.exp(BISECTION.precision), bisected
+                bound, upper = bisected / math.exp(BISECTION.precision), bisected
             elif best.verdict is not ConicStatus.SOLVED:
                 yield conclude(best, iterations)
                 return
-            goal = attrs.evolve(goal, worst=enough)
-            found = sequence(best.iterate if best.verdict is ConicStatus.SOLVED else start, goal, precision)
-        iterations += found.iterations
-        solution = conclude(found, iterations)
+            goal = attrs.evolve(goal, worst=upper)
+            result = sequence(best.iterate if best.verdict is ConicStatus.SOLVED else start, goal, precision)
+        iterations += result.iterations
+        solution = conclude(result, iterations)
         yield attrs.evolve(solution, worst_case_bound=bound * worst_case.load_limits[-1])
         if solution.optimum is None:
             return
-        enough = WORSE * float(goal.worst or 0.0)
-        worse = worse_machines(problem, worst_case, optimal_profile(solution), enough)
+        upper = WORSE * float(goal.worst or 0.0)
+        worse = worse_machines(problem, worst_case, optimal_profile(solution), upper)
         asked, swaying = swaying, to_be_asked(problem, solution, swaying)
         if not worse and asked == swaying:
             if precision < COARSE:
@@ -198,21 +198,21 @@ def _bisected(start: Iterate, goal: Goal) -> float | None:
     """Find about the least worst fraction that motions of least cost keep to, whose programs do not fail."""
 
     def excess(worst: float) -> float:
-        found = sequence(start, attrs.evolve(goal, worst=worst), ROUGH)
-        return -math.inf if found.verdict is ConicStatus.SOLVED else math.inf
+        result = sequence(start, attrs.evolve(goal, worst=worst), ROUGH)
+        return -math.inf if result.verdict is ConicStatus.SOLVED else math.inf
 
     with budget(BISECTING * left()):
         return least(excess, 1.0, BISECTION, HOPELESS)
 
 
-def _begun(setup: Setup, found: ProgramSequence | None) -> Iterate:
+def _begun(setup: Setup, result: ProgramSequence | None) -> Iterate:
     """Begin at a motion found for fewer machines, new ones swinging as the nominal one does; or at rest."""
     rest = setup.transcription.rest()
-    if found is None or found.verdict is not ConicStatus.SOLVED:
+    if result is None or result.verdict is not ConicStatus.SOLVED:
         return rest
-    known = found.iterate.stages
+    known = result.iterate.stages
     new = tuple(known[0][:, :, : stages.shape[2]] for stages in rest.stages[len(known) :])
-    return Iterate(local=found.iterate.local, stages=(*known, *new))
+    return Iterate(local=result.iterate.local, stages=(*known, *new))
 
 
 def _taken_apart(problem: Problem) -> tuple[WorstCase, Problem]:
@@ -254,8 +254,8 @@ def residual_fractions(
     swing = PlantSimulation(
         problem.plant, motion, machines, motion.duration, problem.initial, accuracy=ACCURACY
     )
-    found = zip(machines, swing.at(end), strict=True)
-    return np.array([(modal_amplitudes(problem.plant, p, at) / limits).max() for p, at in found])
+    responses = zip(machines, swing.at(end), strict=True)
+    return np.array([(modal_amplitudes(problem.plant, p, at) / limits).max() for p, at in responses])
 
 
 def _machine(problem: Problem, worst_case: WorstCase, place: Sequence[float] | Array) -> Parameters:

@@ -98,9 +98,9 @@ class BoundaryValueProblem:
         numpy.linalg.LinAlgError
             When they overflow.
         """
-        found = _finite(self.system.slopes(self.unknowns(points), self.data.row()))[:, :, 0]
+        values = _finite(self.system.slopes(self.unknowns(points), self.data.row()))[:, :, 0]
         size = points.shape[1]
-        return found[:, :size] @ self.inverse_transform.T, found[:, size:]
+        return values[:, :size] @ self.inverse_transform.T, values[:, size:]
 
     def linear(self, points: Array) -> tuple[Array, Array]:
         """Differentiate ξ' by ζ, and by ξ the end load's sway in m and what else costs half its square.
@@ -170,7 +170,7 @@ class BoundaryValueProblem:
         difference = (other.nodes - one.nodes)[:, : len(self.final)]
         return float(np.sqrt(np.mean((self.weights(one, other) * difference) ** 2)))
 
-    def missed(self, solution: Trajectory) -> float:
+    def implied_residual(self, solution: Trajectory) -> float:
         """Greatest fraction by which an end condition fails that was not asked for, as others imply it."""
         own = slice(0, 2 * self.system.layout.n_u)
         implied = np.isnan(self.final[own])

@@ -12,17 +12,17 @@ from gen_profile.solvers.solution import Optimum, Solution, Status
 
 METHOD = "indirect"
 UNRESOLVED = 0.1  # defect, as a fraction of a state's size, of a mesh that does not follow the motion
-TOLERATED_MISS = 1e-3  # of the greatest sway, by an end condition that the linear model implies
+TOLERATED_RESIDUAL = 1e-3  # of the greatest sway, by an end condition that the linear model implies
 
 
 def judged(
-    problem: Problem, weighted: BoundaryValueProblem, found: Trajectory, iterations: int, residual: float
+    problem: Problem, weighted: BoundaryValueProblem, trajectory: Trajectory, iterations: int, residual: float
 ) -> Solution:
     """Accept a solution where it stands up to a look between the mesh's points."""
-    if weighted.missed(found) > TOLERATED_MISS:
+    if weighted.implied_residual(trajectory) > TOLERATED_RESIDUAL:
         advice = "Check the machine's equations and parameters."
         return failure(problem, Status.NOT_CONTROLLABLE, iterations, advice)
-    optimum = _optimum(weighted, found)
+    optimum = _optimum(weighted, trajectory)
     if optimum.defect is not None and optimum.defect > UNRESOLVED:
         return too_steep(problem, iterations)
     return Solution(

@@ -80,12 +80,12 @@ class LinearResponse:
         values = own + _times(back, self.weights * nodes[1:, None]).reshape(load.shape)
         return values, self._transposed(values) + load
 
-    def gains(self, driven: IntArray, outputs: Array) -> tuple[Array, Array]:
+    def gains(self, states: IntArray, outputs: Array) -> tuple[Array, Array]:
         """Answer to controls, each a force on one state.
 
         Parameters
         ----------
-        driven : (m,) array of int
+        states : (m,) array of int
             States that the controls drive.
         outputs : (intervals, stages, outputs, n) array
             What is seen of the states at every collocation point.
@@ -98,7 +98,7 @@ class LinearResponse:
             Final states.
         """
         intervals, stages, n = len(self.lengths), self.scheme.stages, self.A.shape[-1]
-        columns = (n * np.arange(stages)[:, None] + driven).ravel()
+        columns = (n * np.arange(stages)[:, None] + states).ravel()
         causes = n + len(columns)  # the state at the interval's beginning, and its controls
         slopes = np.concatenate([self.slopes_by_node, self.slopes[:, :, columns]], axis=2)
         slopes = self.lengths[: len(slopes)] * slopes.reshape(len(slopes), stages, n * causes)
@@ -106,19 +106,19 @@ class LinearResponse:
         across = (self.scheme.b @ slopes).reshape(-1, n, causes)
         values[..., :n] += np.eye(n)
         across[..., :n] += np.eye(n)
-        seen_within = outputs @ values
-        seen_within = seen_within.reshape(len(seen_within), -1, causes)
+        gains_within = outputs @ values
+        gains_within = gains_within.reshape(len(gains_within), -1, causes)
 
-        seen = np.zeros((intervals, seen_within.shape[1], intervals * len(columns)))
+        output_gains = np.zeros((intervals, gains_within.shape[1], intervals * len(columns)))
         final = np.zeros((n, intervals * len(columns)))
         for k in range(intervals):
-            within, to_end = seen_within[k % len(seen_within)], across[k % len(across)]
+            within, to_end = gains_within[k % len(gains_within)], across[k % len(across)]
             past, own = slice(0, k * len(columns)), slice(k * len(columns), (k + 1) * len(columns))
-            seen[k, :, past] = within[:, :n] @ final[:, past]
-            seen[k, :, own] = within[:, n:]
+            output_gains[k, :, past] = within[:, :n] @ final[:, past]
+            output_gains[k, :, own] = within[:, n:]
             final[:, past] = to_end[:, :n] @ final[:, past]
             final[:, own] = to_end[:, n:]
-        return seen.reshape(-1, outputs.shape[2], intervals * len(columns)), final
+        return output_gains.reshape(-1, outputs.shape[2], intervals * len(columns)), final
 
     def _transposed(self, values: Array) -> Array:
         """Aᵀ λ at every point."""

@@ -84,9 +84,9 @@ def _iterate(problem: BoundaryValueProblem, trajectory: Trajectory) -> _Iterate 
 
 def _shortens(problem: BoundaryValueProblem, current: _Iterate, trial: _Iterate, damping: float) -> bool:
     """Apply the monotonicity tests to the damped step that led to `trial`."""
-    enough = (1.0 - damping / 4.0) * current.step
-    if trial.step <= enough:
+    upper = (1.0 - damping / 4.0) * current.step
+    if trial.step <= upper:
         return True
     mixed = np.concatenate([trial.flow[..., :1], current.flow[..., 1:]], axis=-1)
     simplified = problem.solve_linear(mixed, trial.trajectory)
-    return problem.distance(trial.trajectory, simplified) <= enough
+    return problem.distance(trial.trajectory, simplified) <= upper

@@ -117,5 +117,5 @@ def defect(canonical: BoundaryValueProblem, solution: Trajectory) -> Array:
     asked = canonical.slopes(values.reshape(-1, solution.size))[0].reshape(values.shape)
     by_state = canonical.linear(solution.nodes[:-1])[0][:, :, :n]
     fading = np.eye(n) - lengths / scheme.stages * by_state
-    missed = np.linalg.solve(fading, (slopes - lengths * asked[:, :, :n]).swapaxes(1, 2))
-    return np.asarray((np.abs(missed) * canonical.weights(solution)[:, None]).max(axis=(1, 2)))
+    residual = np.linalg.solve(fading, (slopes - lengths * asked[:, :, :n]).swapaxes(1, 2))
+    return np.asarray((np.abs(residual) * canonical.weights(solution)[:, None]).max(axis=(1, 2)))

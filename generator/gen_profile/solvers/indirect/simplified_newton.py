@@ -50,7 +50,7 @@ class _Model:
     Attributes
     ----------
     response : LinearResponse
-    driven : (m,) array of int
+    driven_states : (m,) array of int
         States that the controls drive.
     costed : (intervals, stages, outputs, n) array
         Derivative by the states of the end load's sway, and of what else costs half its square.
@@ -63,7 +63,7 @@ class _Model:
     """
 
     response: LinearResponse
-    driven: IntArray
+    driven_states: IntArray
     costed: Array
     asked: NDArray[np.bool_]
     machine: LinearMachine
@@ -120,16 +120,16 @@ def _model(problem: BoundaryValueProblem, like: Trajectory, points: Array) -> _M
     by_unknowns, costed = problem.linear(points[:: times[1]])
     is_uniform = not (np.ptp(by_unknowns, axis=0).any() or np.ptp(costed, axis=0).any())
     if is_uniform:
-        by_unknowns, costed = (np.repeat(found, times[1], axis=0) for found in (by_unknowns, costed))
+        by_unknowns, costed = (np.repeat(one, times[1], axis=0) for one in (by_unknowns, costed))
     else:
         by_unknowns, costed = problem.linear(points)
     A = by_unknowns[:, :, :n].reshape(*times, n, n)
-    driven = np.arange(n)[layout.axis(layout.orders - 1)]
+    driven_states = np.arange(n)[layout.axis(layout.orders - 1)]
     response = linear_response(A, like.scheme, np.diff(like.mesh))
     costed = costed.reshape(*times, -1, n)
-    gain, final_gain = response.gains(driven, costed)
+    gain, final_gain = response.gains(driven_states, costed)
     asked = ~np.isnan(problem.final)
-    effort = -1.0 / by_unknowns[0, driven, n + driven]  # the controls are −λ / effort
+    effort = -1.0 / by_unknowns[0, driven_states, n + driven_states]  # the controls are −λ / effort
     machine = LinearMachine(
         weights=response.weights.ravel(),
         effort=(response.weights * effort).ravel(),
@@ -137,7 +137,12 @@ def _model(problem: BoundaryValueProblem, like: Trajectory, points: Array) -> _M
         conditions=final_gain[asked],
     )
     return _Model(
-        response=response, driven=driven, costed=costed, asked=asked, machine=machine, is_uniform=is_uniform
+        response=response,
+        driven_states=driven_states,
+        costed=costed,
+        asked=asked,
+        machine=machine,
+        is_uniform=is_uniform,
     )
 
 
@@ -147,8 +152,8 @@ def _corrected(
     """Solve the linear machine's problem for what the conditions miss."""
     n, response, weights = len(problem.final), model.response, model.response.weights
     slopes, sway = problem.slopes(current.trajectory.points)
-    missed = slopes.reshape(current.slopes.shape) - current.slopes
-    force, load = missed[..., :n], -weights * missed[..., n:]
+    defects = slopes.reshape(current.slopes.shape) - current.slopes
+    force, load = defects[..., :n], -weights * defects[..., n:]
     _, states, final = response.states(force)
     slope, _ = response.costates(load, np.zeros(n))
     least = least_cost(
@@ -156,10 +161,10 @@ def _corrected(
         problem.sway_cost,
         sway,
         moved=(model.costed @ states[..., None]).reshape(len(sway), -1),
-        slope=slope[..., model.driven].ravel(),
+        slope=slope[..., model.driven_states].ravel(),
         missing=(problem.final - current.trajectory.nodes[-1, :n] - final)[model.asked],
     )
-    force[..., model.driven] += least.controls.reshape(*force.shape[:2], -1)
+    force[..., model.driven_states] += least.controls.reshape(*force.shape[:2], -1)
     rises, _, _ = response.states(force)
     load += (model.costed.swapaxes(2, 3) @ least.pull.reshape(*load.shape[:2], -1, 1))[..., 0]
     final_costates = np.zeros(n)

@@ -72,9 +72,9 @@ def _solve(problem: Problem, far: Callable[[], bool]) -> Solution:
         return attrs.evolve(solution, problem=problem, redundant=redundant)
     unweighted = attrs.evolve(unweighted, final=np.where(asked, unweighted.final, np.nan))
     with suppress(np.linalg.LinAlgError):
-        found = _solve_simply(problem, unweighted)
-        if found is not None:
-            return found
+        simple = _solve_simply(problem, unweighted)
+        if simple is not None:
+            return simple
     if not far():
         return failure(problem, Status.INFEASIBLE, 0, WIDER)
     try:
@@ -102,19 +102,21 @@ def _solve_simply(problem: Problem, unweighted: BoundaryValueProblem) -> Solutio
             return None
         start, iterations = measured.solution, measured.iterations
     weighted = with_sway_cost(problem, unweighted, start)
-    found = _refined(weighted, start)
-    if found.solution is None:
+    result = _refined(weighted, start)
+    if result.solution is None:
         return None
-    solution = judged(problem, weighted, found.solution, iterations + found.iterations, found.residual)
+    solution = judged(problem, weighted, result.solution, iterations + result.iterations, result.residual)
     return solution if solution.optimum is None or solution.optimum.angle < MODERATE_ANGLE else None
 
 
 def _refined(problem: BoundaryValueProblem, start: Trajectory) -> NewtonOutcome:
     """Solve on the start's mesh, then on finer ones as needed."""
-    found = solve_simplified(problem, start)
-    if found.solution is None:
-        return found
-    refined = refine(problem, found.solution, solve_simplified)
+    result = solve_simplified(problem, start)
+    if result.solution is None:
+        return result
+    refined = refine(problem, result.solution, solve_simplified)
     return attrs.evolve(
-        refined, iterations=found.iterations + refined.iterations, residual=refined.residual or found.residual
+        refined,
+        iterations=result.iterations + refined.iterations,
+        residual=refined.residual or result.residual,
     )

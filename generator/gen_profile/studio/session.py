@@ -12,7 +12,7 @@ import attrs
 from gen_profile.studio.workers import BEGUN, ENDED, LOST, Job, Message, Worker, Workers, failure
 
 PATIENCE = 0.6  # s that a question may wait for the first part of an older one's answer
-CALM = 0.3  # s without a new question, after which what takes longer is asked for
+IDLE_TIME = 0.3  # s without a new question, after which what takes longer is asked for
 NOBODY = -2  # whose question no page asks
 TRIES = 2  # of a new worker in the place of one that died before it began anything
 GONE = "The process that solved this has ended, and another one takes its place. Undo the last change."
@@ -30,7 +30,7 @@ class Loop(Protocol):
         """Call something in the loop's thread."""
 
 
-class QuestionLine:
+class RequestQueue:
     """Questions of one kind, numbered upwards; what is overtaken is left unfinished."""
 
     def __init__(self, kind: str, workers: Workers, loop: Loop, tell: Tell) -> None:
@@ -92,9 +92,9 @@ class QuestionLine:
             return
         if message.name == LOST:
             self.stop()
-            told = {**failure("unanswered", [GONE]), "of": self._job.kind, "serial": self._job.number}
+            failed = {**failure("unanswered", [GONE]), "of": self._job.kind, "serial": self._job.number}
             message = Message(
-                number=self._job.number, kind=self._job.kind, name="failure", text=json.dumps(told)
+                number=self._job.number, kind=self._job.kind, name="failure", text=json.dumps(failed)
             )
         elif message.name == BEGUN:
             self._begun, self._answers, self._deaths = message.number, True, 0
@@ -103,17 +103,17 @@ class QuestionLine:
         self._tell(message)
 
 
-class Desk:
+class Session:
     """The lines of one page: the picture, then what takes longer; files and logs when they are asked for."""
 
     def __init__(self, workers: Workers, loop: Loop) -> None:
         self._loop, self._heard = loop, list[Message]()
         self._tell: Tell = self._heard.append
-        self._picture = QuestionLine("picture", workers, loop, self._take)
-        self._depth = QuestionLine("depth", workers, loop, self._take)
-        self._files = QuestionLine("files", workers, loop, self._take)
-        self._log = QuestionLine("log", workers, loop, self._take)
-        self._drive = QuestionLine("drive", workers, loop, self._take)
+        self._picture = RequestQueue("picture", workers, loop, self._take)
+        self._depth = RequestQueue("depth", workers, loop, self._take)
+        self._files = RequestQueue("files", workers, loop, self._take)
+        self._log = RequestQueue("log", workers, loop, self._take)
+        self._drive = RequestQueue("drive", workers, loop, self._take)
         self._question: Any = None
         self._newest, self._solved, self._orders = -1, -1, 0
 
@@ -135,7 +135,7 @@ class Desk:
         self._orders += 1
         self._files.ask(self._orders, order)
 
-    def leave_off(self) -> None:
+    def cancel(self) -> None:
         """Make no files."""
         self._files.stop()
 
@@ -167,7 +167,7 @@ class Desk:
         if message.name == "verdict":
             self._solved = message.number
         elif message.name == ENDED and message.kind == "picture" and self._solved == message.number:
-            self._loop.call_later(CALM, self._look_deeper, message.number)
+            self._loop.call_later(IDLE_TIME, self._look_deeper, message.number)
 
     def _look_deeper(self, number: int) -> None:
         if number == self._newest:

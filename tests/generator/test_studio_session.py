@@ -3,7 +3,7 @@
 import asyncio
 import json
 
-from gen_profile.studio.desk import CALM, PATIENCE, Desk
+from gen_profile.studio.session import IDLE_TIME, PATIENCE, Session
 from gen_profile.studio.workers import BEGUN, ENDED, LOST, Message
 
 
@@ -60,35 +60,35 @@ class Hands:
 
 
 def page():
-    clock, hands, told = Clock(), Hands(), []
-    desk = Desk(hands, clock)
-    desk.attach(told.append)
-    return clock, hands, told, desk
+    clock, hands, messages = Clock(), Hands(), []
+    session = Session(hands, clock)
+    session.attach(messages.append)
+    return clock, hands, messages, session
 
 
-def names(told):
-    return [(message.number, message.name) for message in told]
+def names(messages):
+    return [(message.number, message.name) for message in messages]
 
 
 def test_a_quick_worker_answers_all_the_way_and_keeps_its_place():
-    clock, hands, told, desk = page()
+    clock, hands, messages, session = page()
     for number in range(5):
-        desk.show(number, f"state {number}")
+        session.show(number, f"state {number}")
         (worker,) = hands.taken
         worker.say(BEGUN)
         worker.say("curves")
         clock.wait(0.9 * PATIENCE)
-    assert names(told) == [(number, "curves") for number in range(5)]
+    assert names(messages) == [(number, "curves") for number in range(5)]
     assert not worker.ended
 
 
 def test_one_that_is_at_an_older_question_for_too_long_is_replaced():
-    clock, hands, told, desk = page()
-    desk.show(0, "slow")
+    clock, hands, messages, session = page()
+    session.show(0, "slow")
     slow = hands.taken[0]
     slow.say(BEGUN)
-    desk.show(1, "newer")
-    desk.show(2, "newest")
+    session.show(1, "newer")
+    session.show(2, "newest")
     clock.wait(0.9 * PATIENCE)
     assert not slow.ended
     clock.wait(0.2 * PATIENCE)
@@ -97,25 +97,27 @@ def test_one_that_is_at_an_older_question_for_too_long_is_replaced():
     assert (job.number, job.question) == (2, "newest")
     slow.say("curves", slow.jobs[0])  # what was on its way from it is not heard
     clock.wait(10.0)
-    assert len(hands.taken) == 2 and told == []  # and one that starts is not replaced for being slow to start
+    assert (
+        len(hands.taken) == 2 and messages == []
+    )  # and one that starts is not replaced for being slow to start
 
 
 def test_what_takes_longer_is_asked_for_once_the_hand_rests():
-    clock, hands, _, desk = page()
+    clock, hands, _, session = page()
     for number in range(3):
-        desk.show(number, f"state {number}")
+        session.show(number, f"state {number}")
         for name in (BEGUN, "curves", "verdict", ENDED):
             hands.taken[0].say(name)
-        clock.wait(0.5 * CALM)
+        clock.wait(0.5 * IDLE_TIME)
     assert len(hands.taken) == 1
-    clock.wait(CALM)
+    clock.wait(IDLE_TIME)
     (job,) = hands.taken[1].jobs
     assert (job.kind, job.number, job.question) == ("depth", 2, "state 2")
 
 
 def test_nothing_longer_is_asked_for_where_there_is_no_motion():
-    clock, hands, _, desk = page()
-    desk.show(0, "infeasible")
+    clock, hands, _, session = page()
+    session.show(0, "infeasible")
     for name in (BEGUN, "setting", "failure", ENDED):
         hands.taken[0].say(name)
     clock.wait(10.0)
@@ -123,89 +125,89 @@ def test_nothing_longer_is_asked_for_where_there_is_no_motion():
 
 
 def test_the_same_question_is_asked_for_once_and_every_number_is_answered():
-    _, hands, _, desk = page()
-    desk.show(0, "state")
-    desk.show(0, "state")
+    _, hands, _, session = page()
+    session.show(0, "state")
+    session.show(0, "state")
     assert len(hands.taken[0].jobs) == 1
-    desk.show(2, "state")  # the page asked something else meanwhile, which was not let run
+    session.show(2, "state")  # the page asked something else meanwhile, which was not let run
     assert hands.taken[0].jobs[-1].number == 2
 
 
 def test_a_worker_that_dies_is_told_of_and_the_next_question_has_another():
-    _, hands, told, desk = page()
-    desk.show(0, "deadly")
+    _, hands, messages, session = page()
+    session.show(0, "deadly")
     hands.taken[0].say(BEGUN)
     hands.taken[0].hear(hands.taken[0], Message(number=-1, name=LOST))
-    (message,) = told
+    (message,) = messages
     assert "Undo the last change" in json.loads(message.text)["sentences"][0]
-    desk.show(1, "harmless")
+    session.show(1, "harmless")
     assert hands.taken[1].jobs[0].question == "harmless"
 
 
 def test_a_worker_that_dies_before_it_begins_is_no_fault_of_the_question():
-    _, hands, told, desk = page()
-    desk.show(0, "harmless")
+    _, hands, messages, session = page()
+    session.show(0, "harmless")
     for worker in range(2):
         hands.taken[worker].hear(hands.taken[worker], Message(number=-1, name=LOST))
-    assert told == [] and [hand.jobs[0].question for hand in hands.taken] == ["harmless"] * 3
+    assert messages == [] and [hand.jobs[0].question for hand in hands.taken] == ["harmless"] * 3
     hands.taken[2].hear(hands.taken[2], Message(number=-1, name=LOST))  # none can be had
-    assert names(told) == [(0, "failure")]
-    assert json.loads(told[0].text)["answer"] == "unanswered"
+    assert names(messages) == [(0, "failure")]
+    assert json.loads(messages[0].text)["answer"] == "unanswered"
 
 
 def test_what_a_worker_says_after_the_studio_ended_is_let_go():
-    _, hands, told, desk = page()
-    desk.show(0, "state")
+    _, hands, messages, session = page()
+    session.show(0, "state")
     loop = asyncio.new_event_loop()
     loop.close()
-    desk._picture._loop = loop
+    session._picture._loop = loop
     hands.taken[0].say("curves")
-    assert told == []
+    assert messages == []
 
 
 def test_a_page_that_comes_late_hears_what_was_found_before():
     clock, hands = Clock(), Hands()
-    desk = Desk(hands, clock)
-    desk.show(0, "first")
+    session = Session(hands, clock)
+    session.show(0, "first")
     hands.taken[0].say("curves")
-    told = []
-    desk.attach(told.append)
+    messages = []
+    session.attach(messages.append)
     hands.taken[0].say("verdict")
-    assert names(told) == [(0, "curves"), (0, "verdict")]
+    assert names(messages) == [(0, "curves"), (0, "verdict")]
 
 
 def test_a_page_that_leaves_takes_its_workers_along():
-    _, hands, _, desk = page()
-    desk.show(0, "state")
-    desk.make("order")
-    desk.close()
+    _, hands, _, session = page()
+    session.show(0, "state")
+    session.make("order")
+    session.close()
     assert [worker.ended for worker in hands.taken] == [True, True]
 
 
 def test_a_page_that_is_closed_takes_no_worker_any_more():
     """What is looked at later was asked for after the page had gone, by a process that nobody ended."""
-    clock, hands, _, desk = page()
-    desk.show(0, "state")
+    clock, hands, _, session = page()
+    session.show(0, "state")
     for name in (BEGUN, "verdict", ENDED):
         hands.taken[0].say(name)
-    desk.close()
-    clock.wait(2 * CALM)
+    session.close()
+    clock.wait(2 * IDLE_TIME)
     assert len(hands.taken) == 1 and hands.taken[0].ended
 
 
 def test_what_looks_deeper_stands_still_while_a_hand_waits():
-    clock, hands, _, desk = page()
-    desk.show(0, "state 0")
+    clock, hands, _, session = page()
+    session.show(0, "state 0")
     picture = hands.taken[0]
     for name in (BEGUN, "verdict", ENDED):
         picture.say(name)
-    clock.wait(CALM)
+    clock.wait(IDLE_TIME)
     deeper = hands.taken[1]
     deeper.say(BEGUN)
     assert not deeper.still
-    desk.show(1, "state 1")
+    session.show(1, "state 1")
     assert deeper.still and not picture.still
     for name in (BEGUN, "verdict", ENDED):
         picture.say(name)
-    clock.wait(CALM)
+    clock.wait(IDLE_TIME)
     assert not deeper.still and deeper.jobs[-1].number == 1
